@@ -264,9 +264,9 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
     try:
         try:
             with opened_archive(archive) as file:
-                found = file.infolist()
+                members = file.infolist()
         except zipfile.BadZipFile:
-            found = _scanned(archive)
+            members = _scanned(archive)
     except OSError as error:
         raise RecordingError(f"{archive.name}: cannot be opened ({error.strerror})") from None
     except _CORRUPT as error:
@@ -274,7 +274,7 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
     return {
         # A name that begins with / would leave the archive.
         Path(info.filename.lstrip("/")).as_posix(): info
-        for info in found
+        for info in members
         if 0 < len(info.filename) <= _LONGEST_MEMBER_NAME and not info.is_dir()
     }
 
@@ -313,27 +313,27 @@ class _Archive(io.FileIO):
 
 def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
     """Return the members of an archive without a directory, which stands at its end."""
-    found: list[zipfile.ZipInfo] = []
+    members: list[zipfile.ZipInfo] = []
     with archive.open("rb") as file:
-        start, held = 0, b""
+        start, data = 0, b""
         while block := file.read(_SCANNED):
-            held += block
-            at = held.find(_ZIP_LOCAL)
-            while at >= 0 and at + _LONGEST_HEADER <= len(held):
-                found += _local_header(held[at : at + _LONGEST_HEADER], start + at)
-                at = held.find(_ZIP_LOCAL, at + 1)
-            if len(found) > MOST_MEMBERS:
+            data += block
+            at = data.find(_ZIP_LOCAL)
+            while at >= 0 and at + _LONGEST_HEADER <= len(data):
+                members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
+                at = data.find(_ZIP_LOCAL, at + 1)
+            if len(members) > MOST_MEMBERS:
                 raise RecordingError(
                     f"{archive.name}: an archive without its directory, with more than "
                     f"{MOST_MEMBERS} members; expected the log alone: pack it anew"
                 )
-            keep = at if at >= 0 else max(len(held) - 3, 0)
-            start, held = start + keep, held[keep:]
-        at = held.find(_ZIP_LOCAL)
+            keep = at if at >= 0 else max(len(data) - 3, 0)
+            start, data = start + keep, data[keep:]
+        at = data.find(_ZIP_LOCAL)
         while at >= 0:
-            found += _local_header(held[at : at + _LONGEST_HEADER], start + at)
-            at = held.find(_ZIP_LOCAL, at + 1)
-    return found
+            members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
+            at = data.find(_ZIP_LOCAL, at + 1)
+    return members
 
 
 def _local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:

@@ -17,7 +17,7 @@ _COMPRESSED = {magic: name for magic, (name, _) in OPENED.items()} | {b"PK\x03\x
 """What is inside is text."""
 
 _LONGEST_MAGIC = 6
-_BY_MARKS = sorted(FILE_FORMATS.values(), key=lambda known: -len(known.signature.within))
+_BY_MARKS = sorted(FILE_FORMATS.values(), key=lambda entry: -len(entry.signature.within))
 """The formats: those first that ask for most within a file."""
 
 

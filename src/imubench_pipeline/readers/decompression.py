@@ -70,17 +70,17 @@ class _Parts:
         self._file.close()
 
 
-def _counted(parts: int, held: int) -> int:
-    """Return one part more than there were, which held so many bytes.
+def _counted(parts: int, size: int) -> int:
+    """Return one part more than there were, which have so many bytes.
 
     Raises
     ------
     OSError
         If they are many that hold next to nothing.
     """
-    if parts >= MOST_PARTS and held < LEAST_IN_PART * parts:
+    if parts >= MOST_PARTS and size < LEAST_IN_PART * parts:
         raise OSError(
-            f"{parts} compressed parts hold {held} bytes, expected more than {LEAST_IN_PART} a part"
+            f"{parts} compressed parts hold {size} bytes, expected more than {LEAST_IN_PART} a part"
         )
     return parts + 1
 
@@ -166,8 +166,10 @@ def unpacked_zstd(data: bytes, most: int) -> bytes:
     import zstandard  # only a log that is compressed so needs it
 
     try:
-        with zstandard.ZstdDecompressor(max_window_size=LARGEST_WINDOW).stream_reader(data) as one:
-            return one.read(most)
+        with zstandard.ZstdDecompressor(max_window_size=LARGEST_WINDOW).stream_reader(
+            data
+        ) as frame:
+            return frame.read(most)
     except zstandard.ZstdError as error:
         raise ValueError(str(error)) from None
 

@@ -88,8 +88,10 @@ def divided(label: str, dimension: str) -> tuple[str, str | None]:
         Without the unit, and without what stands in brackets and is no number.
     unit : str or None
     """
-    unit = next((unit for text in said(label) if (unit := unit_of(text, dimension))), None)
-    name = _BRACKETED.sub(lambda found: found[0] if found[1].strip().isdigit() else " ", label)
+    unit = next((unit for text in bracketed(label) if (unit := unit_of(text, dimension))), None)
+    name = _BRACKETED.sub(
+        lambda bracket: bracket[0] if bracket[1].strip().isdigit() else " ", label
+    )
     if unit is None:
         for start, tail in _tails(name):
             unit = unit_of(tail, dimension)
@@ -98,7 +100,7 @@ def divided(label: str, dimension: str) -> tuple[str, str | None]:
     return name, unit
 
 
-def said(label: str) -> list[str]:
+def bracketed(label: str) -> list[str]:
     """Return what stands in brackets in a name and is no number."""
     return [text for text in _BRACKETED.findall(label) if text.strip() and not text.isdigit()]
 
@@ -107,7 +109,7 @@ def _tails(name: str) -> Iterator[tuple[int, str]]:
     """Yield what stands behind each separator, the longest first, and where."""
     text = name.rstrip()
     begin = max(len(text) - _LONGEST, 0)
-    places = [begin + found.end() for found in _SEPARATOR.finditer(text[begin:])]
+    places = [begin + separator.end() for separator in _SEPARATOR.finditer(text[begin:])]
     for place in places[-_TAILS:]:
         if 0 < place < len(text):
             yield place, text[place:]
@@ -166,19 +168,19 @@ def contradictions(
     units : mapping of str to StatedUnit
         What the log states.
     """
-    found = []
-    for channel, said in units.items():
+    findings = []
+    for channel, in_log in units.items():
         source = sources[channel]
         dimension = QUANTITIES[quantity_of(channel)]
         read = conversion(source.unit, dimension)[0] * abs(source.scale)
-        factor = conversion(said.unit, dimension)[0] / read
+        factor = conversion(in_log.unit, dimension)[0] / read
         if 1.0 / _OTHER < factor < _OTHER:
             continue
         scaled = "" if source.scale == 1 else f", times {source.scale:g}"
         detail = (
-            f"{file} states {said.unit} for {channel} ({said.where}), the sensor file "
+            f"{file} states {in_log.unit} for {channel} ({in_log.where}), the sensor file "
             f"{source.unit}{scaled} (log.channels.{channel}.unit), which is used; if the log is "
             f"right, the figures are to be multiplied by {factor:.5g}: mend the one that is wrong"
         )
-        found.append(Finding("unit_contradicts", "warning", detail, factor, channel))
-    return found
+        findings.append(Finding("unit_contradicts", "warning", detail, factor, channel))
+    return findings

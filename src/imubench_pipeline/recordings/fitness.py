@@ -123,8 +123,8 @@ def doubts(
     models : iterable of mapping
         Rows of the table ``models``.
     """
-    found = [one for row in findings if _casts_doubt(row) for one in _of_finding(row)]
-    found += [
+    every = [doubt for row in findings if _casts_doubt(row) for doubt in _of_finding(row)]
+    every += [
         Doubt(
             *_place(row),
             code="not_explained",
@@ -138,7 +138,7 @@ def doubts(
         for row in models
         if row["chosen"] and row["verdict"] == "not explained"
     ]
-    found += [
+    every += [
         Doubt(
             *_place(row),
             code="doubtful",
@@ -152,7 +152,7 @@ def doubts(
         for row in parameters
         if row["status"] == "doubtful"
     ]
-    yield from sorted(found, key=lambda one: not one.unfit)
+    yield from sorted(every, key=lambda doubt: not doubt.unfit)
 
 
 def fitness(of_recording: Iterable[Doubt]) -> Fitness:
@@ -163,14 +163,14 @@ def fitness(of_recording: Iterable[Doubt]) -> Fitness:
     of_recording : iterable of Doubt
         All of one recording.
     """
-    there = [one for one in of_recording if one.of_recording]
-    if any(one.unfit for one in there):
+    of_log = [doubt for doubt in of_recording if doubt.of_recording]
+    if any(doubt.unfit for doubt in of_log):
         return "unfit"
-    return "fit with doubts" if there else "fit"
+    return "fit with doubts" if of_log else "fit"
 
 
 def judged(
-    recordings: Sequence[Row], found: Iterable[Doubt], included: Collection[str]
+    recordings: Sequence[Row], doubts: Iterable[Doubt], included: Collection[str]
 ) -> list[dict[str, Any]]:
     """Return the rows of recordings with whether they decide, and their doubts.
 
@@ -178,23 +178,25 @@ def judged(
     ----------
     recordings : sequence of mapping
         Rows of the table ``recordings``.
-    found : iterable of Doubt
+    doubts : iterable of Doubt
         Of all of them.
     included : collection of str
         Those that decide although they are unfit, as ``sensor/recording``.
     """
     by_recording: dict[Key, list[Doubt]] = {}
-    for one in found:
-        by_recording.setdefault((one.sensor, one.recording), []).append(one)
+    for doubt in doubts:
+        by_recording.setdefault((doubt.sensor, doubt.recording), []).append(doubt)
     return [_judged(row, by_recording.get(_key(row), []), included) for row in recordings]
 
 
 def words(of_recording: Iterable[Doubt]) -> str:
     """Return the doubts of a recording in a line, the unfit first; empty where there are none."""
     channels: dict[str, dict[str, None]] = {}
-    for one in of_recording:
-        if one.of_recording:
-            channels.setdefault(one.code, {}).update({one.channel: None} if one.channel else {})
+    for doubt in of_recording:
+        if doubt.of_recording:
+            channels.setdefault(doubt.code, {})
+            if doubt.channel:
+                channels[doubt.code][doubt.channel] = None
     named = [
         code.replace("_", " ") + (f" ({', '.join(where)})" if where else "")
         for code, where in channels.items()
@@ -251,10 +253,12 @@ def with_doubts(
     names : sequence of (str, str)
         The columns that name sensor and recording; several pairs, of several recordings.
     """
-    found: dict[tuple[Any, Any], str] = {_key(row): row["doubts"] or "" for row in recordings}
+    by_recording: dict[tuple[Any, Any], str] = {
+        _key(row): row["doubts"] or "" for row in recordings
+    }
     for row in rows:
-        said = [found.get((row.get(of), row.get(name)), "") for of, name in names]
-        yield {**row, "doubts": "; ".join(filter(None, dict.fromkeys(said)))}
+        texts = [by_recording.get((row.get(of), row.get(name)), "") for of, name in names]
+        yield {**row, "doubts": "; ".join(filter(None, dict.fromkeys(texts)))}
 
 
 def with_doubts_of_all(pools: Iterable[Row], recordings: Iterable[Row]) -> Iterator[dict[str, Any]]:
@@ -267,24 +271,24 @@ def with_doubts_of_all(pools: Iterable[Row], recordings: Iterable[Row]) -> Itera
     """
     listed = [row for row in recordings if row["decides"] and row["doubts"]]
     for row in pools:
-        said = [
-            f"{one['recording']}: {one['doubts']}"
-            for one in listed
-            if one["sensor"] == row["sensor"] and row["device"] in (None, one["device"])
+        texts = [
+            f"{recording['recording']}: {recording['doubts']}"
+            for recording in listed
+            if recording["sensor"] == row["sensor"] and row["device"] in (None, recording["device"])
         ]
-        more = len(said) - _SHOWN
-        text = "; ".join(said[:_SHOWN])
+        more = len(texts) - _SHOWN
+        text = "; ".join(texts[:_SHOWN])
         yield {**row, "doubts": text + (f"; and {more} more" if more > 0 else "")}
 
 
-def _judged(row: Row, found: Sequence[Doubt], included: Collection[str]) -> dict[str, Any]:
-    verdict = fitness(found) if row["status"] == "ok" else None
+def _judged(row: Row, doubts: Sequence[Doubt], included: Collection[str]) -> dict[str, Any]:
+    verdict = fitness(doubts) if row["status"] == "ok" else None
     named = f"{row['sensor']}/{row['recording']}" in included
     return {
         **row,
         "fitness": verdict,
         "decides": verdict is not None and (verdict != "unfit" or named),
-        "doubts": words(found),
+        "doubts": words(doubts),
     }
 
 

@@ -72,18 +72,18 @@ class Quality:
             path = folder / name
             try:
                 if path.stat().st_size != stated["size"]:
-                    found = f"has {path.stat().st_size} bytes instead of {stated['size']}"
+                    wrong = f"has {path.stat().st_size} bytes instead of {stated['size']}"
                 elif _footer(path) != stated["footer"] or (
                     whole and digest_of(path) != stated["sha256"]
                 ):
-                    found = "is not as the ingest wrote it"
+                    wrong = "is not as the ingest wrote it"
                 else:
                     continue
             except FileNotFoundError:
                 return f"{path}: is no longer there: run again, and the log is read again"
             except OSError as error:
-                found = f"cannot be read ({error.strerror})"
-            return f"{path}: {found}: {MEND}"
+                wrong = f"cannot be read ({error.strerror})"
+            return f"{path}: {wrong}: {MEND}"
         return None
 
 

@@ -79,8 +79,8 @@ def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
         return {
-            name: KnownFile(**{**one, "stamps": one["stamps"] and tuple(one["stamps"])})
-            for name, one in read_sealed_json(folder / KNOWN)["files"].items()
+            name: KnownFile(**{**file, "stamps": file["stamps"] and tuple(file["stamps"])})
+            for name, file in read_sealed_json(folder / KNOWN)["files"].items()
         }
     return None
 
@@ -95,8 +95,8 @@ def write_known(files: Mapping[str, KnownFile], folder: Path) -> None:
     folder : Path
         Of the recording.
     """
-    kept = {name: asdict(one) for name, one in sorted(files.items())}
-    write_sealed_json({"files": kept}, folder / KNOWN)
+    rows = {name: asdict(file) for name, file in sorted(files.items())}
+    write_sealed_json({"files": rows}, folder / KNOWN)
 
 
 def read_log(source: Path) -> dict[str, KnownFile]:
@@ -131,29 +131,29 @@ def versions(source: Path, folder: Path) -> dict[str, str]:
     OSError
         If a file has gone.
     """
-    known = read_known(folder)
-    found, touched = {}, dict[str, KnownFile]()
+    files = read_known(folder)
+    result, touched = {}, dict[str, KnownFile]()
     for name, path in _places(source).items():
-        before = (known or {}).get(name)
+        before = (files or {}).get(name)
         if before is None:
-            found[name] = glimpse(path)
+            result[name] = glimpse(path)
         elif before.unchanged(path):
-            found[name] = before.version
+            result[name] = before.version
         else:
             now = KnownFile.of(path)
-            found[name] = f"{now.size} sha256 {now.sha256}"
+            result[name] = f"{now.size} sha256 {now.sha256}"
             if before.same(now):
-                found[name] = before.version
+                result[name] = before.version
                 touched[name] = replace(now, version=before.version)
     quality = folder / "quality.json"
-    if known is None and quality.is_file():
+    if files is None and quality.is_file():
         # It was read, and what that was is not known any more: it is read again.
         since = quality.stat().st_mtime_ns
-        return {name: f"{version} {since}" for name, version in found.items()}
-    if known and touched:
+        return {name: f"{version} {since}" for name, version in result.items()}
+    if files and touched:
         with contextlib.suppress(OSError):  # of results that this user may only read
-            write_known(known | touched, folder)
-    return found
+            write_known(files | touched, folder)
+    return result
 
 
 def versions_of(recording: Recording, results: Path) -> dict[str, str]:

@@ -88,13 +88,13 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
             if time is not None:
                 # Not `tofile`: what it hands to the C library may fail unseen when it is closed.
                 stamps.write(np.ascontiguousarray(time[keep]).data)
-            kept = {
+            columns_used = {
                 name: part.columns[name].add(values[keep]) for name, values in batch.columns.items()
             }
-            rows = len(next(iter(kept.values())))
+            rows = len(next(iter(columns_used.values())))
             part.not_used += len(batch) - rows
             part.rows += rows
-            writer.write(kept)
+            writer.write(columns_used)
     if part.rows == 0:
         raise RecordingError(
             f"{file.path.name}: none of its {read_rows} samples lies in the part to use "
@@ -148,22 +148,22 @@ def leave_out_knocks(
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(suspects(b, sigmas)[0])]
     steps = {name: levels.quantisation(part.columns[name]) for name in doubtful}
-    step = {name: found.step if found else None for name, found in steps.items()}
+    step = {name: steps_of.step if steps_of else None for name, steps_of in steps.items()}
     doubtful = [name for name in doubtful if len(suspects(blocks[name], sigmas, step[name])[0])]
     if not doubtful:
         return {}
     part.writer.finish({})
     part.writer.__exit__(None, None, None)
-    found = {}
+    knocks_of = {}
     for name in doubtful:
         here = list(knocks(_pieces(part.data, name), blocks[name], sigmas, longest, step[name]))
         if here:
-            found[name] = here
-    _write_again(part, found, scratch)
-    return found
+            knocks_of[name] = here
+    _write_again(part, knocks_of, scratch)
+    return knocks_of
 
 
-def _write_again(part: Part, found: dict[str, list[Knock]], scratch: Path) -> None:
+def _write_again(part: Part, knocks_of: dict[str, list[Knock]], scratch: Path) -> None:
     """Write the columns again without the samples of knocks; the new writer stays open."""
     old = part.data
     part.data = scratch / f"{old.stem}.calm.parquet"
@@ -177,7 +177,7 @@ def _write_again(part: Part, found: dict[str, list[Knock]], scratch: Path) -> No
             for name in part.columns:
                 values = np.array(table.column(name).to_numpy(), dtype=np.float64)
                 before = int(np.isfinite(values).sum())
-                for knock in found.get(name, []):
+                for knock in knocks_of.get(name, []):
                     start = max(knock.first - reached, 0)
                     values[start : max(knock.last - reached, 0)] = np.nan
                 part.knocks[name] += before - int(np.isfinite(values).sum())

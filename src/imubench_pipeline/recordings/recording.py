@@ -106,11 +106,11 @@ def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
     Its own ``to_numpy`` imports pandas, where that is installed: 40 MB in memory.
     """
     array = column.chunk(0) if column.num_chunks == 1 else pa.concat_arrays(column.chunks)
-    held, data = array.buffers()
+    validity, data = array.buffers()
     part = slice(array.offset, array.offset + len(array))
     values = np.frombuffer(data, array.type.to_pandas_dtype())[part]
     if array.null_count:
-        bits = np.unpackbits(np.frombuffer(held, np.uint8), bitorder="little")[part]
+        bits = np.unpackbits(np.frombuffer(validity, np.uint8), bitorder="little")[part]
         values = np.where(bits, values, np.nan)
     return values
 
@@ -188,9 +188,9 @@ class ChannelLog:
         """Return the mean of the samples present, SI."""
         total, number = 0.0, 0
         for values in self.blocks():
-            there = values[np.isfinite(values)]
-            total += float(there.sum(dtype=np.float64))
-            number += len(there)
+            present = values[np.isfinite(values)]
+            total += float(present.sum(dtype=np.float64))
+            number += len(present)
         return total / number
 
 
@@ -204,8 +204,8 @@ def _named_if_damaged(path: Path) -> Iterator[None]:
 
 def read_metadata(path: Path) -> dict[str, Any]:
     """Return the metadata that `LogWriter.finish` wrote."""
-    found = pq.read_metadata(path).metadata or {}
-    data: dict[str, Any] = json.loads(found[_METADATA])
+    metadata = pq.read_metadata(path).metadata or {}
+    data: dict[str, Any] = json.loads(metadata[_METADATA])
     return data
 
 

@@ -90,37 +90,37 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     interval = typical.mean
     if typical.with_losses is not None and _is(stated, typical.with_losses, settings):
         interval = typical.with_losses
-    found = tracked(stamps, interval, settings.longest_hole)
-    mean = found.mean_interval or interval
+    track = tracked(stamps, interval, settings.longest_hole)
+    mean = track.mean_interval or interval
     if abs(mean / interval - 1.0) > _SAME:
         # The mean over the recording is far better known than the typical interval: once more.
-        found = tracked(stamps, mean, settings.longest_hole)
+        track = tracked(stamps, mean, settings.longest_hole)
     # Many holes that are together longer than the log are pauses of the host, not losses.
-    bursts = found.grid > 2 * found.rows and found.holes > 0.05 * found.rows
-    shared = found.duplicates > _SHARED * found.rows
-    if found.off_grid > settings.jitter * found.rows or bursts or shared:
-        return _arrival_order(stamps, found, stated, settings)
-    exact = found.mean_interval or interval
-    findings = _grid_findings(found, exact)
+    bursts = track.grid > 2 * track.rows and track.holes > 0.05 * track.rows
+    shared = track.duplicates > _SHARED * track.rows
+    if track.off_grid > settings.jitter * track.rows or bursts or shared:
+        return _arrival_order(stamps, track, stated, settings)
+    exact = track.mean_interval or interval
+    findings = _grid_findings(track, exact)
     rate = 1.0 / exact
     if typical.with_losses is not None and stated is None:
         findings.append(_coarse(rate, 1.0 / typical.with_losses))
     findings += _rate_findings(rate, stated, settings)
-    findings += _drift_findings(found, settings)
-    jitter = math.sqrt(found.scatter / max(found.steps, 1))
-    uniform = found.grid == found.rows and len(found.starts) == 1 and not found.duplicates
+    findings += _drift_findings(track, settings)
+    jitter = math.sqrt(track.scatter / max(track.steps, 1))
+    uniform = track.grid == track.rows and len(track.starts) == 1 and not track.duplicates
     return TimeBase(
         rate,
         "stamps",
-        found.rows,
-        found.grid,
-        found.segments,
+        track.rows,
+        track.grid,
+        track.segments,
         uniform,
         True,
         tuple(findings),
-        found.interval,
-        found.duplicates,
-        rate * math.sqrt(2.0) * jitter / max(found.elapsed, exact),
+        track.interval,
+        track.duplicates,
+        rate * math.sqrt(2.0) * jitter / max(track.elapsed, exact),
     )
 
 
@@ -157,18 +157,18 @@ def _coarse(rate: float, lossy: float) -> Finding:
     )
 
 
-def _grid_findings(found: Track, interval: float) -> list[Finding]:
+def _grid_findings(track: Track, interval: float) -> list[Finding]:
     findings = []
-    missing = found.grid - (found.rows - found.duplicates)
+    missing = track.grid - (track.rows - track.duplicates)
     if missing:
         begin, end = (
-            point * interval for point in (found.longest_at, found.longest_at + found.longest)
+            point * interval for point in (track.longest_at, track.longest_at + track.longest)
         )
         findings.append(
             Finding(
                 "missing_samples",
-                "note" if missing < 0.01 * found.grid else "warning",
-                f"{missing} of {found.grid} samples are missing ({found.holes} holes, the "
+                "note" if missing < 0.01 * track.grid else "warning",
+                f"{missing} of {track.grid} samples are missing ({track.holes} holes, the "
                 f"longest {end - begin:.3g} s, from {begin:.5g} s on); they are left out of the "
                 "clusters",
                 missing,
@@ -176,31 +176,31 @@ def _grid_findings(found: Track, interval: float) -> list[Finding]:
                 end=end,
             )
         )
-    if len(found.starts) > 1:
+    if len(track.starts) > 1:
         findings.append(
             _segments(
                 "the clock jumps or stops",
-                [point * interval for point in found.starts[1:]],
-                found.jumps[1:],
+                [point * interval for point in track.starts[1:]],
+                track.jumps[1:],
             )
         )
-    if found.duplicates:
+    if track.duplicates:
         findings.append(
             Finding(
                 "repeated_stamps",
                 "note",
-                f"{found.duplicates} records repeat a stamp or fall on an earlier one; left out",
-                found.duplicates,
+                f"{track.duplicates} records repeat a stamp or fall on an earlier one; left out",
+                track.duplicates,
             )
         )
-    if found.unstamped:
+    if track.unstamped:
         findings.append(
             Finding(
                 "missing_stamps",
                 "warning",
-                f"{found.unstamped} records have no time stamp, or one far astray; taken as "
+                f"{track.unstamped} records have no time stamp, or one far astray; taken as "
                 "consecutive",
-                found.unstamped,
+                track.unstamped,
             )
         )
     return findings
@@ -252,11 +252,11 @@ def _rate_findings(rate: float, stated: float | None, settings: QualitySettings)
     ]
 
 
-def _drift_findings(found: Track, settings: QualitySettings) -> list[Finding]:
+def _drift_findings(track: Track, settings: QualitySettings) -> list[Finding]:
     """Tell whether the interval between samples is another in the second half of the log."""
-    if len(found.starts) > 1 or len(found.marks) < 8:
+    if len(track.starts) > 1 or len(track.marks) < 8:
         return []
-    points, stamps = np.array(found.marks, dtype=np.float64).T
+    points, stamps = np.array(track.marks, dtype=np.float64).T
     half = len(points) // 2
     early, late = (
         (stamps[b] - stamps[a]) / (points[b] - points[a])
@@ -277,12 +277,12 @@ def _drift_findings(found: Track, settings: QualitySettings) -> list[Finding]:
 
 
 def _arrival_order(
-    stamps: Stamps, found: Track, stated: float | None, settings: QualitySettings
+    stamps: Stamps, track: Track, stated: float | None, settings: QualitySettings
 ) -> TimeBase:
     """Return the time base of stamps that lie on no grid: consecutive samples at the mean rate."""
     # A pause is long against the mean interval and against the steps of stamps that are shared.
-    mean = _span(stamps) / max(found.rows - 1, 1)
-    gap = max(1.0, 100 * mean, 10 * found.interval) * (1 + 1e-6)
+    mean = _span(stamps) / max(track.rows - 1, 1)
+    gap = max(1.0, 100 * mean, 10 * track.interval) * (1 + 1e-6)
     rows, last, worst, worst_at = 0, np.nan, 0.0, 0
     starts, jumps = [0], []
     # Between the records with which a stamp changes: samples that share one are counted whole.
@@ -290,10 +290,10 @@ def _arrival_order(
     samples, elapsed = 0, 0.0
     for block in stamps():
         # A missing stamp stands for no time: the step after it covers it.
-        held = np.concatenate(([last], block))
-        good = np.maximum.accumulate(np.where(np.isnan(held), 0, np.arange(len(held))))
-        held = held[good]
-        steps = np.diff(held)
+        latest = np.concatenate(([last], block))
+        good = np.maximum.accumulate(np.where(np.isnan(latest), 0, np.arange(len(latest))))
+        latest = latest[good]
+        steps = np.diff(latest)
         cut = np.abs(steps) > gap
         starts += [rows + int(i) for i in np.flatnonzero(cut)]
         jumps += steps[cut].tolist()
@@ -303,13 +303,13 @@ def _arrival_order(
         changes = np.flatnonzero((steps != 0) & np.isfinite(steps))
         if len(changes):
             at = np.concatenate(([changed_at], rows + changes))
-            when = np.concatenate(([changed_stamp], held[changes + 1]))
+            when = np.concatenate(([changed_stamp], latest[changes + 1]))
             inside = ~cut[changes] & np.isfinite(when[:-1])
             samples += int(np.diff(at)[inside].sum())
             elapsed += float(np.diff(when)[inside].sum())
             changed_at, changed_stamp = int(at[-1]), float(when[-1])
         rows += len(block)
-        last = held[-1]
+        last = latest[-1]
     if elapsed <= 0:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     rate = samples / elapsed
@@ -317,8 +317,8 @@ def _arrival_order(
         Finding(
             "jittered_stamps",
             "warning",
-            f"the stamps lie on no uniform grid ({100 * found.off_grid / found.rows:.0f} % of them "
-            f"off it, {found.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at "
+            f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
+            f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at "
             f"{worst_at / rate:.5g} s); the samples are taken as consecutive at the mean rate of "
             f"{rate:.6g} Hz, so lost samples cannot be seen",
             worst,

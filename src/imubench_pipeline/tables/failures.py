@@ -67,8 +67,8 @@ def failure_of(path: Path) -> Failure | None:
     """
     if path.name == QUALITY:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
-            found = read_json(path).get("failure")
-            return Failure(**found) if found else None
+            failure = read_json(path).get("failure")
+            return Failure(**failure) if failure else None
     if path.suffix == ".parquet":
         with contextlib.suppress(OSError, ValueError, TypeError, pa.ArrowException):
             return told_by(pq.read_schema(path))
@@ -84,7 +84,7 @@ def told_by(read: pa.Schema) -> Failure | None:
 def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, list[Failure]]:
     """Read and join files of one table, and what failed of those that are empty for it."""
     parts = [read_part(table, path) for path in paths]
-    failures = [told for part in parts if len(part) == 0 and (told := told_by(part.schema))]
+    failures = [failure for part in parts if len(part) == 0 and (failure := told_by(part.schema))]
     return joined(table, parts), failures
 
 
@@ -96,9 +96,9 @@ def write_empty(tables: Iterable[Path], failure: Failure) -> None:
     tables : iterable of Path
         Each has the name of its file.
     """
-    told = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
+    metadata = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
     for path in tables:
-        write_arrow(schema(path.stem).empty_table().replace_schema_metadata(told), path)
+        write_arrow(schema(path.stem).empty_table().replace_schema_metadata(metadata), path)
 
 
 def with_failures(
@@ -120,9 +120,10 @@ def with_failures(
         (row["sensor"], row["recording"]): row["kind"] for row in tables["recordings"].to_pylist()
     }
     reasons = {
-        (one.sensor, one.recording): one.reason
-        for one in reversed(failures)
-        if one.step not in _BESIDE or kinds.get((one.sensor, one.recording or "")) != "static"
+        (failure.sensor, failure.recording): failure.reason
+        for failure in reversed(failures)
+        if failure.step not in _BESIDE
+        or kinds.get((failure.sensor, failure.recording or "")) != "static"
     }
     marked = without(tables, reasons)
     marked["recordings"] = build(
@@ -135,10 +136,12 @@ def with_failures(
             for key in [(row["sensor"], row["recording"])]
         ),
     )
-    of_recordings = [one for one in failures if one.recording]
-    known = tables["findings"].to_pylist()
-    told = [one.finding().row(one.sensor, str(one.recording)) for one in of_recordings]
-    marked["findings"] = build("findings", [*known, *(row for row in told if row not in known)])
+    of_recordings = [failure for failure in failures if failure.recording]
+    listed = tables["findings"].to_pylist()
+    rows = [
+        failure.finding().row(failure.sensor, str(failure.recording)) for failure in of_recordings
+    ]
+    marked["findings"] = build("findings", [*listed, *(row for row in rows if row not in listed)])
     before = tables["failures"].to_pylist() if "failures" in tables else []
     new = [row for row in map(asdict, failures) if row not in before]
     marked["failures"] = build("failures", [*before, *new])
@@ -155,9 +158,11 @@ def without(
     left_out : container of (str, str)
         Sensor and recording.
     """
-    kept = dict(tables)
+    filtered = dict(tables)
     for name, table in tables.items():
         if "recording" in table.schema.names and name not in _NAMED:
             keys = zip(table["sensor"].to_pylist(), table["recording"].to_pylist(), strict=True)
-            kept[name] = table.filter(pa.array([key not in left_out for key in keys], pa.bool_()))
-    return kept
+            filtered[name] = table.filter(
+                pa.array([key not in left_out for key in keys], pa.bool_())
+            )
+    return filtered

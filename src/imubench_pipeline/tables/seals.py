@@ -61,8 +61,8 @@ class SealedFile:
                 return f"expected {self.size} bytes, found {about.st_size}"
             if not whole and about.st_mtime_ns == self.changed:
                 return None
-            if (found := digest_of(path)) != self.sha256:
-                return f"expected SHA-256 {self.sha256[:12]}…, found {found[:12]}…"
+            if (digest := digest_of(path)) != self.sha256:
+                return f"expected SHA-256 {self.sha256[:12]}…, found {digest[:12]}…"
         except (FileNotFoundError, NotADirectoryError):
             return f"expected {self.size} bytes, found no such file"
         except OSError as error:
@@ -179,7 +179,7 @@ def read_seal(results: Path, place: str) -> Seal:
     path = _path(results, place)
     try:
         data = read_sealed_json(path)
-        outputs = {name: SealedFile(**one) for name, one in data["outputs"].items()}
+        outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}
         seal = Seal(**{**data, "outputs": outputs})
     except FileNotFoundError:
         raise
@@ -195,8 +195,8 @@ def read_seal(results: Path, place: str) -> Seal:
 def places(results: Path) -> list[str]:
     """Return the places of all seals, in order."""
     folder = results / FOLDER
-    found = (path.relative_to(folder).as_posix() for path in folder.rglob("*.json"))
-    return sorted(name.removesuffix(".json") for name in found)
+    files = (path.relative_to(folder).as_posix() for path in folder.rglob("*.json"))
+    return sorted(name.removesuffix(".json") for name in files)
 
 
 def visible(path: Path) -> bool:

@@ -73,8 +73,8 @@ class _ArrowTable(Table):
     def unit(self, position: int) -> str | None:
         """Return the unit of a column, where its metadata state it."""
         stated = self.schema.field(position).metadata or {}
-        found = next((stated[key] for key in (b"unit", b"units") if key in stated), b"")
-        return found.decode("utf-8", "replace") or None
+        unit = next((stated[key] for key in (b"unit", b"units") if key in stated), b"")
+        return unit.decode("utf-8", "replace") or None
 
     def row_bytes(self, positions: Sequence[int]) -> int:
         """Return the memory that a record takes while these columns are read."""

@@ -85,13 +85,13 @@ class ArrayFile(LogFile):
         tables = list(dict.fromkeys(table for table, _ in places.values()))
         _check_lengths(places)
         wanted = {
-            table: sorted({position for held, position in places.values() if held is table})
+            table: sorted({position for owner, position in places.values() if owner is table})
             for table in tables
         }
-        held = sum(table.held_bytes(wanted[table]) for table in tables)
-        if held > LARGEST_CHUNKS:
+        chunk_bytes = sum(table.held_bytes(wanted[table]) for table in tables)
+        if chunk_bytes > LARGEST_CHUNKS:
             raise UnusableError(
-                f"the columns lie in chunks of {held} bytes together; expected at most "
+                f"the columns lie in chunks of {chunk_bytes} bytes together; expected at most "
                 f"{LARGEST_CHUNKS}: repack the file with smaller chunks"
             )
         rows = rows_of_block(
@@ -220,9 +220,9 @@ def explained(path: Path) -> Iterator[None]:
         raise RecordingError(f"{path.name}: {error}") from None
     # The libraries raise nearly every kind of exception on damaged files.
     except Exception as error:
-        said = " ".join(str(error).split())[:300] or type(error).__name__
+        reason = " ".join(str(error).split())[:300] or type(error).__name__
         raise RecordingError(
-            f"{path.name}: corrupt data, or cut short ({said}); copy it again"
+            f"{path.name}: corrupt data, or cut short ({reason}); copy it again"
         ) from error
 
 
@@ -241,19 +241,19 @@ def _place(tables: dict[str, Table], column: str | int, variable: str | None, ke
     """
     if isinstance(column, int):
         return _numbered(_table(tables, variable, key), column, key)
-    found = _addressed(tables, column, variable)
-    if len(found) == 1:
-        return found[0]
-    if found:
-        names = _listed(table.shown for table, _ in found)
-        if len({table for table, _ in found}) == 1:
+    matches = _addressed(tables, column, variable)
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        names = _listed(table.shown for table, _ in matches)
+        if len({table for table, _ in matches}) == 1:
             raise UnusableError(
                 f"column {column!r} for {key} stands twice in {names}; take it by its position, "
                 "as a number"
             )
         raise UnusableError(
             f"column {column!r} for {key} is in several variables ({names}); name the one with "
-            f"'variable:', or as in 'column: {found[0][0].name}/{column}'"
+            f"'variable:', or as in 'column: {matches[0][0].name}/{column}'"
         )
     address = _address(column, variable)
     if address in tables:

@@ -170,9 +170,8 @@ class DataSet(Array):
         low, high = min(positions), max(positions) + 1
         for start in range(0, self.rows, rows):
             block = self._block(data, slice(start, start + rows), slice(low, high))
-            yield [
-                self.taken(block, position if names else position - low) for position in positions
-            ]
+            before = 0 if names else low
+            yield [self.column_in(block, position - before) for position in positions]
 
     def _block(self, data: Any, time: slice, columns: slice) -> NDArray[Any]:
         """Return a block with time downwards; of records, a vector."""
@@ -276,10 +275,10 @@ def _texts_of_variable_length(path: str, *_: int) -> dict[str, str]:
             timeout=_LONGEST_WAIT,
             check=True,
         )
-        found = json.loads(done.stdout)
+        units = json.loads(done.stdout)
     except (subprocess.SubprocessError, OSError, ValueError):
         return {}
-    return {str(name): str(unit) for name, unit in found.items()}
+    return {str(name): str(unit) for name, unit in units.items()}
 
 
 _READING = """

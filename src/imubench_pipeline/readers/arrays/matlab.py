@@ -53,15 +53,15 @@ class MatlabFile(ArrayFile):
 
 def _variables(file: h5py.File) -> list[Table]:
     """Return the variables of version 7.3: matrices lie there with time along the second side."""
-    found: list[Table] = []
+    tables: list[Table] = []
     # What cells, objects and sparse matrices are made of has no meaning alone.
     for data_set in hdf5.data_sets(file, time_axis=1, passed_over="#"):
         if "MATLAB_sparse" in data_set.data.parent.attrs:
             continue
         if data_set.fault is None:
             data_set.fault = _fault(data_set)
-        found.append(data_set)
-    return found
+        tables.append(data_set)
+    return tables
 
 
 def _fault(data_set: hdf5.DataSet) -> str | None:
@@ -233,8 +233,8 @@ class _Elements:
             raise _damaged(f"an element of {length} bytes with {self.end - self.at} left", self.at)
 
 
-def _damaged(found: str, at: int) -> UnusableError:
-    return UnusableError(f"corrupt data: {found} at byte {at}; copy the file again")
+def _damaged(what: str, at: int) -> UnusableError:
+    return UnusableError(f"corrupt data: {what} at byte {at}; copy the file again")
 
 
 def _matrix(
@@ -277,12 +277,12 @@ def _shape(elements: _Elements) -> tuple[int, ...]:
 
 
 def _numeric(elements: _Elements, name: str, shape: tuple[int, ...]) -> StreamedArray:
-    found = elements.tag(*_NUMBERS)
+    size = elements.tag(*_NUMBERS)
     dtype = np.dtype(elements.order + _NUMBERS[elements.kind])
-    if found != math.prod(shape) * dtype.itemsize:
+    if size != math.prod(shape) * dtype.itemsize:
         raise UnusableError(
             f"corrupt data: {name} promises {sides_of(shape)} values of {dtype.itemsize} "
-            f"bytes, but has {found} bytes; copy the file again"
+            f"bytes, but has {size} bytes; copy the file again"
         )
     return StreamedArray(name, shape, dtype, True, elements.opened, elements.at, elements.checked)
 

@@ -195,7 +195,7 @@ class Array(Table):
             return []
         return list(dict.fromkeys(str(self._leaves[position].path[0]) for position in positions))
 
-    def taken(self, block: NDArray[Any], position: int) -> NDArray[Any]:
+    def column_in(self, block: NDArray[Any], position: int) -> NDArray[Any]:
         """Return one column of a block: of records, or of a matrix with time downwards."""
         if not self._leaves:
             return block[:, position]
@@ -291,7 +291,7 @@ class StreamedArray(Array):
                     block = self._next(streams[0], count * self._across)
                     if not self._leaves:
                         block = block.reshape(count, self._across)
-                    yield [self.taken(block, position) for position in positions]
+                    yield [self.column_in(block, position) for position in positions]
                 else:
                     yield [self._next(stream, count) for stream in streams]
             if self._checked:

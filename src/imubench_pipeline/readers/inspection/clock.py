@@ -221,10 +221,10 @@ def _guessed(values: NDArray[np.float64], rate: float | None) -> tuple[str, str]
             return unit, f"guessed: since 1970 it is {date[:16]} then"
     rates = {unit: 1 / (step * seconds) for unit, seconds in SECONDS.items()}
     shown = f"the stamps advance by {step:.5g}"
-    for unit, found in rates.items():
-        if rate is not None and abs(found / rate - 1) < _AGREE:
+    for unit, guess in rates.items():
+        if rate is not None and abs(guess / rate - 1) < _AGREE:
             return unit, f"guessed: {shown}, and the file states {rate:.5g} Hz"
-    likely = [unit for unit, found in rates.items() if _LIKELY[0] <= found <= _LIKELY[1]]
+    likely = [unit for unit, guess in rates.items() if _LIKELY[0] <= guess <= _LIKELY[1]]
     if len(likely) != 1 or step == 1:
         return UNKNOWN, f"{_UNIT_HINT} {shown}"
     return likely[0], f"guessed: {shown}, that is {rates[likely[0]]:.5g} Hz"
@@ -266,7 +266,7 @@ def _wrap(values: NDArray[np.float64]) -> int | None:
     if not len(falls) or step is None:
         return None
     range_of = step - float(falls[0])
-    return next((one for one in _WRAPS if abs(range_of - one) <= max(2 * step, 1e-9 * one)), None)
+    return next((end for end in _WRAPS if abs(range_of - end) <= max(2 * step, 1e-9 * end)), None)
 
 
 def advances(values: NDArray[np.float64], wrap: float | None = None) -> bool:

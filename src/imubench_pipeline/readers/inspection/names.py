@@ -86,9 +86,9 @@ def meaning(label: str, context: str = "") -> Meaning | None:
         name, unit = divided(label, dimension)
         meant = _meant(name)
         if meant is None and (axis := _bare_axis(name)):
-            told = quantity_of_text(context)
-            if told is not None:
-                meant = Meaning(told[0], axis, "", None, told[1])
+            by_context = quantity_of_text(context)
+            if by_context is not None:
+                meant = Meaning(by_context[0], axis, "", None, by_context[1])
         if meant is None and unit is not None:
             meant = _told_by_unit(quantity, name, unit)
         if meant is not None and meant.quantity == quantity:

@@ -122,9 +122,9 @@ def _shown_rate(files: list[_First], draft: Draft) -> str:
             rates.setdefault(name.split("_")[0], file.rate)
     if None in rates.values():
         return "stamps that do not advance"
-    known = {f"{rate:.4g} Hz" for rate in rates.values() if rate is not None}
-    if len(known) == 1:
-        return f"{known.pop()} from the stamps"
+    distinct = {f"{rate:.4g} Hz" for rate in rates.values() if rate is not None}
+    if len(distinct) == 1:
+        return f"{distinct.pop()} from the stamps"
     each = (f"{name} {rates[name]:.4g} Hz" for name in sorted(rates, key=_ORDER.index))
     return ", ".join(each) + " from the stamps"
 

@@ -128,13 +128,13 @@ class RosbagFile(LogFile):
         while True:
             times: list[int] = []
             messages: list[bytes] = []
-            held = 0
+            size = 0
             with explained(self.path):
                 for time, message in incoming:
                     times.append(time)
                     messages.append(message)
-                    held += len(message)
-                    if len(times) == _BATCH or held > LARGEST_BATCH:
+                    size += len(message)
+                    if len(times) == _BATCH or size > LARGEST_BATCH:
                         break
                 written = np.array(times, np.int64)
             if not times:
@@ -175,7 +175,7 @@ class RosbagFile(LogFile):
             and all(source.column in LAYOUTS[kind].columns for source in self.sources.values())
         }
         wanted = ", ".join(str(source.column) for source in self.sources.values())
-        found = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items())[:30])
+        present = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items())[:30])
         if stated:
             (name,) = stated
             chosen = [topic for topic in able if topic.strip("/") == name.strip("/")]
@@ -189,11 +189,11 @@ class RosbagFile(LogFile):
                 "with 'variable:' at each column in the sensor file"
             )
         cut = " (the bag is cut short, or was not closed)" if source.unclosed else ""
-        known = "; ".join(f"{kind}: {', '.join(LAYOUTS[kind].columns)}" for kind in LAYOUTS)
+        expected = "; ".join(f"{kind}: {', '.join(LAYOUTS[kind].columns)}" for kind in LAYOUTS)
         raise RecordingError(
             f"{self.path.name}: no topic {name + ' ' if name else ''}with {wanted}; found "
-            f"{found or 'none'}{cut}; expected a topic of {known}; mend 'variable' or 'column' in "
-            "the sensor file"
+            f"{present or 'none'}{cut}; expected a topic of {expected}; mend 'variable' or "
+            "'column' in the sensor file"
         )
 
     # ----------------------------------------------------------------------------- findings
@@ -234,11 +234,11 @@ def explained(path: Path) -> Iterator[None]:
         raise
     # They raise whatever their parsing meets: struct.error, KeyError, ...
     except Exception as error:
-        said = " ".join(str(error).replace(f"{path.parent}/", "").split())[:300]
+        reason = " ".join(str(error).replace(f"{path.parent}/", "").split())[:300]
         if isinstance(error, MemoryError):
-            said = "a record promises more bytes than memory can hold"
+            reason = "a record promises more bytes than memory can hold"
         raise RecordingError(
-            f"{path.name}: corrupt, or cut short ({said or type(error).__name__}); "
+            f"{path.name}: corrupt, or cut short ({reason or type(error).__name__}); "
             "expected a ROS bag; copy it again, or mend it ('ros2 bag reindex', 'mcap recover', "
             "'.recover' of sqlite3)"
         ) from None
@@ -323,9 +323,9 @@ def _table(
     file_format: FileFormat, source: Source, topic: str, kind: str, rows: int | None
 ) -> LogTable:
     if kind not in LAYOUTS:
-        known = " or ".join(name.replace("/msg/", "/") for name in LAYOUTS)
+        kinds = " or ".join(name.replace("/msg/", "/") for name in LAYOUTS)
         return LogTable(
-            file_format, topic, rows=rows, about=kind, fault=f"is {kind}; only {known} are read"
+            file_format, topic, rows=rows, about=kind, fault=f"is {kind}; only {kinds} are read"
         )
     layout = LAYOUTS[kind]
     count = ROWS if layout.covariances else _RARE

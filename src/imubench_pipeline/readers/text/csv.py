@@ -157,19 +157,19 @@ class CsvFile(LogFile):
             f"{_ADVICE}"
         )
 
-    def _bad_cell(self, line: int, column: str, found: str, expected: str) -> RecordingError:
+    def _bad_cell(self, line: int, column: str, cell: str, expected: str) -> RecordingError:
         return RecordingError(
-            f"{self.path.name}, line {line}, column {column!r}: found {found[:40]!r}, expected "
+            f"{self.path.name}, line {line}, column {column!r}: found {cell[:40]!r}, expected "
             f"{expected}; {_ADVICE}"
         )
 
     def _line(self, row: int, layout: TextLayout, *, blank: bool) -> int:
         """Return the line of a record in the file; ``blank``: lines of spaces count as records."""
         stripped = b"\r\n" if blank else b"\r\n\t "
-        one, count = layout.records(), 0
+        records, count = layout.records(), 0
         for number, raw in enumerate(first_lines(self.path), start=1):
             if number > layout.lines_before:
-                count += sum(bool(line.strip(stripped)) for line in one(raw).split(b"\n"))
+                count += sum(bool(line.strip(stripped)) for line in records(raw).split(b"\n"))
             if count >= row:
                 return number
         return row + layout.lines_before

@@ -32,14 +32,14 @@ def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
     int or None
         The one with the most names; of equals the first. None: no line has names.
     """
-    best, found = 0, None
+    best, header = 0, None
     for index, cells in enumerate(lines):
         if any(is_number(cell) for cell in cells) or says_units(cells):
             continue
         names = len({cell for cell in cells if not is_missing(cell)})
         if 2 * names >= len(cells) and names > best:
-            best, found = names, index
-    return found
+            best, header = names, index
+    return header
 
 
 def says_units(cells: Sequence[str]) -> bool:
@@ -97,9 +97,9 @@ def stated_rate(lines: Iterable[str]) -> float | None:
     """
     rates = set()
     for line in lines:
-        for found in _RATE.finditer(line):
-            figure = float(found["figure"].replace(",", "."))
-            rates.add(figure * (1000.0 if found["kilo"] else 1.0))
+        for match in _RATE.finditer(line):
+            figure = float(match["figure"].replace(",", "."))
+            rates.add(figure * (1000.0 if match["kilo"] else 1.0))
     (rate,) = rates if len(rates) == 1 else (None,)
     return rate or None
 
@@ -107,8 +107,8 @@ def stated_rate(lines: Iterable[str]) -> float | None:
 def stated_start(lines: Iterable[str]) -> str | None:
     """Return the date and time (ISO 8601) of lines such as ``// Start Time: 2024-05-01 12:00``."""
     for line in lines:
-        if found := _START.search(line):
-            text = f"{found['date'].replace('/', '-')}T{found['time'].replace(',', '.')}"
+        if match := _START.search(line):
+            text = f"{match['date'].replace('/', '-')}T{match['time'].replace(',', '.')}"
             try:
                 return str(np.datetime64(text, "ms"))
             except ValueError:

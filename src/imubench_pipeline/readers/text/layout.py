@@ -75,23 +75,23 @@ class TextLayout:
             If the file has no such column, or two of that name.
         """
         shown = [name[:_LONGEST_SHOWN] for name in self.names[:_SHOWN]]
-        found = ", ".join(shown) + (", ..." if len(self.names) > _SHOWN else "")
+        present = ", ".join(shown) + (", ..." if len(self.names) > _SHOWN else "")
         if isinstance(column, int):
             if column > len(self.names):
                 raise RecordingError(
                     f"{self.file}: no column {column} for {key}; found {len(self.names)} columns "
-                    f"({found}) with delimiter {self.split}; mend 'column' of {key}, or "
+                    f"({present}) with delimiter {self.split}; mend 'column' of {key}, or "
                     f"'delimiter', in {stated_in(key)}"
                 )
             return column - 1
         if column not in self.names:
             raise RecordingError(
-                f"{self.file}: no column {column!r} for {key}; found {found} with delimiter "
+                f"{self.file}: no column {column!r} for {key}; found {present} with delimiter "
                 f"{self.split}; mend 'column' of {key} in {stated_in(key)}"
             )
         if self.names.count(column) > 1:
             raise RecordingError(
-                f"{self.file}: column {column!r} for {key} stands twice in the header ({found}); "
+                f"{self.file}: column {column!r} for {key} stands twice in the header ({present}); "
                 "take it by its position, as a number"
             )
         return self.names.index(column)
@@ -208,7 +208,7 @@ class _Search:
         """Return the comments and the other lines of the beginning of a file."""
         comments: deque[_Line] = deque()
         lines: list[_Line] = []
-        number, start, held, told = 0, 0, 0, 0
+        number, start, line_bytes, comment_bytes = 0, 0, 0, 0
         # Whether a semicolon begins a comment or is the delimiter is not yet known.
         signs = tuple(sign for sign in self._signs(None) if sign != ";")
         for raw in first_lines(path, bounds.MOST_BYTES_BEFORE):
@@ -220,13 +220,13 @@ class _Search:
             line = _Line(number, here, raw.rstrip(b"\r\n"), _decoded(raw.rstrip(b"\r\n")))
             if line.text.startswith(signs):
                 comments.append(line)
-                told += len(line.raw)
-                while len(comments) > bounds.COMMENT_LINES or told > bounds.COMMENT_BYTES:
-                    told -= len(comments.popleft().raw)
+                comment_bytes += len(line.raw)
+                while len(comments) > bounds.COMMENT_LINES or comment_bytes > bounds.COMMENT_BYTES:
+                    comment_bytes -= len(comments.popleft().raw)
                 continue
             lines.append(line)
-            held += len(raw)
-            if len(lines) >= _LINES or (held > _BYTES and len(lines) > _UNIT_LINES):
+            line_bytes += len(raw)
+            if len(lines) >= _LINES or (line_bytes > _BYTES and len(lines) > _UNIT_LINES):
                 break
         if not lines and (number > bounds.MOST_LINES_BEFORE or start > bounds.MOST_BYTES_BEFORE):
             raise RecordingError(
@@ -273,10 +273,10 @@ class _Search:
         shown, fits = 0, False
         for line in [*lines, *comments] if self._names else []:
             names = self._names_in(split, line, width)
-            held = sum(name in names for name in self._names)
-            if held > shown:
-                shown, fits = held, any(completed(names, row) for row in even)
-            if held == len(self._names):
+            count = sum(name in names for name in self._names)
+            if count > shown:
+                shown, fits = count, any(completed(names, row) for row in even)
+            if count == len(self._names):
                 break
         cells = [cell for row in even for cell in row[:_SCORED_CELLS]]
         alike = len(even) / len(rows) * sum(map(is_datum, cells)) / max(len(cells), 1)
@@ -323,9 +323,9 @@ class _Search:
         else:
             header = None
         if self._log.header and header is None and first == 0:
-            told = [line for line in comments if line.number < lines[0].number]
-            if told and len(self._names_in(split, told[-1])) == width:
-                return told[-1], 0
+            before = [line for line in comments if line.number < lines[0].number]
+            if before and len(self._names_in(split, before[-1])) == width:
+                return before[-1], 0
             first = 1
         if first >= len(lines):
             raise RecordingError(
@@ -344,8 +344,8 @@ class _Search:
         record = split.cells(lines[-1].text)
         near = [line for line in comments if line.number < lines[-1].number] + lines[:-1]
         named = [completed(self._names_in(split, line, len(record)), record) for line in near]
-        found = likely_header(named)
-        return None if found is None else near[found]
+        place = likely_header(named)
+        return None if place is None else near[place]
 
     def _named(self, split: Split, lines: list[_Line], width: int) -> _Line | None:
         """Return the line that has all names that are wanted."""

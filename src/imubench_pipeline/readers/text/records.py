@@ -106,7 +106,7 @@ class Records:
         return before + _BLANK_LINES.sub(_MISSING, ended) + b"\n"
 
     def _without_headers(self, lines: bytes) -> bytes:
-        kept = []
+        records = []
         for line in lines[:-1].split(b"\n"):
             text = line.rstrip(b"\r")
             if text == self._header:
@@ -117,8 +117,8 @@ class Records:
                 self.restarts += text.endswith(self._header)
                 self.cut += 1
             else:
-                kept.append(line + b"\n")
-        return b"".join(kept)
+                records.append(line + b"\n")
+        return b"".join(records)
 
 
 def are_apart(numbers: Sequence[int]) -> bool:

@@ -57,9 +57,9 @@ def arrow_type(texts: Collection[str]) -> pa.DataType | None:
 
     None where it does not: a comma before the fraction, spaces around the stamp, a zone apart.
     """
-    found = [_ISO.fullmatch(text) for text in texts]
-    zones = {bool(one["zone"]) for one in found if one}
-    if not all(found) or len(zones) != 1:
+    stamps = [_ISO.fullmatch(text) for text in texts]
+    zones = {bool(stamp["zone"]) for stamp in stamps if stamp}
+    if not all(stamps) or len(zones) != 1:
         return None
     return pa.timestamp("ns", "UTC" if zones.pop() else None)
 
@@ -94,12 +94,12 @@ class TextStamps:
             If a stamp is neither in the pattern nor missing.
         """
         texts = pc.fill_null(texts, "")
-        found = pc.extract_regex(texts, self._expression)
-        time, sound = self._composed(found)
-        sound &= np.asarray(found.is_valid())
+        fields = pc.extract_regex(texts, self._expression)
+        time, sound = self._composed(fields)
+        sound &= np.asarray(fields.is_valid())
         if "z" in self._fields:
             # Local time among stamps with a zone would be off by hours.
-            zoned = np.asarray(pc.fill_null(pc.not_equal(found.field("z"), ""), False))
+            zoned = np.asarray(pc.fill_null(pc.not_equal(fields.field("z"), ""), False))
             if self._zoned is None and sound.any():
                 self._zoned = bool(zoned[sound.argmax()])
             sound &= zoned == self._zoned
@@ -109,15 +109,15 @@ class TextStamps:
                 raise StampError(int(row), text)
         return time, sound
 
-    def _composed(self, found: pa.StructArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def _composed(self, fields: pa.StructArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         def figures(name: str, default: int) -> NDArray[np.int64]:
             if name not in self._fields:
-                return np.full(len(found), default, np.int64)
-            text = found.field(name)
+                return np.full(len(fields), default, np.int64)
+            text = fields.field(name)
             if name == "f":
                 text = pc.utf8_rpad(text, 9, "0")
-            given = pc.if_else(pc.equal(text, ""), str(default), text)
-            return np.asarray(pc.fill_null(given, str(default)).cast(pa.int64()))
+            digits = pc.if_else(pc.equal(text, ""), str(default), text)
+            return np.asarray(pc.fill_null(digits, str(default)).cast(pa.int64()))
 
         year = figures("Y", 1970)
         if "y" in self._fields:
@@ -125,14 +125,14 @@ class TextStamps:
             year = np.where(short < 69, 2000, 1900) + short
         month = figures("m", 1)
         if "b" in self._fields:
-            names = pc.utf8_lower(pc.fill_null(found.field("b"), ""))
+            names = pc.utf8_lower(pc.fill_null(fields.field("b"), ""))
             month = np.asarray(pc.fill_null(pc.index_in(names, pa.array(_MONTHS)), -1)) + 1
         day = figures("d", 1)
         hour = figures("H", 0)
         if "I" in self._fields:
             hour = figures("I", 12) % 12
         if "p" in self._fields:
-            after_noon = pc.equal(pc.utf8_lower(pc.fill_null(found.field("p"), "")), "pm")
+            after_noon = pc.equal(pc.utf8_lower(pc.fill_null(fields.field("p"), "")), "pm")
             hour = hour + 12 * np.asarray(after_noon)
         minute, second = figures("M", 0), figures("S", 0)
         months = (year - 1970) * 12 + month - 1
@@ -142,14 +142,14 @@ class TextStamps:
         sound &= (hour < 24) & (minute < 60) & (second <= 60)
         sound &= (year > 1700) & (year < 2200)  # else ns overflow
         days = first + day - 1 + figures("j", 1) - 1
-        seconds = days * 86_400 + hour * 3600 + minute * 60 + second - self._zone(found)
+        seconds = days * 86_400 + hour * 3600 + minute * 60 + second - self._zone(fields)
         return seconds * 10**9 + figures("f", 0), sound
 
-    def _zone(self, found: pa.StructArray) -> NDArray[Any] | int:
+    def _zone(self, fields: pa.StructArray) -> NDArray[Any] | int:
         """Return the offset of the zone from UTC, s."""
         if "z" not in self._fields:
             return 0
-        zones = pc.fill_null(found.field("z"), "").dictionary_encode()
+        zones = pc.fill_null(fields.field("z"), "").dictionary_encode()
         offsets = np.array([_offset(zone) for zone in zones.dictionary.to_pylist()], np.int64)
         return offsets[np.asarray(zones.indices)] if len(offsets) else 0
 
@@ -165,15 +165,15 @@ def _offset(zone: str) -> int:
 def _expression(form: str) -> str:
     """Return the regular expression of a ``strptime`` pattern."""
     form = form.replace("%T", "%H:%M:%S").replace("%F", "%Y-%m-%d").replace("%R", "%H:%M")
-    found = ""
+    expression = ""
     for part in re.findall(r"[.,]%f|%.|\s+|[^%\s]", form):
         if part[1:] == "%f":
-            found += rf"(?:[.,]{_FIELDS['f']})?"  # loggers leave out a fraction of zero
+            expression += rf"(?:[.,]{_FIELDS['f']})?"  # loggers leave out a fraction of zero
         elif part.startswith("%"):
-            found += _FIELDS[part[1:]]
+            expression += _FIELDS[part[1:]]
         else:
-            found += r"\s+" if part.isspace() else re.escape(part)
-    return found
+            expression += r"\s+" if part.isspace() else re.escape(part)
+    return expression
 
 
 _DATES = (
@@ -189,12 +189,12 @@ _NO_SIGN = re.compile(r"%\w|[^\W_]+")
 
 def _by_signs() -> dict[str, list[str]]:
     """Return the patterns by the signs between their fields."""
-    found: dict[str, list[str]] = {}
+    patterns: dict[str, list[str]] = {}
     whole = (date + sign + time for date, sign, time in product(_DATES, _BETWEEN, _TIMES))
     for form in chain(_TIMES, _DATES, whole):
         for written in dict.fromkeys((form, form.replace(".%f", ""))):
-            found.setdefault(_NO_SIGN.sub("", written), []).append(form)
-    return found
+            patterns.setdefault(_NO_SIGN.sub("", written), []).append(form)
+    return patterns
 
 
 _BY_SIGNS = _by_signs()
@@ -220,21 +220,21 @@ def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
     if ":" in stamps[0]:
         forms = ["iso8601", *forms]
     written = pa.array(stamps)
-    fitting = {form: found for form in forms if (found := _fitting(form, written)) is not None}
-    spans = {form: np.ptp(found) for form, found in fitting.items()}
+    fitting = {form: times for form in forms if (times := _fitting(form, written)) is not None}
+    spans = {form: np.ptp(times) for form, times in fitting.items()}
     return tuple(form for form in fitting if spans[form] == min(spans.values()))
 
 
 def stamps_of(form: str, texts: Sequence[str]) -> NDArray[np.float64]:
     """Return ns since 1970 or since midnight of stamps in a pattern; NaN where one is missing."""
-    found, present = TextStamps(form).nanoseconds(pa.array(texts))
-    return np.where(present, found, np.nan)
+    times, present = TextStamps(form).nanoseconds(pa.array(texts))
+    return np.where(present, times, np.nan)
 
 
 def _fitting(form: str, texts: pa.Array) -> NDArray[np.int64] | None:
     """Return stamps in a pattern; None where one is not."""
     try:
-        found, present = TextStamps(form).nanoseconds(texts)
+        times, present = TextStamps(form).nanoseconds(texts)
     except StampError:
         return None
-    return found if present.all() else None
+    return times if present.all() else None

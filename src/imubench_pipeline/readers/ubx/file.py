@@ -92,14 +92,14 @@ class UbxFile(LogFile):
     def _batch(
         self, words: Words, clock: _Clock, records: _Records, ended: bool
     ) -> Iterator[Batch]:
-        columns, values, tags, places = words.taken()
+        columns, values, tags, places = words.drained()
         table, stamps = records.grouped(columns, values, clock.stamps(tags, places), ended)
         if len(table):
-            held = dict(zip(self._columns(), np.ascontiguousarray(table.T), strict=True))
+            figures = dict(zip(self._columns(), np.ascontiguousarray(table.T), strict=True))
             yield Batch(
                 None if self.log.time is None else self.seconds(stamps, clock.first),
                 {
-                    name: self.to_si(name, held[str(source.column)])
+                    name: self.to_si(name, figures[str(source.column)])
                     for name, source in self.sources.items()
                 },
             )
@@ -122,11 +122,11 @@ class UbxFile(LogFile):
         time = self.log.time
         if time is None:
             return
-        known = ("time_tag", "sTtag") if kind == RAW else ("time_tag",)
-        if time.column not in known:
+        columns = ("time_tag", "sTtag") if kind == RAW else ("time_tag",)
+        if time.column not in columns:
             raise RecordingError(
                 f"{self.path.name}: no time column {time.column!r}; {KINDS[kind]} has "
-                f"{' and '.join(known)}; mend 'column' of 'time' in the sensor file"
+                f"{' and '.join(columns)}; mend 'column' of 'time' in the sensor file"
             )
         in_ms = kind == RAW and time.column == "time_tag"
         if time.format is not None or (in_ms and time.unit != "ms"):
@@ -154,18 +154,18 @@ class UbxFile(LogFile):
             if number % 1000 == 0 and self._told(frames, words):
                 break
         self._told(frames, words)
-        held = [key for key in KINDS if words[key].present]
-        if len(held) == 1:
-            return held[0]
-        if held:
+        present = [key for key in KINDS if words[key].present]
+        if len(present) == 1:
+            return present[0]
+        if present:
             raise RecordingError(
                 f"{self.path.name}: both ESF-MEAS and ESF-RAW hold the columns; say which with "
                 "'variable: ESF-RAW' (every sample) or 'variable: ESF-MEAS' at each column"
             )
         types = ", ".join(
-            f"{KINDS[key]} with data types {found.types()}"
-            for key, found in words.items()
-            if found.types()
+            f"{KINDS[key]} with data types {of_kind.types()}"
+            for key, of_kind in words.items()
+            if of_kind.types()
         )
         raise RecordingError(
             f"{self.path.name}: found {types or 'no ESF-MEAS and no ESF-RAW'} among "
@@ -177,9 +177,9 @@ class UbxFile(LogFile):
 
     def _told(self, frames: Frames, words: dict[bytes, Words]) -> bool:
         """Tell whether the log so far says where the columns are."""
-        for found in words.values():
-            found.taken()
-        return frames.read > _LOOKED_AT and any(found.present for found in words.values())
+        for of_kind in words.values():
+            of_kind.drained()
+        return frames.read > _LOOKED_AT and any(of_kind.present for of_kind in words.values())
 
     # ----------------------------------------------------------------------------- findings
 
@@ -263,7 +263,7 @@ class Words:
             self._tags.append(int.from_bytes(payload[:4], "little"))
         self._held += max(count, 0)
 
-    def taken(
+    def drained(
         self,
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
         """Take out column, figure, tag and place of the measurements that are wanted."""
@@ -362,12 +362,12 @@ class _Records:
         if self._stamp is None:
             self._stamp = np.zeros(1, stamps.dtype)
         table = np.empty((len(columns) + 1, len(self._open)))
-        found = np.empty(len(columns) + 1, stamps.dtype)
-        count = _group(columns, values, stamps, self._open, self._stamp, self._state, table, found)
+        times = np.empty(len(columns) + 1, stamps.dtype)
+        count = _group(columns, values, stamps, self._open, self._stamp, self._state, table, times)
         if ended and self._state[1]:
-            table[count], found[count] = self._open, self._stamp[0]
+            table[count], times[count] = self._open, self._stamp[0]
             count += 1
-        return table[:count], found[:count]
+        return table[:count], times[:count]
 
 
 @njit(cache=True, nogil=True)
@@ -379,7 +379,7 @@ def _group(
     row_stamp: NDArray[Any],
     state: NDArray[np.int64],
     table: NDArray[np.float64],
-    found: NDArray[Any],
+    times: NDArray[Any],
 ) -> int:
     """Fill records; return how many are complete.
 
@@ -393,7 +393,7 @@ def _group(
             state[0] = column
         if state[1] and (column == state[0] or not np.isnan(row[column])):
             table[count] = row
-            found[count] = row_stamp[0]
+            times[count] = row_stamp[0]
             count += 1
             row[:] = np.nan
             state[1] = 0
@@ -438,7 +438,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
 
 def _table(file_format: FileFormat, kind: bytes, words: Words, frames: Frames) -> LogTable:
     """Describe one kind of message."""
-    places, figures, tags, _ = words.taken()
+    places, figures, tags, _ = words.drained()
     name = KINDS[kind]
     columns = []
     for place, column in enumerate(COLUMNS):

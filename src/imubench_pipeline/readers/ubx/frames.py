@@ -57,8 +57,8 @@ class Frames:
             data += block
             first, second = _sums(data)
             at = 0
-            while (found := data.find(_SYNC, at)) >= 0:
-                at = found
+            while (sync := data.find(_SYNC, at)) >= 0:
+                at = sync
                 if len(data) > at + 2 and data[at + 2] not in _CLASSES:
                     at += 2
                     continue

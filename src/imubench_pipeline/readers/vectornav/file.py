@@ -111,27 +111,27 @@ class VectorNavFile(LogFile):
         able = [kind for kind in FIELDS if all(position_of(kind, c) >= 0 for c in wanted)]
         if not able:
             named = ", ".join(str(column) for column in wanted)
-            known = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
+            expected = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
             raise RecordingError(
                 f"{self.path.name}: no VectorNav sentence has the columns {named} together; mend "
-                f"'column' in the sensor file, expected those of one sentence of {known}"
+                f"'column' in the sensor file, expected those of one sentence of {expected}"
             )
         if len(able) == 1:
             return able[0]
         present = self._present()
-        held = [kind for kind in able if kind in present]
-        if len(held) == 1:
-            return held[0]
-        found = _listed(present) or "no sentence with a right checksum"
-        if not held:
+        both = [kind for kind in able if kind in present]
+        if len(both) == 1:
+            return both[0]
+        seen = _listed(present) or "no sentence with a right checksum"
+        if not both:
             raise RecordingError(
-                f"{self.path.name}: found {found}; expected one of {', '.join(able)}, each with "
+                f"{self.path.name}: found {seen}; expected one of {', '.join(able)}, each with "
                 "a checksum of 2 or 4 digits; mend 'column' in the sensor file, or set the "
                 "output of the device (registers 6 and 30)"
             )
         raise RecordingError(
-            f"{self.path.name}: {' and '.join(held)} both hold the columns; say which in the "
-            f"sensor file, as in 'column: {held[0]}.{FIELDS[held[0]][-1]}'"
+            f"{self.path.name}: {' and '.join(both)} both hold the columns; say which in the "
+            f"sensor file, as in 'column: {both[0]}.{FIELDS[both[0]][-1]}'"
         )
 
     def _present(self) -> set[str]:
@@ -281,7 +281,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
         read += len(text)
         if read > _DESCRIBED_IN:
             break
-    present = [kind for kind, kept in rows.items() if kept]
+    present = [kind for kind, of_kind in rows.items() if of_kind]
     if not present:
         raise RecordingError(
             f"{path.name}: no sentence of {', '.join(FIELDS)} with a right checksum at its "

@@ -112,8 +112,8 @@ class Sentences:
     def _damaged_name(self, body: bytes) -> bool:
         """Tell whether this was a sentence of our kind: as many fields, and no known name."""
         name = body.partition(b",")[0].decode("ascii", "replace")
-        known = name in self.others or name in FIELDS
-        return not known and body.count(b",") == self._commas
+        other = name in self.others or name in FIELDS
+        return not other and body.count(b",") == self._commas
 
     def _row(self, before: bytes, body: bytes) -> Row:
         row = Row(before, body[len(self._head) :])
@@ -174,12 +174,12 @@ def right_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:
     # A zero byte before each changes no XOR, and makes each begin somewhere.
     joined = np.frombuffer(b"\0" + b"\0".join(bodies), np.uint8)
     lengths = np.fromiter(map(len, bodies), np.int64, len(bodies)) + 1
-    found = np.bitwise_xor.reduceat(joined, np.cumsum(lengths) - lengths).tolist()
+    sums = np.bitwise_xor.reduceat(joined, np.cumsum(lengths) - lengths).tolist()
     return [
         _BYTE.get(check, -1) == xor
         if len(check) != 4
         else b"%04X" % crc_hqx(body, 0) == check.upper()
-        for xor, body, check in zip(found, bodies, checks, strict=True)
+        for xor, body, check in zip(sums, bodies, checks, strict=True)
     ]
 
 

@@ -72,13 +72,13 @@ def _united(rows: Array, together: int) -> Array:
         return rows.copy()
     begins = np.arange(0, len(rows), together)
     count, mean, spread, low, high = rows.T
-    there = count > 0
+    present = count > 0
     total = np.add.reduceat(count, begins)
     weight = np.maximum(total, 1.0)
-    united = np.add.reduceat(np.where(there, count * mean, 0.0), begins) / weight
+    united = np.add.reduceat(np.where(present, count * mean, 0.0), begins) / weight
     # About the mean of the new block: no digit is lost to a large bias.
     away = mean - np.repeat(united, together)[: len(rows)]
-    squares = np.add.reduceat(np.where(there, count * (spread**2 + away**2), 0.0), begins)
+    squares = np.add.reduceat(np.where(present, count * (spread**2 + away**2), 0.0), begins)
     empty = total == 0
     return np.column_stack(
         [

@@ -92,9 +92,9 @@ def _parts(deviation: float) -> tuple[float, float]:
     deviation : float
         Of d, in steps.
     """
-    below, none, one, two = (_excess(x, deviation) for x in (-1.0, 0.0, 1.0, 2.0))
-    equal = below - 2.0 * none + one
-    return equal, 2.0 * (none - 2.0 * one + two) / (1.0 - equal)
+    below, none, single, two = (_excess(x, deviation) for x in (-1.0, 0.0, 1.0, 2.0))
+    equal = below - 2.0 * none + single
+    return equal, 2.0 * (none - 2.0 * single + two) / (1.0 - equal)
 
 
 def _excess(x: float, deviation: float) -> float:

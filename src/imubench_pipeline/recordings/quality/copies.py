@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -55,16 +56,16 @@ def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
         name: column.excerpts() for name, column in columns.items() if column.low < column.high
     }
     names = list(pieces)
-    told: set[str] = set()
-    for place, one in enumerate(names):
+    named: set[str] = set()
+    for place, first in enumerate(names):
         for other in names[place + 1 :]:
-            factor = _factor(pieces[one], pieces[other])
+            factor = _factor(pieces[first], pieces[other])
             if factor is None:
                 continue
-            for channel, of, times in ((one, other, 1.0 / factor), (other, one, factor)):
-                if channel in told:
+            for channel, of, times in ((first, other, 1.0 / factor), (other, first, factor)):
+                if channel in named:
                     continue
-                told.add(channel)
+                named.add(channel)
                 scaled = "" if abs(times - 1.0) < 1e-6 else f", times {times:.6g} in SI"
                 detail = (
                     f"{channel} has the samples of {of}{scaled}: one column is used for both; "
@@ -73,13 +74,13 @@ def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
                 yield Finding("channel_twice", "warning", detail, times, channel)
 
 
-def _factor(one: list[Excerpt], other: list[Excerpt]) -> float | None:
+def _factor(first: list[Excerpt], other: list[Excerpt]) -> float | None:
     """Return by what the samples of one column are multiplied in the other, or None.
 
     The pieces vote: a knock, or a shaking that both feel, decides none but its own.
     """
     slopes, alike = [], []
-    for x, y in together(one, other):
+    for x, y in together(first, other):
         dx, dy = np.diff(x), np.diff(y)
         if min(np.count_nonzero(dx), np.count_nonzero(dy)) < _FEWEST:
             continue
@@ -122,20 +123,23 @@ def repeated_stretches(
     rate : float
         Hz.
     """
-    found = {name: _told(column, steps[name]) for name, column in columns.items()}
-    channels = Counter(lag for told in found.values() for lag in {one.lag for one in told})
+    stretches_of = {name: _told(column, steps[name]) for name, column in columns.items()}
+    lags = {name: {s.lag for s in stretches} for name, stretches in stretches_of.items()}
+    channels = Counter(chain.from_iterable(lags.values()))
     # In most channels at once: the records themselves are there twice. A coarse channel may be
     # unable to tell.
-    common = {lag for lag, count in channels.items() if 2 * count > len(found) > 1}
-    shared = {
-        lag: next(name for name, told in found.items() if any(one.lag == lag for one in told))
-        for lag in sorted(common)
-    }
+    common = {lag for lag, count in channels.items() if 2 * count > len(stretches_of) > 1}
+    shared = {lag: next(name for name in lags if lag in lags[name]) for lag in sorted(common)}
     if shared:
-        stretches = [one for lag, name in shared.items() for one in found[name] if one.lag == lag]
+        stretches = [
+            stretch
+            for lag, name in shared.items()
+            for stretch in stretches_of[name]
+            if stretch.lag == lag
+        ]
         yield _repeated(None, stretches, max(c.present for c in columns.values()), rate)
-    for name, told in found.items():
-        alone = [one for one in told if one.lag not in common]
+    for name, of_channel in stretches_of.items():
+        alone = [stretch for stretch in of_channel if stretch.lag not in common]
         if alone:
             yield _repeated(name, alone, columns[name].present, rate)
 
@@ -188,8 +192,8 @@ def recorded_twice(models: Iterable[Row], biases: Iterable[Row]) -> Iterator[Row
         of = first.setdefault((sensor, channel, *samples), recording)
         if of != recording:
             copies.setdefault((sensor, recording), {}).setdefault(of, []).append(channel)
-    for (sensor, recording), found in copies.items():
-        for of, channels in found.items():
+    for (sensor, recording), originals in copies.items():
+        for of, channels in originals.items():
             detail = (
                 f"{recording} has the samples of {of} ({', '.join(channels)}): one log lies in the "
                 "folder of the sensor twice, and would count as two; remove one of them"

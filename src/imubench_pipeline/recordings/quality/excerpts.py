@@ -57,16 +57,16 @@ class Excerpts:
 
     def pieces(self) -> list[Excerpt]:
         """Return the pieces in order; the last one as far as it goes."""
-        kept = [*self._kept, np.concatenate(self._open)] if self._open else self._kept
-        return [Excerpt(k * self._stride * PIECE, values) for k, values in enumerate(kept)]
+        pieces = [*self._kept, np.concatenate(self._open)] if self._open else self._kept
+        return [Excerpt(k * self._stride * PIECE, values) for k, values in enumerate(pieces)]
 
 
-def together(one: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
+def together(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
     """Return the samples of two columns at the same records, those present in both.
 
     Parameters
     ----------
-    one, other : list of Excerpt
+    first, other : list of Excerpt
         Of columns that advance together.
 
     Returns
@@ -76,9 +76,9 @@ def together(one: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Arra
     """
     places = {piece.first: piece.values for piece in other}
     pairs = []
-    for piece in one:
+    for piece in first:
         values = places.get(piece.first)
         if values is not None and len(values) == len(piece.values):
-            there = np.isfinite(piece.values) & np.isfinite(values)
-            pairs.append((piece.values[there], values[there]))
+            present = np.isfinite(piece.values) & np.isfinite(values)
+            pairs.append((piece.values[present], values[present]))
     return pairs

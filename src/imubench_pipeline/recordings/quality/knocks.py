@@ -63,8 +63,8 @@ def suspects(
         of their spreads, or more where that is small against the step.
     """
     least = _STEPS * (step or 0.0) / sigmas
-    there = np.isfinite(blocks.spread)
-    usual = np.median(blocks.spread[there]) if there.any() else np.inf
+    filled = np.isfinite(blocks.spread)
+    usual = np.median(blocks.spread[filled]) if filled.any() else np.inf
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
     quick = np.flatnonzero(reach > 0.5 * sigmas * usual)
     number, levels, noises = [], [], []

@@ -171,8 +171,8 @@ def level_of(column: ColumnSummary) -> float:
 
 
 def _median(values: NDArray[np.float64]) -> float:
-    there = values[np.isfinite(values)]
-    return float(np.median(there)) if len(there) else float("nan")
+    present = values[np.isfinite(values)]
+    return float(np.median(present)) if len(present) else float("nan")
 
 
 def longest_by_chance(column: ColumnSummary) -> float:

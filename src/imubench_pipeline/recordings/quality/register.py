@@ -60,11 +60,11 @@ def hidden_step(pieces: Sequence[Excerpt]) -> float | None:
     chosen = [values for values in chosen if len(values) >= _FEWEST]
     chosen = chosen[:: max(1, len(chosen) // _PIECES)][:_PIECES]
     steps = [_hidden_step(values) for values in chosen]
-    found = [step for step in steps if step is not None]
-    if 2 * len(found) <= len(steps):
+    periods = [step for step in steps if step is not None]
+    if 2 * len(periods) <= len(steps):
         return None
-    step = float(np.median(found))
-    return step if max(abs(one / step - 1.0) for one in found) < 0.05 else None
+    step = float(np.median(periods))
+    return step if max(abs(period / step - 1.0) for period in periods) < 0.05 else None
 
 
 def _hidden_step(values: Array) -> float | None:
@@ -103,10 +103,10 @@ def _peak(levels: Array, counts: NDArray[np.int64], sigma: float) -> float | Non
     peaks &= (frequencies[inner] > 1.0 / (_COARSEST * sigma)) & (
         frequencies[inner] < 1.0 / (_FINEST * sigma)
     )
-    found = np.flatnonzero(peaks)
-    if len(found) == 0:
+    places = np.flatnonzero(peaks)
+    if len(places) == 0:
         return None
-    about = frequencies[found[0] + 1] + np.linspace(-0.75, 0.75, 61) / (2.0 * span)
+    about = frequencies[places[0] + 1] + np.linspace(-0.75, 0.75, 61) / (2.0 * span)
     return float(about[np.argmax([_height(levels, counts, f) for f in about])])
 
 

@@ -53,8 +53,8 @@ def gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> GravityTurn | 
     whole = np.all([blocks.count > 0.9 * blocks.size for blocks in axes], axis=0)
     means = np.column_stack([np.where(whole, blocks.mean, np.nan) for blocks in axes])
     steps, middles = np.diff(means, axis=0), 0.5 * (means[1:] + means[:-1])
-    there = np.isfinite(steps).all(axis=1)
-    steps, middles = steps[there], middles[there]
+    present = np.isfinite(steps).all(axis=1)
+    steps, middles = steps[present], middles[present]
     if len(steps) < _FEWEST_BLOCKS:
         return None
     per_block = _turn(steps, middles)
@@ -79,5 +79,5 @@ def _turn(steps: Array, middles: Array) -> Array:
     total = float(np.trace(squares))
     normal = total * np.eye(3) - squares
     seen: Array = np.linalg.pinv(normal, rcond=_SEEN, hermitian=True)
-    found: Array = seen @ -np.cross(middles, steps).sum(axis=0)
-    return found
+    rate: Array = seen @ -np.cross(middles, steps).sum(axis=0)
+    return rate

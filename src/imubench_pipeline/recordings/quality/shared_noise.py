@@ -37,13 +37,13 @@ def shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
     """
     pieces = {name: column.excerpts() for name, column in columns.items()}
     strongest: dict[str, tuple[float, str]] = {}
-    for one, other in itertools.combinations(pieces, 2):
-        if one.partition("_")[0] != other.partition("_")[0]:
+    for first, other in itertools.combinations(pieces, 2):
+        if first.partition("_")[0] != other.partition("_")[0]:
             continue
-        correlation, error = _correlation(pieces[one], pieces[other])
+        correlation, error = _correlation(pieces[first], pieces[other])
         if abs(correlation) < _SHARED + _SURE * error:
             continue
-        for channel, beside in ((one, other), (other, one)):
+        for channel, beside in ((first, other), (other, first)):
             if abs(correlation) > abs(strongest.get(channel, (0.0, ""))[0]):
                 strongest[channel] = (correlation, beside)
     for channel, (correlation, beside) in strongest.items():
@@ -55,7 +55,7 @@ def shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
         yield Finding("shared_noise", "warning", detail, correlation, channel)
 
 
-def _correlation(one: list[Excerpt], other: list[Excerpt]) -> tuple[float, float]:
+def _correlation(first: list[Excerpt], other: list[Excerpt]) -> tuple[float, float]:
     """Return the correlation of the increments, a median over pieces, and its standard error.
 
     Of noise whose autocorrelations are a_k and b_k it is sqrt(sum a_k b_k / n) (M. S. Bartlett,
@@ -63,7 +63,7 @@ def _correlation(one: list[Excerpt], other: list[Excerpt]) -> tuple[float, float
     has 1.25 times that of their mean.
     """
     correlations, variances = [], []
-    for x, y in together(one, other):
+    for x, y in together(first, other):
         dx, dy = np.diff(x), np.diff(y)
         if min(np.count_nonzero(dx), np.count_nonzero(dy)) < _FEWEST:
             continue

@@ -71,7 +71,7 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     far = np.flatnonzero(np.abs(away) > sigmas * scale)
     if len(far) == 0:
         return []
-    found = []
+    moves = []
     for group in np.split(far, np.flatnonzero(np.diff(far) > 3) + 1):
         peak = group[np.argmax(np.abs(away[group]))]
         # A step stays; what comes back at once is a knock.
@@ -80,8 +80,8 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
         change = after - before
         if abs(change) > 0.5 * abs(float(away[peak])):
             sample = (int(peak) + 1) * size * blocks.size + size * blocks.size // 2
-            found.append(Step(sample, change, abs(float(away[peak])) / scale, size * blocks.size))
-    return found
+            moves.append(Step(sample, change, abs(float(away[peak])) / scale, size * blocks.size))
+    return moves
 
 
 def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
@@ -180,5 +180,5 @@ def _means(blocks: BlockStatistics, size: int) -> Array:
 
 def _median(values: Array) -> float:
     """Return the median of the values that are there; NaN where none is."""
-    there = values[np.isfinite(values)]
-    return float(np.median(there)) if len(there) else float("nan")
+    present = values[np.isfinite(values)]
+    return float(np.median(present)) if len(present) else float("nan")

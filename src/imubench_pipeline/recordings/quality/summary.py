@@ -56,10 +56,10 @@ class ColumnSummary:
         number, infinite = _take(np.ascontiguousarray(values), self._state, rows)
         if number:
             self._blocks.add(rows[:number])
-        kept = np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
-        self._excerpts.add(kept)
-        self.repeated.add(kept)
-        return kept
+        finite = np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
+        self._excerpts.add(finite)
+        self.repeated.add(finite)
+        return finite
 
     @property
     def present(self) -> int:
