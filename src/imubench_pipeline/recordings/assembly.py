@@ -58,7 +58,6 @@ def assemble(
     """
     for part in parts:
         part.writer.finish(metadata)
-        part.writer.__exit__(None, None, None)
     if len(parts) == 1 and base.uniform:
         return parts[0].data, {}
     repeated: dict[str, int] = {}

@@ -83,16 +83,16 @@ class Doubt:
     code: str
     """The finding, ``not_explained`` (no model explains the spectrum), or the status of a
     parameter."""
-    parameters: tuple[str, ...]
-    """On which it bears; none: on all."""
-    unfit: bool
-    """The figures may be of something else."""
-    factor: float | None
-    """By which it may change a value, where that is known."""
-    start: float | None
-    end: float | None
-    """The part of the recording that it concerns, s from the first sample; None: all of it."""
     reason: str
+    parameters: tuple[str, ...] = ()
+    """On which it bears; none: on all."""
+    unfit: bool = False
+    """The figures may be of something else."""
+    factor: float | None = None
+    """By which it may change a value, where that is known."""
+    start: float | None = None
+    end: float | None = None
+    """The part of the recording that it concerns, s from the first sample; None: all of it."""
 
     @property
     def of_recording(self) -> bool:
@@ -125,29 +125,16 @@ def doubts(
     """
     every = [doubt for row in findings if _casts_doubt(row) for doubt in _of_finding(row)]
     every += [
-        Doubt(
-            *_place(row),
-            code="not_explained",
-            parameters=(),
-            unfit=False,
-            factor=None,
-            start=None,
-            end=None,
-            reason=f"no model explains the spectrum of {row['channel']}",
-        )
+        Doubt(*_place(row), "not_explained", f"no model explains the spectrum of {row['channel']}")
         for row in models
         if row["chosen"] and row["verdict"] == "not explained"
     ]
     every += [
         Doubt(
             *_place(row),
-            code="doubtful",
+            "doubtful",
+            row["reason"] or "its status is doubtful",
             parameters=(row["parameter"],),
-            unfit=False,
-            factor=None,
-            start=None,
-            end=None,
-            reason=row["reason"] or "its status is doubtful",
         )
         for row in parameters
         if row["status"] == "doubtful"
@@ -197,12 +184,12 @@ def words(of_recording: Iterable[Doubt]) -> str:
             channels.setdefault(doubt.code, {})
             if doubt.channel:
                 channels[doubt.code][doubt.channel] = None
-    named = [
-        code.replace("_", " ") + (f" ({', '.join(where)})" if where else "")
-        for code, where in channels.items()
-    ]
-    more = len(named) - _SHOWN
-    return "; ".join(named[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+    return _shortened(
+        [
+            code.replace("_", " ") + (f" ({', '.join(where)})" if where else "")
+            for code, where in channels.items()
+        ]
+    )
 
 
 def left_out(recordings: Iterable[Row]) -> dict[Key, str]:
@@ -276,9 +263,12 @@ def with_doubts_of_all(pools: Iterable[Row], recordings: Iterable[Row]) -> Itera
             for recording in listed
             if recording["sensor"] == row["sensor"] and row["device"] in (None, recording["device"])
         ]
-        more = len(texts) - _SHOWN
-        text = "; ".join(texts[:_SHOWN])
-        yield {**row, "doubts": text + (f"; and {more} more" if more > 0 else "")}
+        yield {**row, "doubts": _shortened(texts)}
+
+
+def _shortened(texts: Sequence[str]) -> str:
+    more = len(texts) - _SHOWN
+    return "; ".join(texts[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
 
 
 def _judged(row: Row, doubts: Sequence[Doubt], included: Collection[str]) -> dict[str, Any]:
@@ -307,13 +297,13 @@ def _of_finding(row: Row) -> Iterator[Doubt]:
     for factor, names in (by_factor or {None: [*BEARS_ON.get(code, ())]}).items():
         yield Doubt(
             *_place(row),
-            code=code,
+            code,
+            row["detail"],
             parameters=tuple(sorted(names)),
             unfit=code in UNFIT,
             factor=factor,
             start=row["start"],
             end=row["end"],
-            reason=row["detail"],
         )
 
 

@@ -23,11 +23,9 @@ from imubench_pipeline.recordings.quality.copies import copied_channels
 from imubench_pipeline.recordings.quality.levels import kept_level
 from imubench_pipeline.recordings.quality.rotation import GravityTurn, gravity_turn
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.recordings.recording import channel_logs, log_paths
+from imubench_pipeline.recordings.recording import BESIDE, channel_logs, log_paths
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
-    POSITION,
-    TABLE_RATE,
     TEMPERATURE,
     LogFormat,
     RecordingNotes,
@@ -202,9 +200,8 @@ def _findings(
         findings += column_findings(part.columns, base.rate, settings, static=static)
         if static:  # what is sensed of a turn looks like a knock
             findings += _knock_findings(part, base.rate, settings, scratch)
-    beside = {TEMPERATURE, POSITION, TABLE_RATE}
     findings += copied_channels(
-        {name: c for part in parts for name, c in part.columns.items() if name not in beside}
+        {name: c for part in parts for name, c in part.columns.items() if name not in BESIDE}
     )
     if len({part.rows for part in parts if not part.stamped}) > 1:
         lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in parts)
@@ -303,8 +300,7 @@ def _shared_bases(parts: list[Part], bases: list[timebase.TimeBase]) -> list[lis
 def _summary(
     parts: list[Part], bases: list[timebase.TimeBase], started: str | None
 ) -> dict[str, Any]:
-    beside = {TEMPERATURE, POSITION, TABLE_RATE}
-    measured = [i for i, part in enumerate(parts) if set(part.columns) - beside]
+    measured = [i for i, part in enumerate(parts) if set(part.columns) - BESIDE]
     longest = max(measured, key=lambda index: bases[index].rows)
     base = bases[longest]
     temperature = next(

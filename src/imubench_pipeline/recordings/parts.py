@@ -153,7 +153,6 @@ def leave_out_knocks(
     if not doubtful:
         return {}
     part.writer.finish({})
-    part.writer.__exit__(None, None, None)
     knocks_of = {}
     for name in doubtful:
         here = list(knocks(_pieces(part.data, name), blocks[name], sigmas, longest, step[name]))

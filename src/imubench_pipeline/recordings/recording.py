@@ -13,7 +13,6 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -32,7 +31,10 @@ ROW_GROUP = 1 << 20
 MEND = "remove it, and the next run reads the log again"
 
 _METADATA = b"imubench"
-_NOT_CHANNELS = {"time", "sample", TEMPERATURE, POSITION, TABLE_RATE}
+BESIDE = frozenset({TEMPERATURE, POSITION, TABLE_RATE})
+"""Columns that are no channels."""
+
+_NOT_CHANNELS = BESIDE | {"time", "sample"}
 
 
 class LogWriter:
@@ -58,12 +60,7 @@ class LogWriter:
     def __enter__(self) -> LogWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._writer.close()
 
     def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
@@ -77,10 +74,11 @@ class LogWriter:
             self._flush(ROW_GROUP)
 
     def finish(self, metadata: Mapping[str, Any]) -> None:
-        """Write what is waiting, and the metadata of the file."""
+        """Write what is waiting, and the metadata of the file; close it."""
         if self._rows:
             self._flush(self._rows)
         self._writer.add_key_value_metadata({_METADATA: json.dumps(metadata)})
+        self._writer.close()
 
     def _flush(self, rows: int) -> None:
         """Write the first rows of what is waiting, which is not copied for it."""

@@ -36,20 +36,10 @@ def printable(text: str) -> str:
 def as_cell(text: str) -> str:
     """Return a text as a cell of a CSV file that no spreadsheet takes for a formula.
 
-    Each sign that would begin a formula has one apostrophe more before it than in the text:
-    `of_cell` takes it away.
-
-    Returns
-    -------
-    str
-        Printable (`printable`).
+    It is `printable`, and each sign that would begin a formula has one apostrophe more before it
+    than in the text.
     """
     return _FORMULA.sub(r"\1'\2", printable(text))
-
-
-def of_cell(cell: str) -> str:
-    """Return the printable text that `as_cell` made a cell of."""
-    return _FORMULA.sub(lambda sign: sign[1] + sign[2].removeprefix("'"), cell)
 
 
 def with_safe_cells(table: pa.Table) -> pa.Table:

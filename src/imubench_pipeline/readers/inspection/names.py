@@ -32,6 +32,11 @@ _GYRO = re.compile(
 )
 _ACCEL = re.compile(r"acc(?!ur)|specificforce|gforce")
 _TEMPERATURE = re.compile(r"temp(?!or|l)")
+_PATTERNS: dict[Quantity, re.Pattern[str]] = {
+    "gyro": _GYRO,
+    "accel": _ACCEL,
+    "temperature": _TEMPERATURE,
+}
 _OTHER = re.compile(
     r"ang(?:ular|le)?acc|alpha|quat|euler|orient|attitude|angle|inclin|heading|mag(?!ic)|baro|press"
 )
@@ -98,14 +103,12 @@ def meaning(label: str, context: str = "") -> Meaning | None:
 
 def quantity_of_text(text: str) -> tuple[Quantity, int] | None:
     """Return the one quantity that a text such as the name of a file says, and its rank."""
-    joined = "".join(_words(text[:_LONGEST]))
-    quantities: list[Quantity] = []
-    for quantity, pattern in (("gyro", _GYRO), ("accel", _ACCEL), ("temperature", _TEMPERATURE)):
-        if pattern.search(joined):
-            quantities.append(quantity)  # type: ignore[arg-type]  # the keys of Quantity
+    words = words_of(text)
+    joined = "".join(words)
+    quantities = [quantity for quantity, pattern in _PATTERNS.items() if pattern.search(joined)]
     if len(quantities) != 1 or _OTHER.search(joined):
         return None
-    return quantities[0], _rank(_words(text[:_LONGEST]), joined)
+    return quantities[0], _rank(words, joined)
 
 
 def words_of(label: str) -> list[str]:

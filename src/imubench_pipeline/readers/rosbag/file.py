@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,23 +36,7 @@ STAMP, LOG_TIME = "header.stamp", "log_time"
 """The columns of time."""
 
 
-class Source(Protocol):
-    """A bag of either kind."""
-
-    ros_1: bool
-    unclosed: bool
-
-    def topics(self) -> dict[str, str]:
-        """Return the topics, and the type of message of each."""
-
-    def counts(self) -> dict[str, int]:
-        """Return how many messages a topic has, where that is cheap to know."""
-
-    def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
-        """Yield time of recording (ns) and bytes of the messages of a topic."""
-
-    def close(self) -> None:
-        """Close the bag."""
+Source = Bag | Bag2
 
 
 class RosbagFile(LogFile):

@@ -57,16 +57,7 @@ class Bag:
         RecordingError
             If this is no bag, or it is damaged.
         """
-        for _ in self._listed():
-            pass
-        return dict(self._connections.values())
-
-    def counts(self) -> dict[str, int]:
-        """Return nothing: only the whole bag tells how many messages a topic has."""
-        return {}
-
-    def _listed(self) -> Iterator[None]:
-        """Read connections where the index says they are, or from all of the bag."""
+        # The index says where the connections are; without one, all of the bag does.
         with self._path.open("rb") as file:
             try:
                 start = self._start(file)
@@ -78,7 +69,12 @@ class Bag:
                 self._connections.clear()
         if not self._connections:
             for _ in self.messages(""):
-                yield
+                pass
+        return dict(self._connections.values())
+
+    def counts(self) -> dict[str, int]:
+        """Return nothing: only the whole bag tells how many messages a topic has."""
+        return {}
 
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
         """Yield time of recording (ns) and bytes of the messages of a topic.

@@ -289,16 +289,14 @@ class _Clock:
     def __init__(self, file: UbxFile, kind: bytes) -> None:
         self._file = file
         self._time = file.log.time
-        self._tick = TICK_MS if kind == RAW and self._column() == "time_tag" else 1
+        column = None if self._time is None else self._time.column
+        self._tick = TICK_MS if kind == RAW and column == "time_tag" else 1
         self._wraps: float | None = 2.0**32 if kind == _MEAS else None
         if self._time is not None and self._time.wraps is not None:
             self._wraps = self._time.wraps / self._tick
         self._state = WrapState()
         self._date: tuple[datetime, int] | None = None
         self.first: Any = None
-
-    def _column(self) -> str | int | None:
-        return None if self._time is None else self._time.column
 
     def note_date(self, payload: bytes, place: int) -> None:
         """Remember the date of a NAV-PVT message that comes before the word at a place."""

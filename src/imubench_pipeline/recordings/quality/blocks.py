@@ -89,3 +89,9 @@ def _united(rows: Array, together: int) -> Array:
             np.fmax.reduceat(high, begins),
         ]
     )
+
+
+def present_median(values: Array) -> float:
+    """Return the median of the values that are there, shape (n,); NaN where none is."""
+    present = values[np.isfinite(values)]
+    return float(np.median(present)) if len(present) else float("nan")

@@ -28,6 +28,11 @@ class Excerpt:
     values: Array
     """SI, shape (n,); NaN where the sample is missing."""
 
+    @property
+    def present(self) -> Array:
+        """The samples that are there."""
+        return self.values[np.isfinite(self.values)]
+
 
 @dataclass
 class Excerpts:

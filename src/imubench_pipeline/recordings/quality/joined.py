@@ -152,8 +152,7 @@ def register_of(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
         SI. ``step`` is infinite where no step shows; ``seen`` is the finest that would.
     """
     whole = [piece for piece in pieces if len(piece.values) >= PIECE // 4]
-    values = [piece.values[np.isfinite(piece.values)] for piece in whole]
-    values = [some for some in values if len(some) >= PIECE // 8]
+    values = [piece.present for piece in whole if len(piece.present) >= PIECE // 8]
     if not values:
         return None
     joint = np.concatenate(values[:: max(1, len(values) // 4)][:4])

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.recordings.quality.blocks import present_median
 from imubench_pipeline.recordings.quality.register import hidden_step
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.typing import Array
 
 _SURE = 1e-9
 """Chance of a run by accident below which it is none."""
@@ -75,7 +77,7 @@ def quantisation(column: ColumnSummary) -> Quantisation | None:
 
 def noise_of(column: ColumnSummary) -> float:
     """Return the usual standard deviation of the samples of a block, SI."""
-    return _median(column.blocks().spread)
+    return present_median(column.blocks().spread)
 
 
 def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, float] | None:
@@ -96,19 +98,23 @@ def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, flo
     """
     if steps is not None and steps.over_noise > _COARSE:
         return None
-    pieces = [piece.values[np.isfinite(piece.values)] for piece in column.excerpts()]
-    values = np.concatenate([np.empty(0), *pieces])
-    if len(values) == 0:
+    at, counts = _counts(column)
+    if len(at) == 0:
         return None
-    at, counts = np.unique(values, return_counts=True)
     most = int(np.argmax(counts))
     around = np.delete(counts[max(0, most - _BESIDE) : most + _BESIDE + 1], min(most, _BESIDE))
     if at[most] in (column.low, column.high) or len(around) < 2 * _BESIDE:
         return None  # saturated, or too few levels
-    share = counts[most] / len(values)
+    share = counts[most] / counts.sum()
     if share < _PILED or counts[most] < _TIMES * max(around.max(), _BY_CHANCE):
         return None
     return float(at[most]), float(share)
+
+
+def _counts(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:
+    """Return the values that a column has in its excerpts, and how often each."""
+    pieces = [piece.present for piece in column.excerpts()]
+    return np.unique(np.concatenate([np.empty(0), *pieces]), return_counts=True)
 
 
 def kept_level(
@@ -128,16 +134,11 @@ def kept_level(
     Returns
     -------
     dict
-        ``mean``, SI; ``density``, see `density_of`; ``unit``; ``rate``; ``timed``.
+        ``mean``, SI, the usual one of a block, which a knock does not move; ``density``, see
+        `density_of`; ``unit``; ``rate``; ``timed``.
     """
-    density = density_of(column, rate)
-    return {
-        "mean": level_of(column),
-        "density": density,
-        "unit": unit,
-        "rate": rate,
-        "timed": timed,
-    }
+    level, density = present_median(column.blocks().mean), density_of(column, rate)
+    return {"mean": level, "density": density, "unit": unit, "rate": rate, "timed": timed}
 
 
 def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
@@ -163,16 +164,6 @@ def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]
     slow = math.sqrt(variance * blocks.size / rate)
     least_bit = column.step if np.isfinite(column.step) else 0.0
     return min(spread, slow), max(spread, slow, least_bit / math.sqrt(12.0 * rate))
-
-
-def level_of(column: ColumnSummary) -> float:
-    """Return the usual mean of a block, SI: a knock does not move it."""
-    return _median(column.blocks().mean)
-
-
-def _median(values: NDArray[np.float64]) -> float:
-    present = values[np.isfinite(values)]
-    return float(np.median(present)) if len(present) else float("nan")
 
 
 def longest_by_chance(column: ColumnSummary) -> float:
@@ -217,8 +208,7 @@ def _cut_off(column: ColumnSummary, steps: Quantisation | None, side: str, numbe
     """
     if steps is None:
         return True
-    pieces = [piece.values[np.isfinite(piece.values)] for piece in column.excerpts()]
-    at, counts = np.unique(np.concatenate([np.empty(0), *pieces]), return_counts=True)
+    at, counts = _counts(column)
     last, following = (0, 1) if side == "lowest" else (-1, -2)
     if len(at) < 2 or at[last] != (column.low if side == "lowest" else column.high):
         return True

@@ -56,8 +56,7 @@ def hidden_step(pieces: Sequence[Excerpt]) -> float | None:
     float or None
         SI. None where the least difference of values is the step, or where there is none.
     """
-    chosen = [piece.values[np.isfinite(piece.values)] for piece in pieces]
-    chosen = [values for values in chosen if len(values) >= _FEWEST]
+    chosen = [piece.present for piece in pieces if len(piece.present) >= _FEWEST]
     chosen = chosen[:: max(1, len(chosen) // _PIECES)][:_PIECES]
     steps = [_hidden_step(values) for values in chosen]
     periods = [step for step in steps if step is not None]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.recordings.quality.blocks import BlockStatistics
+from imubench_pipeline.recordings.quality.blocks import BlockStatistics, present_median
 from imubench_pipeline.typing import Array
 
 _PARTS = 20
@@ -65,7 +65,7 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
         return []
     # Over two windows, so that a step inside a window shows whole.
     away = means[2:] - means[:-2]
-    scale = _MAD * _median(np.abs(away - _median(away)))
+    scale = _MAD * present_median(np.abs(away - present_median(away)))
     if not scale > 0.0:
         return []
     far = np.flatnonzero(np.abs(away) > sigmas * scale)
@@ -75,8 +75,8 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     for group in np.split(far, np.flatnonzero(np.diff(far) > 3) + 1):
         peak = group[np.argmax(np.abs(away[group]))]
         # A step stays; what comes back at once is a knock.
-        before = _median(means[max(0, group[0] - 4) : group[0] + 1])
-        after = _median(means[group[-1] + 2 : group[-1] + 7])
+        before = present_median(means[max(0, group[0] - 4) : group[0] + 1])
+        after = present_median(means[group[-1] + 2 : group[-1] + 7])
         change = after - before
         if abs(change) > 0.5 * abs(float(away[peak])):
             sample = (int(peak) + 1) * size * blocks.size + size * blocks.size // 2
@@ -99,9 +99,9 @@ def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
     for k in range(_PARTS):
         part = blocks.mean[k * size : (k + 1) * size]
         third = size // 3
-        drifts[k] = _median(part[-third:]) - _median(part[:third])
+        drifts[k] = present_median(part[-third:]) - present_median(part[:third])
     rest = np.abs(drifts[_PARTS // 2 :])
-    usual, first = _median(rest), float(drifts[0])
+    usual, first = present_median(rest), float(drifts[0])
     most = float(np.max(rest[np.isfinite(rest)], initial=0.0))
     # Parts that do not drift at all are those of a coarse register: nothing to compare with.
     if not (usual > 0.0 and abs(first) > times * usual and abs(first) > 2.0 * most):
@@ -124,7 +124,7 @@ def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
     if size < _FEWEST_BLOCKS:
         return None
     spreads = np.array(
-        [_median(part) for part in blocks.spread[: size * _PARTS].reshape(_PARTS, size)]
+        [present_median(part) for part in blocks.spread[: size * _PARTS].reshape(_PARTS, size)]
     )
     calm = float(np.min(spreads[spreads > 0.0], initial=np.inf))
     noisy = int(np.argmax(np.nan_to_num(spreads)))
@@ -152,7 +152,7 @@ def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[t
     list of (int, int)
         First and one-past-last record of each.
     """
-    usual = _median(blocks.spread)
+    usual = present_median(blocks.spread)
     if not usual > 0.0:
         return []
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
@@ -175,10 +175,4 @@ def _means(blocks: BlockStatistics, size: int) -> Array:
     grouped = mean[: whole * size].reshape(whole, size)
     if np.isfinite(grouped).all():
         return np.median(grouped, axis=1)
-    return np.array([_median(group) for group in grouped])
-
-
-def _median(values: Array) -> float:
-    """Return the median of the values that are there; NaN where none is."""
-    present = values[np.isfinite(values)]
-    return float(np.median(present)) if len(present) else float("nan")
+    return np.array([present_median(group) for group in grouped])
