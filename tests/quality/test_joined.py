@@ -5,12 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imubench_pipeline.recordings.quality.excerpts import MOST, PIECE, Excerpts, together
 from imubench_pipeline.recordings.quality.held import held
 from imubench_pipeline.recordings.quality.joined import interleaved
 from imubench_pipeline.recordings.quality.levels import quantisation
 from imubench_pipeline.recordings.quality.register import hidden_step
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.summary import (
+    MOST,
+    PIECE,
+    ColumnSummary,
+    Excerpts,
+    together,
+)
 from tests.quality.real import Log, adis16405, findings, warnings
 
 

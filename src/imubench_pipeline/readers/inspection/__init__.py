@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.readers.contents import contents
-from imubench_pipeline.readers.inspection.block import block
-from imubench_pipeline.readers.inspection.draft import Draft
+from imubench_pipeline.readers.inspection.draft import Draft, block
 from imubench_pipeline.readers.inspection.drafting import draft
 from imubench_pipeline.readers.inspection.listing import listing
 from imubench_pipeline.readers.inspection.proof import Proof, proof

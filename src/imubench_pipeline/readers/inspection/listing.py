@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from imubench_pipeline.readers.contents import Contents
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
-from imubench_pipeline.readers.inspection.block import printable
+from imubench_pipeline.readers.inspection.draft import printable
 from imubench_pipeline.readers.inspection.names import meaning
 from imubench_pipeline.readers.stated_units import bracketed
 

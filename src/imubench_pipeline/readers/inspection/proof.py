@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.readers import LogFile, read
-from imubench_pipeline.readers.inspection.block import printable
 from imubench_pipeline.readers.inspection.clock import typical_step
-from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft
+from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, printable
 from imubench_pipeline.settings.sensor import CHANNELS, LogFormat, Sensor
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.tables.findings import RecordingError

@@ -26,8 +26,13 @@ from imubench_pipeline.readers.text.complete_lines import CompleteLines, first_l
 from imubench_pipeline.readers.text.header import completed, says_units, stated_rate, stated_start
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
 from imubench_pipeline.readers.text.records import Records
-from imubench_pipeline.readers.text.stamps import StampError, stamp_forms, stamps_of
-from imubench_pipeline.readers.text.time import TextTime, time_columns
+from imubench_pipeline.readers.text.stamps import (
+    StampError,
+    TextTime,
+    stamp_forms,
+    stamps_of,
+    time_columns,
+)
 from imubench_pipeline.tables.findings import RecordingError
 
 _BLOCK_BYTES = 1 << 20  # pyarrow reads 32 of them ahead

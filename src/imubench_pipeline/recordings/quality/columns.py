@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from imubench_pipeline.recordings.quality import copies, held, joined, levels, stationarity
-from imubench_pipeline.recordings.quality.shared_noise import shared_noise
+from imubench_pipeline.recordings.quality.copies import shared_noise
 from imubench_pipeline.recordings.quality.summary import LARGEST, ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (

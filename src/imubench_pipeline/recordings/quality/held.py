@@ -9,8 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.excerpts import PIECE, Excerpt
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.summary import PIECE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding
 
 _LONGEST = 256

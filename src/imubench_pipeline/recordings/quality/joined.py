@@ -13,9 +13,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.excerpts import PIECE, Excerpt
 from imubench_pipeline.recordings.quality.register import hidden_step
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.summary import PIECE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 

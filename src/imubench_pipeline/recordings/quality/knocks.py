@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.blocks import BlockStatistics
+from imubench_pipeline.recordings.quality.summary import BlockStatistics
 from imubench_pipeline.typing import Array
 
 _NEIGHBOURS = 16

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.blocks import present_median
 from imubench_pipeline.recordings.quality.register import hidden_step
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.summary import ColumnSummary, present_median
 from imubench_pipeline.typing import Array
 
 _SURE = 1e-9

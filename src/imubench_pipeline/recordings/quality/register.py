@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.excerpts import Excerpt
+from imubench_pipeline.recordings.quality.summary import Excerpt
 from imubench_pipeline.typing import Array
 
 _PIECES = 4

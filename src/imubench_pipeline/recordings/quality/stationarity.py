@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.recordings.quality.blocks import BlockStatistics, present_median
+from imubench_pipeline.recordings.quality.summary import BlockStatistics, present_median
 from imubench_pipeline.typing import Array
 
 _PARTS = 20
