@@ -169,11 +169,8 @@ def _corrupt(name: str, error: Exception) -> RecordingError:
 def open_bytes(path: Path) -> Bytes:
     """Open a log for reading.
 
-    Parameters
-    ----------
-    path : Path
-        A file, compressed or not, or a member of a zip archive: the path of the archive and
-        the name in it.
+    ``path``: a file, compressed or not, or a member of a zip archive: the path of the archive and
+    the name in it.
 
     Raises
     ------
@@ -401,10 +398,7 @@ BLOCK_BYTES = 1 << 20
 def blocks(path: Path, findings: list[Finding]) -> Iterator[bytes]:
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
-    Parameters
-    ----------
-    findings : list of Finding
-        What is found goes here: that compressed data end early.
+    ``findings``: what is found goes here: that compressed data end early.
 
     Raises
     ------

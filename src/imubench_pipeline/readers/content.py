@@ -40,10 +40,7 @@ def is_endless(path: Path) -> bool:
 def format_of(path: Path, stated: Reader | None = None) -> FileFormat:
     """Return the format of a file: the stated one, or what its content tells (`content_of`).
 
-    Parameters
-    ----------
-    stated : Reader or None
-        What the sensor file says.
+    ``stated``: what the sensor file says.
     """
     return content_of(path)[0] if stated is None else FILE_FORMATS[stated]
 
@@ -53,10 +50,7 @@ def content_of(path: Path) -> tuple[FileFormat, str]:
 
     Of a zip archive with several files this is the text that each of them may be.
 
-    Parameters
-    ----------
-    path : Path
-        A log file, the folder of a ROS 2 bag, or a member of a zip archive.
+    ``path``: a log file, the folder of a ROS 2 bag, or a member of a zip archive.
 
     Raises
     ------

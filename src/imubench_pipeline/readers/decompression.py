@@ -153,10 +153,7 @@ class _Zstd:
 def unpacked_zstd(data: bytes, most: int) -> bytes:
     """Return the first bytes of what is compressed in a frame of zstd.
 
-    Parameters
-    ----------
-    most : int
-        That are unpacked at most.
+    ``most``: that are unpacked at most.
 
     Raises
     ------

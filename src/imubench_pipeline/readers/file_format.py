@@ -84,10 +84,7 @@ class FileFormat:
     def tables(self, path: Path) -> list[LogTable]:
         """Return what a log holds, told from its beginning.
 
-        Parameters
-        ----------
-        path : Path
-            A file, or a member of a zip archive where the format is streamed.
+        ``path``: a file, or a member of a zip archive where the format is streamed.
 
         Raises
         ------

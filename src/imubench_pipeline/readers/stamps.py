@@ -123,12 +123,8 @@ def date_of(nanoseconds: int) -> str | None:
 def date_of_stamp(first: float, source: TimeSource) -> str | None:
     """Return ISO 8601 date and time (UTC) of a numeric stamp, as `date_of` does.
 
-    Parameters
-    ----------
-    first : float or int
-        As written, in ticks of ``source``; integer ns lose no digit.
-    source : TimeSource
-        Its unit and scale; None is returned for a count of samples.
+    ``first``: as written, in ticks of ``source``; integer ns lose no digit.
+    ``source``: its unit and scale; None is returned for a count of samples.
     """
     if source.unit not in SECONDS:
         return None

@@ -72,10 +72,7 @@ class KnownFile:
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """Return the files of a log as they were read; None where that is not known.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the recording.
+    ``folder``: of the recording.
     """
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
         return {
@@ -88,12 +85,8 @@ def read_known(folder: Path) -> dict[str, KnownFile] | None:
 def write_known(files: Mapping[str, KnownFile], folder: Path) -> None:
     """Keep the files of a log as they were read.
 
-    Parameters
-    ----------
-    files : mapping of str to KnownFile
-        By their place in the log.
-    folder : Path
-        Of the recording.
+    ``files``: by their place in the log.
+    ``folder``: of the recording.
     """
     rows = {name: asdict(file) for name, file in sorted(files.items())}
     write_sealed_json({"files": rows}, folder / KNOWN)
@@ -102,10 +95,7 @@ def write_known(files: Mapping[str, KnownFile], folder: Path) -> None:
 def read_log(source: Path) -> dict[str, KnownFile]:
     """Return the files of a log, all of which is read, by their place in it.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
+    ``source``: the log file, or the folder of a recording.
     """
     return {name: KnownFile.of(file) for name, file in _places(source).items()}
 
@@ -179,10 +169,7 @@ def glimpse(path: Path) -> str:
     The first and the last block are among them. A change that leaves the size and all 16 blocks of
     4 kB as they are is not seen, in a file above 1 MB.
 
-    Parameters
-    ----------
-    path : Path
-        A file.
+    ``path``: a file.
     """
     digest = hashlib.sha256()
     with path.open("rb", buffering=0) as file:

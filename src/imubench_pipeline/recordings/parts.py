@@ -59,12 +59,8 @@ class Part:
 def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     """Read one file of a recording, in bounded memory.
 
-    Parameters
-    ----------
-    scratch : Path
-        Folder for the scratch files.
-    number : int
-        Of the file, for their names.
+    ``scratch``: folder for the scratch files.
+    ``number``: of the file, for their names.
 
     Raises
     ------
@@ -111,12 +107,8 @@ def _used(
 ) -> slice | NDArray[np.bool_]:
     """Return which records of a batch lie in the part to use.
 
-    Parameters
-    ----------
-    before : int
-        Records before the batch.
-    rate : float or None
-        The stated one, Hz; needed where there are no stamps.
+    ``before``: records before the batch.
+    ``rate``: the stated one, Hz; needed where there are no stamps.
     """
     if use.start == 0.0 and use.end is None:
         return slice(None)

@@ -72,12 +72,8 @@ def without_stamps(rows: int, rate: float) -> TimeBase:
 def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings) -> TimeBase:
     """Find the time base of stamps.
 
-    Parameters
-    ----------
-    stamps : callable
-        Gives the stamps in s, in blocks; called several times.
-    stated : float or None
-        The rate that the sensor file states, Hz.
+    ``stamps``: gives the stamps in s, in blocks; called several times.
+    ``stated``: the rate that the sensor file states, Hz.
 
     Raises
     ------

@@ -164,10 +164,7 @@ _BUFFER = struct.Struct("<qq")
 def check_batches(path: Path, in_file: bool) -> None:
     """Raise where a compressed batch is larger than may be in memory as a whole.
 
-    Parameters
-    ----------
-    in_file : bool
-        The format is that of a file, and not that of a stream.
+    ``in_file``: the format is that of a file, and not that of a stream.
 
     Raises
     ------

@@ -179,12 +179,8 @@ def _stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
 def rows_of_block(row_bytes: int, most: int) -> int:
     """Return how many records are read at a time.
 
-    Parameters
-    ----------
-    row_bytes : int
-        Memory that one takes.
-    most : int
-        That all may take together.
+    ``row_bytes``: memory that one takes.
+    ``most``: that all may take together.
 
     Raises
     ------

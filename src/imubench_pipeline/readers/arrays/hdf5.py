@@ -52,12 +52,8 @@ def opened(path: Path) -> h5py.File:
 def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
     """Return the data sets of a file by name; links, hard ones apart, are not followed.
 
-    Parameters
-    ----------
-    time_axis : int
-        The side of a square matrix that is time.
-    passed_over : str
-        Beginning of the names in the root that are no data.
+    ``time_axis``: the side of a square matrix that is time.
+    ``passed_over``: beginning of the names in the root that are no data.
 
     Raises
     ------

@@ -68,12 +68,8 @@ class Clock:
 def clocks(table: LogTable, columns: Sequence[LogColumn], rate: float | None) -> list[Clock]:
     """Return the columns that may be the time, the likeliest first.
 
-    Parameters
-    ----------
-    columns : sequence of LogColumn
-        Those of the table that are no channel, and vectors beside it.
-    rate : float or None
-        That the file states, Hz.
+    ``columns``: those of the table that are no channel, and vectors beside it.
+    ``rate``: that the file states, Hz.
     """
     likely = []
     for place, column in enumerate(columns):

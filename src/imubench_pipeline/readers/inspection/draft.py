@@ -86,10 +86,7 @@ _Dumper.add_representer(str, _text)
 def block(draft: Draft, file: str) -> str:
     """Return a sensor file.
 
-    Parameters
-    ----------
-    file : str
-        The name of the log, for the first line.
+    ``file``: the name of the log, for the first line.
     """
     above = (("reader", draft.reader), ("rate", draft.rate), ("time", draft.time))
     inside = [(key, entry) for key, entry in above if entry is not None]

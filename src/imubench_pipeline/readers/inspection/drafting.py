@@ -27,10 +27,7 @@ _NEAR = 0.06
 def draft(contents: Contents, model: str | None = None) -> Draft:
     """Write a sensor file for what a recording holds, as far as it tells.
 
-    Parameters
-    ----------
-    model : str or None
-        What the sensor is called; None: as the log.
+    ``model``: what the sensor is called; None: as the log.
     """
     choice = chosen(contents)
     drafted = Draft(

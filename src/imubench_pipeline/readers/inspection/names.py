@@ -81,10 +81,8 @@ class Meaning:
 def meaning(label: str, context: str = "") -> Meaning | None:
     """Return what the name of a column means; None: no figure of an inertial sensor.
 
-    Parameters
-    ----------
-    context : str
-        The name of its table or file, which says the quantity where the label says an axis alone.
+    ``context``: the name of its table or file, which says the quantity where the label says an axis
+    alone.
     """
     label = label[:_LONGEST].replace("ω", "omega").replace("Ω", "omega")
     for quantity, dimension in DIMENSIONS.items():

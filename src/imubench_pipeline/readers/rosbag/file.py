@@ -231,10 +231,7 @@ def explained(path: Path) -> Iterator[None]:
 def opened(path: Path) -> Source:
     """Open a bag; its content tells which kind it is.
 
-    Parameters
-    ----------
-    path : Path
-        A file, or the folder of a ROS 2 bag.
+    ``path``: a file, or the folder of a ROS 2 bag.
 
     Raises
     ------
@@ -279,10 +276,7 @@ _RARE = 20
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each topic.
 
-    Parameters
-    ----------
-    path : Path
-        A file, or the folder of a ROS 2 bag.
+    ``path``: a file, or the folder of a ROS 2 bag.
 
     Raises
     ------

@@ -138,10 +138,7 @@ def _check_overlap(storage: McapReader) -> None:
 def check_folder(path: Path) -> None:
     """Raise if what describes a bag is too long to be that, or a packed file expands too far.
 
-    Parameters
-    ----------
-    path : Path
-        The folder of a ROS 2 bag.
+    ``path``: the folder of a ROS 2 bag.
     """
     size = (path / "metadata.yaml").stat().st_size
     if size > LARGEST_METADATA:

@@ -199,10 +199,7 @@ class CompleteLines:
 def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
     """Yield the lines of a text log from its beginning; the last one may lack its line break.
 
-    Parameters
-    ----------
-    most : int or None
-        Bytes that are read, about; None: the whole file is.
+    ``most``: bytes that are read, about; None: the whole file is.
     """
     with CompleteLines(path, [], most=most) as lines:
         while block := lines.read(_SEEN):

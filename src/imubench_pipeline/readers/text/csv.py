@@ -253,10 +253,7 @@ def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
 def text_units(layout: TextLayout, columns: Mapping[str, int]) -> dict[str, StatedUnit]:
     """Return the units that a log states of its channels.
 
-    Parameters
-    ----------
-    columns : mapping of str to int
-        Position of the column of each channel, and of what is beside them.
+    ``columns``: position of the column of each channel, and of what is beside them.
     """
     beside, _ = line_of_units(layout)
     units = {}
@@ -276,10 +273,7 @@ _NOTES = 12
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return the one table of a text log.
 
-    Parameters
-    ----------
-    path : Path
-        A file, compressed or not, or a member of a zip archive.
+    ``path``: a file, compressed or not, or a member of a zip archive.
 
     Raises
     ------

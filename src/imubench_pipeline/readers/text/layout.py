@@ -118,13 +118,9 @@ def find_layout(
 ) -> TextLayout:
     """Find how a text log is laid out.
 
-    Parameters
-    ----------
-    log : LogFormat
-        What is stated.
-    figures, times : sequence of str or int
-        The columns of figures and those of time stamps that are wanted, by name or position. Where
-        none is, the likeliest layout is found.
+    ``log``: what is stated.
+    ``figures`` and ``times``: the columns of figures and those of time stamps that are wanted, by
+    name or position. Where none is, the likeliest layout is found.
 
     Raises
     ------

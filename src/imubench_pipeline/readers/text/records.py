@@ -124,10 +124,7 @@ class Records:
 def are_apart(numbers: Sequence[int]) -> bool:
     """Return whether blank lines are between all records, and only set these apart.
 
-    Parameters
-    ----------
-    numbers : sequence of int
-        The lines of the first records.
+    ``numbers``: the lines of the first records.
     """
     return all(later > sooner + 1 for sooner, later in pairwise(numbers))
 

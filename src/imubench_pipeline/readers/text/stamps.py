@@ -212,10 +212,7 @@ def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
     A pattern with a date alone or a time of day alone is a part of one, that of a column. Where
     day and month may be either, those are right that lie nearest together.
 
-    Parameters
-    ----------
-    texts : sequence of str
-        As written; missing ones are passed over.
+    ``texts``: as written; missing ones are passed over.
     """
     stamps = [text.strip() for text in texts if not is_missing(text)]
     if not stamps or not all(_SHORTEST <= len(stamp) <= _LONGEST for stamp in stamps):

@@ -87,10 +87,7 @@ def _parts(deviation: float) -> tuple[float, float]:
     Their difference d is normal; rounded at a random place it is k steps with a chance of
     1 - |d - k|, so that with G(x) = E[(d - x)⁺] the part is G(k - 1) - 2 G(k) + G(k + 1).
 
-    Parameters
-    ----------
-    deviation : float
-        Of d, in steps.
+    ``deviation``: of d, in steps.
     """
     below, none, single, two = (_excess(x, deviation) for x in (-1.0, 0.0, 1.0, 2.0))
     equal = below - 2.0 * none + single

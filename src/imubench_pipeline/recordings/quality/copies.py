@@ -50,10 +50,7 @@ _DIGITS = ".8e"
 def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
     """Yield the channels that hold the samples of another one, perhaps in another unit.
 
-    Parameters
-    ----------
-    columns : mapping of str to ColumnSummary
-        All channels of a recording; no other columns.
+    ``columns``: all channels of a recording; no other columns.
     """
     pieces = {
         name: column.excerpts() for name, column in columns.items() if column.low < column.high
@@ -184,11 +181,8 @@ def _repeated(channel: str | None, stretches: list[Stretch], present: int, rate:
 def recorded_twice(models: Iterable[Row], biases: Iterable[Row]) -> Iterator[Row]:
     """Yield the rows of the table ``findings`` about recordings that another one holds, too.
 
-    Parameters
-    ----------
-    models, biases : iterable of mapping
-        Rows of the tables ``models`` and ``fixed_bias``, in the order of the recordings. The first
-        of several copies is taken for the log.
+    ``models`` and ``biases``: rows of the tables ``models`` and ``fixed_bias``, in the order of the
+    recordings. The first of several copies is taken for the log.
     """
     means = {_place(row): row["value"] for row in biases}
     first: dict[tuple[Any, ...], str] = {}
@@ -232,10 +226,7 @@ def shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
 
     Increments leave out what is slow, such as a temperature that all axes follow.
 
-    Parameters
-    ----------
-    columns : mapping of str to ColumnSummary
-        Usable channels of one file.
+    ``columns``: usable channels of one file.
     """
     pieces = {name: column.excerpts() for name, column in columns.items()}
     strongest: dict[str, tuple[float, str]] = {}

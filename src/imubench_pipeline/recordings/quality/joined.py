@@ -51,10 +51,7 @@ _MAD = 1.4826
 def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
     """Yield where the samples of another sensor seem to begin.
 
-    Parameters
-    ----------
-    rate : float
-        Hz.
+    ``rate``: Hz.
     """
     blocks = column.blocks()
     filled = np.flatnonzero(blocks.spread > 0.0)

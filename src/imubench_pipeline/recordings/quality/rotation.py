@@ -43,12 +43,8 @@ def gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> GravityTurn | 
     steps d between neighbours with mean m, -w × m = d is solved for w by least squares, where
     |w| = 2 tan(θ/2) and θ is the angle of a block.
 
-    Parameters
-    ----------
-    axes : sequence of BlockStatistics
-        Of x, y and z, SI, over the same records.
-    rate : float
-        Of the samples, Hz.
+    ``axes``: of x, y and z, SI, over the same records.
+    ``rate``: of the samples, Hz.
     """
     whole = np.all([blocks.count > 0.9 * blocks.size for blocks in axes], axis=0)
     means = np.column_stack([np.where(whole, blocks.mean, np.nan) for blocks in axes])

@@ -54,10 +54,7 @@ class WarmUp:
 def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     """Find sudden changes of the mean.
 
-    Parameters
-    ----------
-    sigmas : float
-        How far a step lies out of the others, in their robust standard deviations.
+    ``sigmas``: how far a step lies out of the others, in their robust standard deviations.
     """
     size = max(1, len(blocks.mean) // 400)
     means = _means(blocks, size)
@@ -87,10 +84,7 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
 def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
     """Find a beginning that drifts more than the rest.
 
-    Parameters
-    ----------
-    times : float
-        How many times the median drift of a part counts.
+    ``times``: how many times the median drift of a part counts.
     """
     size = len(blocks.mean) // _PARTS
     if size < _FEWEST_BLOCKS:
