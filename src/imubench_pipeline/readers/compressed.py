@@ -96,12 +96,7 @@ class Bytes:
 class _Deflated:
     """A deflated file in an archive; unlike the library's, it gives all that is there of a cut one.
 
-    Parameters
-    ----------
-    file : file
-        At the first byte of the data.
-    info : ZipInfo
-        Its checksum is None where it is not known.
+    ``file`` is at the first byte of the data; the checksum of ``info`` is None where not known.
     """
 
     def __init__(self, file: IO[bytes], info: zipfile.ZipInfo) -> None:

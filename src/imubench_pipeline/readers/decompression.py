@@ -22,14 +22,8 @@ class _Parts:
     Parts that hold next to nothing cost time and no bytes of the file to speak of: the libraries
     pass over them by the million before they return.
 
-    Parameters
-    ----------
-    file : file
-        At the first byte of the first part.
-    new : callable
-        Makes what decompresses one part.
-    padded : bool
-        Zeros may follow a part, and nothing else; otherwise what is no part ends the data.
+    ``new`` makes what decompresses one part. ``padded``: zeros may follow a part, and nothing else;
+    otherwise what is no part ends the data.
     """
 
     def __init__(self, file: IO[bytes], new: Callable[[], Any], padded: bool) -> None:
@@ -71,13 +65,7 @@ class _Parts:
 
 
 def _counted(parts: int, size: int) -> int:
-    """Return one part more than there were, which have so many bytes.
-
-    Raises
-    ------
-    OSError
-        If they are many that hold next to nothing.
-    """
+    """Return one part more than there were; raise if they are many that hold next to nothing."""
     if parts >= MOST_PARTS and size < LEAST_IN_PART * parts:
         raise OSError(
             f"{parts} compressed parts hold {size} bytes, expected more than {LEAST_IN_PART} a part"

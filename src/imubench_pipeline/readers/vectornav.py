@@ -194,15 +194,11 @@ def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
         yield rest
     elif rest.strip(b"\0\r\t "):
         shown = rest[:60].decode("ascii", "replace")
-        findings.append(
-            Finding(
-                "incomplete_last_record",
-                "note",
-                f"{path.name}: the last line has no line break and no right checksum; left out: "
-                f"{shown!r}",
-                1,
-            )
+        detail = (
+            f"{path.name}: the last line has no line break and no right checksum; left out: "
+            f"{shown!r}"
         )
+        findings.append(Finding("incomplete_last_record", "note", detail, 1))
 
 
 def right_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:

@@ -262,17 +262,13 @@ def _knock_findings(
         worst = max(events, key=lambda knock: knock.size)
         at = ", ".join(f"{max(knock.first, 0) / rate:.5g}" for knock in events[:5])
         more = " ..." if len(events) > 5 else ""
+        detail = (
+            f"{channel} has {len(events)} knocks, up to {worst.size:.0f} standard deviations "
+            f"(at {at}{more} s); {part.knocks[channel]} samples about them are left out"
+        )
+        begin, end = max(events[0].first, 0) / rate, events[-1].last / rate
         findings.append(
-            Finding(
-                "knocks",
-                "warning",
-                f"{channel} has {len(events)} knocks, up to {worst.size:.0f} standard deviations "
-                f"(at {at}{more} s); {part.knocks[channel]} samples about them are left out",
-                part.knocks[channel],
-                channel,
-                max(events[0].first, 0) / rate,
-                events[-1].last / rate,
-            )
+            Finding("knocks", "warning", detail, part.knocks[channel], channel, begin, end)
         )
     return findings
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.stamps import Stamps, Track, tracked, typical_interval
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
 
 _SHARED = 0.2
 """Part of the records that repeat a stamp beyond which a stamp belongs to a group of samples."""
@@ -157,75 +157,40 @@ def _grid_findings(track: Track, interval: float) -> list[Finding]:
     findings = []
     missing = track.grid - (track.rows - track.duplicates)
     if missing:
-        begin, end = (
-            point * interval for point in (track.longest_at, track.longest_at + track.longest)
+        begin = track.longest_at * interval
+        end = (track.longest_at + track.longest) * interval
+        severity: Severity = "note" if missing < 0.01 * track.grid else "warning"
+        detail = (
+            f"{missing} of {track.grid} samples are missing ({track.holes} holes, the longest "
+            f"{end - begin:.3g} s, from {begin:.5g} s on); they are left out of the clusters"
         )
-        findings.append(
-            Finding(
-                "missing_samples",
-                "note" if missing < 0.01 * track.grid else "warning",
-                f"{missing} of {track.grid} samples are missing ({track.holes} holes, the "
-                f"longest {end - begin:.3g} s, from {begin:.5g} s on); they are left out of the "
-                "clusters",
-                missing,
-                start=begin,
-                end=end,
-            )
-        )
+        findings.append(Finding("missing_samples", severity, detail, missing, start=begin, end=end))
     if len(track.starts) > 1:
-        findings.append(
-            _segments(
-                "the clock jumps or stops",
-                [point * interval for point in track.starts[1:]],
-                track.jumps[1:],
-            )
-        )
+        times = [point * interval for point in track.starts[1:]]
+        findings.append(_segments("the clock jumps or stops", times, track.jumps[1:]))
     if track.duplicates:
-        findings.append(
-            Finding(
-                "repeated_stamps",
-                "note",
-                f"{track.duplicates} records repeat a stamp or fall on an earlier one; left out",
-                track.duplicates,
-            )
-        )
+        detail = f"{track.duplicates} records repeat a stamp or fall on an earlier one; left out"
+        findings.append(Finding("repeated_stamps", "note", detail, track.duplicates))
     if track.unstamped:
-        findings.append(
-            Finding(
-                "missing_stamps",
-                "warning",
-                f"{track.unstamped} records have no time stamp, or one far astray; taken as "
-                "consecutive",
-                track.unstamped,
-            )
-        )
+        detail = f"{track.unstamped} records have no time stamp, or one far astray; taken as "
+        detail += "consecutive"
+        findings.append(Finding("missing_stamps", "warning", detail, track.unstamped))
     return findings
 
 
 def _segments(what: str, times: list[float], jumps: list[float]) -> Finding:
     """Return the finding of pauses, with the place of the longest one.
 
-    Parameters
-    ----------
-    what : str
-        What the clock does.
-    times : list of float
-        s of samples before each.
-    jumps : list of float
-        Step of the stamps at each, s; below 0: backwards.
+    ``times``: s of samples before each; ``jumps``: step of the stamps, s, below 0 backwards.
     """
-    longest = max(range(len(jumps)), key=lambda k: abs(jumps[k]))
-    jump, at = jumps[longest], times[longest]
+    jump, at = max(zip(jumps, times, strict=True), key=lambda place: abs(place[0]))
     direction = "backwards" if jump < 0 else "forward"
-    return Finding(
-        "segments",
-        "warning",
+    segments = len(jumps) + 1
+    detail = (
         f"{what} {len(jumps)} times, by up to {abs(jump):.5g} s {direction}, after {at:.5g} s of "
-        f"samples; the recording is analysed as {len(jumps) + 1} segments",
-        len(jumps) + 1,
-        start=at,
-        end=at,
+        f"samples; the recording is analysed as {segments} segments"
     )
+    return Finding("segments", "warning", detail, segments, start=at, end=at)
 
 
 def _rate_findings(rate: float, stated: float | None, settings: QualitySettings) -> list[Finding]:
@@ -237,15 +202,11 @@ def _rate_findings(rate: float, stated: float | None, settings: QualitySettings)
             f"the stamps say {rate:.6g} Hz, stated are {stated:.6g} Hz: 'unit' of "
             "'time' is probably another one of s, ms, us, ns"
         )
-    return [
-        Finding(
-            "rate_contradicts_stamps",
-            "warning",
-            f"stated are {stated:.6g} Hz, in the sensor file or in the log itself; the stamps say "
-            f"{rate:.6g} Hz, which is used; mend 'rate', or drop it",
-            rate,
-        )
-    ]
+    detail = (
+        f"stated are {stated:.6g} Hz, in the sensor file or in the log itself; the stamps say "
+        f"{rate:.6g} Hz, which is used; mend 'rate', or drop it"
+    )
+    return [Finding("rate_contradicts_stamps", "warning", detail, rate)]
 
 
 def _drift_findings(track: Track, settings: QualitySettings) -> list[Finding]:
@@ -261,15 +222,11 @@ def _drift_findings(track: Track, settings: QualitySettings) -> list[Finding]:
     drift = late / early - 1.0
     if abs(drift) < settings.rate_drift:
         return []
-    return [
-        Finding(
-            "rate_drifts",
-            "warning",
-            f"the interval between samples is {1e6 * drift:+.0f} ppm longer in the second half of "
-            "the recording: the clock of the sensor or of the host drifts; one rate is used",
-            drift,
-        )
-    ]
+    detail = (
+        f"the interval between samples is {1e6 * drift:+.0f} ppm longer in the second half of "
+        "the recording: the clock of the sensor or of the host drifts; one rate is used"
+    )
+    return [Finding("rate_drifts", "warning", detail, drift)]
 
 
 def _arrival_order(
@@ -309,18 +266,15 @@ def _arrival_order(
     if elapsed <= 0:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     rate = samples / elapsed
+    worst_time = worst_at / rate
+    detail = (
+        f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
+        f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at "
+        f"{worst_time:.5g} s); the samples are taken as consecutive at the mean rate of "
+        f"{rate:.6g} Hz, so lost samples cannot be seen"
+    )
     findings = [
-        Finding(
-            "jittered_stamps",
-            "warning",
-            f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
-            f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at "
-            f"{worst_at / rate:.5g} s); the samples are taken as consecutive at the mean rate of "
-            f"{rate:.6g} Hz, so lost samples cannot be seen",
-            worst,
-            start=worst_at / rate,
-            end=worst_at / rate,
-        ),
+        Finding("jittered_stamps", "warning", detail, worst, start=worst_time, end=worst_time),
         *_rate_findings(rate, stated, settings),
     ]
     segments = tuple(zip(starts, [*starts[1:], rows], strict=True))

@@ -155,20 +155,7 @@ def _variables_of_5(path: Path) -> Iterator[Table]:
 class _Elements:
     """Reads the elements of a variable one after another.
 
-    Attributes
-    ----------
-    at : int
-        Bytes from the beginning of the stream.
-    end : int
-        Where the element that is being read ends.
-    order : str
-        Of the bytes, as in `struct`.
-    kind : int
-        Type of the last element.
-    opened : callable
-        Opens the stream afresh.
-    checked : bool
-        It has a checksum at its end.
+    ``opened`` opens the stream afresh; ``checked``: it has a checksum at its end.
     """
 
     def __init__(
@@ -180,13 +167,9 @@ class _Elements:
         opened: Callable[[], IO[bytes]],
         checked: bool,
     ) -> None:
-        self.order = order
-        self.at = at
-        self.end = end
-        self.opened = opened
-        self.checked = checked
-        self.kind = 0
-        self._stream = stream
+        self.order, self.opened, self.checked, self._stream = order, opened, checked, stream
+        self.at, self.end = at, end  # bytes from the beginning; the end is that of the element
+        self.kind = 0  # of the last element
 
     def tag(self, *kinds: int) -> int:
         """Read type and size of the next element, and return its size.

@@ -185,15 +185,11 @@ class CompleteLines:
             self._findings.append(ended_early(self._path))
         if self.rest.strip(b"\0\r\n\t "):
             shown = self.rest[:60].decode("utf-8", "replace")
-            self._findings.append(
-                Finding(
-                    "incomplete_last_record",
-                    "note",
-                    f"{self._path.name}: the last record has no line break and may be cut short; "
-                    f"left out: {shown!r}",
-                    1,
-                )
+            detail = (
+                f"{self._path.name}: the last record has no line break and may be cut short; left "
+                f"out: {shown!r}"
             )
+            self._findings.append(Finding("incomplete_last_record", "note", detail, 1))
 
 
 def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:

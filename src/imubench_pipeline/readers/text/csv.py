@@ -205,18 +205,11 @@ class CsvFile(LogFile):
 
 
 class _WrongWidth:
-    """The first record with too many or too few columns: no fault where it is the last one.
-
-    Attributes
-    ----------
-    row : InvalidRow or None
-    record : int
-        Its number among the records without lines of spaces, counted from 1.
-    """
+    """The first record with too many or too few columns: no fault where it is the last one."""
 
     def __init__(self) -> None:
         self.row: pacsv.InvalidRow | None = None
-        self.record = 0
+        self.record = 0  # its number without lines of spaces, from 1
         self._blank = 0
 
     def keep(self, row: pacsv.InvalidRow) -> str:
