@@ -85,11 +85,8 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     for name, source in sources.items():
         file = _file_of(path, present, source, name)
         together.setdefault((file, _clock(file, log, source)), {})[name] = source
-    return [_open(file, log, columns) for (file, _), columns in sorted(together.items(), key=_key)]
-
-
-def _key(item: tuple[tuple[Path, str], object]) -> tuple[Path, str]:
-    return item[0]
+    in_order = sorted(together.items(), key=lambda item: item[0])
+    return [_open(file, log, columns) for (file, _), columns in in_order]
 
 
 def _clock(file: Path, log: LogFormat, source: ColumnSource) -> str:

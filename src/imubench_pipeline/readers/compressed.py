@@ -38,19 +38,11 @@ _UNKNOWN_SIZE = 1 << 62
 
 
 class Bytes:
-    """The bytes of a log as it was before it was compressed.
-
-    Attributes
-    ----------
-    name : str
-        The log's name, for messages.
-    ended_early : bool
-        The compressed data stop before their end.
-    """
+    """The bytes of a log as it was before it was compressed; ``name``: of the log, for messages."""
 
     def __init__(self, name: str, stream: Any, size: int, under: tuple[Any, ...] = ()) -> None:
         self.name = name
-        self.ended_early = False
+        self.ended_early = False  # whether the compressed data stop before their end
         self._stream = stream
         self._streams = (stream, *under)
         self._left = max(UNSUSPICIOUS, LARGEST_RATIO * size)

@@ -47,13 +47,8 @@ class Frames:
     NMEA and RTCM between them are passed over. After a damaged message the next one is looked
     for right behind its first bytes, since its length may be what is damaged.
 
-    Attributes
-    ----------
-    right, wrong, cut : Counter of bytes
-        By class and id: messages, those with a wrong checksum, and those that reach beyond
-        the end of the log.
-    read : int
-        Bytes read so far.
+    ``right``, ``wrong`` and ``cut`` count, by class and id, messages, those with a wrong checksum,
+    and those that reach beyond the end of the log; ``read``: bytes read so far.
     """
 
     def __init__(self, path: Path, findings: list[Finding]) -> None:
@@ -298,15 +293,7 @@ def _types_of(columns: list[str]) -> str:
 class Words:
     """The measurements of the messages read so far that are not yet in a batch.
 
-    Parameters
-    ----------
-    kind : bytes
-        Class and id of the messages.
-
-    Attributes
-    ----------
-    seen : ndarray of int64
-        How often each data type was there.
+    ``kind``: class and id of the messages; ``seen``: how often each data type was there.
     """
 
     def __init__(self, kind: bytes, columns: list[str]) -> None:

@@ -1,25 +1,11 @@
 """VectorNav ASCII output: asynchronous sentences such as ``$VNYMR,...*68``.
 
-Columns are named as here, with or without the name of the sentence: ``gyro_x`` or
+Columns are named as in `FIELDS`, with or without the name of the sentence: ``gyro_x`` or
 ``VNYMR.gyro_x``. The name is needed only in a log that holds several sentences with that column.
 
-========  ======================================================================
-Sentence  Fields, in their order
-========  ======================================================================
-VNYMR     yaw pitch roll, mag_x..z, accel_x..z, gyro_x..z
-VNQMR     quat_x quat_y quat_z quat_w, mag_x..z, accel_x..z, gyro_x..z
-VNMAR     mag_x..z, accel_x..z, gyro_x..z
-VNIMU     mag_x..z, accel_x..z, gyro_x..z, temperature, pressure
-VNCMV     mag_x..z, accel_x..z, gyro_x..z, temperature
-VNACC     accel_x..z
-VNGYR     gyro_x..z
-VNYBA     yaw pitch roll, linear_accel_x..z (without gravity), gyro_x..z
-VNYIA     yaw pitch roll, inertial_accel_x..z (in the frame of the Earth), gyro_x..z
-========  ======================================================================
-
 gyro is in rad/s, accel in m/s^2, temperature in degC as the device writes it. Time columns:
-``host_time``, what a logging host wrote before the ``$``; ``counter``, the figure after ``T``
-that the device appends on request (SerialCount).
+``host_time``, what a logging host wrote before the ``$``; ``counter``, the figure after ``T`` that
+the device appends on request (SerialCount).
 
 VNISL and VNISE are estimates of a filter, not measurements, and VNDTV holds increments: they are
 passed over.
@@ -75,8 +61,8 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "VNCMV": (*_MEASURED, "temperature"),
     "VNACC": _axes("accel"),
     "VNGYR": _axes("gyro"),
-    "VNYBA": (*_ATTITUDE, *_axes("linear_accel", "gyro")),
-    "VNYIA": (*_ATTITUDE, *_axes("inertial_accel", "gyro")),
+    "VNYBA": (*_ATTITUDE, *_axes("linear_accel", "gyro")),  # without gravity
+    "VNYIA": (*_ATTITUDE, *_axes("inertial_accel", "gyro")),  # in the frame of the Earth
 }
 """The fields of each sentence that holds angular rate or acceleration."""
 

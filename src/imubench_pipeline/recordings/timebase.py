@@ -266,17 +266,8 @@ def _arrival_order(
     if elapsed <= 0:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     rate = samples / elapsed
-    worst_time = worst_at / rate
-    detail = (
-        f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
-        f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at "
-        f"{worst_time:.5g} s); the samples are taken as consecutive at the mean rate of "
-        f"{rate:.6g} Hz, so lost samples cannot be seen"
-    )
-    findings = [
-        Finding("jittered_stamps", "warning", detail, worst, start=worst_time, end=worst_time),
-        *_rate_findings(rate, stated, settings),
-    ]
+    findings = [_jittered(track, rate, worst, worst_at / rate)]
+    findings += _rate_findings(rate, stated, settings)
     segments = tuple(zip(starts, [*starts[1:], rows], strict=True))
     if len(segments) > 1:
         times = [start / rate for start in starts[1:]]
@@ -292,6 +283,17 @@ def _arrival_order(
         tuple(findings),
         rate_error=rate * worst / elapsed,
     )
+
+
+def _jittered(track: Track, rate: float, worst: float, at: float) -> Finding:
+    """Return the finding of stamps that lie on no grid; ``worst``: the longest interval, s."""
+    detail = (
+        f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
+        f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at {at:.5g} s); the "
+        f"samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost samples "
+        "cannot be seen"
+    )
+    return Finding("jittered_stamps", "warning", detail, worst, start=at, end=at)
 
 
 def _span(stamps: Stamps) -> float:

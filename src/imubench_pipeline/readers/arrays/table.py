@@ -56,27 +56,18 @@ class Column:
 
 
 class Table(ABC):
-    """Columns of equal length that a file keeps under one name.
-
-    Attributes
-    ----------
-    name : str
-        Empty where the file holds one table, without a name.
-    rows : int or None
-        Records; None where only reading tells.
-    width : int
-        Columns.
-    labels : sequence of str
-        Names of the columns; empty where they have none.
-    fault : str or None
-        Why it cannot be used at all, as the end of a sentence.
-    """
+    """Columns of equal length that a file keeps under one name."""
 
     name: str = ""
+    """Empty where the file holds one table, without a name."""
     rows: int | None = None
+    """Records; None where only reading tells."""
     width: int = 0
+    """Columns."""
     labels: Sequence[str] = ()
+    """Names of the columns; empty where they have none."""
     fault: str | None = None
+    """Why it cannot be used at all, as the end of a sentence."""
 
     @property
     def shown(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -151,6 +152,4 @@ def _shown_vectors(files: list[_First], unfilled: list[str]) -> list[str]:
 
 def _list(keys: list[str]) -> str:
     """Return some keys, those of the axes of one quantity as one."""
-    short = dict.fromkeys(key.replace("_x.", "_*.").replace("_y.", "_*.").replace("_z.", "_*.")
-                          for key in keys)  # fmt: skip
-    return ", ".join(short)
+    return ", ".join(dict.fromkeys(re.sub(r"_[xyz]\.", "_*.", key) for key in keys))

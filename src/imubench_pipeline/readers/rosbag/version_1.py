@@ -32,10 +32,7 @@ _TIME = struct.Struct("<II")
 class Bag:
     """A ROS 1 bag.
 
-    Attributes
-    ----------
-    unclosed : bool
-        The bag was not closed, or is cut short; known after the last message.
+    ``unclosed``: it was not closed, or is cut short; known after the last message.
     """
 
     ros_1 = True

@@ -88,13 +88,6 @@ class CompleteLines:
         Makes of complete lines what is read.
     most : int or None
         Bytes of the text after which no more is read; None: the whole file is.
-
-    Attributes
-    ----------
-    rest : bytes
-        What follows the last complete line.
-    error : RecordingError or None
-        Kept as well as raised: a parser between us and the caller may wrap the exception.
     """
 
     closed = False
@@ -113,7 +106,8 @@ class CompleteLines:
         self._ready = b""
         self._ended = False
         self._left = most
-        self.rest = b""
+        self.rest = b""  # what follows the last complete line
+        # Kept as well as raised: a parser between us and the caller may wrap the exception.
         self.error: RecordingError | None = None
         self._text = _Text(path, skipped)
 

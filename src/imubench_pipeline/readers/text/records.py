@@ -38,13 +38,6 @@ class Records:
         Columns are divided by runs of spaces or tabs, which become one space.
     blank_is_missing : bool
         A blank line between two records is one whose only cell is empty.
-
-    Attributes
-    ----------
-    restarts : int
-        How often the header stood among the records.
-    cut : int
-        Records cut short, in the line of which the log begins again.
     """
 
     def __init__(
@@ -70,8 +63,8 @@ class Records:
         self._runs = runs
         self._blank_is_missing = blank_is_missing
         self._blank = 0
-        self.restarts = 0
-        self.cut = 0
+        self.restarts = 0  # how often the header stood among the records
+        self.cut = 0  # records cut short, in the line of which the log begins again
 
     def __call__(self, lines: bytes) -> bytes:
         """Return the records of complete lines."""

@@ -75,17 +75,13 @@ class TextStamps:
     ----------
     form : str
         ``iso8601`` or a pattern as for ``strptime``.
-
-    Attributes
-    ----------
-    dated : bool
-        Whether the stamps have a date; else they start again at midnight.
     """
 
     def __init__(self, form: str) -> None:
         pattern = _ISO_PATTERN if form == "iso8601" else _expression(form)
         self._expression = rf"^\s*{pattern}\s*$"
         self._fields = re.compile(self._expression).groupindex
+        # Without a date, stamps start again at midnight.
         self.dated = "d" in self._fields or "j" in self._fields
         self._zoned: bool | None = None
 
@@ -251,19 +247,8 @@ _WHOLE = re.compile(r"-?\d{1,19}")
 class TextTime:
     """Makes seconds of the stamps of a text log.
 
-    Parameters
-    ----------
-    file : LogFile
-        Gets ``started`` with the first stamp.
-
-    Attributes
-    ----------
-    types : dict of int to DataType
-        What pyarrow is to read, by position; a date in a column of its own first.
-    position : int
-        That of the stamps.
-    expected : str
-        What a stamp is, for messages.
+    ``types`` says what pyarrow is to read, by position, a date in a column of its own first;
+    ``position`` is that of the stamps, and ``expected`` what a stamp is, for messages.
     """
 
     def __init__(self, file: LogFile, layout: TextLayout) -> None:

@@ -209,6 +209,16 @@ def _start() -> Array:
     return state
 
 
+class _Count:
+    """A count in the state of a column."""
+
+    def __init__(self, place: int) -> None:
+        self._place = place
+
+    def __get__(self, column: ColumnSummary, _: type) -> int:
+        return int(column._state[self._place])
+
+
 @dataclass
 class ColumnSummary:
     """A column as it streams past; NaN is a missing sample."""
@@ -217,6 +227,25 @@ class ColumnSummary:
     _blocks: Gathering = field(default_factory=Gathering)
     _excerpts: Excerpts = field(default_factory=Excerpts)
     repeated: Repeats = field(default_factory=Repeats)
+
+    present = _Count(_PRESENT)
+    """Samples that are finite numbers."""
+    missing = _Count(_MISSING)
+    """Records without a number."""
+    not_finite = _Count(_INFINITE)
+    """Infinities, and figures beyond `LARGEST`."""
+    repeats = _Count(_REPEATS)
+    """Samples that equal the one before."""
+    pairs = _Count(_PAIRS)
+    """Neighbours that were compared: in all pieces in which any are equal."""
+    far_pairs = _Count(_FAR_PAIRS)
+    """Samples that were compared with that `FAR` before, where neighbours were."""
+    far_repeats = _Count(_FAR_REPEATS)
+    """Samples among them that equal that."""
+    steps = _Count(_CHANGES)
+    """Neighbours that differ, as far as they were compared since the smallest step."""
+    single_steps = _Count(_SINGLE)
+    """Neighbours among them that differ by the smallest step."""
 
     def add(self, values: Array) -> Array:
         """Count a piece of the column and return it with what is not finite made missing."""
@@ -228,21 +257,6 @@ class ColumnSummary:
         self._excerpts.add(finite)
         self.repeated.add(finite)
         return finite
-
-    @property
-    def present(self) -> int:
-        """Samples that are finite numbers."""
-        return int(self._state[_PRESENT])
-
-    @property
-    def missing(self) -> int:
-        """Records without a number."""
-        return int(self._state[_MISSING])
-
-    @property
-    def not_finite(self) -> int:
-        """Infinities, and figures beyond `LARGEST`."""
-        return int(self._state[_INFINITE])
 
     @property
     def longest_gap(self) -> tuple[int, int]:
@@ -268,36 +282,6 @@ class ColumnSummary:
     def longest_run(self) -> tuple[int, int]:
         """Length of the longest run of one value, and the record one past its end."""
         return int(self._state[_LONGEST]), int(self._state[_LONGEST_END])
-
-    @property
-    def repeats(self) -> int:
-        """Samples that equal the one before."""
-        return int(self._state[_REPEATS])
-
-    @property
-    def pairs(self) -> int:
-        """Neighbours that were compared: in all pieces in which any are equal."""
-        return int(self._state[_PAIRS])
-
-    @property
-    def far_pairs(self) -> int:
-        """Samples that were compared with that `FAR` before, where neighbours were."""
-        return int(self._state[_FAR_PAIRS])
-
-    @property
-    def far_repeats(self) -> int:
-        """Samples among them that equal that."""
-        return int(self._state[_FAR_REPEATS])
-
-    @property
-    def steps(self) -> int:
-        """Neighbours that differ, as far as they were compared since the smallest step."""
-        return int(self._state[_CHANGES])
-
-    @property
-    def single_steps(self) -> int:
-        """Neighbours among them that differ by the smallest step."""
-        return int(self._state[_SINGLE])
 
     @property
     def step(self) -> float:
