@@ -32,7 +32,7 @@ class _Parts:
         self._padded = padded
         self._part = new()
         self._parts = 1
-        self._held = 0
+        self._size = 0
 
     def read1(self, size: int) -> bytes:
         while True:
@@ -47,7 +47,7 @@ class _Parts:
                 if not packed:
                     return b""
                 self._part = self._new()
-                self._parts = _counted(self._parts, self._held)
+                self._parts = _counted(self._parts, self._size)
             try:
                 block: bytes = self._part.decompress(packed, size)
             except (OSError, lzma.LZMAError, EOFError):
@@ -55,7 +55,7 @@ class _Parts:
                     return b""
                 raise
             if block:
-                self._held += len(block)
+                self._size += len(block)
                 return block
             if not packed and not self._part.eof:
                 raise EOFError
@@ -110,7 +110,7 @@ class _Zstd:
         self._fed = b""
         self._ready = memoryview(b"")
         self._frames = 0
-        self._held = 0
+        self._size = 0
 
     def read1(self, size: int) -> bytes:
         while not self._ready:
@@ -121,12 +121,12 @@ class _Zstd:
                 return b""
             if self._frame is None:
                 self._frame = self._new()
-                self._frames = _counted(self._frames, self._held)
+                self._frames = _counted(self._frames, self._size)
             try:
                 self._ready = memoryview(self._frame.decompress(self._fed))
             except self._error as error:
                 raise OSError(str(error)) from None
-            self._held += len(self._ready)
+            self._size += len(self._ready)
             self._fed = b""
             if self._frame.eof:
                 self._fed, self._frame = self._frame.unused_data, None

@@ -231,9 +231,9 @@ class UbxFile(LogFile):
         for number, (key, payload) in enumerate(frames):
             if key in words:
                 words[key].add(payload)
-            if number % 1000 == 0 and self._told(frames, words):
+            if number % 1000 == 0 and self._is_clear(frames, words):
                 break
-        self._told(frames, words)
+        self._is_clear(frames, words)
         present = [key for key in KINDS if words[key].present]
         if len(present) == 1:
             return present[0]
@@ -255,7 +255,7 @@ class UbxFile(LogFile):
             "mend 'column' in the sensor file"
         )
 
-    def _told(self, frames: Frames, words: dict[bytes, Words]) -> bool:
+    def _is_clear(self, frames: Frames, words: dict[bytes, Words]) -> bool:
         """Tell whether the log so far says where the columns are."""
         for of_kind in words.values():
             of_kind.drained()
@@ -305,11 +305,11 @@ class Words:
         self._parts: list[bytes] = []
         self._counts: list[int] = []
         self._tags: list[int] = []
-        self._held = 0
+        self._waiting = 0
         self.seen = np.zeros(256, np.int64)
 
     def __len__(self) -> int:
-        return self._held
+        return self._waiting
 
     @property
     def present(self) -> bool:
@@ -333,7 +333,7 @@ class Words:
             self._parts.append(payload[8 : 8 + 4 * max(count, 0)])
             self._counts.append(max(count, 0))
             self._tags.append(int.from_bytes(payload[:4], "little"))
-        self._held += max(count, 0)
+        self._waiting += max(count, 0)
 
     def drained(
         self,
@@ -346,7 +346,7 @@ class Words:
         else:
             words, tags = written, np.repeat(np.array(self._tags, np.int64), self._counts)
             types = words >> 24 & 0x3F
-        self._parts, self._counts, self._tags, self._held = [], [], [], 0
+        self._parts, self._counts, self._tags, self._waiting = [], [], [], 0
         self.seen += np.bincount(types, minlength=256)
         columns = self._place[types]
         wanted = np.flatnonzero(columns >= 0)
@@ -387,7 +387,7 @@ class _Clock:
         if not len(tags) or self._time is None:
             return tags
         if self._wraps is None:
-            self._wraps = _found_wrap(tags, self._state.last)
+            self._wraps = _wrap_of(tags, self._state.last)
         stamps = unwrapped(tags, self._wraps or _NEVER, self._state) * self._tick
         if self.first is None:
             self.first = stamps[0]
@@ -402,7 +402,7 @@ class _Clock:
         return stamps
 
 
-def _found_wrap(tags: NDArray[np.int64], last: int | None) -> float | None:
+def _wrap_of(tags: NDArray[np.int64], last: int | None) -> float | None:
     """Return where tags start again from 0; None where they do not, or it cannot be told."""
     if tags.max() >= 1 << 24:
         return 2.0**32

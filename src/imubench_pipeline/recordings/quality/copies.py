@@ -130,7 +130,7 @@ def repeated_stretches(
     rate : float
         Hz.
     """
-    stretches_of = {name: _told(column, steps[name]) for name, column in columns.items()}
+    stretches_of = {name: _significant(column, steps[name]) for name, column in columns.items()}
     lags = {name: {s.lag for s in stretches} for name, stretches in stretches_of.items()}
     channels = Counter(chain.from_iterable(lags.values()))
     # In most channels at once: the records themselves are there twice. A coarse channel may be
@@ -151,7 +151,7 @@ def repeated_stretches(
             yield _repeated(name, alone, columns[name].present, rate)
 
 
-def _told(column: ColumnSummary, steps: levels.Quantisation | None) -> list[Stretch]:
+def _significant(column: ColumnSummary, steps: levels.Quantisation | None) -> list[Stretch]:
     """Return the stretches that are no accident."""
     few = steps is not None and steps.levels < _FEW_LEVELS
     fewest = _LOW_ENTROPY if few else WINDOW

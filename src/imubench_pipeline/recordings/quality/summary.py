@@ -134,30 +134,30 @@ class Excerpts:
     """
 
     _stride: int = 1
-    _taken: int = 0
-    _kept: list[Array] = field(default_factory=list)
+    _reached: int = 0
+    _pieces: list[Array] = field(default_factory=list)
     _open: list[Array] = field(default_factory=list)
 
     def add(self, values: Array) -> None:
         """Take the next records of the column."""
         start = 0
         while start < len(values):
-            number, inside = divmod(self._taken, PIECE)
+            number, inside = divmod(self._reached, PIECE)
             stop = min(len(values), start + PIECE - inside)
             if number % self._stride == 0:
                 self._open.append(values[start:stop].copy())
-            self._taken += stop - start
+            self._reached += stop - start
             start = stop
-            if self._taken % PIECE == 0 and self._open:
-                self._kept.append(np.concatenate(self._open))
+            if self._reached % PIECE == 0 and self._open:
+                self._pieces.append(np.concatenate(self._open))
                 self._open = []
-                if len(self._kept) == MOST:
-                    self._kept = self._kept[::2]
+                if len(self._pieces) == MOST:
+                    self._pieces = self._pieces[::2]
                     self._stride *= 2
 
     def pieces(self) -> list[Excerpt]:
         """Return the pieces in order; the last one as far as it goes."""
-        pieces = [*self._kept, np.concatenate(self._open)] if self._open else self._kept
+        pieces = [*self._pieces, np.concatenate(self._open)] if self._open else self._pieces
         return [Excerpt(k * self._stride * PIECE, values) for k, values in enumerate(pieces)]
 
 
