@@ -59,7 +59,7 @@ import pyarrow.csv
 import pyarrow.parquet
 from scipy.stats import beta
 
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.tables import read
 from silent_cases import CASES, CLEAN, FILTERED, NOTHING, Log, Truth

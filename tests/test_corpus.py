@@ -15,8 +15,8 @@ import pytest
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.recordings.ingest import ingest_as_planned
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
-from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.recordings.recording import channel_logs, log_paths
 from imubench_pipeline.run.plan import Plan
 from tests.conftest import few

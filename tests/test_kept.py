@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.recordings.ingest import ingest
-from imubench_pipeline.recordings.kept import kept_logs, kept_static_logs
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality, kept_logs, kept_static_logs
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes

@@ -10,7 +10,7 @@ import pyarrow as pa
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recordings.quality_file import Quality, identified
+from imubench_pipeline.recordings.kept import Quality, identified
 from imubench_pipeline.recordings.recording import LogWriter, log_paths
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.steps.earth_rotation import earth_rate_tables

@@ -27,7 +27,7 @@ from typing import Any
 import yaml
 
 from imubench_pipeline.readers.bounded import limit_memory
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.report.publish import _keys
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.run.nightly.lock import _holder, read_note

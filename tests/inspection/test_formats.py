@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.readers.inspection import inspect
-from imubench_pipeline.readers.vectornav.sentences import FIELDS
+from imubench_pipeline.readers.vectornav import FIELDS
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor
 from imubench_pipeline.settings.validation import parse
 from tests.inspection.drafts import (

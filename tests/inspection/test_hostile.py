@@ -104,7 +104,7 @@ def test_hostile_names(tmp_path: Path) -> None:
 @examples(150)
 def test_any_name(name: str) -> None:
     from imubench_pipeline.readers.inspection.names import meaning
-    from imubench_pipeline.readers.spellings import divided
+    from imubench_pipeline.readers.stated_units import divided
 
     meaning(name)
     for dimension in ("time", "angular_rate", "acceleration", "temperature"):

@@ -11,7 +11,7 @@ from imubench_pipeline.readers.inspection.names import (
     WITHOUT_GRAVITY,
     meaning,
 )
-from imubench_pipeline.readers.spellings import unit_of
+from imubench_pipeline.readers.stated_units import unit_of
 from imubench_pipeline.units import UnitError, conversion
 
 MEANT = {

@@ -5,12 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imubench_pipeline.recordings.quality.excerpts import MOST, PIECE, Excerpts, together
-from imubench_pipeline.recordings.quality.held import held
+from imubench_pipeline.recordings.quality.held import regular_repeats
 from imubench_pipeline.recordings.quality.joined import interleaved
 from imubench_pipeline.recordings.quality.levels import quantisation
 from imubench_pipeline.recordings.quality.register import hidden_step
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.summary import (
+    MOST,
+    PIECE,
+    ColumnSummary,
+    Excerpts,
+    together,
+)
 from tests.quality.real import Log, adis16405, findings, warnings
 
 
@@ -110,9 +115,9 @@ def test_samples_of_a_real_log_that_are_held_in_turn(shared: Path, every: int) -
 def test_no_sample_is_held_by_chance(rng: np.random.Generator, step: float) -> None:
     log = rng.standard_normal(50_000)
     log = np.round(log / step) if step else log
-    assert held(pieces(log)) is None
+    assert regular_repeats(pieces(log)) is None
     line = np.sin(2 * np.pi * np.arange(len(log)) / 10.0)
-    assert held(pieces(np.round((log + line) / (step or 1.0)))) is None
+    assert regular_repeats(pieces(np.round((log + line) / (step or 1.0)))) is None
 
 
 def pieces(log: np.ndarray):

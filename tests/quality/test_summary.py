@@ -4,9 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from imubench_pipeline.recordings.quality import blocks as of_blocks
-from imubench_pipeline.recordings.quality.blocks import FIRST_SIZE
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality import summary
+from imubench_pipeline.recordings.quality.summary import FIRST_SIZE, ColumnSummary
 
 VALUES = st.sampled_from([-1.0, 0.0, 0.5, 2.0, np.nan, np.inf, -np.inf, 1e300, -1e76])
 
@@ -46,7 +45,7 @@ def test_blocks_are_those_of_the_records(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch, many: int, size: int
 ) -> None:
     """However many there are: then blocks are made of several."""
-    monkeypatch.setattr(of_blocks, "_MANY", many)
+    monkeypatch.setattr(summary, "_MANY", many)
     log = 9.81 + 1e-6 * rng.standard_normal(10 * FIRST_SIZE + 17)
     log[rng.random(len(log)) < 0.2] = np.nan
     log[3 * FIRST_SIZE : 4 * FIRST_SIZE] = np.nan

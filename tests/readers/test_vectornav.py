@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.vectornav.file import VectorNavFile
-from imubench_pipeline.readers.vectornav.sentences import FIELDS, right_checksums
+from imubench_pipeline.readers.vectornav import FIELDS, VectorNavFile, right_checksums
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.damage import Damage, damaged, damages, examples
 

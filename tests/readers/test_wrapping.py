@@ -3,8 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.readers.started import date_of
-from imubench_pipeline.readers.wrapping import WrapState, unwrapped
+from imubench_pipeline.readers.stamps import WrapState, date_of, unwrapped
 
 
 @given(

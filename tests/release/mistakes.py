@@ -27,7 +27,7 @@ import pyarrow.csv
 import yaml
 
 from imubench_pipeline.recordings.fitness import left_out
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.tables import read
 

@@ -19,8 +19,8 @@ import numpy as np
 from imubench_pipeline.datasheets.comparable import bias_comparables
 from imubench_pipeline.datasheets.suspicion import NEAR_PRINTED, printed_figures
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.rotation import GravityTurn
-from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import conversion, from_si, to_si

@@ -8,13 +8,7 @@ from pathlib import Path
 
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.bounds import MOST_LOOKED_INTO
-from imubench_pipeline.readers.compressed import (
-    holds_text,
-    is_archive,
-    is_member,
-    members,
-    visible,
-)
+from imubench_pipeline.readers.compressed import holds_text, is_archive, is_member, members, visible
 from imubench_pipeline.readers.content import format_of, format_of_folder, is_endless
 from imubench_pipeline.settings.sensor import (
     POSITION,
@@ -91,11 +85,8 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     for name, source in sources.items():
         file = _file_of(path, present, source, name)
         together.setdefault((file, _clock(file, log, source)), {})[name] = source
-    return [_open(file, log, columns) for (file, _), columns in sorted(together.items(), key=_key)]
-
-
-def _key(item: tuple[tuple[Path, str], object]) -> tuple[Path, str]:
-    return item[0]
+    in_order = sorted(together.items(), key=lambda item: item[0])
+    return [_open(file, log, columns) for (file, _), columns in in_order]
 
 
 def _clock(file: Path, log: LogFormat, source: ColumnSource) -> str:

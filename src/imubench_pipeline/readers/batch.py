@@ -22,7 +22,7 @@ from imubench_pipeline.settings.sensor import (
     LogFormat,
     quantity_of,
 )
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, Severity
 from imubench_pipeline.units import conversion
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -30,30 +30,19 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 def stated_in(key: str) -> str:
-    """Return where it is to be mended from which column a channel, or what is beside, is read.
-
-    Parameters
-    ----------
-    key : str
-    """
+    """Return where it is to be mended from which column a channel, or what is beside, is read."""
     notes = "the notes beside the log or " if key == POSITION else ""
     return f"{notes}the sensor file"
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Consecutive records of one log file.
-
-    Attributes
-    ----------
-    time : ndarray of float64, shape (n,), or None
-        s since the first stamp of the file; NaN where the stamp is missing.
-    columns : mapping of str to ndarray of float64, shape (n,)
-        rad/s, m/s² or °C by channel; NaN where the sample is missing.
-    """
+    """Consecutive records of one log file."""
 
     time: NDArray[np.float64] | None
+    """s since the first stamp of the file, shape (n,); NaN where the stamp is missing."""
     columns: Mapping[str, NDArray[np.float64]]
+    """rad/s, m/s² or °C by channel, shape (n,); NaN where the sample is missing."""
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
@@ -61,36 +50,24 @@ class Batch:
 
 @dataclass
 class LogFile(ABC):
-    """One file of a recording, read as a stream in bounded memory.
-
-    Attributes
-    ----------
-    path : Path
-    log : LogFormat
-    sources : mapping of str to ColumnSource
-        The columns that are taken from this file: channels, and perhaps temperature.
-    started : str or None
-        ISO 8601 date and time of the first sample, known after the first batch.
-    rate : float or None
-        Sampling rate that the file itself states, Hz; known after the first batch.
-    findings : list of Finding
-        What was left out or passed over; complete once `batches` is exhausted.
-    units : dict of str to StatedUnit
-        Units of channels that the file itself states, known after the first batch.
-    fixed_units, fixed_by
-        Units that the format fixes, by quantity, and what it is called.
-    """
+    """One file of a recording, read as a stream in bounded memory."""
 
     fixed_units: ClassVar[Mapping[str, str]] = {}
     fixed_by: ClassVar[str] = ""
+    """Units that the format fixes, by quantity, and what it is called."""
 
     path: Path
     log: LogFormat
     sources: Mapping[str, ColumnSource]
+    """The columns that are taken from this file: channels, and perhaps temperature."""
     started: str | None = None
+    """ISO 8601 date and time of the first sample, known after the first batch."""
     rate: float | None = None
+    """Sampling rate that the file itself states, Hz; known after the first batch."""
     findings: list[Finding] = field(default_factory=list)
+    """What was left out or passed over; complete once `batches` is exhausted."""
     units: dict[str, StatedUnit] = field(default_factory=dict)
+    """Units of channels that the file itself states, known after the first batch."""
 
     @abstractmethod
     def batches(self) -> Iterator[Batch]:
@@ -101,6 +78,10 @@ class LogFile(ABC):
         RecordingError
             If the file is not what its sensor file says, or is corrupt inside.
         """
+
+    def note(self, finding: str, text: str, value: float, severity: Severity = "warning") -> None:
+        """Add a finding about the whole file."""
+        self.findings.append(Finding(finding, severity, f"{self.path.name}: {text}", value))
 
     def contradicted_units(self) -> list[Finding]:
         """Return the channels of which the file states another unit than the sensor file."""

@@ -29,33 +29,28 @@ def limit_memory(more: int) -> None:
 
     What it asks for beyond is refused to it, which the libraries report as an error. Addresses
     that are only reserved do not count, as they do with RLIMIT_AS: Arrow and numba reserve many.
-
-    Parameters
-    ----------
-    more : int
     """
     if sys.platform != "linux":
         return
     status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
-    held = 1024 * int(status.partition("VmData:")[2].split()[0])
+    now = 1024 * int(status.partition("VmData:")[2].split()[0])
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    most = held + more if hard == resource.RLIM_INFINITY else min(held + more, hard)
+    most = now + more if hard == resource.RLIM_INFINITY else min(now + more, hard)
     resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
 
 
 def bounded(
-    seconds: float, memory: int, function: Callable[P, T], *given: P.args, **named: P.kwargs
+    seconds: float, memory: int, function: Callable[P, T], *arguments: P.args, **named: P.kwargs
 ) -> T:
     """Call a function in a process of its own, which is ended where it takes too long.
 
     Parameters
     ----------
-    seconds : float
     memory : int
         Bytes that it may take beside what this process has.
     function : callable
         What it returns or raises is pickled.
-    *given, **named
+    *arguments, **named
         Its arguments.
 
     Raises
@@ -67,7 +62,7 @@ def bounded(
     process = os.fork()
     if process == 0:
         os.close(ours)
-        _answer(theirs, memory, lambda: function(*given, **named))
+        _answer(theirs, memory, lambda: function(*arguments, **named))
     os.close(theirs)
     try:
         answer = _received(ours, seconds)

@@ -21,7 +21,7 @@ from imubench_pipeline.readers.bounds import (
     UNSUSPICIOUS,
 )
 from imubench_pipeline.readers.decompression import OPENED
-from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _READ = 1 << 16
 _SEEN = 1 << 12
@@ -38,19 +38,11 @@ _UNKNOWN_SIZE = 1 << 62
 
 
 class Bytes:
-    """The bytes of a log as it was before it was compressed.
-
-    Attributes
-    ----------
-    name : str
-        The log's name, for messages.
-    ended_early : bool
-        The compressed data stop before their end.
-    """
+    """The bytes of a log as it was before it was compressed; ``name``: of the log, for messages."""
 
     def __init__(self, name: str, stream: Any, size: int, under: tuple[Any, ...] = ()) -> None:
         self.name = name
-        self.ended_early = False
+        self.ended_early = False  # whether the compressed data stop before their end
         self._stream = stream
         self._streams = (stream, *under)
         self._left = max(UNSUSPICIOUS, LARGEST_RATIO * size)
@@ -79,6 +71,14 @@ class Bytes:
             )
         return block
 
+    def filled(self, size: int) -> bytes:
+        """Return the next ``size`` bytes, fewer at the end alone."""
+        blocks: list[bytes] = []
+        while size > 0 and (block := self.read(size)):
+            blocks.append(block)
+            size -= len(block)
+        return b"".join(blocks)
+
     def close(self) -> None:
         """Close the file."""
         for stream in self._streams:
@@ -88,12 +88,7 @@ class Bytes:
 class _Deflated:
     """A deflated file in an archive; unlike the library's, it gives all that is there of a cut one.
 
-    Parameters
-    ----------
-    file : file
-        At the first byte of the data.
-    info : ZipInfo
-        Its checksum is None where it is not known.
+    ``file`` is at the first byte of the data; the checksum of ``info`` is None where not known.
     """
 
     def __init__(self, file: IO[bytes], info: zipfile.ZipInfo) -> None:
@@ -161,11 +156,8 @@ def _corrupt(name: str, error: Exception) -> RecordingError:
 def open_bytes(path: Path) -> Bytes:
     """Open a log for reading.
 
-    Parameters
-    ----------
-    path : Path
-        A file, compressed or not, or a member of a zip archive: the path of the archive and
-        the name in it.
+    ``path``: a file, compressed or not, or a member of a zip archive: the path of the archive and
+    the name in it.
 
     Raises
     ------
@@ -188,7 +180,7 @@ def open_bytes(path: Path) -> Bytes:
                     f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
                     "zip: unpack it"
                 )
-        opened = next((how for magic, how in OPENED.items() if begin.startswith(magic)), None)
+        opened = next((how for magic, (_, how) in OPENED.items() if begin.startswith(magic)), None)
         if opened is None:
             return Bytes(path.name, file, _UNKNOWN_SIZE)
         return Bytes(path.name, opened(file), path.stat().st_size, (file,))
@@ -256,9 +248,9 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
     try:
         try:
             with opened_archive(archive) as file:
-                found = file.infolist()
+                members = file.infolist()
         except zipfile.BadZipFile:
-            found = _scanned(archive)
+            members = _scanned(archive)
     except OSError as error:
         raise RecordingError(f"{archive.name}: cannot be opened ({error.strerror})") from None
     except _CORRUPT as error:
@@ -266,7 +258,7 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
     return {
         # A name that begins with / would leave the archive.
         Path(info.filename.lstrip("/")).as_posix(): info
-        for info in found
+        for info in members
         if 0 < len(info.filename) <= _LONGEST_MEMBER_NAME and not info.is_dir()
     }
 
@@ -274,10 +266,6 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
 @contextmanager
 def opened_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a zip archive whose directory is no larger than that of a log.
-
-    Parameters
-    ----------
-    path : Path
 
     Raises
     ------
@@ -309,27 +297,27 @@ class _Archive(io.FileIO):
 
 def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
     """Return the members of an archive without a directory, which stands at its end."""
-    found: list[zipfile.ZipInfo] = []
+    members: list[zipfile.ZipInfo] = []
     with archive.open("rb") as file:
-        start, held = 0, b""
+        start, data = 0, b""
         while block := file.read(_SCANNED):
-            held += block
-            at = held.find(_ZIP_LOCAL)
-            while at >= 0 and at + _LONGEST_HEADER <= len(held):
-                found += _local_header(held[at : at + _LONGEST_HEADER], start + at)
-                at = held.find(_ZIP_LOCAL, at + 1)
-            if len(found) > MOST_MEMBERS:
+            data += block
+            at = data.find(_ZIP_LOCAL)
+            while at >= 0 and at + _LONGEST_HEADER <= len(data):
+                members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
+                at = data.find(_ZIP_LOCAL, at + 1)
+            if len(members) > MOST_MEMBERS:
                 raise RecordingError(
                     f"{archive.name}: an archive without its directory, with more than "
                     f"{MOST_MEMBERS} members; expected the log alone: pack it anew"
                 )
-            keep = at if at >= 0 else max(len(held) - 3, 0)
-            start, held = start + keep, held[keep:]
-        at = held.find(_ZIP_LOCAL)
+            keep = at if at >= 0 else max(len(data) - 3, 0)
+            start, data = start + keep, data[keep:]
+        at = data.find(_ZIP_LOCAL)
         while at >= 0:
-            found += _local_header(held[at : at + _LONGEST_HEADER], start + at)
-            at = held.find(_ZIP_LOCAL, at + 1)
-    return found
+            members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
+            at = data.find(_ZIP_LOCAL, at + 1)
+    return members
 
 
 def _local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
@@ -389,3 +377,31 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     except NotImplementedError as error:
         raise RecordingError(f"{shown}: {error}; unpack the archive") from None
     return Bytes(shown, stream, min(info.compress_size, archive.stat().st_size), (file,))
+
+
+BLOCK_BYTES = 1 << 20
+
+
+def blocks(path: Path, findings: list[Finding]) -> Iterator[bytes]:
+    """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
+
+    ``findings``: what is found goes here: that compressed data end early.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be opened, or compressed data are corrupt.
+    """
+    with closing(open_bytes(path)) as stream:
+        while block := stream.filled(BLOCK_BYTES):
+            yield block
+            if len(block) < BLOCK_BYTES:
+                break
+    if stream.ended_early:
+        findings.append(ended_early(path))
+
+
+def ended_early(path: Path) -> Finding:
+    """Return the finding on a log whose compressed data end early."""
+    detail = f"{path.name}: the compressed file ends early; read as far as it goes"
+    return Finding("truncated_file", "warning", detail, 1)

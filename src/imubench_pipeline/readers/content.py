@@ -6,23 +6,18 @@ from contextlib import closing
 from pathlib import Path
 
 from imubench_pipeline.readers.compressed import is_member, members, open_bytes
+from imubench_pipeline.readers.decompression import OPENED
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.settings.sensor import Reader
 from imubench_pipeline.tables.findings import RecordingError
 
 _SEEN = 1 << 16
-_COMPRESSED = {
-    b"\x1f\x8b": "gzip",
-    b"\x28\xb5\x2f\xfd": "zstd",
-    b"\xfd7zXZ\0": "xz",
-    b"BZh": "bzip2",
-    b"PK\x03\x04": "zip",
-}
+_COMPRESSED = {magic: name for magic, (name, _) in OPENED.items()} | {b"PK\x03\x04": "zip"}
 """What is inside is text."""
 
 _LONGEST_MAGIC = 6
-_BY_MARKS = sorted(FILE_FORMATS.values(), key=lambda known: -len(known.signature.within))
+_BY_MARKS = sorted(FILE_FORMATS.values(), key=lambda entry: -len(entry.signature.within))
 """The formats: those first that ask for most within a file."""
 
 
@@ -45,11 +40,7 @@ def is_endless(path: Path) -> bool:
 def format_of(path: Path, stated: Reader | None = None) -> FileFormat:
     """Return the format of a file: the stated one, or what its content tells (`content_of`).
 
-    Parameters
-    ----------
-    path : Path
-    stated : Reader or None
-        What the sensor file says.
+    ``stated``: what the sensor file says.
     """
     return content_of(path)[0] if stated is None else FILE_FORMATS[stated]
 
@@ -59,10 +50,7 @@ def content_of(path: Path) -> tuple[FileFormat, str]:
 
     Of a zip archive with several files this is the text that each of them may be.
 
-    Parameters
-    ----------
-    path : Path
-        A log file, the folder of a ROS 2 bag, or a member of a zip archive.
+    ``path``: a log file, the folder of a ROS 2 bag, or a member of a zip archive.
 
     Raises
     ------
@@ -76,9 +64,7 @@ def content_of(path: Path) -> tuple[FileFormat, str]:
         of_archive = _format_of_archive(path)
         return (TEXT, packed) if of_archive is None else (of_archive, "")
     with closing(open_bytes(path)) as stream:
-        begin = b""
-        while len(begin) < _SEEN and (block := stream.read(_SEEN - len(begin))):
-            begin += block
+        begin = stream.filled(_SEEN)
     if packed and (again := _named(begin)):
         raise RecordingError(
             f"{path.name}: is compressed twice, by {packed} and inside by {again}; expected once: "

@@ -22,28 +22,18 @@ MOST_FILES = 200
 
 @dataclass(frozen=True)
 class Contents:
-    """What a recording holds.
-
-    Attributes
-    ----------
-    path : Path
-    about : str
-        What it is.
-    tables : tuple of LogTable
-    stated : FileFormat or None
-        What the sensor file must state, since the file does not tell it by its first bytes.
-    files : int
-        How many there are; at most `MOST_FILES` are looked into.
-    only : str or None
-        The one file of a folder that is read where no ``file`` is stated.
-    """
+    """What a recording holds."""
 
     path: Path
     about: str
+    """What it is."""
     tables: tuple[LogTable, ...]
     stated: FileFormat | None = None
+    """What the sensor file must state, since the file does not tell it by its first bytes."""
     files: int = 1
+    """How many there are; at most `MOST_FILES` are looked into."""
     only: str | None = None
+    """The one file of a folder that is read where no ``file`` is stated."""
 
 
 def contents(path: Path) -> Contents:

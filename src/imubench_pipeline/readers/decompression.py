@@ -22,14 +22,8 @@ class _Parts:
     Parts that hold next to nothing cost time and no bytes of the file to speak of: the libraries
     pass over them by the million before they return.
 
-    Parameters
-    ----------
-    file : file
-        At the first byte of the first part.
-    new : callable
-        Makes what decompresses one part.
-    padded : bool
-        Zeros may follow a part, and nothing else; otherwise what is no part ends the data.
+    ``new`` makes what decompresses one part. ``padded``: zeros may follow a part, and nothing else;
+    otherwise what is no part ends the data.
     """
 
     def __init__(self, file: IO[bytes], new: Callable[[], Any], padded: bool) -> None:
@@ -38,7 +32,7 @@ class _Parts:
         self._padded = padded
         self._part = new()
         self._parts = 1
-        self._held = 0
+        self._size = 0
 
     def read1(self, size: int) -> bytes:
         while True:
@@ -53,7 +47,7 @@ class _Parts:
                 if not packed:
                     return b""
                 self._part = self._new()
-                self._parts = _counted(self._parts, self._held)
+                self._parts = _counted(self._parts, self._size)
             try:
                 block: bytes = self._part.decompress(packed, size)
             except (OSError, lzma.LZMAError, EOFError):
@@ -61,7 +55,7 @@ class _Parts:
                     return b""
                 raise
             if block:
-                self._held += len(block)
+                self._size += len(block)
                 return block
             if not packed and not self._part.eof:
                 raise EOFError
@@ -70,17 +64,11 @@ class _Parts:
         self._file.close()
 
 
-def _counted(parts: int, held: int) -> int:
-    """Return one part more than there were, which held so many bytes.
-
-    Raises
-    ------
-    OSError
-        If they are many that hold next to nothing.
-    """
-    if parts >= MOST_PARTS and held < LEAST_IN_PART * parts:
+def _counted(parts: int, size: int) -> int:
+    """Return one part more than there were; raise if they are many that hold next to nothing."""
+    if parts >= MOST_PARTS and size < LEAST_IN_PART * parts:
         raise OSError(
-            f"{parts} compressed parts hold {held} bytes, expected more than {LEAST_IN_PART} a part"
+            f"{parts} compressed parts hold {size} bytes, expected more than {LEAST_IN_PART} a part"
         )
     return parts + 1
 
@@ -122,7 +110,7 @@ class _Zstd:
         self._fed = b""
         self._ready = memoryview(b"")
         self._frames = 0
-        self._held = 0
+        self._size = 0
 
     def read1(self, size: int) -> bytes:
         while not self._ready:
@@ -133,12 +121,12 @@ class _Zstd:
                 return b""
             if self._frame is None:
                 self._frame = self._new()
-                self._frames = _counted(self._frames, self._held)
+                self._frames = _counted(self._frames, self._size)
             try:
                 self._ready = memoryview(self._frame.decompress(self._fed))
             except self._error as error:
                 raise OSError(str(error)) from None
-            self._held += len(self._ready)
+            self._size += len(self._ready)
             self._fed = b""
             if self._frame.eof:
                 self._fed, self._frame = self._frame.unused_data, None
@@ -153,11 +141,7 @@ class _Zstd:
 def unpacked_zstd(data: bytes, most: int) -> bytes:
     """Return the first bytes of what is compressed in a frame of zstd.
 
-    Parameters
-    ----------
-    data : bytes
-    most : int
-        That are unpacked at most.
+    ``most``: that are unpacked at most.
 
     Raises
     ------
@@ -167,8 +151,10 @@ def unpacked_zstd(data: bytes, most: int) -> bytes:
     import zstandard  # only a log that is compressed so needs it
 
     try:
-        with zstandard.ZstdDecompressor(max_window_size=LARGEST_WINDOW).stream_reader(data) as one:
-            return one.read(most)
+        with zstandard.ZstdDecompressor(max_window_size=LARGEST_WINDOW).stream_reader(
+            data
+        ) as frame:
+            return frame.read(most)
     except zstandard.ZstdError as error:
         raise ValueError(str(error)) from None
 
@@ -178,10 +164,10 @@ def _unxz() -> lzma.LZMADecompressor:
     return lzma.LZMADecompressor(memlimit=LARGEST_WINDOW)
 
 
-OPENED: Mapping[bytes, Callable[[IO[bytes]], Any]] = {
-    b"\x1f\x8b": lambda file: _Parts(file, _Gunzip, padded=True),
-    b"\x28\xb5\x2f\xfd": _Zstd,
-    b"\xfd7zXZ\0": lambda file: _Parts(file, _unxz, padded=False),
-    b"BZh": lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False),
+OPENED: Mapping[bytes, tuple[str, Callable[[IO[bytes]], Any]]] = {
+    b"\x1f\x8b": ("gzip", lambda file: _Parts(file, _Gunzip, padded=True)),
+    b"\x28\xb5\x2f\xfd": ("zstd", _Zstd),
+    b"\xfd7zXZ\0": ("xz", lambda file: _Parts(file, _unxz, padded=False)),
+    b"BZh": ("bzip2", lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False)),
 }
-"""How a file is opened that begins so."""
+"""By what a file is compressed that begins so, and how it is opened."""

@@ -29,92 +29,62 @@ NOTHING_STATED = LogFormat.model_validate(
 
 @dataclass(frozen=True, kw_only=True)
 class Signature:
-    """How a log of a format is told from others: by what it holds, and never by its name.
-
-    Attributes
-    ----------
-    begins : tuple of bytes
-        A file that begins with one of these is of the format.
-    within : tuple of bytes
-        So is one that begins as that of no format, and has all of these near its beginning: formats
-        with more of them are asked first. Empty: it is told by its first bytes alone.
-    folder_has : str or None
-        A folder with a file of this name is one log.
-    archive_has : str or None
-        A zip archive with a file that ends so is one log.
-    """
+    """How a log of a format is told from others: by what it holds, and never by its name."""
 
     begins: tuple[bytes, ...] = ()
+    """A file that begins with one of these is of the format."""
     within: tuple[bytes, ...] = ()
+    """So is one that begins as that of no format, and has all of these near its beginning: formats
+    with more of them are asked first. Empty: it is told by its first bytes alone."""
     folder_has: str | None = None
+    """A folder with a file of this name is one log."""
     archive_has: str | None = None
+    """A zip archive with a file that ends so is one log."""
 
 
 class Code(NamedTuple):
-    """What reads the files of a format.
-
-    Attributes
-    ----------
-    log_file : type of LogFile
-        Reads one file, or one topic of it.
-    tables : callable
-        Of a path and the format: the tables of a file, told from its beginning. It raises
-        `RecordingError` where there is none.
-    """
+    """What reads the files of a format."""
 
     log_file: type[LogFile]
+    """Reads one file, or one topic of it."""
     tables: Callable[[Path, FileFormat], list[LogTable]]
+    """Of a path and the format: the tables of a file, told from its beginning. It raises
+    `RecordingError` where there is none."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FileFormat:
-    """A format of log files: all that is known of it beside the code that reads it.
-
-    Attributes
-    ----------
-    name : Reader
-        What ``reader`` of a sensor file says; its module in `imubench_pipeline.readers.formats` is
-        called so.
-    title : str
-        What people call it.
-    endings : tuple of str
-        How the names of its files mostly end, for people.
-    signature : Signature
-    streamed : bool
-        Its logs are read from front to back, so that they may be compressed, or in a zip archive.
-    clock_of : {"file", "variable", "length"}
-        What has a clock of its own: the whole file, each ``variable``, or all arrays of one length.
-    time_columns : tuple of str
-        What the format calls the columns of time; empty: they are called as their writer likes.
-    settings : tuple of str
-        Entries of ``log``, or of its channels, that are for logs of some formats, and this one.
-    code : callable
-        Imports and returns the code, since only what a run needs is to be imported.
-    vendor : str or None
-        Who makes every sensor with such logs.
-    measured_by_name : bool
-        The format has names for what is measured alone: its linear acceleration has gravity in it.
-    """
+    """A format of log files: all that is known of it beside the code that reads it."""
 
     name: Reader
+    """What ``reader`` of a sensor file says; its module in `imubench_pipeline.readers.formats` is
+    called so."""
     title: str
+    """What people call it."""
     endings: tuple[str, ...]
+    """How the names of its files mostly end, for people."""
     signature: Signature
     streamed: bool
+    """Its logs are read from front to back, so that they may be compressed, or in a zip archive."""
     clock_of: Literal["file", "variable", "length"]
+    """What has a clock of its own: the whole file, each ``variable``, or all arrays of one length.
+    """
     time_columns: tuple[str, ...]
+    """What the format calls the columns of time; empty: they are called as their writer likes."""
     settings: tuple[str, ...]
+    """Entries of ``log``, or of its channels, that are for logs of some formats, and this one."""
     code: Callable[[], Code]
+    """Imports and returns the code, since only what a run needs is to be imported."""
     vendor: str | None = None
+    """Who makes every sensor with such logs."""
     measured_by_name: bool = False
+    """The format has names for what is measured alone: its linear acceleration has gravity in it.
+    """
 
     def tables(self, path: Path) -> list[LogTable]:
         """Return what a log holds, told from its beginning.
 
-        Parameters
-        ----------
-        path : Path
-            A file, or a member of a zip archive where the format is streamed.
+        ``path``: a file, or a member of a zip archive where the format is streamed.
 
         Raises
         ------
@@ -126,78 +96,51 @@ class FileFormat:
 
 @dataclass(frozen=True, eq=False)
 class LogColumn:
-    """One column, as far as the beginning of a file tells.
-
-    Attributes
-    ----------
-    source : str or int
-        What ``column`` of a sensor file says for it.
-    label : str
-        Its name; empty where it has none.
-    kind : {"number", "date", "text", "other"}
-    first : tuple of str
-        The first values as written.
-    values : ndarray of float64, shape (n,)
-        The first values, ns since 1970 (or since midnight) of dates, NaN where one is missing;
-        empty where they are no figures.
-    unit : str or None
-        As the file states it, or its format fixes it.
-    forms : tuple of str
-        Of dates in text: ``iso8601`` or patterns that fit, the likeliest first; a date alone or a
-        time of day alone is a part of one.
-    address : str or int or None
-        What ``column`` of ``time`` says for it, where that is not ``source``.
-    """
+    """One column, as far as the beginning of a file tells."""
 
     source: str | int
+    """What ``column`` of a sensor file says for it."""
     label: str
+    """Its name; empty where it has none."""
     kind: Kind
     first: tuple[str, ...] = ()
+    """The first values as written."""
     values: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """The first values, ns since 1970 (or since midnight) of dates, NaN where one is missing, shape
+    (n,); empty where they are no figures."""
     unit: str | None = None
+    """As the file states it, or its format fixes it."""
     forms: tuple[str, ...] = ()
+    """Of dates in text: ``iso8601`` or patterns that fit, the likeliest first; a date alone or a
+    time of day alone is a part of one."""
     address: str | int | None = None
+    """What ``column`` of ``time`` says for it, where that is not ``source``."""
 
 
 @dataclass(frozen=True, eq=False)
 class LogTable:
-    """Columns that have their records in common: of a text log, an array, a topic, a message.
-
-    Attributes
-    ----------
-    file_format : FileFormat
-    name : str
-        Of the array, topic or message; empty in a text log.
-    columns : tuple of LogColumn
-    variable : str or None
-        What ``variable`` of a sensor file says for it.
-    file : str or None
-        What ``file`` of a sensor file says for it; None: the recording is one file.
-    rows : int or None
-        Records, where that is cheap to know.
-    rate : float or None
-        Hz, as the file states it.
-    started : str or None
-        ISO 8601, as the file states it.
-    about : str
-        How it is written.
-    notes : tuple of str
-        What the file says in words.
-    fault : str or None
-        Why it cannot be used, as the end of a sentence.
-    """
+    """Columns that have their records in common: of a text log, an array, a topic, a message."""
 
     file_format: FileFormat
     name: str = ""
+    """Of the array, topic or message; empty in a text log."""
     columns: tuple[LogColumn, ...] = ()
     variable: str | None = None
+    """What ``variable`` of a sensor file says for it."""
     file: str | None = None
+    """What ``file`` of a sensor file says for it; None: the recording is one file."""
     rows: int | None = None
+    """Records, where that is cheap to know."""
     rate: float | None = None
+    """Hz, as the file states it."""
     started: str | None = None
+    """ISO 8601, as the file states it."""
     about: str = ""
+    """How it is written."""
     notes: tuple[str, ...] = ()
+    """What the file says in words."""
     fault: str | None = None
+    """Why it cannot be used, as the end of a sentence."""
 
 
 def shown(values: NDArray[Any]) -> tuple[str, ...]:

@@ -26,9 +26,9 @@ def names_of(parts: list[Part], groups: list[list[int]]) -> list[str]:
     contents = [[name for index in group for name in parts[index].columns] for group in groups]
     quantities = [sorted({quantity_of(name) for name in names}) for names in contents]
     names = []
-    for held, kinds in zip(contents, quantities, strict=True):
+    for channels, kinds in zip(contents, quantities, strict=True):
         alone = len(kinds) == 1 and quantities.count(kinds) == 1
-        names.append(f"log.{kinds[0] if alone else '+'.join(held)}.parquet")
+        names.append(f"log.{kinds[0] if alone else '+'.join(channels)}.parquet")
     return names
 
 
@@ -43,10 +43,8 @@ def assemble(
 
     Parameters
     ----------
-    parts : list of Part
     base : TimeBase
         Their clock.
-    settings : QualitySettings
     metadata : dict
         Goes into the file.
     path : Path
@@ -60,7 +58,6 @@ def assemble(
     """
     for part in parts:
         part.writer.finish(metadata)
-        part.writer.__exit__(None, None, None)
     if len(parts) == 1 and base.uniform:
         return parts[0].data, {}
     repeated: dict[str, int] = {}
@@ -128,17 +125,17 @@ def counted(
         If a sample was lost or invented: a fault of this program.
     """
     file = pq.read_metadata(path)
-    kept = dict.fromkeys(file.schema.names, 0)
+    used = dict.fromkeys(file.schema.names, 0)
     for group in range(file.num_row_groups):
         for index, name in enumerate(file.schema.names):
             column = file.row_group(group).column(index)
-            kept[name] += column.num_values - column.statistics.null_count
+            used[name] += column.num_values - column.statistics.null_count
     counts = {}
     for part in parts:
         for name, column in part.columns.items():
             counts[name] = {
                 "present": column.present,
-                "used": kept[name],
+                "used": used[name],
                 "knocks": part.knocks.get(name, 0),
                 "repeated": repeated.get(name, 0),
             }

@@ -22,29 +22,19 @@ _LONGEST_NAME = 120
 
 @dataclass(frozen=True)
 class Recording:
-    """One recording that was found, or is to be simulated.
-
-    Attributes
-    ----------
-    sensor, name : str
-    path : Path
-        The log file, or the folder of a recording that has several.
-    notes : Path or None
-        The file of notes beside it.
-    simulated : bool
-    error : str or None
-        Why the file cannot be used, where its name or its place says so already.
-    held_back : bool
-        The log is not read in this run: the results that are there stay.
-    """
+    """One recording that was found, or is to be simulated."""
 
     sensor: str
     name: str
     path: Path
+    """The log file, or the folder of a recording that has several."""
     notes: Path | None
+    """The file of notes beside it."""
     simulated: bool
     error: str | None = None
+    """Why the file cannot be used, where its name or its place says so already."""
     held_back: bool = False
+    """The log is not read in this run: the results that are there stay."""
 
     @property
     def files(self) -> list[Path]:
@@ -70,7 +60,7 @@ class Recording:
 
 def found_logs(logs: Path) -> list[Recording]:
     """Return the recordings of a drop zone, in order; two logs of one name are there twice."""
-    found = []
+    recordings = []
     for folder in sorted(path for path in logs.iterdir() if path.is_dir()):
         for path in sorted(folder.iterdir()):
             if path.name.startswith(".") or path.name.endswith("~"):
@@ -79,7 +69,7 @@ def found_logs(logs: Path) -> list[Recording]:
                 continue
             name = path.name if path.is_dir() else _stem(path)
             notes = folder / f"{name}.yaml"
-            found.append(
+            recordings.append(
                 Recording(
                     sensor_of(folder),
                     _usable(name),
@@ -89,7 +79,7 @@ def found_logs(logs: Path) -> list[Recording]:
                     error=_fault(path, name),
                 )
             )
-    return found
+    return recordings
 
 
 def name_of(file: str) -> str:
@@ -110,10 +100,10 @@ def _fault(path: Path, name: str) -> str | None:
     """Return why a file of the drop zone cannot be used, if its name or place says so."""
     shown = ascii(path.name)
     folder = path.parent.name
-    for what, found, stem in (("file", shown, name), ("folder", ascii(folder), folder)):
+    for what, name_shown, stem in (("file", shown, name), ("folder", ascii(folder), folder)):
         if _UNUSABLE_IN_NAMES.search(stem) or len(stem) > _LONGEST_NAME:
             return (
-                f"the {what} name {found} cannot be used; expected at most {_LONGEST_NAME} "
+                f"the {what} name {name_shown} cannot be used; expected at most {_LONGEST_NAME} "
                 f"letters, digits, spaces and . _ - + ( ) in it: rename the {what}"
             )
     try:

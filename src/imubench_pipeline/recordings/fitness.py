@@ -74,37 +74,25 @@ _SHOWN = 3
 
 @dataclass(frozen=True)
 class Doubt:
-    """Why figures of a recording may be wrong.
-
-    Attributes
-    ----------
-    sensor, recording : str
-    channel : str or None
-        None: the whole recording.
-    code : str
-        The finding, ``not_explained`` (no model explains the spectrum), or the status of a
-        parameter.
-    parameters : tuple of str
-        On which it bears; none: on all.
-    unfit : bool
-        The figures may be of something else.
-    factor : float or None
-        By which it may change a value, where that is known.
-    start, end : float or None
-        The part of the recording that it concerns, s from the first sample; None: all of it.
-    reason : str
-    """
+    """Why figures of a recording may be wrong."""
 
     sensor: str
     recording: str
     channel: str | None
+    """None: the whole recording."""
     code: str
-    parameters: tuple[str, ...]
-    unfit: bool
-    factor: float | None
-    start: float | None
-    end: float | None
+    """The finding, ``not_explained`` (no model explains the spectrum), or the status of a
+    parameter."""
     reason: str
+    parameters: tuple[str, ...] = ()
+    """On which it bears; none: on all."""
+    unfit: bool = False
+    """The figures may be of something else."""
+    factor: float | None = None
+    """By which it may change a value, where that is known."""
+    start: float | None = None
+    end: float | None = None
+    """The part of the recording that it concerns, s from the first sample; None: all of it."""
 
     @property
     def of_recording(self) -> bool:
@@ -135,36 +123,23 @@ def doubts(
     models : iterable of mapping
         Rows of the table ``models``.
     """
-    found = [one for row in findings if _casts_doubt(row) for one in _of_finding(row)]
-    found += [
-        Doubt(
-            *_place(row),
-            code="not_explained",
-            parameters=(),
-            unfit=False,
-            factor=None,
-            start=None,
-            end=None,
-            reason=f"no model explains the spectrum of {row['channel']}",
-        )
+    every = [doubt for row in findings if _casts_doubt(row) for doubt in _of_finding(row)]
+    every += [
+        Doubt(*_place(row), "not_explained", f"no model explains the spectrum of {row['channel']}")
         for row in models
         if row["chosen"] and row["verdict"] == "not explained"
     ]
-    found += [
+    every += [
         Doubt(
             *_place(row),
-            code="doubtful",
+            "doubtful",
+            row["reason"] or "its status is doubtful",
             parameters=(row["parameter"],),
-            unfit=False,
-            factor=None,
-            start=None,
-            end=None,
-            reason=row["reason"] or "its status is doubtful",
         )
         for row in parameters
         if row["status"] == "doubtful"
     ]
-    yield from sorted(found, key=lambda one: not one.unfit)
+    yield from sorted(every, key=lambda doubt: not doubt.unfit)
 
 
 def fitness(of_recording: Iterable[Doubt]) -> Fitness:
@@ -175,14 +150,14 @@ def fitness(of_recording: Iterable[Doubt]) -> Fitness:
     of_recording : iterable of Doubt
         All of one recording.
     """
-    there = [one for one in of_recording if one.of_recording]
-    if any(one.unfit for one in there):
+    of_log = [doubt for doubt in of_recording if doubt.of_recording]
+    if any(doubt.unfit for doubt in of_log):
         return "unfit"
-    return "fit with doubts" if there else "fit"
+    return "fit with doubts" if of_log else "fit"
 
 
 def judged(
-    recordings: Sequence[Row], found: Iterable[Doubt], included: Collection[str]
+    recordings: Sequence[Row], doubts: Iterable[Doubt], included: Collection[str]
 ) -> list[dict[str, Any]]:
     """Return the rows of recordings with whether they decide, and their doubts.
 
@@ -190,29 +165,31 @@ def judged(
     ----------
     recordings : sequence of mapping
         Rows of the table ``recordings``.
-    found : iterable of Doubt
+    doubts : iterable of Doubt
         Of all of them.
     included : collection of str
         Those that decide although they are unfit, as ``sensor/recording``.
     """
     by_recording: dict[Key, list[Doubt]] = {}
-    for one in found:
-        by_recording.setdefault((one.sensor, one.recording), []).append(one)
+    for doubt in doubts:
+        by_recording.setdefault((doubt.sensor, doubt.recording), []).append(doubt)
     return [_judged(row, by_recording.get(_key(row), []), included) for row in recordings]
 
 
 def words(of_recording: Iterable[Doubt]) -> str:
     """Return the doubts of a recording in a line, the unfit first; empty where there are none."""
     channels: dict[str, dict[str, None]] = {}
-    for one in of_recording:
-        if one.of_recording:
-            channels.setdefault(one.code, {}).update({one.channel: None} if one.channel else {})
-    named = [
-        code.replace("_", " ") + (f" ({', '.join(where)})" if where else "")
-        for code, where in channels.items()
-    ]
-    more = len(named) - _SHOWN
-    return "; ".join(named[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+    for doubt in of_recording:
+        if doubt.of_recording:
+            channels.setdefault(doubt.code, {})
+            if doubt.channel:
+                channels[doubt.code][doubt.channel] = None
+    return _shortened(
+        [
+            code.replace("_", " ") + (f" ({', '.join(where)})" if where else "")
+            for code, where in channels.items()
+        ]
+    )
 
 
 def left_out(recordings: Iterable[Row]) -> dict[Key, str]:
@@ -258,16 +235,17 @@ def with_doubts(
 
     Parameters
     ----------
-    rows : iterable of mapping
     recordings : iterable of mapping
         Rows of the table ``recordings``.
     names : sequence of (str, str)
         The columns that name sensor and recording; several pairs, of several recordings.
     """
-    found: dict[tuple[Any, Any], str] = {_key(row): row["doubts"] or "" for row in recordings}
+    by_recording: dict[tuple[Any, Any], str] = {
+        _key(row): row["doubts"] or "" for row in recordings
+    }
     for row in rows:
-        said = [found.get((row.get(of), row.get(name)), "") for of, name in names]
-        yield {**row, "doubts": "; ".join(filter(None, dict.fromkeys(said)))}
+        texts = [by_recording.get((row.get(of), row.get(name)), "") for of, name in names]
+        yield {**row, "doubts": "; ".join(filter(None, dict.fromkeys(texts)))}
 
 
 def with_doubts_of_all(pools: Iterable[Row], recordings: Iterable[Row]) -> Iterator[dict[str, Any]]:
@@ -280,24 +258,27 @@ def with_doubts_of_all(pools: Iterable[Row], recordings: Iterable[Row]) -> Itera
     """
     listed = [row for row in recordings if row["decides"] and row["doubts"]]
     for row in pools:
-        said = [
-            f"{one['recording']}: {one['doubts']}"
-            for one in listed
-            if one["sensor"] == row["sensor"] and row["device"] in (None, one["device"])
+        texts = [
+            f"{recording['recording']}: {recording['doubts']}"
+            for recording in listed
+            if recording["sensor"] == row["sensor"] and row["device"] in (None, recording["device"])
         ]
-        more = len(said) - _SHOWN
-        text = "; ".join(said[:_SHOWN])
-        yield {**row, "doubts": text + (f"; and {more} more" if more > 0 else "")}
+        yield {**row, "doubts": _shortened(texts)}
 
 
-def _judged(row: Row, found: Sequence[Doubt], included: Collection[str]) -> dict[str, Any]:
-    verdict = fitness(found) if row["status"] == "ok" else None
+def _shortened(texts: Sequence[str]) -> str:
+    more = len(texts) - _SHOWN
+    return "; ".join(texts[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+
+
+def _judged(row: Row, doubts: Sequence[Doubt], included: Collection[str]) -> dict[str, Any]:
+    verdict = fitness(doubts) if row["status"] == "ok" else None
     named = f"{row['sensor']}/{row['recording']}" in included
     return {
         **row,
         "fitness": verdict,
         "decides": verdict is not None and (verdict != "unfit" or named),
-        "doubts": words(found),
+        "doubts": words(doubts),
     }
 
 
@@ -316,13 +297,13 @@ def _of_finding(row: Row) -> Iterator[Doubt]:
     for factor, names in (by_factor or {None: [*BEARS_ON.get(code, ())]}).items():
         yield Doubt(
             *_place(row),
-            code=code,
+            code,
+            row["detail"],
             parameters=tuple(sorted(names)),
             unfit=code in UNFIT,
             factor=factor,
             start=row["start"],
             end=row["end"],
-            reason=row["detail"],
         )
 
 

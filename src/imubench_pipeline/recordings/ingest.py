@@ -14,6 +14,7 @@ from typing import Any
 from imubench_pipeline.readers import read
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.assembly import assemble, counted, names_of
+from imubench_pipeline.recordings.kept import Quality, identified
 from imubench_pipeline.recordings.known_logs import KnownFile, read_log, write_known
 from imubench_pipeline.recordings.opening import check_opening
 from imubench_pipeline.recordings.parts import Part, leave_out_knocks, read_part
@@ -22,12 +23,9 @@ from imubench_pipeline.recordings.quality.copies import copied_channels
 from imubench_pipeline.recordings.quality.levels import kept_level
 from imubench_pipeline.recordings.quality.rotation import GravityTurn, gravity_turn
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.recordings.quality_file import Quality, identified
-from imubench_pipeline.recordings.recording import channel_logs, log_paths
+from imubench_pipeline.recordings.recording import BESIDE, channel_logs, log_paths
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
-    POSITION,
-    TABLE_RATE,
     TEMPERATURE,
     LogFormat,
     RecordingNotes,
@@ -39,29 +37,19 @@ from imubench_pipeline.tables.findings import Finding, RecordingError
 
 @dataclass(frozen=True)
 class Ingested:
-    """What was kept of a recording.
-
-    Attributes
-    ----------
-    summary : dict
-        A row of the table ``recordings`` without the names.
-    findings : list of Finding
-    channels : dict
-        Rate in Hz, points of the grid, segments and levels of each channel that goes on.
-    kept : dict
-        The files of samples (`imubench_pipeline.recordings.quality_file.identified`).
-    gravity : GravityTurn or None
-        How gravity turns against the sensor.
-    sources : dict
-        The files of the log, by their place in it; None: they were not read to their end.
-    """
+    """What was kept of a recording."""
 
     summary: dict[str, Any]
+    """A row of the table ``recordings`` without the names."""
     findings: list[Finding]
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Rate in Hz, points of the grid, segments and levels of each channel that goes on."""
     kept: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """The files of samples (`imubench_pipeline.recordings.kept.identified`)."""
     gravity: GravityTurn | None = None
+    """How gravity turns against the sensor."""
     sources: dict[str, KnownFile] | None = None
+    """The files of the log, by their place in it; None: they were not read to their end."""
 
     def quality(self, names: dict[str, Any]) -> Quality:
         """Return what ``quality.json`` says, with the names of the recording."""
@@ -112,10 +100,10 @@ def ingest(
     beside = ThreadPoolExecutor(1)
     sources = beside.submit(read_log, source)
     try:
-        found = _ingest(source, log, notes, settings, folder, scratch, provenance, sources)
-        end = max((f.end or 0.0 for f in found.findings if f.finding == "warm_up"), default=0.0)
+        whole = _ingest(source, log, notes, settings, folder, scratch, provenance, sources)
+        end = max((f.end or 0.0 for f in whole.findings if f.finding == "warm_up"), default=0.0)
         if not (settings.trim_warm_up and end):
-            return found
+            return whole
         later = notes.model_copy(update={"use": UsedPart(start=end, end=notes.use.end)})
         trimmed = _ingest(source, log, later, settings, folder, scratch, provenance, sources)
         detail = f"the first {end:.5g} s, a warm-up, are left out (quality.trim_warm_up)"
@@ -155,8 +143,8 @@ def _ingest(
     names = names_of(parts, groups)
     metadata = provenance | {
         "sources": [
-            {"name": (source / place).name, "size": one.size, "sha256": one.sha256}
-            for place, one in sources.result().items()
+            {"name": (source / place).name, "size": file.size, "sha256": file.sha256}
+            for place, file in sources.result().items()
         ],
         "reader": log.reader,
         "begins": notes.use.start,
@@ -178,22 +166,22 @@ def _ingest(
         raise RecordingError(f"no channel can be used: {reasons}")
     for temporary, final in written:
         temporary.replace(final)
-    column = {name: found for part in parts for name, found in part.columns.items()}
+    column = {name: summary_of for part in parts for name, summary_of in part.columns.items()}
     timed = {name for part in parts if part.stamped for name in part.columns}
     units = {str(name): source.unit for name, source in log.channels.items()}
     channels = {
-        name: {"grid": kept.grid, "segments": kept.segments}
+        name: {"grid": channel.grid, "segments": channel.segments}
         | counts[name]
-        | kept_level(column[name], kept.rate, units[name], timed=name in timed)
-        for name, kept in channel_logs(folder).items()
+        | kept_level(column[name], channel.rate, units[name], timed=name in timed)
+        for name, channel in channel_logs(folder).items()
     }
     begin = notes.use.start
     findings = [
         f if f.start is None else replace(f, start=f.start + begin, end=(f.end or 0.0) + begin)
         for f in findings
     ]
-    kept = identified(log_paths(folder))
-    return Ingested(summary, findings, channels, kept, _gravity(parts, bases), sources.result())
+    files = identified(log_paths(folder))
+    return Ingested(summary, findings, channels, files, _gravity(parts, bases), sources.result())
 
 
 def _findings(
@@ -212,9 +200,8 @@ def _findings(
         findings += column_findings(part.columns, base.rate, settings, static=static)
         if static:  # what is sensed of a turn looks like a knock
             findings += _knock_findings(part, base.rate, settings, scratch)
-    beside = {TEMPERATURE, POSITION, TABLE_RATE}
     findings += copied_channels(
-        {name: c for part in parts for name, c in part.columns.items() if name not in beside}
+        {name: c for part in parts for name, c in part.columns.items() if name not in BESIDE}
     )
     if len({part.rows for part in parts if not part.stamped}) > 1:
         lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in parts)
@@ -271,21 +258,17 @@ def _knock_findings(
 ) -> list[Finding]:
     longest = round(settings.longest_knock * rate)
     findings = []
-    for channel, found in leave_out_knocks(part, settings.knock, longest, scratch).items():
-        worst = max(found, key=lambda knock: knock.size)
-        at = ", ".join(f"{max(knock.first, 0) / rate:.5g}" for knock in found[:5])
-        more = " ..." if len(found) > 5 else ""
+    for channel, events in leave_out_knocks(part, settings.knock, longest, scratch).items():
+        worst = max(events, key=lambda knock: knock.size)
+        at = ", ".join(f"{max(knock.first, 0) / rate:.5g}" for knock in events[:5])
+        more = " ..." if len(events) > 5 else ""
+        detail = (
+            f"{channel} has {len(events)} knocks, up to {worst.size:.0f} standard deviations "
+            f"(at {at}{more} s); {part.knocks[channel]} samples about them are left out"
+        )
+        begin, end = max(events[0].first, 0) / rate, events[-1].last / rate
         findings.append(
-            Finding(
-                "knocks",
-                "warning",
-                f"{channel} has {len(found)} knocks, up to {worst.size:.0f} standard deviations "
-                f"(at {at}{more} s); {part.knocks[channel]} samples about them are left out",
-                part.knocks[channel],
-                channel,
-                max(found[0].first, 0) / rate,
-                found[-1].last / rate,
-            )
+            Finding("knocks", "warning", detail, part.knocks[channel], channel, begin, end)
         )
     return findings
 
@@ -313,15 +296,14 @@ def _shared_bases(parts: list[Part], bases: list[timebase.TimeBase]) -> list[lis
 def _summary(
     parts: list[Part], bases: list[timebase.TimeBase], started: str | None
 ) -> dict[str, Any]:
-    beside = {TEMPERATURE, POSITION, TABLE_RATE}
-    measured = [i for i, part in enumerate(parts) if set(part.columns) - beside]
+    measured = [i for i, part in enumerate(parts) if set(part.columns) - BESIDE]
     longest = max(measured, key=lambda index: bases[index].rows)
     base = bases[longest]
     temperature = next(
         (part.columns[TEMPERATURE] for part in parts if TEMPERATURE in part.columns),
         ColumnSummary(),
     )
-    known = temperature.present > 0
+    measured_temperature = temperature.present > 0
     return {
         "started": started,
         "rate": base.rate,
@@ -329,19 +311,13 @@ def _summary(
         "rate_error": base.rate_error,
         "samples": base.samples,
         "duration": base.grid / base.rate,
-        "temperature_min": temperature.low if known else None,
-        "temperature_max": temperature.high if known else None,
+        "temperature_min": temperature.low if measured_temperature else None,
+        "temperature_max": temperature.high if measured_temperature else None,
     }
 
 
 def ingest_as_planned(
-    source: Path,
-    settings: str,
-    sensor: str,
-    recording: str,
-    folder: Path,
-    *,
-    guarded: bool = False,
+    source: Path, settings: str, sensor: str, recording: str, folder: Path, *, guarded: bool = False
 ) -> Quality:
     """Ingest a recording as the plan says; one that cannot be used is rejected, with its reason.
 
@@ -358,31 +334,32 @@ def ingest_as_planned(
         A process of its own opens the log first (`opening.check_opening`), so that none that hangs
         or crashes its reader does so here; it takes 0.1 s.
     """
-    given = json.loads(settings)
-    notes = RecordingNotes.model_validate(given.get("notes", {}))
+    plan = json.loads(settings)
+    notes = RecordingNotes.model_validate(plan.get("notes", {}))
     names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}
-    names |= {"kind": given.get("kind", "static"), "simulated": given["simulated"]}
+    names |= {"kind": plan.get("kind", "static"), "simulated": plan["simulated"]}
     try:
-        if "error" in given:
-            raise RecordingError(given["error"])
-        log = LogFormat.model_validate(given["log"])
-        limits = QualitySettings.model_validate(given["quality"])
+        if "error" in plan:
+            raise RecordingError(plan["error"])
+        log = LogFormat.model_validate(plan["log"])
+        limits = QualitySettings.model_validate(plan["quality"])
         if guarded:
             check_opening(source, log, limits.opening)
-        kept = ingest(source, log, notes, limits, folder, names)
+        ingested = ingest(source, log, notes, limits, folder, names)
     except RecordingError as error:
         remove_kept(folder)
-        kept = rejected(error, notes)
-    if versions := given.get("files"):
-        read = kept.sources
+        ingested = rejected(error, notes)
+    if versions := plan.get("files"):
+        read = ingested.sources
         if read is None:
             with contextlib.suppress(OSError):  # what is rejected may not be readable at all
                 read = read_log(source)
-        known = {
-            name: replace(one, version=versions.get(name, "")) for name, one in (read or {}).items()
+        files = {
+            name: replace(file, version=versions.get(name, ""))
+            for name, file in (read or {}).items()
         }
-        write_known(known, folder)
-    return kept.quality(names | {"power_cycled": notes.power_cycled})
+        write_known(files, folder)
+    return ingested.quality(names | {"power_cycled": notes.power_cycled})
 
 
 def write_failed(settings: str, failure: Failure, path: Path) -> None:
@@ -396,14 +373,14 @@ def write_failed(settings: str, failure: Failure, path: Path) -> None:
     path : Path
         The ``quality.json`` of the recording.
     """
-    given = json.loads(settings)
-    notes = given.get("notes", {})
+    plan = json.loads(settings)
+    notes = plan.get("notes", {})
     recording = {
         "sensor": failure.sensor,
         "device": notes.get("device") or failure.recording,
         "recording": failure.recording,
-        "kind": given.get("kind", "static"),
-        "simulated": given["simulated"],
+        "kind": plan.get("kind", "static"),
+        "simulated": plan["simulated"],
         "status": "failed",
         "started": notes.get("started"),
         "reason": failure.reason,

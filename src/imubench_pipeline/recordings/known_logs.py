@@ -33,28 +33,19 @@ _TICK = 2_000_000_000
 
 @dataclass(frozen=True)
 class KnownFile:
-    """A file of a log as it was read.
-
-    Attributes
-    ----------
-    size : int
-        Bytes.
-    sha256 : str
-        Of the content.
-    steady : bool
-        Nothing was done to it while it was read.
-    stamps : tuple of int or None
-        Last change of the content and of anything, ns since 1970; None: they were too young to
-        tell a later change.
-    version : str
-        What the plan calls this content; another text wherever it is another one.
-    """
+    """A file of a log as it was read."""
 
     size: int
+    """Bytes."""
     sha256: str
+    """Of the content."""
     steady: bool
+    """Nothing was done to it while it was read."""
     stamps: tuple[int, int] | None
+    """Last change of the content and of anything, ns since 1970; None: they were too young to tell
+    a later change."""
     version: str = ""
+    """What the plan calls this content; another text wherever it is another one."""
 
     @classmethod
     def of(cls, path: Path) -> KnownFile:
@@ -81,15 +72,12 @@ class KnownFile:
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """Return the files of a log as they were read; None where that is not known.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the recording.
+    ``folder``: of the recording.
     """
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
         return {
-            name: KnownFile(**{**one, "stamps": one["stamps"] and tuple(one["stamps"])})
-            for name, one in read_sealed_json(folder / KNOWN)["files"].items()
+            name: KnownFile(**{**file, "stamps": file["stamps"] and tuple(file["stamps"])})
+            for name, file in read_sealed_json(folder / KNOWN)["files"].items()
         }
     return None
 
@@ -97,24 +85,17 @@ def read_known(folder: Path) -> dict[str, KnownFile] | None:
 def write_known(files: Mapping[str, KnownFile], folder: Path) -> None:
     """Keep the files of a log as they were read.
 
-    Parameters
-    ----------
-    files : mapping of str to KnownFile
-        By their place in the log.
-    folder : Path
-        Of the recording.
+    ``files``: by their place in the log.
+    ``folder``: of the recording.
     """
-    kept = {name: asdict(one) for name, one in sorted(files.items())}
-    write_sealed_json({"files": kept}, folder / KNOWN)
+    rows = {name: asdict(file) for name, file in sorted(files.items())}
+    write_sealed_json({"files": rows}, folder / KNOWN)
 
 
 def read_log(source: Path) -> dict[str, KnownFile]:
     """Return the files of a log, all of which is read, by their place in it.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
+    ``source``: the log file, or the folder of a recording.
     """
     return {name: KnownFile.of(file) for name, file in _places(source).items()}
 
@@ -140,38 +121,33 @@ def versions(source: Path, folder: Path) -> dict[str, str]:
     OSError
         If a file has gone.
     """
-    known = read_known(folder)
-    found, touched = {}, dict[str, KnownFile]()
+    files = read_known(folder)
+    result, touched = {}, dict[str, KnownFile]()
     for name, path in _places(source).items():
-        before = (known or {}).get(name)
+        before = (files or {}).get(name)
         if before is None:
-            found[name] = glimpse(path)
+            result[name] = glimpse(path)
         elif before.unchanged(path):
-            found[name] = before.version
+            result[name] = before.version
         else:
             now = KnownFile.of(path)
-            found[name] = f"{now.size} sha256 {now.sha256}"
+            result[name] = f"{now.size} sha256 {now.sha256}"
             if before.same(now):
-                found[name] = before.version
+                result[name] = before.version
                 touched[name] = replace(now, version=before.version)
     quality = folder / "quality.json"
-    if known is None and quality.is_file():
+    if files is None and quality.is_file():
         # It was read, and what that was is not known any more: it is read again.
         since = quality.stat().st_mtime_ns
-        return {name: f"{version} {since}" for name, version in found.items()}
-    if known and touched:
+        return {name: f"{version} {since}" for name, version in result.items()}
+    if files and touched:
         with contextlib.suppress(OSError):  # of results that this user may only read
-            write_known(known | touched, folder)
-    return found
+            write_known(files | touched, folder)
+    return result
 
 
 def versions_of(recording: Recording, results: Path) -> dict[str, str]:
     """Return the `versions` of the files of a recording; of one that is to be simulated, none.
-
-    Parameters
-    ----------
-    recording : Recording
-    results : Path
 
     Raises
     ------
@@ -193,10 +169,7 @@ def glimpse(path: Path) -> str:
     The first and the last block are among them. A change that leaves the size and all 16 blocks of
     4 kB as they are is not seen, in a file above 1 MB.
 
-    Parameters
-    ----------
-    path : Path
-        A file.
+    ``path``: a file.
     """
     digest = hashlib.sha256()
     with path.open("rb", buffering=0) as file:

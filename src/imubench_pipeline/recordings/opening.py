@@ -21,13 +21,8 @@ _SLOWEST = 5e6
 def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
     """Read the first records of each file of a recording, and no more.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    log : LogFormat
-    seconds : float
-        How long it may take, and a second more for each 5 MB of the log.
+    ``source``: the log file, or the folder of a recording.
+    ``seconds``: how long it may take, and a second more for each 5 MB of the log.
 
     Raises
     ------

@@ -77,7 +77,7 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
     buckets : int, optional
         Stretches of time of an envelope, at most; more where the sensor was turned.
     """
-    found = Overview([], [])
+    result = Overview([], [])
     logs = channel_logs(folder)
     if buckets is None:
         buckets = BUCKETS if was_at_rest(folder) else BUCKETS_OF_TURNS
@@ -88,11 +88,11 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
         if len(drawn) == 0:
             continue
         times = edges / log.rate + read_metadata(log.path).get("begins", 0.0)
-        found.envelope.extend(names | row for row in _envelope(times, figures))
+        result.envelope.extend(names | row for row in _envelope(times, figures))
         if log.channel != TEMPERATURE:
             low, high = float(figures[:, _LOW].min()), float(figures[:, _HIGH].max())
-            found.histogram.extend(names | row for row in _bins(log, bin_edges(drawn, low, high)))
-    return found
+            result.histogram.extend(names | row for row in _bins(log, bin_edges(drawn, low, high)))
+    return result
 
 
 def _temperature(folder: Path) -> Iterator[ChannelLog]:

@@ -18,41 +18,30 @@ from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.sensor import UsedPart
 from imubench_pipeline.tables import checked_parquet
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import RecordingError
 
 _STAMP_BLOCK = 1 << 20
 
 
 @dataclass
 class Part:
-    """One file of a recording, read once into columns and stamps on the disk.
-
-    Attributes
-    ----------
-    source : LogFile
-    data, stamps_path : Path
-        Scratch files: the columns as Parquet, the stamps as they come.
-    writer : LogWriter
-        Of ``data``; open until it is known what belongs into the metadata.
-    columns : dict of str to ColumnSummary
-        What was counted of each column.
-    rows, not_used : int
-        Records kept, and those outside the part to use.
-    knocks : dict of str to int
-        Samples left out of each column, as part of a knock.
-    stamped : bool
-        Records have stamps.
-    """
+    """One file of a recording, read once into columns and stamps on the disk."""
 
     source: LogFile
     data: Path
     stamps_path: Path
+    """Scratch files: the columns as Parquet, the stamps as they come."""
     writer: LogWriter
+    """Of ``data``; open until it is known what belongs into the metadata."""
     rows: int = 0
     not_used: int = 0
+    """Records kept, and those outside the part to use."""
     columns: dict[str, ColumnSummary] = field(default_factory=dict)
+    """What was counted of each column."""
     knocks: dict[str, int] = field(default_factory=dict)
+    """Samples left out of each column, as part of a knock."""
     stamped: bool = False
+    """Records have stamps."""
 
     def stamps(self) -> Iterator[NDArray[np.float64]]:
         """Yield the stamps in s, from the disk."""
@@ -70,14 +59,8 @@ class Part:
 def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     """Read one file of a recording, in bounded memory.
 
-    Parameters
-    ----------
-    file : LogFile
-    use : UsedPart
-    scratch : Path
-        Folder for the scratch files.
-    number : int
-        Of the file, for their names.
+    ``scratch``: folder for the scratch files.
+    ``number``: of the file, for their names.
 
     Raises
     ------
@@ -101,27 +84,21 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
             if time is not None:
                 # Not `tofile`: what it hands to the C library may fail unseen when it is closed.
                 stamps.write(np.ascontiguousarray(time[keep]).data)
-            kept = {
+            columns_used = {
                 name: part.columns[name].add(values[keep]) for name, values in batch.columns.items()
             }
-            rows = len(next(iter(kept.values())))
+            rows = len(next(iter(columns_used.values())))
             part.not_used += len(batch) - rows
             part.rows += rows
-            writer.write(kept)
+            writer.write(columns_used)
     if part.rows == 0:
         raise RecordingError(
             f"{file.path.name}: none of its {read_rows} samples lies in the part to use "
             f"(use: start {use.start} s, end {use.end or 'open'})"
         )
     if part.not_used:
-        file.findings.append(
-            Finding(
-                "not_used",
-                "note",
-                f"{file.path.name}: {part.not_used} samples lie outside the part to use",
-                part.not_used,
-            )
-        )
+        detail = f"{part.not_used} samples lie outside the part to use"
+        file.note("not_used", detail, part.not_used, "note")
     return part
 
 
@@ -130,14 +107,8 @@ def _used(
 ) -> slice | NDArray[np.bool_]:
     """Return which records of a batch lie in the part to use.
 
-    Parameters
-    ----------
-    batch : Batch
-    use : UsedPart
-    before : int
-        Records before the batch.
-    rate : float or None
-        The stated one, Hz; needed where there are no stamps.
+    ``before``: records before the batch.
+    ``rate``: the stated one, Hz; needed where there are no stamps.
     """
     if use.start == 0.0 and use.end is None:
         return slice(None)
@@ -165,27 +136,25 @@ def leave_out_knocks(
         Distance from the level that counts, in standard deviations.
     longest : int
         Records: what lasts longer is motion.
-    scratch : Path
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(suspects(b, sigmas)[0])]
     steps = {name: levels.quantisation(part.columns[name]) for name in doubtful}
-    step = {name: found.step if found else None for name, found in steps.items()}
+    step = {name: steps_of.step if steps_of else None for name, steps_of in steps.items()}
     doubtful = [name for name in doubtful if len(suspects(blocks[name], sigmas, step[name])[0])]
     if not doubtful:
         return {}
     part.writer.finish({})
-    part.writer.__exit__(None, None, None)
-    found = {}
+    knocks_of = {}
     for name in doubtful:
         here = list(knocks(_pieces(part.data, name), blocks[name], sigmas, longest, step[name]))
         if here:
-            found[name] = here
-    _write_again(part, found, scratch)
-    return found
+            knocks_of[name] = here
+    _write_again(part, knocks_of, scratch)
+    return knocks_of
 
 
-def _write_again(part: Part, found: dict[str, list[Knock]], scratch: Path) -> None:
+def _write_again(part: Part, knocks_of: dict[str, list[Knock]], scratch: Path) -> None:
     """Write the columns again without the samples of knocks; the new writer stays open."""
     old = part.data
     part.data = scratch / f"{old.stem}.calm.parquet"
@@ -199,7 +168,7 @@ def _write_again(part: Part, found: dict[str, list[Knock]], scratch: Path) -> No
             for name in part.columns:
                 values = np.array(table.column(name).to_numpy(), dtype=np.float64)
                 before = int(np.isfinite(values).sum())
-                for knock in found.get(name, []):
+                for knock in knocks_of.get(name, []):
                     start = max(knock.first - reached, 0)
                     values[start : max(knock.last - reached, 0)] = np.nan
                 part.knocks[name] += before - int(np.isfinite(values).sum())

@@ -13,7 +13,6 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality_file import MEND
 from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
 from imubench_pipeline.tables import checked_parquet
 from imubench_pipeline.tables.findings import RecordingError
@@ -30,8 +28,13 @@ from imubench_pipeline.typing import Array
 ROW_GROUP = 1 << 20
 """Rows of a row group."""
 
+MEND = "remove it, and the next run reads the log again"
+
 _METADATA = b"imubench"
-_NOT_CHANNELS = {"time", "sample", TEMPERATURE, POSITION, TABLE_RATE}
+BESIDE = frozenset({TEMPERATURE, POSITION, TABLE_RATE})
+"""Columns that are no channels."""
+
+_NOT_CHANNELS = BESIDE | {"time", "sample"}
 
 
 class LogWriter:
@@ -57,12 +60,7 @@ class LogWriter:
     def __enter__(self) -> LogWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._writer.close()
 
     def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
@@ -76,10 +74,11 @@ class LogWriter:
             self._flush(ROW_GROUP)
 
     def finish(self, metadata: Mapping[str, Any]) -> None:
-        """Write what is waiting, and the metadata of the file."""
+        """Write what is waiting, and the metadata of the file; close it."""
         if self._rows:
             self._flush(self._rows)
         self._writer.add_key_value_metadata({_METADATA: json.dumps(metadata)})
+        self._writer.close()
 
     def _flush(self, rows: int) -> None:
         """Write the first rows of what is waiting, which is not copied for it."""
@@ -105,49 +104,36 @@ def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
     Its own ``to_numpy`` imports pandas, where that is installed: 40 MB in memory.
     """
     array = column.chunk(0) if column.num_chunks == 1 else pa.concat_arrays(column.chunks)
-    held, data = array.buffers()
+    validity, data = array.buffers()
     part = slice(array.offset, array.offset + len(array))
     values = np.frombuffer(data, array.type.to_pandas_dtype())[part]
     if array.null_count:
-        bits = np.unpackbits(np.frombuffer(held, np.uint8), bitorder="little")[part]
+        bits = np.unpackbits(np.frombuffer(validity, np.uint8), bitorder="little")[part]
         values = np.where(bits, values, np.nan)
     return values
 
 
 @dataclass(frozen=True)
 class ChannelLog:
-    """One channel of a kept recording.
-
-    Attributes
-    ----------
-    path : Path
-        Its Parquet file.
-    channel : str
-    rate : float
-        Hz.
-    grid : int
-        Points of the uniform grid.
-    segments : tuple of (int, int)
-        Grid points that begin and end each segment.
-    holes : bool
-        Samples are missing: blocks have NaN in their place.
-    temperature : bool
-        There are readings of the temperature on the same grid.
-    position : bool
-        There is a column on the same grid that says how the sensor stood.
-    table_rate : bool
-        There is a column on the same grid with the rate of the table that the sensor stood on.
-    """
+    """One channel of a kept recording."""
 
     path: Path
+    """Its Parquet file."""
     channel: str
     rate: float
+    """Hz."""
     grid: int
+    """Points of the uniform grid."""
     segments: tuple[tuple[int, int], ...]
+    """Grid points that begin and end each segment."""
     holes: bool
+    """Samples are missing: blocks have NaN in their place."""
     temperature: bool = False
+    """There are readings of the temperature on the same grid."""
     position: bool = False
+    """There is a column on the same grid that says how the sensor stood."""
     table_rate: bool = False
+    """There is a column on the same grid with the rate of the table that the sensor stood on."""
 
     def blocks(self) -> Iterator[NDArray[np.float64]]:
         """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing.
@@ -200,9 +186,9 @@ class ChannelLog:
         """Return the mean of the samples present, SI."""
         total, number = 0.0, 0
         for values in self.blocks():
-            there = values[np.isfinite(values)]
-            total += float(there.sum(dtype=np.float64))
-            number += len(there)
+            present = values[np.isfinite(values)]
+            total += float(present.sum(dtype=np.float64))
+            number += len(present)
         return total / number
 
 
@@ -216,8 +202,8 @@ def _named_if_damaged(path: Path) -> Iterator[None]:
 
 def read_metadata(path: Path) -> dict[str, Any]:
     """Return the metadata that `LogWriter.finish` wrote."""
-    found = pq.read_metadata(path).metadata or {}
-    data: dict[str, Any] = json.loads(found[_METADATA])
+    metadata = pq.read_metadata(path).metadata or {}
+    data: dict[str, Any] = json.loads(metadata[_METADATA])
     return data
 
 

@@ -31,19 +31,13 @@ _ENOUGH = 1 << 17
 
 @dataclass(frozen=True)
 class Interval:
-    """The interval between samples that stamps show at first sight.
-
-    Attributes
-    ----------
-    mean : float
-        Mean of the intervals between which no sample is missing, s.
-    with_losses : float or None
-        That, if the long ones among regular steps of one and two are samples lost; None where
-        there are none. Stamps rounded coarsely look the same, and are taken to be there.
-    """
+    """The interval between samples that stamps show at first sight."""
 
     mean: float
+    """Mean of the intervals between which no sample is missing, s."""
     with_losses: float | None = None
+    """That, if the long ones among regular steps of one and two are samples lost; None where there
+    are none. Stamps rounded coarsely look the same, and are taken to be there."""
 
 
 def typical_interval(stamps: Stamps) -> Interval | None:
@@ -101,45 +95,32 @@ _MARK = 1 << 14
 
 @dataclass
 class Track:
-    """Follows stamps along a grid, and counts what it meets.
-
-    Attributes
-    ----------
-    interval : float
-        Of the grid at its beginning, s.
-    longest_hole : float
-        A longer step forward begins a segment, s.
-    rows, grid : int
-        Records, and points of the grid up to the last one.
-    off_grid, duplicates, unstamped : int
-        Records whose stamp lies between two points, repeats a point, or is missing.
-    holes, longest, longest_at : int
-        Number of holes, the points of the longest, and the first of them.
-    elapsed, steps
-        s, and grid points, between stamped records of the same segment.
-    starts : list of int
-        First grid point of each segment.
-    jumps : list of float
-        Step of the stamps at each of them, s; NaN at the first.
-    marks : list of (int, float)
-        Grid point and stamp of a record now and then, to see the rate drift.
-    """
+    """Follows stamps along a grid, and counts what it meets."""
 
     interval: float
+    """Of the grid at its beginning, s."""
     longest_hole: float
+    """A longer step forward begins a segment, s."""
     rows: int = 0
     grid: int = 0
+    """Records, and points of the grid up to the last one."""
     off_grid: int = 0
     duplicates: int = 0
     unstamped: int = 0
+    """Records whose stamp lies between two points, repeats a point, or is missing."""
     holes: int = 0
     longest: int = 0
     longest_at: int = 0
+    """Number of holes, the points of the longest, and the first of them."""
     elapsed: float = 0.0
     steps: int = 0
+    """s, and grid points, between stamped records of the same segment."""
     starts: list[int] = field(default_factory=list)
+    """First grid point of each segment."""
     jumps: list[float] = field(default_factory=list)
+    """Step of the stamps at each of them, s; NaN at the first."""
     marks: list[tuple[int, float]] = field(default_factory=list)
+    """Grid point and stamp of a record now and then, to see the rate drift."""
     _state: NDArray[np.float64] = field(
         default_factory=lambda: np.array([np.nan, np.nan, np.nan, np.nan, 0.0])
     )

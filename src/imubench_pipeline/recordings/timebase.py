@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.stamps import Stamps, Track, tracked, typical_interval
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
 
 _SHARED = 0.2
 """Part of the records that repeat a stamp beyond which a stamp belongs to a group of samples."""
@@ -28,45 +28,30 @@ _SAME = 1e-5
 
 @dataclass(frozen=True)
 class TimeBase:
-    """The uniform grid that the samples of a file lie on.
-
-    Attributes
-    ----------
-    rate : float
-        Hz.
-    source : str
-        Where the rate is from: ``stated`` or ``stamps``.
-    rows : int
-        Records in the file.
-    grid : int
-        Grid points from the first to the last sample, all segments together.
-    segments : tuple of (int, int)
-        First and one-past-last grid point of each; no difference may span two segments.
-    uniform : bool
-        The samples are the grid points: stamps need not be kept.
-    stamped : bool
-        The stamps say which grid point each sample is.
-    findings : tuple of Finding
-    tracking_interval : float or None
-        Interval with which the stamps were put on the grid, s.
-    repeated : int
-        Records left out, since an earlier one has their grid point.
-    rate_error : float or None
-        Standard deviation of the rate, as far as the scatter of the stamps tells, Hz; None for
-        a stated rate.
-    """
+    """The uniform grid that the samples of a file lie on."""
 
     rate: float
+    """Hz."""
     source: str
+    """Where the rate is from: ``stated`` or ``stamps``."""
     rows: int
+    """Records in the file."""
     grid: int
+    """Grid points from the first to the last sample, all segments together."""
     segments: tuple[tuple[int, int], ...]
+    """First and one-past-last grid point of each; no difference may span two segments."""
     uniform: bool
+    """The samples are the grid points: stamps need not be kept."""
     stamped: bool
+    """The stamps say which grid point each sample is."""
     findings: tuple[Finding, ...] = ()
     tracking_interval: float | None = None
+    """Interval with which the stamps were put on the grid, s."""
     repeated: int = 0
+    """Records left out, since an earlier one has their grid point."""
     rate_error: float | None = None
+    """Standard deviation of the rate, as far as the scatter of the stamps tells, Hz; None for a
+    stated rate."""
 
     @property
     def missing(self) -> int:
@@ -87,13 +72,8 @@ def without_stamps(rows: int, rate: float) -> TimeBase:
 def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings) -> TimeBase:
     """Find the time base of stamps.
 
-    Parameters
-    ----------
-    stamps : callable
-        Gives the stamps in s, in blocks; called several times.
-    stated : float or None
-        The rate that the sensor file states, Hz.
-    settings : QualitySettings
+    ``stamps``: gives the stamps in s, in blocks; called several times.
+    ``stated``: the rate that the sensor file states, Hz.
 
     Raises
     ------
@@ -106,37 +86,37 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     interval = typical.mean
     if typical.with_losses is not None and _is(stated, typical.with_losses, settings):
         interval = typical.with_losses
-    found = tracked(stamps, interval, settings.longest_hole)
-    mean = found.mean_interval or interval
+    track = tracked(stamps, interval, settings.longest_hole)
+    mean = track.mean_interval or interval
     if abs(mean / interval - 1.0) > _SAME:
         # The mean over the recording is far better known than the typical interval: once more.
-        found = tracked(stamps, mean, settings.longest_hole)
+        track = tracked(stamps, mean, settings.longest_hole)
     # Many holes that are together longer than the log are pauses of the host, not losses.
-    bursts = found.grid > 2 * found.rows and found.holes > 0.05 * found.rows
-    shared = found.duplicates > _SHARED * found.rows
-    if found.off_grid > settings.jitter * found.rows or bursts or shared:
-        return _arrival_order(stamps, found, stated, settings)
-    exact = found.mean_interval or interval
-    findings = _grid_findings(found, exact)
+    bursts = track.grid > 2 * track.rows and track.holes > 0.05 * track.rows
+    shared = track.duplicates > _SHARED * track.rows
+    if track.off_grid > settings.jitter * track.rows or bursts or shared:
+        return _arrival_order(stamps, track, stated, settings)
+    exact = track.mean_interval or interval
+    findings = _grid_findings(track, exact)
     rate = 1.0 / exact
     if typical.with_losses is not None and stated is None:
         findings.append(_coarse(rate, 1.0 / typical.with_losses))
     findings += _rate_findings(rate, stated, settings)
-    findings += _drift_findings(found, settings)
-    jitter = math.sqrt(found.scatter / max(found.steps, 1))
-    uniform = found.grid == found.rows and len(found.starts) == 1 and not found.duplicates
+    findings += _drift_findings(track, settings)
+    jitter = math.sqrt(track.scatter / max(track.steps, 1))
+    uniform = track.grid == track.rows and len(track.starts) == 1 and not track.duplicates
     return TimeBase(
         rate,
         "stamps",
-        found.rows,
-        found.grid,
-        found.segments,
+        track.rows,
+        track.grid,
+        track.segments,
         uniform,
         True,
         tuple(findings),
-        found.interval,
-        found.duplicates,
-        rate * math.sqrt(2.0) * jitter / max(found.elapsed, exact),
+        track.interval,
+        track.duplicates,
+        rate * math.sqrt(2.0) * jitter / max(track.elapsed, exact),
     )
 
 
@@ -173,79 +153,44 @@ def _coarse(rate: float, lossy: float) -> Finding:
     )
 
 
-def _grid_findings(found: Track, interval: float) -> list[Finding]:
+def _grid_findings(track: Track, interval: float) -> list[Finding]:
     findings = []
-    missing = found.grid - (found.rows - found.duplicates)
+    missing = track.grid - (track.rows - track.duplicates)
     if missing:
-        begin, end = (
-            point * interval for point in (found.longest_at, found.longest_at + found.longest)
+        begin = track.longest_at * interval
+        end = (track.longest_at + track.longest) * interval
+        severity: Severity = "note" if missing < 0.01 * track.grid else "warning"
+        detail = (
+            f"{missing} of {track.grid} samples are missing ({track.holes} holes, the longest "
+            f"{end - begin:.3g} s, from {begin:.5g} s on); they are left out of the clusters"
         )
-        findings.append(
-            Finding(
-                "missing_samples",
-                "note" if missing < 0.01 * found.grid else "warning",
-                f"{missing} of {found.grid} samples are missing ({found.holes} holes, the "
-                f"longest {end - begin:.3g} s, from {begin:.5g} s on); they are left out of the "
-                "clusters",
-                missing,
-                start=begin,
-                end=end,
-            )
-        )
-    if len(found.starts) > 1:
-        findings.append(
-            _segments(
-                "the clock jumps or stops",
-                [point * interval for point in found.starts[1:]],
-                found.jumps[1:],
-            )
-        )
-    if found.duplicates:
-        findings.append(
-            Finding(
-                "repeated_stamps",
-                "note",
-                f"{found.duplicates} records repeat a stamp or fall on an earlier one; left out",
-                found.duplicates,
-            )
-        )
-    if found.unstamped:
-        findings.append(
-            Finding(
-                "missing_stamps",
-                "warning",
-                f"{found.unstamped} records have no time stamp, or one far astray; taken as "
-                "consecutive",
-                found.unstamped,
-            )
-        )
+        findings.append(Finding("missing_samples", severity, detail, missing, start=begin, end=end))
+    if len(track.starts) > 1:
+        times = [point * interval for point in track.starts[1:]]
+        findings.append(_segments("the clock jumps or stops", times, track.jumps[1:]))
+    if track.duplicates:
+        detail = f"{track.duplicates} records repeat a stamp or fall on an earlier one; left out"
+        findings.append(Finding("repeated_stamps", "note", detail, track.duplicates))
+    if track.unstamped:
+        detail = f"{track.unstamped} records have no time stamp, or one far astray; taken as "
+        detail += "consecutive"
+        findings.append(Finding("missing_stamps", "warning", detail, track.unstamped))
     return findings
 
 
 def _segments(what: str, times: list[float], jumps: list[float]) -> Finding:
     """Return the finding of pauses, with the place of the longest one.
 
-    Parameters
-    ----------
-    what : str
-        What the clock does.
-    times : list of float
-        s of samples before each.
-    jumps : list of float
-        Step of the stamps at each, s; below 0: backwards.
+    ``times``: s of samples before each; ``jumps``: step of the stamps, s, below 0 backwards.
     """
-    longest = max(range(len(jumps)), key=lambda k: abs(jumps[k]))
-    jump, at = jumps[longest], times[longest]
+    jump, at = max(zip(jumps, times, strict=True), key=lambda place: abs(place[0]))
     direction = "backwards" if jump < 0 else "forward"
-    return Finding(
-        "segments",
-        "warning",
+    segments = len(jumps) + 1
+    detail = (
         f"{what} {len(jumps)} times, by up to {abs(jump):.5g} s {direction}, after {at:.5g} s of "
-        f"samples; the recording is analysed as {len(jumps) + 1} segments",
-        len(jumps) + 1,
-        start=at,
-        end=at,
+        f"samples; the recording is analysed as {segments} segments"
     )
+    return Finding("segments", "warning", detail, segments, start=at, end=at)
 
 
 def _rate_findings(rate: float, stated: float | None, settings: QualitySettings) -> list[Finding]:
@@ -257,22 +202,18 @@ def _rate_findings(rate: float, stated: float | None, settings: QualitySettings)
             f"the stamps say {rate:.6g} Hz, stated are {stated:.6g} Hz: 'unit' of "
             "'time' is probably another one of s, ms, us, ns"
         )
-    return [
-        Finding(
-            "rate_contradicts_stamps",
-            "warning",
-            f"stated are {stated:.6g} Hz, in the sensor file or in the log itself; the stamps say "
-            f"{rate:.6g} Hz, which is used; mend 'rate', or drop it",
-            rate,
-        )
-    ]
+    detail = (
+        f"stated are {stated:.6g} Hz, in the sensor file or in the log itself; the stamps say "
+        f"{rate:.6g} Hz, which is used; mend 'rate', or drop it"
+    )
+    return [Finding("rate_contradicts_stamps", "warning", detail, rate)]
 
 
-def _drift_findings(found: Track, settings: QualitySettings) -> list[Finding]:
+def _drift_findings(track: Track, settings: QualitySettings) -> list[Finding]:
     """Tell whether the interval between samples is another in the second half of the log."""
-    if len(found.starts) > 1 or len(found.marks) < 8:
+    if len(track.starts) > 1 or len(track.marks) < 8:
         return []
-    points, stamps = np.array(found.marks, dtype=np.float64).T
+    points, stamps = np.array(track.marks, dtype=np.float64).T
     half = len(points) // 2
     early, late = (
         (stamps[b] - stamps[a]) / (points[b] - points[a])
@@ -281,24 +222,20 @@ def _drift_findings(found: Track, settings: QualitySettings) -> list[Finding]:
     drift = late / early - 1.0
     if abs(drift) < settings.rate_drift:
         return []
-    return [
-        Finding(
-            "rate_drifts",
-            "warning",
-            f"the interval between samples is {1e6 * drift:+.0f} ppm longer in the second half of "
-            "the recording: the clock of the sensor or of the host drifts; one rate is used",
-            drift,
-        )
-    ]
+    detail = (
+        f"the interval between samples is {1e6 * drift:+.0f} ppm longer in the second half of "
+        "the recording: the clock of the sensor or of the host drifts; one rate is used"
+    )
+    return [Finding("rate_drifts", "warning", detail, drift)]
 
 
 def _arrival_order(
-    stamps: Stamps, found: Track, stated: float | None, settings: QualitySettings
+    stamps: Stamps, track: Track, stated: float | None, settings: QualitySettings
 ) -> TimeBase:
     """Return the time base of stamps that lie on no grid: consecutive samples at the mean rate."""
     # A pause is long against the mean interval and against the steps of stamps that are shared.
-    mean = _span(stamps) / max(found.rows - 1, 1)
-    gap = max(1.0, 100 * mean, 10 * found.interval) * (1 + 1e-6)
+    mean = _span(stamps) / max(track.rows - 1, 1)
+    gap = max(1.0, 100 * mean, 10 * track.interval) * (1 + 1e-6)
     rows, last, worst, worst_at = 0, np.nan, 0.0, 0
     starts, jumps = [0], []
     # Between the records with which a stamp changes: samples that share one are counted whole.
@@ -306,10 +243,10 @@ def _arrival_order(
     samples, elapsed = 0, 0.0
     for block in stamps():
         # A missing stamp stands for no time: the step after it covers it.
-        held = np.concatenate(([last], block))
-        good = np.maximum.accumulate(np.where(np.isnan(held), 0, np.arange(len(held))))
-        held = held[good]
-        steps = np.diff(held)
+        latest = np.concatenate(([last], block))
+        good = np.maximum.accumulate(np.where(np.isnan(latest), 0, np.arange(len(latest))))
+        latest = latest[good]
+        steps = np.diff(latest)
         cut = np.abs(steps) > gap
         starts += [rows + int(i) for i in np.flatnonzero(cut)]
         jumps += steps[cut].tolist()
@@ -319,30 +256,18 @@ def _arrival_order(
         changes = np.flatnonzero((steps != 0) & np.isfinite(steps))
         if len(changes):
             at = np.concatenate(([changed_at], rows + changes))
-            when = np.concatenate(([changed_stamp], held[changes + 1]))
+            when = np.concatenate(([changed_stamp], latest[changes + 1]))
             inside = ~cut[changes] & np.isfinite(when[:-1])
             samples += int(np.diff(at)[inside].sum())
             elapsed += float(np.diff(when)[inside].sum())
             changed_at, changed_stamp = int(at[-1]), float(when[-1])
         rows += len(block)
-        last = held[-1]
+        last = latest[-1]
     if elapsed <= 0:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     rate = samples / elapsed
-    findings = [
-        Finding(
-            "jittered_stamps",
-            "warning",
-            f"the stamps lie on no uniform grid ({100 * found.off_grid / found.rows:.0f} % of them "
-            f"off it, {found.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at "
-            f"{worst_at / rate:.5g} s); the samples are taken as consecutive at the mean rate of "
-            f"{rate:.6g} Hz, so lost samples cannot be seen",
-            worst,
-            start=worst_at / rate,
-            end=worst_at / rate,
-        ),
-        *_rate_findings(rate, stated, settings),
-    ]
+    findings = [_jittered(track, rate, worst, worst_at / rate)]
+    findings += _rate_findings(rate, stated, settings)
     segments = tuple(zip(starts, [*starts[1:], rows], strict=True))
     if len(segments) > 1:
         times = [start / rate for start in starts[1:]]
@@ -358,6 +283,17 @@ def _arrival_order(
         tuple(findings),
         rate_error=rate * worst / elapsed,
     )
+
+
+def _jittered(track: Track, rate: float, worst: float, at: float) -> Finding:
+    """Return the finding of stamps that lie on no grid; ``worst``: the longest interval, s."""
+    detail = (
+        f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
+        f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at {at:.5g} s); the "
+        f"samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost samples "
+        "cannot be seen"
+    )
+    return Finding("jittered_stamps", "warning", detail, worst, start=at, end=at)
 
 
 def _span(stamps: Stamps) -> float:

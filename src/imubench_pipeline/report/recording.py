@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import log_paths, read_metadata
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.backtest import backtest_lines

@@ -13,7 +13,7 @@ from imubench_pipeline.estimators.likelihood import fit_models
 from imubench_pipeline.estimators.spectral_findings import band_finding, line_findings
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.recordings.ingest import ingest_as_planned
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import ChannelLog, static_logs
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.tables.findings import Finding

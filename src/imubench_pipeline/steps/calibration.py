@@ -31,7 +31,7 @@ from imubench_pipeline.steps.noise_source import (
     segments_reason,
 )
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.tables.of_calibration import CALIBRATION_TABLES
+from imubench_pipeline.tables.of_experiments import CALIBRATION_TABLES
 from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
 

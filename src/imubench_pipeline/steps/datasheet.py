@@ -11,7 +11,7 @@ from imubench_pipeline.datasheets.comparable import SENSITIVITY, comparables
 from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
 from imubench_pipeline.datasheets.measured import sensitivity
 from imubench_pipeline.estimators.rows import estimates
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.steps.kept_curves import curves
 from imubench_pipeline.tables import read

@@ -42,7 +42,7 @@ from imubench_pipeline.steps.noise_source import (
     segments_reason,
 )
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.tables.of_earth_rate import EARTH_RATE_TABLES
+from imubench_pipeline.tables.of_experiments import EARTH_RATE_TABLES
 from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
 

@@ -30,8 +30,7 @@ from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperatu
 from imubench_pipeline.estimators.thermal.register import step_of
 from imubench_pipeline.estimators.thermal.result import ThermalFit, shift_by_effect
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.kept import kept_static_logs
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality, kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of

@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.keys import divided
 

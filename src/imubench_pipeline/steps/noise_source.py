@@ -16,7 +16,7 @@ from imubench_pipeline.estimators.rows import estimates, recommended_estimates
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import ConfigError

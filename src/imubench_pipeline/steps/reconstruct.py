@@ -22,7 +22,7 @@ from imubench_pipeline.noise.simulate import (
     reconstructed_variance,
     simulate_blocks,
 )
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.config import ReconstructionSettings
 from imubench_pipeline.steps.kept_curves import compensated_curves, curves

@@ -22,8 +22,8 @@ from imubench_pipeline.recordings.fitness import (
     with_doubts,
     with_doubts_of_all,
 )
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.copies import recorded_twice
-from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.settings.sensor import sensors_of
 from imubench_pipeline.steps.published import published_rows, truth_rows
 from imubench_pipeline.tables import build

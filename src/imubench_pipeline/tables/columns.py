@@ -38,6 +38,18 @@ def count(name: str, meaning: str, required: bool = False) -> Column:
     return Column(name, pa.int64(), "-", meaning, required)
 
 
+def flag(name: str, meaning: str, required: bool = True) -> Column:
+    """Return a column of yes and no."""
+    return Column(name, pa.bool_(), "-", meaning, required)
+
+
+SENSOR = text("sensor", "name of the sensor file")
+RECORDING = text("recording", "name of the recording")
+CHANNEL = text("channel", "axis and quantity, gyro_x to accel_z")
+KEYS = (SENSOR, RECORDING, CHANNEL)
+"""What names a channel in every table."""
+
+
 def curve_limits(unit: str) -> tuple[Column, ...]:
     """Return what every table of a measured Allan curve says of its limits."""
     return (

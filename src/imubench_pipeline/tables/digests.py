@@ -22,7 +22,6 @@ def write_sealed_json(data: Mapping[str, Any], path: Path) -> None:
     ----------
     data : mapping
         What JSON can hold, no NaN among it.
-    path : Path
     """
     text = json.dumps(dict(data), indent=1, allow_nan=False)
     write_content(text.removesuffix(_END) + _last_line(text), path)
@@ -40,9 +39,9 @@ def read_sealed_json(path: Path) -> dict[str, Any]:
     """
     # All letters count, and not only what they mean.
     text = path.read_bytes().decode()
-    found = _LAST_LINE.search(text)
-    rest = text[: found.start()] + _END if found else text
-    if found is None or found[0] != _last_line(rest):
+    seal = _LAST_LINE.search(text)
+    rest = text[: seal.start()] + _END if seal else text
+    if seal is None or seal[0] != _last_line(rest):
         raise ValueError(f"{path}: its digest is another one")
     data: dict[str, Any] = json.loads(rest)
     return data

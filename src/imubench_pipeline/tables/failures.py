@@ -34,24 +34,15 @@ _NAMED = ("recordings", "findings", "estimate_findings", "failures")
 
 @dataclass(frozen=True)
 class Failure:
-    """A step that failed.
-
-    Attributes
-    ----------
-    sensor : str
-    recording : str or None
-        None: a step of the whole sensor.
-    step : str
-    cause : {"error", "killed", "time"}
-    reason : str
-        In one line.
-    """
+    """A step that failed."""
 
     sensor: str
     recording: str | None
+    """None: a step of the whole sensor."""
     step: str
     cause: Cause
     reason: str
+    """In one line."""
 
     @property
     def name(self) -> str:
@@ -76,8 +67,8 @@ def failure_of(path: Path) -> Failure | None:
     """
     if path.name == QUALITY:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
-            found = read_json(path).get("failure")
-            return Failure(**found) if found else None
+            failure = read_json(path).get("failure")
+            return Failure(**failure) if failure else None
     if path.suffix == ".parquet":
         with contextlib.suppress(OSError, ValueError, TypeError, pa.ArrowException):
             return told_by(pq.read_schema(path))
@@ -91,15 +82,9 @@ def told_by(read: pa.Schema) -> Failure | None:
 
 
 def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, list[Failure]]:
-    """Read and join files of one table, and what failed of those that are empty for it.
-
-    Parameters
-    ----------
-    table : str
-    paths : sequence of Path
-    """
+    """Read and join files of one table, and what failed of those that are empty for it."""
     parts = [read_part(table, path) for path in paths]
-    failures = [told for part in parts if len(part) == 0 and (told := told_by(part.schema))]
+    failures = [failure for part in parts if len(part) == 0 and (failure := told_by(part.schema))]
     return joined(table, parts), failures
 
 
@@ -110,11 +95,10 @@ def write_empty(tables: Iterable[Path], failure: Failure) -> None:
     ----------
     tables : iterable of Path
         Each has the name of its file.
-    failure : Failure
     """
-    told = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
+    metadata = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
     for path in tables:
-        write_arrow(schema(path.stem).empty_table().replace_schema_metadata(told), path)
+        write_arrow(schema(path.stem).empty_table().replace_schema_metadata(metadata), path)
 
 
 def with_failures(
@@ -129,7 +113,6 @@ def with_failures(
     ----------
     tables : mapping of str to Table
         Those of recordings, among them ``recordings`` and ``findings``.
-    failures : sequence of Failure
     """
     if not failures:
         return {"failures": schema("failures").empty_table()} | dict(tables)
@@ -137,9 +120,10 @@ def with_failures(
         (row["sensor"], row["recording"]): row["kind"] for row in tables["recordings"].to_pylist()
     }
     reasons = {
-        (one.sensor, one.recording): one.reason
-        for one in reversed(failures)
-        if one.step not in _BESIDE or kinds.get((one.sensor, one.recording or "")) != "static"
+        (failure.sensor, failure.recording): failure.reason
+        for failure in reversed(failures)
+        if failure.step not in _BESIDE
+        or kinds.get((failure.sensor, failure.recording or "")) != "static"
     }
     marked = without(tables, reasons)
     marked["recordings"] = build(
@@ -152,10 +136,12 @@ def with_failures(
             for key in [(row["sensor"], row["recording"])]
         ),
     )
-    of_recordings = [one for one in failures if one.recording]
-    known = tables["findings"].to_pylist()
-    told = [one.finding().row(one.sensor, str(one.recording)) for one in of_recordings]
-    marked["findings"] = build("findings", [*known, *(row for row in told if row not in known)])
+    of_recordings = [failure for failure in failures if failure.recording]
+    listed = tables["findings"].to_pylist()
+    rows = [
+        failure.finding().row(failure.sensor, str(failure.recording)) for failure in of_recordings
+    ]
+    marked["findings"] = build("findings", [*listed, *(row for row in rows if row not in listed)])
     before = tables["failures"].to_pylist() if "failures" in tables else []
     new = [row for row in map(asdict, failures) if row not in before]
     marked["failures"] = build("failures", [*before, *new])
@@ -169,13 +155,14 @@ def without(
 
     Parameters
     ----------
-    tables : mapping of str to Table
     left_out : container of (str, str)
         Sensor and recording.
     """
-    kept = dict(tables)
+    filtered = dict(tables)
     for name, table in tables.items():
         if "recording" in table.schema.names and name not in _NAMED:
             keys = zip(table["sensor"].to_pylist(), table["recording"].to_pylist(), strict=True)
-            kept[name] = table.filter(pa.array([key not in left_out for key in keys], pa.bool_()))
-    return kept
+            filtered[name] = table.filter(
+                pa.array([key not in left_out for key in keys], pa.bool_())
+            )
+    return filtered

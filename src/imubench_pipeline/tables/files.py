@@ -162,8 +162,8 @@ def read_part(table: str, path: Path) -> pa.Table:
             raise pa.ArrowInvalid("its metadata are not those that were written")
         with checked_parquet(path) as file:
             part = file.read(use_threads=False)
-        told = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}
-        part = part.replace_schema_metadata(told)
+        metadata = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}
+        part = part.replace_schema_metadata(metadata)
     except FileNotFoundError:
         raise
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
@@ -180,19 +180,19 @@ def read_part(table: str, path: Path) -> pa.Table:
     return part.cast(expected).replace_schema_metadata(part.schema.metadata)
 
 
-def _other_columns(found: pa.Schema, expected: pa.Schema) -> str:
+def _other_columns(actual: pa.Schema, expected: pa.Schema) -> str:
     """Return in which columns a table is another than expected; nothing where it is not."""
-    if found.names != expected.names:
-        missing = [name for name in expected.names if name not in found.names]
-        unknown = [name for name in found.names if name not in expected.names]
-        said = [f"it has no {', '.join(missing)}"] * bool(missing)
-        said += [f"it has {', '.join(unknown)}, not known here"] * bool(unknown)
-        return " and ".join(said) or "its columns have another order"
+    if actual.names != expected.names:
+        missing = [name for name in expected.names if name not in actual.names]
+        unknown = [name for name in actual.names if name not in expected.names]
+        faults = [f"it has no {', '.join(missing)}"] * bool(missing)
+        faults += [f"it has {', '.join(unknown)}, not known here"] * bool(unknown)
+        return " and ".join(faults) or "its columns have another order"
     for name in expected.names:
-        here, there = found.field(name), expected.field(name)
-        if here.type != there.type:
-            return f"{name} is {here.type}, expected {there.type}"
-        due = (there.metadata or {})[b"unit"]
+        here, due_field = actual.field(name), expected.field(name)
+        if here.type != due_field.type:
+            return f"{name} is {here.type}, expected {due_field.type}"
+        due = (due_field.metadata or {})[b"unit"]
         unit = (here.metadata or {}).get(b"unit", due)
         if unit != due:
             return f"{name} is in {unit.decode()!r}, expected {due.decode()!r}"

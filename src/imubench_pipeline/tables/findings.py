@@ -17,31 +17,21 @@ _HALF_REASON = 700
 
 @dataclass(frozen=True)
 class Finding:
-    """One finding about a recording or one of its channels.
-
-    Attributes
-    ----------
-    finding : str
-        Its name, such as ``missing_samples``.
-    severity : {"note", "warning", "fatal"}
-        ``fatal``: the channel, or the whole recording, is left out of the analysis.
-    detail : str
-        In words, with the unit of ``value`` and what to do.
-    value : float
-        Its size.
-    channel : str or None
-        None: the whole recording.
-    start, end : float or None
-        The part of the recording that it concerns, s from the first sample; None: all of it.
-    """
+    """One finding about a recording or one of its channels."""
 
     finding: str
+    """Its name, such as ``missing_samples``."""
     severity: Severity
+    """``fatal``: the channel, or the whole recording, is left out of the analysis."""
     detail: str
+    """In words, with the unit of ``value`` and what to do."""
     value: float
+    """Its size."""
     channel: str | None = None
+    """None: the whole recording."""
     start: float | None = None
     end: float | None = None
+    """The part of the recording that it concerns, s from the first sample; None: all of it."""
 
     def row(self, sensor: str, recording: str) -> Mapping[str, Any]:
         """Return the row of the table ``findings``."""

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import pyarrow as pa
-
-from imubench_pipeline.tables.columns import Column, number, text
+from imubench_pipeline.tables.columns import RECORDING, SENSOR, flag, number, text
 
 JUDGED = (
     text("fitness", "fit, fit with doubts or unfit; null: not analysed", required=False),
-    Column("decides", pa.bool_(), "-", "enters rankings, pools and exports", required=False),
+    flag("decides", "enters rankings, pools and exports", required=False),
     text("doubts", "what puts its figures in doubt; empty: nothing", required=False),
 )
 """What the table ``recordings`` says of it."""
 
 DOUBTS = (
-    text("sensor", "name of the sensor file"),
-    text("recording", "name of the recording"),
+    SENSOR,
+    RECORDING,
     text("channel", "the channel concerned; null: the whole recording", required=False),
     text("code", "a finding; not_explained: the spectrum; doubtful: a parameter's status"),
     text("fitness", "unfit: the figures may be of something else; else fit with doubts"),

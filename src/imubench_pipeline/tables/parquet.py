@@ -35,8 +35,6 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
 
     Parameters
     ----------
-    table : pyarrow.Table
-    path : Path
     compression : str
         As `pyarrow.parquet.ParquetWriter` takes it.
     """
@@ -45,13 +43,13 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
     ) as writer:
         writer.write_table(table)
         writer.add_key_value_metadata({SEAL: _UNSEALED})
-    found = end_of(path)
-    place = _PLACE.search(found)
+    footer = end_of(path)
+    place = _PLACE.search(footer)
     if place is None:
         raise RuntimeError(f"{path}: its metadata are not laid out as expected")
     with path.open("r+b") as file:
-        file.seek(place.start(1) - len(found), 2)
-        file.write(hashlib.sha256(found).hexdigest().encode())
+        file.seek(place.start(1) - len(footer), 2)
+        file.write(hashlib.sha256(footer).hexdigest().encode())
 
 
 def seal_broken(path: Path) -> bool:
@@ -59,11 +57,11 @@ def seal_broken(path: Path) -> bool:
 
     Of a file without a digest that is not known: False.
     """
-    found = end_of(path)
-    place = _PLACE.search(found)
+    footer = end_of(path)
+    place = _PLACE.search(footer)
     if place is None:
         return False
-    unsealed = found[: place.start(1)] + _UNSEALED + found[place.end(1) :]
+    unsealed = footer[: place.start(1)] + _UNSEALED + footer[place.end(1) :]
     return hashlib.sha256(unsealed).hexdigest().encode() != place[1]
 
 

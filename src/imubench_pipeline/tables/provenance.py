@@ -59,18 +59,18 @@ def _path(module: str) -> Path:
 def _used(path: Path) -> tuple[Path, ...]:
     """Return the files of the package that a module uses by itself."""
     text = path.read_text("utf-8")
-    found: list[Path] = []
+    files: list[Path] = []
     for package, base, names in _IMPORT.findall(text):
         if package != _NAME:
             continue
         if base:
-            found.append(_path(base[1:]))
+            files.append(_path(base[1:]))
         for name in _IMPORTED.findall(names):
             with suppress(ValueError):
-                found.append(_path(f"{base}.{name}"[1:]))
+                files.append(_path(f"{base}.{name}"[1:]))
     for name in dict.fromkeys(_TEXT.findall(text)):
-        found += _named(name, path.parent)
-    return tuple(found)
+        files += _named(name, path.parent)
+    return tuple(files)
 
 
 def _named(text: str, folder: Path) -> Iterator[Path]:

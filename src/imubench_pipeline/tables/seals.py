@@ -52,7 +52,6 @@ class SealedFile:
 
         Parameters
         ----------
-        path : Path
         whole : bool
             All of it is read, and not only where it was changed since.
         """
@@ -62,8 +61,8 @@ class SealedFile:
                 return f"expected {self.size} bytes, found {about.st_size}"
             if not whole and about.st_mtime_ns == self.changed:
                 return None
-            if (found := digest_of(path)) != self.sha256:
-                return f"expected SHA-256 {self.sha256[:12]}…, found {found[:12]}…"
+            if (digest := digest_of(path)) != self.sha256:
+                return f"expected SHA-256 {self.sha256[:12]}…, found {digest[:12]}…"
         except (FileNotFoundError, NotADirectoryError):
             return f"expected {self.size} bytes, found no such file"
         except OSError as error:
@@ -73,27 +72,18 @@ class SealedFile:
 
 @dataclass(frozen=True)
 class Seal:
-    """What a step left.
-
-    Attributes
-    ----------
-    place : str
-        Of the seal: the step, after the recording or sensor that it is of.
-    form : str
-        As `form` gave it.
-    inputs : dict of str to str
-        Digests of what it read, by their places below the results.
-    outputs : dict of str to SealedFile
-        Likewise, what it wrote.
-    settings : str
-        Digest of the settings and the code that it ran with.
-    """
+    """What a step left."""
 
     place: str
+    """Of the seal: the step, after the recording or sensor that it is of."""
     form: str
+    """As `form` gave it."""
     inputs: dict[str, str]
+    """Digests of what it read, by their places below the results."""
     outputs: dict[str, SealedFile]
+    """Likewise, what it wrote."""
     settings: str = ""
+    """Digest of the settings and the code that it ran with."""
 
     def write(self, results: Path) -> None:
         """Keep it, atomically."""
@@ -127,7 +117,6 @@ def seal_files(
 
     Parameters
     ----------
-    results : Path
     place : str
         As of `place_of`.
     outputs : iterable of Path
@@ -146,10 +135,8 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
 
     Parameters
     ----------
-    results : Path
     place : str
         Where there is no seal, none is made.
-    outputs : iterable of Path
     """
     try:
         before = read_seal(results, place)
@@ -160,13 +147,7 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
 
 
 def lost_inputs(results: Path, place: str) -> list[str]:
-    """Return what a step read and is no longer there; nothing where there is no seal of it.
-
-    Parameters
-    ----------
-    results : Path
-    place : str
-    """
+    """Return what a step read and is no longer there; nothing where there is no seal of it."""
     try:
         inputs = read_seal(results, place).inputs
     except (FileNotFoundError, SealError):
@@ -179,7 +160,6 @@ def digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
 
     Parameters
     ----------
-    results : Path
     paths : iterable of Path
         Files, and folders of which all files are meant; others than of results are left out.
     """
@@ -199,7 +179,7 @@ def read_seal(results: Path, place: str) -> Seal:
     path = _path(results, place)
     try:
         data = read_sealed_json(path)
-        outputs = {name: SealedFile(**one) for name, one in data["outputs"].items()}
+        outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}
         seal = Seal(**{**data, "outputs": outputs})
     except FileNotFoundError:
         raise
@@ -215,8 +195,8 @@ def read_seal(results: Path, place: str) -> Seal:
 def places(results: Path) -> list[str]:
     """Return the places of all seals, in order."""
     folder = results / FOLDER
-    found = (path.relative_to(folder).as_posix() for path in folder.rglob("*.json"))
-    return sorted(name.removesuffix(".json") for name in found)
+    files = (path.relative_to(folder).as_posix() for path in folder.rglob("*.json"))
+    return sorted(name.removesuffix(".json") for name in files)
 
 
 def visible(path: Path) -> bool:

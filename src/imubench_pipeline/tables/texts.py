@@ -28,31 +28,18 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(
-        one if one.isprintable() else one.encode("unicode_escape").decode("ascii") for one in text
+        sign if sign.isprintable() else sign.encode("unicode_escape").decode("ascii")
+        for sign in text
     )
 
 
 def as_cell(text: str) -> str:
     """Return a text as a cell of a CSV file that no spreadsheet takes for a formula.
 
-    Each sign that would begin a formula has one apostrophe more before it than in the text:
-    `of_cell` takes it away.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    str
-        Printable (`printable`).
+    It is `printable`, and each sign that would begin a formula has one apostrophe more before it
+    than in the text.
     """
     return _FORMULA.sub(r"\1'\2", printable(text))
-
-
-def of_cell(cell: str) -> str:
-    """Return the printable text that `as_cell` made a cell of."""
-    return _FORMULA.sub(lambda found: found[1] + found[2].removeprefix("'"), cell)
 
 
 def with_safe_cells(table: pa.Table) -> pa.Table:
@@ -61,9 +48,9 @@ def with_safe_cells(table: pa.Table) -> pa.Table:
         if not pa.types.is_string(field.type):
             continue
         column = table.column(place).combine_chunks().dictionary_encode()
-        known = column.dictionary.to_pylist()
-        safe = [as_cell(text) for text in known]
-        if safe != known:
+        texts = column.dictionary.to_pylist()
+        safe = [as_cell(text) for text in texts]
+        if safe != texts:
             column = pa.DictionaryArray.from_arrays(column.indices, pa.array(safe, pa.string()))
             table = table.set_column(place, field, column.cast(pa.string()))
     return table

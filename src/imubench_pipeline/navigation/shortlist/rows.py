@@ -21,7 +21,7 @@ from imubench_pipeline.navigation.shortlist.figures import End, Figures, figures
 from imubench_pipeline.navigation.suitability.abilities import Abilities, abilities, judge
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
-from imubench_pipeline.tables.of_shortlist import SHORTLIST
+from imubench_pipeline.tables.of_navigation import SHORTLIST
 from imubench_pipeline.typing import Row
 
 VERDICTS: Mapping[str, str] = {

@@ -16,8 +16,10 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -26,10 +28,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Column, Table, UnusableError
-from imubench_pipeline.readers.arrays.time import ArrayTime
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.bounds import LARGEST_CHUNKS, LARGEST_RECORD, MOST_ARRAYS
+from imubench_pipeline.readers.file_format import (
+    FIRST,
+    NOTHING_STATED,
+    ROWS,
+    FileFormat,
+    Kind,
+    LogColumn,
+    LogTable,
+    shown,
+)
+from imubench_pipeline.readers.stamps import Clock, date_of_nanoseconds, date_of_stamp
 from imubench_pipeline.readers.stated_units import StatedUnit, stated
+from imubench_pipeline.settings.sensor import TimeSource
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -51,13 +64,12 @@ class ArrayFile(LogFile):
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
         check_not_empty(self.path)
-        time = ArrayTime(self)
+        time = None if self.log.time is None else ArrayTime(self, self.log.time)
         for block in self._guarded():
-            stamps = block.pop(_TIME, None)
             # What stands in a damaged file may overflow: infinite, and counted as such.
             with np.errstate(over="ignore", invalid="ignore"):
                 try:
-                    seconds = None if stamps is None else time.seconds(stamps)
+                    seconds = None if time is None else time.seconds(block.pop(_TIME))
                 except UnusableError as error:
                     raise RecordingError(f"{self.path.name}: {error}") from None
                 columns = {name: self.to_si(name, numbers(raw)) for name, raw in block.items()}
@@ -74,13 +86,13 @@ class ArrayFile(LogFile):
         tables = list(dict.fromkeys(table for table, _ in places.values()))
         _check_lengths(places)
         wanted = {
-            table: sorted({position for held, position in places.values() if held is table})
+            table: sorted({position for owner, position in places.values() if owner is table})
             for table in tables
         }
-        held = sum(table.held_bytes(wanted[table]) for table in tables)
-        if held > LARGEST_CHUNKS:
+        chunk_bytes = sum(table.held_bytes(wanted[table]) for table in tables)
+        if chunk_bytes > LARGEST_CHUNKS:
             raise UnusableError(
-                f"the columns lie in chunks of {held} bytes together; expected at most "
+                f"the columns lie in chunks of {chunk_bytes} bytes together; expected at most "
                 f"{LARGEST_CHUNKS}: repack the file with smaller chunks"
             )
         rows = rows_of_block(
@@ -155,25 +167,20 @@ class ArrayFile(LogFile):
 
 def _stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
     """Return the units that a file states of its channels."""
-    found = {}
+    units = {}
     for name, (table, position) in places.items():
         label = table.column(position).label or table.name.rpartition("/")[2]
-        beside = (table.unit(position), f"an attribute of {table.shown}")
-        unit = stated(name, (beside,), label)
-        if unit is not None:
-            found[name] = unit
-    return found
+        where = f"an attribute of {table.shown}"
+        if unit := stated(name, table.unit(position), where, label):
+            units[name] = unit
+    return units
 
 
 def rows_of_block(row_bytes: int, most: int) -> int:
     """Return how many records are read at a time.
 
-    Parameters
-    ----------
-    row_bytes : int
-        Memory that one takes.
-    most : int
-        That all may take together.
+    ``row_bytes``: memory that one takes.
+    ``most``: that all may take together.
 
     Raises
     ------
@@ -210,9 +217,9 @@ def explained(path: Path) -> Iterator[None]:
         raise RecordingError(f"{path.name}: {error}") from None
     # The libraries raise nearly every kind of exception on damaged files.
     except Exception as error:
-        said = " ".join(str(error).split())[:300] or type(error).__name__
+        reason = " ".join(str(error).split())[:300] or type(error).__name__
         raise RecordingError(
-            f"{path.name}: corrupt data, or cut short ({said}); copy it again"
+            f"{path.name}: corrupt data, or cut short ({reason}); copy it again"
         ) from error
 
 
@@ -231,19 +238,19 @@ def _place(tables: dict[str, Table], column: str | int, variable: str | None, ke
     """
     if isinstance(column, int):
         return _numbered(_table(tables, variable, key), column, key)
-    found = _addressed(tables, column, variable)
-    if len(found) == 1:
-        return found[0]
-    if found:
-        names = _listed(table.shown for table, _ in found)
-        if len({table for table, _ in found}) == 1:
+    matches = _addressed(tables, column, variable)
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        names = _listed(table.shown for table, _ in matches)
+        if len({table for table, _ in matches}) == 1:
             raise UnusableError(
                 f"column {column!r} for {key} stands twice in {names}; take it by its position, "
                 "as a number"
             )
         raise UnusableError(
             f"column {column!r} for {key} is in several variables ({names}); name the one with "
-            f"'variable:', or as in 'column: {found[0][0].name}/{column}'"
+            f"'variable:', or as in 'column: {matches[0][0].name}/{column}'"
         )
     address = _address(column, variable)
     if address in tables:
@@ -383,3 +390,200 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(cut(name, str) for name in every[:_SHOWN]) + (
         ", ..." if len(every) > _SHOWN else ""
     )
+
+
+# ----------------------------------------------------------------------- what a log holds
+
+_MOST_TABLES, _MOST_COLUMNS = 1000, 1000
+_MOST_BYTES = 1 << 24
+_RATES = frozenset(
+    ("fs", "rate", "sr", "samplerate", "samplingrate", "samplefreq", "samplingfreq", "freq",
+     "samplefrequency", "samplingfrequency", "frequency", "odr")
+)  # fmt: skip
+_HIGHEST_RATE = 1e6
+
+
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+    """Return the tables of a file, as far as the first thousand.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be read.
+    """
+    check_not_empty(path)
+    file = file_format.code().log_file(path, NOTHING_STATED, {})
+    assert isinstance(file, ArrayFile)  # the readers of these files
+    with explained(path), ExitStack() as stack:
+        tables = list(islice(file.tables(stack), _MOST_TABLES))
+        described = [_described(path, file_format, table) for table in tables]
+    rates = {rate for table in described if (rate := _rate(table)) is not None}
+    if len(rates) == 1:
+        (rate,) = rates
+        described = [replace(table, rate=rate) for table in described]
+    return _together(described)
+
+
+def _rate(table: LogTable) -> float | None:
+    """Return the rate that a single value is, by its name."""
+    name = re.sub(r"[\W_\d]+", "", table.name.rpartition("/")[2]).lower().removesuffix("hz")
+    if table.rows != 1 or len(table.columns) != 1 or name not in _RATES:
+        return None
+    values = table.columns[0].values
+    return float(values[0]) if len(values) and 0 < values[0] < _HIGHEST_RATE else None
+
+
+def _together(described: Sequence[LogTable]) -> list[LogTable]:
+    """Put vectors of one length, side by side in the file, into one table."""
+    tables: dict[object, LogTable] = {}
+    for number, table in enumerate(described):
+        alone = table.fault or table.variable or not table.name or table.rows in (None, 1)
+        above = table.name.rpartition("/")[0]
+        key = number if alone else (above, table.rows)
+        if key in tables:
+            first = tables[key]
+            columns = (*first.columns, *table.columns)
+            tables[key] = replace(
+                first, name=above, columns=columns, about=f"{len(columns)} vectors of {table.rows}"
+            )
+        else:
+            tables[key] = table
+    return list(tables.values())
+
+
+def _described(path: Path, file_format: FileFormat, table: Table) -> LogTable:
+    if table.fault is not None:
+        return LogTable(file_format, table.name, fault=table.fault)
+    described = [table.column(place) for place in range(min(table.width, _MOST_COLUMNS))]
+    usable = [n for n, column in enumerate(described) if column.kind in NUMBERS + DATES]
+    try:
+        with explained(path):
+            values = _first_records(table, usable)
+            units = [table.unit(place) for place in range(len(described))]
+    except RecordingError as error:
+        return LogTable(file_format, table.name, fault=str(error).removeprefix(f"{path.name}: "))
+    kinds: dict[str, Kind] = {DATES: "date", **dict.fromkeys(NUMBERS, "number")}
+    columns = []
+    labels = Counter(table.labels)
+    for place, column in enumerate(described):
+        source, address = _called(table, place, labels)
+        raw = values.get(place, np.empty(0))
+        dated = column.kind == DATES
+        columns.append(
+            LogColumn(
+                source,
+                column.label or (table.name if table.width == 1 else ""),
+                kinds.get(column.kind, "other"),
+                tuple(map(str, raw[:FIRST])) if dated else shown(raw),
+                _floats_of(raw) if dated else numbers(raw),
+                units[place],
+                ("iso8601",) if dated else (),
+                address,
+            )
+        )
+    whole = not table.labels and table.width == 1 and table.name != ""
+    variable = None if whole or not table.name else table.name
+    about = "" if table.rows is None else f"{table.rows} x {table.width}"
+    return LogTable(file_format, table.name, tuple(columns), variable, rows=table.rows, about=about)
+
+
+def _called(table: Table, place: int, labels: Mapping[str, int]) -> tuple[str | int, str | int]:
+    """Return what a column is called, in its table and in the whole file."""
+    label = table.labels[place] if table.labels else ""
+    if label and (not label.isprintable() or labels[label] > 1):
+        label = ""
+    if label:
+        return label, f"{table.name}/{label}" if table.name else label
+    if not table.name:
+        return place + 1, place + 1
+    if table.labels:
+        return place + 1, f"{table.name}/{table.labels[place]}"
+    return (
+        (table.name, table.name) if table.width == 1 else (place + 1, f"{table.name}[{place + 1}]")
+    )
+
+
+def _first_records(table: Table, places: Sequence[int]) -> dict[int, NDArray[Any]]:
+    """Return the first records of some columns, by position."""
+    if not places:
+        return {}
+    rows = min(ROWS, rows_of_block(table.row_bytes(places), _MOST_BYTES))
+    for block in table.blocks(places, rows):
+        if len(block[0]):
+            return {place: values[:rows] for place, values in zip(places, block, strict=True)}
+    return {}
+
+
+def _floats_of(raw: NDArray[Any]) -> NDArray[np.float64]:
+    """Return dates as ns since 1970; NaN where one is missing."""
+    dates = raw.astype("M8[ns]")
+    return np.where(np.isnat(dates), np.nan, dates.astype(np.int64).astype(np.float64))
+
+
+# ------------------------------------------------------------------------------------------- stamps
+
+_NANOSECONDS = {
+    "D": 86_400 * 10**9,
+    "h": 3_600 * 10**9,
+    "m": 60 * 10**9,
+    "s": 10**9,
+    "ms": 10**6,
+    "us": 10**3,
+    "ns": 1,
+}
+_LARGEST = 2**63 - 1
+
+
+class ArrayTime:
+    """Makes seconds of the stamps of an array; integers and dates lose no digit."""
+
+    def __init__(self, file: LogFile, source: TimeSource) -> None:
+        self._source = source
+        self._clock = Clock(file, source.wraps, self._started)
+        self._dated = False
+
+    def seconds(self, raw: NDArray[Any]) -> NDArray[np.float64]:
+        """Return s since the first stamp of the file; NaN where the stamp is missing.
+
+        Raises
+        ------
+        UnusableError
+            If dates do not fit into nanoseconds.
+        RecordingError
+            If the first records have no stamp.
+        """
+        missing = np.ma.getmaskarray(raw).copy()
+        values = np.ma.getdata(raw)
+        self._dated = values.dtype.kind == DATES
+        if self._dated:
+            missing |= np.isnat(values)
+            stamps = _nanoseconds(values, missing)
+        elif values.dtype.kind == "f":
+            stamps = values.astype(np.float64)
+            missing |= ~np.isfinite(stamps)
+        else:
+            # The differences of uint64 are right in int64 too, and may be negative there.
+            stamps = values.astype(np.int64)
+        return self._clock.seconds(stamps, ~missing)
+
+    def _started(self, first: Any) -> str | None:
+        return date_of_nanoseconds(first) if self._dated else date_of_stamp(first, self._source)
+
+
+def _nanoseconds(dates: NDArray[Any], missing: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return dates as ns since 1970."""
+    unit, count = np.datetime_data(dates.dtype)
+    if unit not in _NANOSECONDS:
+        raise UnusableError(
+            f"time stamps are dates in units of {unit}; expected "
+            f"{', '.join(_NANOSECONDS)}: convert them"
+        )
+    factor = _NANOSECONDS[unit] * count
+    whole = dates.astype(f"M8[{count}{unit}]", copy=False).view(np.int64)
+    limit = _LARGEST // factor
+    if np.any(~missing & ((whole > limit) | (whole < -limit))):
+        raise UnusableError(
+            "time stamps are dates before 1678 or after 2262, expected the time of a log; mend "
+            "'column' of 'time' in the sensor file, or copy the file again"
+        )
+    return np.where(missing, 0, whole) * np.int64(factor)

@@ -6,9 +6,13 @@ records, or a data set in the group that ``variable`` names. HDF5 has no dates o
 
 from __future__ import annotations
 
+import json
 import math
+import subprocess
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
-from imubench_pipeline.readers.arrays.hdf5_units import stated_unit
 from imubench_pipeline.readers.arrays.table import Array, Table, UnusableError
 from imubench_pipeline.readers.bounds import DEEPEST_GROUP, LARGEST_CHUNKS, MOST_OBJECTS
 
@@ -42,25 +45,15 @@ class Hdf5File(ArrayFile):
 
 
 def opened(path: Path) -> h5py.File:
-    """Open an HDF5 file for reading.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Open an HDF5 file for reading."""
     return h5py.File(path, "r")
 
 
 def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
     """Return the data sets of a file by name; links, hard ones apart, are not followed.
 
-    Parameters
-    ----------
-    file : h5py.File
-    time_axis : int
-        The side of a square matrix that is time.
-    passed_over : str
-        Beginning of the names in the root that are no data.
+    ``time_axis``: the side of a square matrix that is time.
+    ``passed_over``: beginning of the names in the root that are no data.
 
     Raises
     ------
@@ -117,8 +110,6 @@ class DataSet(Array):
 
     Parameters
     ----------
-    data : h5py.Dataset
-    name : str
     time_axis : int
         See `Array`.
     """
@@ -175,9 +166,8 @@ class DataSet(Array):
         low, high = min(positions), max(positions) + 1
         for start in range(0, self.rows, rows):
             block = self._block(data, slice(start, start + rows), slice(low, high))
-            yield [
-                self.taken(block, position if names else position - low) for position in positions
-            ]
+            before = 0 if names else low
+            yield [self.column_in(block, position - before) for position in positions]
 
     def _block(self, data: Any, time: slice, columns: slice) -> NDArray[Any]:
         """Return a block with time downwards; of records, a vector."""
@@ -237,3 +227,70 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
             f"{written} of {chunks} chunks of {name} were written, the others would read as "
             "zeros; cut it to what was recorded, or copy the file again"
         )
+
+
+# -------------------------------------------------------- units, in attributes of the data sets
+
+_NAMES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
+_LONGEST_WAIT = 3.0
+_LONGEST = 40
+_LONGEST_STORED = 1 << 12
+
+
+def stated_unit(data: h5py.Dataset) -> str | None:
+    """Return the unit that an attribute of a data set states."""
+    name = next((name for name in _NAMES if name in data.attrs), None)
+    if name is None:
+        return None
+    kind = data.attrs.get_id(name)
+    if kind.shape != () or kind.dtype.itemsize > _LONGEST_STORED:
+        return None
+    if kind.dtype.kind == "S":
+        text = bytes(data.attrs[name]).decode("utf-8", "replace")
+    elif h5py.check_string_dtype(kind.dtype) is not None:
+        path = Path(data.file.filename).resolve()
+        status = path.stat()
+        units = _texts_of_variable_length(str(path), status.st_mtime_ns, status.st_size)
+        text = units.get(str(data.name), "")
+    else:
+        return None
+    return text.strip("\0 \t\r\n")[:_LONGEST] or None
+
+
+@lru_cache(maxsize=4)
+def _texts_of_variable_length(path: str, *_: int) -> dict[str, str]:
+    """Return the units of a file by data set; none where they cannot be read.
+
+    The library does not come back from every damaged text of variable length: a process of its own
+    reads these, and is ended where it does not answer.
+    """
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _READING, path, *_NAMES],
+            capture_output=True,
+            timeout=_LONGEST_WAIT,
+            check=True,
+        )
+        units = json.loads(done.stdout)
+    except (subprocess.SubprocessError, OSError, ValueError):
+        return {}
+    return {str(name): str(unit) for name, unit in units.items()}
+
+
+_READING = """
+import json, sys
+import h5py
+
+found = {}
+
+def visit(name, item):
+    if isinstance(item, h5py.Dataset):
+        for key in sys.argv[2:]:
+            if key in item.attrs:
+                text = item.attrs[key]
+                found["/" + name] = text if isinstance(text, str) else text.decode()
+
+with h5py.File(sys.argv[1], "r") as file:
+    file.visititems(visit)
+print(json.dumps(found))
+"""

@@ -7,15 +7,32 @@ Tables, timetables and cells are not arrays: save ``table2array`` of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import io
+import math
+import struct
+import zlib
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import IO
 
 import h5py
 import numpy as np
 
-from imubench_pipeline.readers.arrays import hdf5, matlab_5
+from imubench_pipeline.readers.arrays import hdf5
 from imubench_pipeline.readers.arrays.file import ArrayFile
-from imubench_pipeline.readers.arrays.table import Table, UnusableError
+from imubench_pipeline.readers.arrays.table import (
+    LARGEST_RATIO,
+    Refused,
+    StreamedArray,
+    Table,
+    UnusableError,
+    exactly,
+    sides_of,
+    skip,
+)
+from imubench_pipeline.readers.bounds import DEEPEST_STRUCTURE, LONGEST_MATLAB_NAME, MOST_SIDES
 
 _LONGEST_CLASS = 64
 
@@ -27,8 +44,8 @@ class MatlabFile(ArrayFile):
         """Describe every variable."""
         if h5py.is_hdf5(self.path):
             return _variables(stack.enter_context(hdf5.opened(self.path)))
-        if matlab_5.is_version_5(self.path):
-            return matlab_5.variables(self.path)
+        if _is_version_5(self.path):
+            return _variables_of_5(self.path)
         raise UnusableError(
             "not a MATLAB file of version 5 or 7.3, or its beginning is damaged; save it with -v7.3"
         )
@@ -36,15 +53,15 @@ class MatlabFile(ArrayFile):
 
 def _variables(file: h5py.File) -> list[Table]:
     """Return the variables of version 7.3: matrices lie there with time along the second side."""
-    found: list[Table] = []
+    tables: list[Table] = []
     # What cells, objects and sparse matrices are made of has no meaning alone.
     for data_set in hdf5.data_sets(file, time_axis=1, passed_over="#"):
         if "MATLAB_sparse" in data_set.data.parent.attrs:
             continue
         if data_set.fault is None:
             data_set.fault = _fault(data_set)
-        found.append(data_set)
-    return found
+        tables.append(data_set)
+    return tables
 
 
 def _fault(data_set: hdf5.DataSet) -> str | None:
@@ -62,3 +79,252 @@ def _fault(data_set: hdf5.DataSet) -> str | None:
     if np.bytes_(attributes["MATLAB_class"]) == b"char":
         return "holds text; expected numbers"
     return None
+
+
+# --------------------------------------------------------------------------------- version 5
+#
+# Arrays are found and streamed here, for the readers of the format that hold whole variables in
+# memory also read beyond it where a file is damaged. A file is a sequence of elements: type, size,
+# and data padded to eight bytes. A variable is an element of elements: flags, sides, name and
+# values; the values of a structure are such elements again. See "MAT-File Format" of MATLAB.
+
+_HEADER = 128
+_ORDERS = {b"IM": "<", b"MI": ">"}
+_VERSION = 1
+_MATRIX, _COMPRESSED = 14, 15
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8",
+            13: "u8"}  # fmt: skip
+"""Types of elements whose data are figures. Integral values may be kept in a smaller type."""
+
+_STRUCTURE, _FIRST_NUMERIC, _LAST_NUMERIC = 2, 6, 15
+_CLASSES = {
+    1: "is a cell array; expected a vector or a matrix: save cell2mat of it",
+    2: "is an array of structures; expected one structure",
+    3: "is an object; expected a vector or a matrix",
+    4: "holds text; expected numbers",
+    5: "is sparse; expected a vector or a matrix: save full() of it",
+    16: "is a function; expected a vector or a matrix",
+    17: "is a table or an object; expected a vector or a matrix: save table2array of it",
+}
+_COMPLEX = 0x0800
+_TABLE = 17
+_LARGEST_HEADER = 1 << 16
+_STEP = {"<": 1, ">": -1}
+"""Size and type of a small element stand in the order of the bytes."""
+
+_FED = 1 << 16
+
+
+def _is_version_5(path: Path) -> bool:
+    """Tell whether a file begins as MATLAB files of version 5 do."""
+    with path.open("rb") as file:
+        header = file.read(_HEADER)
+    order = _ORDERS.get(header[126:])
+    return order is not None and struct.unpack(f"{order}H", header[124:126])[0] >> 8 == _VERSION
+
+
+def _variables_of_5(path: Path) -> Iterator[Table]:
+    """Yield the variables of a file, and the fields of its structures as ``name/field``."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        order = _ORDERS[file.read(_HEADER)[126:]]
+        start = _HEADER
+        while start < size:
+            file.seek(start)
+            kind, length = struct.unpack(f"{order}II", exactly(file, 8))
+            begin, end = start + 8, start + 8 + length
+            if end > size:
+                raise UnusableError(
+                    f"cut short: a variable ends at byte {end}, the file at {size}; copy it again"
+                )
+            if kind == _COMPRESSED:
+                opened = partial(_inflated, path, begin, length)
+                with opened() as stream:
+                    most = LARGEST_RATIO * (length + 8)
+                    elements = _Elements(stream, order, 0, most, opened, checked=True)
+                    yield from _matrix(elements, elements.tag(_MATRIX))
+            elif kind == _MATRIX:
+                opened = partial(_plain, path)
+                elements = _Elements(file, order, begin, end, opened, checked=False)
+                yield from _matrix(elements, length)
+            else:
+                raise _damaged(f"a variable of type {kind}", start)
+            start = end
+
+
+class _Elements:
+    """Reads the elements of a variable one after another.
+
+    ``opened`` opens the stream afresh; ``checked``: it has a checksum at its end.
+    """
+
+    def __init__(
+        self,
+        stream: IO[bytes],
+        order: str,
+        at: int,
+        end: int,
+        opened: Callable[[], IO[bytes]],
+        checked: bool,
+    ) -> None:
+        self.order, self.opened, self.checked, self._stream = order, opened, checked, stream
+        self.at, self.end = at, end  # bytes from the beginning; the end is that of the element
+        self.kind = 0  # of the last element
+
+    def tag(self, *kinds: int) -> int:
+        """Read type and size of the next element, and return its size.
+
+        The data of a small element follow in the same eight bytes.
+        """
+        self._check(8)
+        first = self._read(4)
+        self.kind, length = struct.unpack(f"{self.order}HH", first)[:: _STEP[self.order]]
+        if not length:
+            self.kind, length = struct.unpack(f"{self.order}II", first + self._read(4))
+            self._check(length)
+        elif length > 4:
+            raise _damaged(f"a small element of {length} bytes", self.at)
+        if self.kind not in kinds:
+            raise _damaged(f"an element of type {self.kind}", self.at)
+        return length
+
+    def data(self, *kinds: int) -> bytes:
+        """Return the data of the next element."""
+        begin = self.at
+        length = self.tag(*kinds)
+        if length > _LARGEST_HEADER:
+            raise _damaged(f"{length} bytes of sides or names", self.at)
+        read = self._read(length)
+        self.pad(begin)
+        return read
+
+    def pad(self, begin: int) -> None:
+        """Go on to the next element, which stands a multiple of eight bytes further."""
+        self.skip(-(self.at - begin) % 8)
+
+    def skip(self, size: int) -> None:
+        """Pass over data."""
+        skip(self._stream, size)
+        self.at += size
+
+    def _read(self, size: int) -> bytes:
+        self.at += size
+        return exactly(self._stream, size)
+
+    def _check(self, length: int) -> None:
+        if self.at + length > self.end:
+            raise _damaged(f"an element of {length} bytes with {self.end - self.at} left", self.at)
+
+
+def _damaged(what: str, at: int) -> UnusableError:
+    return UnusableError(f"corrupt data: {what} at byte {at}; copy the file again")
+
+
+def _matrix(
+    elements: _Elements, length: int, above: str | None = None, depth: int = 0
+) -> Iterator[Table]:
+    """Yield the arrays of an element that is a variable, or a field of the structure ``above``."""
+    end = elements.at + length
+    outer, elements.end = elements.end, end
+    if length == 0 and above is not None:
+        yield Refused(above, "is empty; expected a vector or a matrix")
+    else:
+        (flags, _) = struct.unpack(f"{elements.order}II", elements.data(6)[:8].ljust(8, b"\0"))
+        kind = flags & 0xFF
+        shape = () if kind == _TABLE else _shape(elements)
+        own = elements.data(1, 16).decode("utf-8", "replace")
+        if len(own) > LONGEST_MATLAB_NAME:
+            raise _damaged(f"a name of {len(own)} letters", elements.at)
+        name = own if above is None else above
+        if not name:
+            pass  # what MATLAB keeps of functions and objects
+        elif kind == _STRUCTURE and math.prod(shape) == 1:
+            yield from _fields(elements, name, depth)
+        elif not _FIRST_NUMERIC <= kind <= _LAST_NUMERIC:
+            yield Refused(name, _CLASSES.get(kind, f"is of the unknown class {kind}"))
+        elif flags & _COMPLEX:
+            yield Refused(name, "holds complex numbers; expected numbers: save real() of it")
+        else:
+            yield _numeric(elements, name, shape)
+    elements.end = outer
+    if above is not None:
+        elements.skip(end - elements.at)
+
+
+def _shape(elements: _Elements) -> tuple[int, ...]:
+    data = elements.data(5)
+    shape: tuple[int, ...] = struct.unpack(f"{elements.order}{len(data) // 4}i", data)
+    if not 2 <= len(shape) <= MOST_SIDES or min(shape) < 0:
+        raise _damaged(f"sides {shape[:MOST_SIDES]}", elements.at)
+    return shape
+
+
+def _numeric(elements: _Elements, name: str, shape: tuple[int, ...]) -> StreamedArray:
+    size = elements.tag(*_NUMBERS)
+    dtype = np.dtype(elements.order + _NUMBERS[elements.kind])
+    if size != math.prod(shape) * dtype.itemsize:
+        raise UnusableError(
+            f"corrupt data: {name} promises {sides_of(shape)} values of {dtype.itemsize} "
+            f"bytes, but has {size} bytes; copy the file again"
+        )
+    return StreamedArray(name, shape, dtype, True, elements.opened, elements.at, elements.checked)
+
+
+def _fields(elements: _Elements, name: str, depth: int) -> Iterator[Table]:
+    if depth == DEEPEST_STRUCTURE:
+        yield Refused(name, f"lies {depth} structures deep; expected a vector or a matrix")
+        return
+    width = int.from_bytes(elements.data(5), "little" if elements.order == "<" else "big")
+    names = elements.data(1)
+    if not 1 <= width <= LONGEST_MATLAB_NAME:
+        raise _damaged(f"names of fields of {width} bytes", elements.at)
+    for start in range(0, len(names), width):
+        field = names[start : start + width].split(b"\0")[0].decode("utf-8", "replace")
+        length = elements.tag(_MATRIX)
+        yield from _matrix(elements, length, f"{name}/{field}", depth + 1)
+
+
+class _Inflated(io.RawIOBase):
+    """The data of a compressed element."""
+
+    def __init__(self, path: Path, start: int, length: int) -> None:
+        super().__init__()
+        self._file = path.open("rb")
+        self._file.seek(start)
+        self._left = length
+        self._inflate = zlib.decompressobj()
+
+    def readable(self) -> bool:
+        """Return True: the stream can be read."""
+        return True
+
+    def readinto(self, buffer: object) -> int:
+        """Fill a buffer; 0 at the end, where the checksum has been compared."""
+        view = memoryview(buffer)  # type: ignore[arg-type]  # RawIOBase hands over any writable buffer
+        while not self._inflate.eof:
+            packed = self._inflate.unconsumed_tail
+            if not packed:
+                packed = self._file.read(min(_FED, self._left))
+                self._left -= len(packed)
+            read = self._inflate.decompress(packed, len(view))
+            if read:
+                view[: len(read)] = read
+                return len(read)
+            if not packed and not self._inflate.eof:
+                raise UnusableError(
+                    "compressed data end early; the file is cut short: copy it again"
+                )
+        return 0
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+        super().close()
+
+
+def _plain(path: Path) -> IO[bytes]:
+    return path.open("rb")
+
+
+def _inflated(path: Path, start: int, length: int) -> IO[bytes]:
+    return io.BufferedReader(_Inflated(path, start, length), _FED)

@@ -20,8 +20,14 @@ import numpy as np
 from numpy.lib import format as npy
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
-from imubench_pipeline.readers.arrays.stream import LARGEST_RATIO, StreamedArray, exactly
-from imubench_pipeline.readers.arrays.table import Table, UnusableError, sides_of
+from imubench_pipeline.readers.arrays.table import (
+    LARGEST_RATIO,
+    StreamedArray,
+    Table,
+    UnusableError,
+    exactly,
+    sides_of,
+)
 from imubench_pipeline.readers.bounds import LONGEST_NPY_HEADER
 from imubench_pipeline.readers.compressed import opened_archive
 
@@ -76,14 +82,14 @@ def _array(name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool)
                 f"{shown} has format version {version}; expected 1.0 to 3.0: save again"
             )
         length = exactly(stream, struct.calcsize(_LENGTH[version]))
-        (said,) = struct.unpack(_LENGTH[version], length)
-        if said > LONGEST_NPY_HEADER:
+        (header_size,) = struct.unpack(_LENGTH[version], length)
+        if header_size > LONGEST_NPY_HEADER:
             raise UnusableError(
-                f"{shown} has a header of {said} bytes; expected at most {LONGEST_NPY_HEADER}: "
-                "save fewer fields, or copy the file again"
+                f"{shown} has a header of {header_size} bytes; expected at most "
+                f"{LONGEST_NPY_HEADER}: save fewer fields, or copy the file again"
             )
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, fortran, dtype = read(io.BytesIO(length + exactly(stream, said)))
+        shape, fortran, dtype = read(io.BytesIO(length + exactly(stream, header_size)))
         offset = stream.tell()
     if version == (3, 0):
         _decode_names(dtype)

@@ -4,9 +4,9 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
 def _code() -> Code:
-    from imubench_pipeline.readers.arrays import arrow, contents
+    from imubench_pipeline.readers.arrays import arrow, file
 
-    return Code(arrow.ArrowFile, contents.tables)
+    return Code(arrow.ArrowFile, file.tables)
 
 
 FORMAT = FileFormat(

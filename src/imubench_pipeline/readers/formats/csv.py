@@ -4,9 +4,9 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
 def _code() -> Code:
-    from imubench_pipeline.readers.text import contents, csv
+    from imubench_pipeline.readers.text import csv
 
-    return Code(csv.CsvFile, contents.tables)
+    return Code(csv.CsvFile, csv.tables)
 
 
 FORMAT = FileFormat(

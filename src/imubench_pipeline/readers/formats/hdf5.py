@@ -4,9 +4,9 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
 def _code() -> Code:
-    from imubench_pipeline.readers.arrays import contents, hdf5
+    from imubench_pipeline.readers.arrays import file, hdf5
 
-    return Code(hdf5.Hdf5File, contents.tables)
+    return Code(hdf5.Hdf5File, file.tables)
 
 
 FORMAT = FileFormat(

@@ -4,9 +4,9 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
 def _code() -> Code:
-    from imubench_pipeline.readers.arrays import contents, matlab
+    from imubench_pipeline.readers.arrays import file, matlab
 
-    return Code(matlab.MatlabFile, contents.tables)
+    return Code(matlab.MatlabFile, file.tables)
 
 
 FORMAT = FileFormat(

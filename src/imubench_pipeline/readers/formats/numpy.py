@@ -4,9 +4,9 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
 def _code() -> Code:
-    from imubench_pipeline.readers.arrays import contents, npy
+    from imubench_pipeline.readers.arrays import file, npy
 
-    return Code(npy.NumpyFile, contents.tables)
+    return Code(npy.NumpyFile, file.tables)
 
 
 FORMAT = FileFormat(

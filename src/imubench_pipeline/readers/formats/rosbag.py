@@ -4,9 +4,9 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
 def _code() -> Code:
-    from imubench_pipeline.readers.rosbag import contents, file
+    from imubench_pipeline.readers.rosbag import file
 
-    return Code(file.RosbagFile, contents.tables)
+    return Code(file.RosbagFile, file.tables)
 
 
 FORMAT = FileFormat(

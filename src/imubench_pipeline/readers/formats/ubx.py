@@ -4,9 +4,9 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
 def _code() -> Code:
-    from imubench_pipeline.readers.ubx import contents, file
+    from imubench_pipeline.readers import ubx
 
-    return Code(file.UbxFile, contents.tables)
+    return Code(ubx.UbxFile, ubx.tables)
 
 
 FORMAT = FileFormat(

@@ -4,9 +4,9 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
 def _code() -> Code:
-    from imubench_pipeline.readers.vectornav import contents, file
+    from imubench_pipeline.readers import vectornav
 
-    return Code(file.VectorNavFile, contents.tables)
+    return Code(vectornav.VectorNavFile, vectornav.tables)
 
 
 FORMAT = FileFormat(

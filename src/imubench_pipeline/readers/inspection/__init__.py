@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.readers.contents import contents
-from imubench_pipeline.readers.inspection.block import block
-from imubench_pipeline.readers.inspection.draft import Draft
+from imubench_pipeline.readers.inspection.draft import Draft, block
 from imubench_pipeline.readers.inspection.drafting import draft
 from imubench_pipeline.readers.inspection.listing import listing
 from imubench_pipeline.readers.inspection.proof import Proof, proof
@@ -19,24 +18,16 @@ __all__ = ["Draft", "Inspection", "Proof", "inspect"]
 
 @dataclass(frozen=True)
 class Inspection:
-    """What was found of a recording.
-
-    Attributes
-    ----------
-    listing : str
-        What it holds, for a human.
-    block : str
-        The sensor file, YAML.
-    draft : Draft
-        The same, as values.
-    proof : Proof
-        What came of reading the first records with it.
-    """
+    """What was found of a recording."""
 
     listing: str
+    """What it holds, for a human."""
     block: str
+    """The sensor file, YAML."""
     draft: Draft
+    """The same, as values."""
     proof: Proof
+    """What came of reading the first records with it."""
 
     @property
     def complete(self) -> bool:

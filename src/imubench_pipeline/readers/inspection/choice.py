@@ -17,46 +17,30 @@ _CALLED = {"gyro": "gyro", "accel": "accelerometer", "temperature": "temperature
 
 @dataclass(frozen=True)
 class Choice:
-    """What is taken of a log.
-
-    Attributes
-    ----------
-    gyro, accel, temperature : Group or None
-    clock : Clock or None
-    local : bool
-        The time column is one of the table of the channels, in each file.
-    anchor : LogTable or None
-        The table that the others must go with.
-    other_clocks : list of Clock
-    left : list of (Group, str)
-        What was recognised and not taken, and why.
-    unknown : list of LogColumn
-        Numbers of the tables in use that were not recognised.
-    """
+    """What is taken of a log."""
 
     gyro: Group | None
     accel: Group | None
     temperature: Group | None
     clock: Clock | None
     local: bool
+    """The time column is one of the table of the channels, in each file."""
     anchor: LogTable | None
+    """The table that the others must go with."""
     other_clocks: list[Clock]
     left: list[tuple[Group, str]]
+    """What was recognised and not taken, and why."""
     unknown: list[LogColumn]
+    """Numbers of the tables in use that were not recognised."""
 
     @property
-    def taken(self) -> list[Group]:
+    def selected(self) -> list[Group]:
         """The groups that are taken."""
         return [g for g in (self.gyro, self.accel, self.temperature) if g is not None]
 
 
 def chosen(contents: Contents) -> Choice:
-    """Choose the channels, the temperature and the time of a recording.
-
-    Parameters
-    ----------
-    contents : Contents
-    """
+    """Choose the channels, the temperature and the time of a recording."""
     recognised = groups(contents)
     left = [(g, _why_not(g)) for g in recognised if _why_not(g)]
     able = [group for group in recognised if not _why_not(group)]
@@ -88,8 +72,8 @@ def chosen(contents: Contents) -> Choice:
     left += [(g, why) for g in able if g not in fitting]
     accel = _best([g for g in fitting if g.quantity == "accel"], gyro, able)
     temperature = _best([g for g in fitting if g.quantity == "temperature"], gyro or accel, able)
-    taken = [group for group in (gyro, accel, temperature) if group is not None]
-    left += [(g, f"another {_CALLED[g.quantity]}") for g in fitting if g not in taken]
+    selected = [group for group in (gyro, accel, temperature) if group is not None]
+    left += [(g, f"another {_CALLED[g.quantity]}") for g in fitting if g not in selected]
     columns = {id(column) for group in recognised for column in group.columns.values()}
     spoken = columns | ({id(clock.column)} if clock else set())
     spoken |= {id(other.column) for other in ours}
@@ -98,13 +82,13 @@ def chosen(contents: Contents) -> Choice:
         accel,
         temperature,
         clock,
-        _is_local(taken, clock),
+        _is_local(selected, clock),
         anchor,
         [other for other in ours if other is not clock],
         left,
         [
             column
-            for table in _tables(taken, anchor)
+            for table in _tables(selected, anchor)
             for column in table.columns
             if id(column) not in spoken
             and not (clock is not None and column.source == clock.column.source)
@@ -150,13 +134,13 @@ def _best(likely: Sequence[Group], beside: Group | None, every: Sequence[Group])
 
 def _clocks(contents: Contents, table: LogTable, recognised: Sequence[Group]) -> list[Clock]:
     """Return what may be the time of a table."""
-    taken = {id(column) for group in recognised for column in group.columns.values()}
-    columns = [c for c in table.columns if id(c) not in taken]
+    in_groups = {id(column) for group in recognised for column in group.columns.values()}
+    columns = [c for c in table.columns if id(c) not in in_groups]
     rate = table.rate
     if table.file_format.clock_of == "length":
         for other in contents.tables:
             if other is not table and other.file == table.file and other.rows == table.rows:
-                columns += [c for c in other.columns if id(c) not in taken]
+                columns += [c for c in other.columns if id(c) not in in_groups]
     return clocks(table, columns, rate)
 
 
@@ -191,18 +175,18 @@ def _same_clock(anchor: LogTable, table: LogTable) -> bool:
     return anchor is table or (anchor.file == table.file and by_length)
 
 
-def _is_local(taken: Sequence[Group], clock: Clock | None) -> bool:
+def _is_local(groups: Sequence[Group], clock: Clock | None) -> bool:
     if clock is None:
         return True
     by_file: dict[str | None, set[int]] = {}
-    for group in taken:
+    for group in groups:
         by_file.setdefault(group.table.file, set()).add(id(group.table))
     if any(len(tables) > 1 for tables in by_file.values()):
         return False
-    tables = _tables(taken, None)
+    tables = _tables(groups, None)
     return len(tables) > 1 or any(clock.column is c for t in tables for c in t.columns)
 
 
-def _tables(taken: Sequence[Group], anchor: LogTable | None) -> list[LogTable]:
-    tables = [group.table for group in taken] or ([anchor] if anchor else [])
+def _tables(groups: Sequence[Group], anchor: LogTable | None) -> list[LogTable]:
+    tables = [group.table for group in groups] or ([anchor] if anchor else [])
     return list({id(table): table for table in tables}.values())

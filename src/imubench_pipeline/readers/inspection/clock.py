@@ -13,8 +13,8 @@ from imubench_pipeline.readers.batch import SECONDS
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Entry
 from imubench_pipeline.readers.inspection.names import words_of
-from imubench_pipeline.readers.spellings import divided, unit_of
-from imubench_pipeline.readers.started import date_of
+from imubench_pipeline.readers.stamps import date_of
+from imubench_pipeline.readers.stated_units import divided, unit_of
 from imubench_pipeline.readers.text.stamps import DAY
 
 _WORDS = frozenset(
@@ -54,35 +54,22 @@ _RATE_HINT = "the file does not say: such as 100 Hz"
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """The time of a table, as a sensor file states it.
-
-    Attributes
-    ----------
-    column : LogColumn
-    entry : Entry
-        ``time`` of the sensor file.
-    counts : bool
-        It counts samples: ``rate`` is needed.
-    order : tuple
-        The lower, the better.
-    """
+    """The time of a table, as a sensor file states it."""
 
     column: LogColumn
     entry: Entry
+    """``time`` of the sensor file."""
     counts: bool
+    """It counts samples: ``rate`` is needed."""
     order: tuple[int, ...]
+    """The lower, the better."""
 
 
 def clocks(table: LogTable, columns: Sequence[LogColumn], rate: float | None) -> list[Clock]:
     """Return the columns that may be the time, the likeliest first.
 
-    Parameters
-    ----------
-    table : LogTable
-    columns : sequence of LogColumn
-        Those of the table that are no channel, and vectors beside it.
-    rate : float or None
-        That the file states, Hz.
+    ``columns``: those of the table that are no channel, and vectors beside it.
+    ``rate``: that the file states, Hz.
     """
     likely = []
     for place, column in enumerate(columns):
@@ -230,10 +217,10 @@ def _guessed(values: NDArray[np.float64], rate: float | None) -> tuple[str, str]
             return unit, f"guessed: since 1970 it is {date[:16]} then"
     rates = {unit: 1 / (step * seconds) for unit, seconds in SECONDS.items()}
     shown = f"the stamps advance by {step:.5g}"
-    for unit, found in rates.items():
-        if rate is not None and abs(found / rate - 1) < _AGREE:
+    for unit, guess in rates.items():
+        if rate is not None and abs(guess / rate - 1) < _AGREE:
             return unit, f"guessed: {shown}, and the file states {rate:.5g} Hz"
-    likely = [unit for unit, found in rates.items() if _LIKELY[0] <= found <= _LIKELY[1]]
+    likely = [unit for unit, guess in rates.items() if _LIKELY[0] <= guess <= _LIKELY[1]]
     if len(likely) != 1 or step == 1:
         return UNKNOWN, f"{_UNIT_HINT} {shown}"
     return likely[0], f"guessed: {shown}, that is {rates[likely[0]]:.5g} Hz"
@@ -275,7 +262,7 @@ def _wrap(values: NDArray[np.float64]) -> int | None:
     if not len(falls) or step is None:
         return None
     range_of = step - float(falls[0])
-    return next((one for one in _WRAPS if abs(range_of - one) <= max(2 * step, 1e-9 * one)), None)
+    return next((end for end in _WRAPS if abs(range_of - end) <= max(2 * step, 1e-9 * end)), None)
 
 
 def advances(values: NDArray[np.float64], wrap: float | None = None) -> bool:

@@ -27,11 +27,7 @@ _NEAR = 0.06
 def draft(contents: Contents, model: str | None = None) -> Draft:
     """Write a sensor file for what a recording holds, as far as it tells.
 
-    Parameters
-    ----------
-    contents : Contents
-    model : str or None
-        What the sensor is called; None: as the log.
+    ``model``: what the sensor is called; None: as the log.
     """
     choice = chosen(contents)
     drafted = Draft(
@@ -47,7 +43,7 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
         drafted.time = Entry(value, choice.clock.entry.comment)
     if choice.clock is None or choice.clock.counts:
         drafted.rate = rate_entry(choice.anchor or _stating(contents.tables))
-    files = {group.table.file for group in choice.taken}
+    files = {group.table.file for group in choice.selected}
     alone = len(files) == 1 and files == {contents.only}
     for group in (choice.gyro, choice.accel):
         if group is not None:

@@ -23,7 +23,7 @@ from imubench_pipeline.readers.inspection.names import (
     meaning,
     quantity_of_text,
 )
-from imubench_pipeline.readers.spellings import said, unit_of
+from imubench_pipeline.readers.stated_units import bracketed, unit_of
 from imubench_pipeline.units import conversion
 
 _AXES = "xyz"
@@ -38,31 +38,20 @@ _TELLING = 40
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """The axes of one sensor, or a temperature.
-
-    Attributes
-    ----------
-    quantity : {"gyro", "accel", "temperature"}
-    table : LogTable
-    columns : dict of str to LogColumn
-        By axis; of a temperature by an empty text.
-    unit : str or None
-        The unit that the file states.
-    written : str
-        What the file says where a unit is expected and none is understood.
-    rank : int
-        See `imubench_pipeline.readers.inspection.names.Meaning`.
-    guessed : str
-        Why these columns are taken for it, where no name says so.
-    """
+    """The axes of one sensor, or a temperature."""
 
     quantity: Quantity
     table: LogTable
     columns: dict[str, LogColumn]
+    """By axis; of a temperature by an empty text."""
     unit: str | None
+    """The unit that the file states."""
     written: str
+    """What the file says where a unit is expected and none is understood."""
     rank: int
+    """See `imubench_pipeline.readers.inspection.names.Meaning`."""
     guessed: str = ""
+    """Why these columns are taken for it, where no name says so."""
 
     @property
     def names(self) -> str:
@@ -82,8 +71,8 @@ class Group:
     @property
     def constant(self) -> bool:
         """Whether no axis ever changes in the first records: fields that nothing was put into."""
-        known = [column.values[np.isfinite(column.values)] for column in self.columns.values()]
-        return all(values.size >= _TELLING and np.ptp(values) == 0.0 for values in known)
+        axes = [column.values[np.isfinite(column.values)] for column in self.columns.values()]
+        return all(values.size >= _TELLING and np.ptp(values) == 0.0 for values in axes)
 
     @property
     def gravity_unit(self) -> str | None:
@@ -114,13 +103,13 @@ def _named(table: LogTable, contents: Contents) -> list[Group]:
         if column.kind != "number":
             continue
         label = column.label or f"{context}[{column.source}]"
-        told = meaning(label, context)
-        if told is not None:
-            if told.quantity != "temperature":
-                key = told.quantity, told.stem, told.axis.isdecimal()
-                together.setdefault(key, {}).setdefault(told.axis, (column, told))
+        meant = meaning(label, context)
+        if meant is not None:
+            if meant.quantity != "temperature":
+                key = meant.quantity, meant.stem, meant.axis.isdecimal()
+                together.setdefault(key, {}).setdefault(meant.axis, (column, meant))
             elif column.label or not advances(column.values):
-                together["temperature", label, False] = {"": (column, told)}
+                together["temperature", label, False] = {"": (column, meant)}
     result = []
     for (quantity, _, counted), axes in together.items():
         placed = _counted_axes(axes) if counted else axes
@@ -157,7 +146,7 @@ def _group(
     same = {unit_of(c.unit or "", DIMENSIONS[quantity]) or m.unit for c, m in axes.values()} == {
         unit
     }
-    written = beside or ", ".join(said(column.label))
+    written = beside or ", ".join(bracketed(column.label))
     rank = max(meaning.rank for meaning in meanings)
     if table.file_format.measured_by_name:
         rank = DERIVED if rank == DERIVED else PLAIN
@@ -170,11 +159,11 @@ def _roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]:
         return
     by_name = {re.split(r"[\s(\[]", c.label)[0].lower(): c for c in table.columns}
     if {"p", "q", "r"} <= set(by_name):
-        told = {
+        meanings = {
             axis: (by_name[name], meaning(by_name[name].label.lower().replace(name, f"w{axis}", 1)))
             for axis, name in zip(_AXES, "pqr", strict=True)
         }
-        axes = {axis: (column, meant) for axis, (column, meant) in told.items() if meant}
+        axes = {axis: (column, meant) for axis, (column, meant) in meanings.items() if meant}
         if len(axes) == 3:
             group = _group("gyro", table, axes)
             yield Group("gyro", table, group.columns, group.unit, group.written, WEAK,

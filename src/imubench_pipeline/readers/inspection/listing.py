@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from imubench_pipeline.readers.contents import Contents
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
-from imubench_pipeline.readers.inspection.block import printable
+from imubench_pipeline.readers.inspection.draft import printable
 from imubench_pipeline.readers.inspection.names import meaning
-from imubench_pipeline.readers.spellings import said
+from imubench_pipeline.readers.stated_units import bracketed
 
 _MOST = 40
 _WIDEST_NAME, _WIDEST_VALUES = 44, 60
@@ -16,12 +16,7 @@ _NOT_STATED = "-"
 
 
 def listing(contents: Contents) -> str:
-    """Return what a recording holds: its tables, and of each its columns.
-
-    Parameters
-    ----------
-    contents : Contents
-    """
+    """Return what a recording holds: its tables, and of each its columns."""
     lines = [f"{printable(contents.path.name)}: {printable(contents.about)}"]
     stated: set[object] = set()
     for table in contents.tables[:_MOST]:
@@ -63,7 +58,8 @@ def _row(column: LogColumn) -> tuple[str, str, str, str]:
     """Return name, kind, unit and first values of a column."""
     name = printable(column.label) or f"column {column.source}"
     meant = meaning(column.label)
-    unit = column.unit or (meant and meant.unit) or ", ".join(said(column.label)) or _NOT_STATED
+    in_name = (meant and meant.unit) or ", ".join(bracketed(column.label))
+    unit = column.unit or in_name or _NOT_STATED
     values = ", ".join(printable(text) for text in column.first)
     return (
         _cut(name, _WIDEST_NAME),

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from imubench_pipeline.readers.spellings import divided
+from imubench_pipeline.readers.stated_units import divided
 from imubench_pipeline.settings.sensor import QUANTITIES
 
 Quantity = Literal["gyro", "accel", "temperature"]
@@ -32,6 +32,11 @@ _GYRO = re.compile(
 )
 _ACCEL = re.compile(r"acc(?!ur)|specificforce|gforce")
 _TEMPERATURE = re.compile(r"temp(?!or|l)")
+_PATTERNS: dict[Quantity, re.Pattern[str]] = {
+    "gyro": _GYRO,
+    "accel": _ACCEL,
+    "temperature": _TEMPERATURE,
+}
 _OTHER = re.compile(
     r"ang(?:ular|le)?acc|alpha|quat|euler|orient|attitude|angle|inclin|heading|mag(?!ic)|baro|press"
 )
@@ -60,45 +65,33 @@ _SHORT: dict[str, tuple[Quantity, int]] = {
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name says.
-
-    Attributes
-    ----------
-    quantity : {"gyro", "accel", "temperature"}
-    axis : str
-        x, y or z; a number where columns are counted; empty: none.
-    stem : str
-        The rest of the name: the axes of one sensor have the same.
-    unit : str or None
-        The unit that is in the name.
-    rank : int
-        `PLAIN`, `WEAK`, `WITHOUT_GRAVITY` or `DERIVED`.
-    """
+    """What a name says."""
 
     quantity: Quantity
     axis: str
+    """x, y or z; a number where columns are counted; empty: none."""
     stem: str
+    """The rest of the name: the axes of one sensor have the same."""
     unit: str | None
+    """The unit that is in the name."""
     rank: int
+    """`PLAIN`, `WEAK`, `WITHOUT_GRAVITY` or `DERIVED`."""
 
 
 def meaning(label: str, context: str = "") -> Meaning | None:
     """Return what the name of a column means; None: no figure of an inertial sensor.
 
-    Parameters
-    ----------
-    label : str
-    context : str
-        The name of its table or file, which says the quantity where the label says an axis alone.
+    ``context``: the name of its table or file, which says the quantity where the label says an axis
+    alone.
     """
     label = label[:_LONGEST].replace("ω", "omega").replace("Ω", "omega")
     for quantity, dimension in DIMENSIONS.items():
         name, unit = divided(label, dimension)
         meant = _meant(name)
         if meant is None and (axis := _bare_axis(name)):
-            told = quantity_of_text(context)
-            if told is not None:
-                meant = Meaning(told[0], axis, "", None, told[1])
+            by_context = quantity_of_text(context)
+            if by_context is not None:
+                meant = Meaning(by_context[0], axis, "", None, by_context[1])
         if meant is None and unit is not None:
             meant = _told_by_unit(quantity, name, unit)
         if meant is not None and meant.quantity == quantity:
@@ -108,18 +101,12 @@ def meaning(label: str, context: str = "") -> Meaning | None:
 
 def quantity_of_text(text: str) -> tuple[Quantity, int] | None:
     """Return the one quantity that a text such as the name of a file says, and its rank."""
-    joined = "".join(_words(text[:_LONGEST]))
-    quantities: list[Quantity] = []
-    for quantity, pattern in (
-        ("gyro", _GYRO),
-        ("accel", _ACCEL),
-        ("temperature", _TEMPERATURE),
-    ):
-        if pattern.search(joined):
-            quantities.append(quantity)  # type: ignore[arg-type]  # the keys of Quantity
+    words = words_of(text)
+    joined = "".join(words)
+    quantities = [quantity for quantity, pattern in _PATTERNS.items() if pattern.search(joined)]
     if len(quantities) != 1 or _OTHER.search(joined):
         return None
-    return quantities[0], _rank(_words(text[:_LONGEST]), joined)
+    return quantities[0], _rank(words, joined)
 
 
 def words_of(label: str) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.readers import LogFile, read
-from imubench_pipeline.readers.inspection.block import printable
 from imubench_pipeline.readers.inspection.clock import typical_step
-from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft
+from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, printable
 from imubench_pipeline.settings.sensor import CHANNELS, LogFormat, Sensor
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.tables.findings import RecordingError
@@ -28,18 +28,12 @@ _NEAR = 0.2
 
 @dataclass(frozen=True)
 class Proof:
-    """What came of reading the first records as drafted.
-
-    Attributes
-    ----------
-    read : bool
-        They could be read.
-    said : str
-        One line: what they are, or why they cannot be read.
-    """
+    """What came of reading the first records as drafted."""
 
     read: bool
+    """They could be read."""
     said: str
+    """One line: what they are, or why they cannot be read."""
 
 
 @dataclass
@@ -55,11 +49,6 @@ def proof(path: Path, draft: Draft) -> Proof:
     """Read the first records of a recording as a draft says.
 
     Where it has not been filled in, another unit stands in, for the reading alone.
-
-    Parameters
-    ----------
-    path : Path
-    draft : Draft
     """
     unfilled = draft.unfilled()
     if any(key.endswith(".column") for key in unfilled):
@@ -133,9 +122,9 @@ def _shown_rate(files: list[_First], draft: Draft) -> str:
             rates.setdefault(name.split("_")[0], file.rate)
     if None in rates.values():
         return "stamps that do not advance"
-    known = {f"{rate:.4g} Hz" for rate in rates.values() if rate is not None}
-    if len(known) == 1:
-        return f"{known.pop()} from the stamps"
+    distinct = {f"{rate:.4g} Hz" for rate in rates.values() if rate is not None}
+    if len(distinct) == 1:
+        return f"{distinct.pop()} from the stamps"
     each = (f"{name} {rates[name]:.4g} Hz" for name in sorted(rates, key=_ORDER.index))
     return ", ".join(each) + " from the stamps"
 
@@ -163,6 +152,4 @@ def _shown_vectors(files: list[_First], unfilled: list[str]) -> list[str]:
 
 def _list(keys: list[str]) -> str:
     """Return some keys, those of the axes of one quantity as one."""
-    short = dict.fromkeys(key.replace("_x.", "_*.").replace("_y.", "_*.").replace("_z.", "_*.")
-                          for key in keys)  # fmt: skip
-    return ", ".join(short)
+    return ", ".join(dict.fromkeys(re.sub(r"_[xyz]\.", "_*.", key) for key in keys))

@@ -9,10 +9,12 @@ hold the column. Time columns, with ``unit: ns``: ``header.stamp``, what the dri
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +24,109 @@ from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.bounds import LARGEST_BATCH
-from imubench_pipeline.readers.rosbag.messages import LAYOUTS, Layout, figures_of
+from imubench_pipeline.readers.file_format import ROWS, FileFormat, LogColumn, LogTable, shown
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder
-from imubench_pipeline.readers.started import date_of
-from imubench_pipeline.readers.wrapping import WrapState, unwrapped
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.readers.stamps import Clock, date_of
+from imubench_pipeline.tables.findings import RecordingError
+
+# ---------------------------------------------------------------------------------- messages
+#
+# Both are a header (stamp, name of a frame) and float64 figures, so many can be read at once.
+
+_ENCAPSULATION = 4
+_CDR = {b"\0\1": "<", b"\0\0": ">"}
+_SECOND = 10**9
+
+
+def _xyz(name: str, first: int) -> dict[str, int]:
+    return {f"{name}.{axis}": first + place for place, axis in enumerate("xyz")}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the figures of a kind of message stand, counted behind its header."""
+
+    figures: int
+    """How many there are."""
+    columns: dict[str, int]
+    """Place of each that can be a column."""
+    units: dict[str, str]
+    """Unit of each, which ROS fixes."""
+    covariances: dict[str, int]
+    """Place of the first covariance of a quantity; it is -1 where the quantity is not there."""
+
+
+LAYOUTS: dict[str, Layout] = {
+    # Orientation 0 and covariance 4, angular velocity 13 and 16, acceleration 25 and 28.
+    "sensor_msgs/msg/Imu": Layout(
+        37,
+        _xyz("angular_velocity", 13) | _xyz("linear_acceleration", 25),
+        dict.fromkeys(_xyz("angular_velocity", 0), "rad/s")
+        | dict.fromkeys(_xyz("linear_acceleration", 0), "m/s^2"),
+        {"angular_velocity": 16, "linear_acceleration": 28},
+    ),
+    "sensor_msgs/msg/Temperature": Layout(2, {"temperature": 0}, {"temperature": "degC"}, {}),
+}
+"""The messages that are read, by type."""
+
+
+def figures_of(
+    messages: Sequence[bytes], layout: Layout, ros_1: bool
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Read some messages.
+
+    Parameters
+    ----------
+    messages : sequence of bytes
+        As recorded.
+    ros_1 : bool
+        They are written as ROS 1 does; else as CDR.
+
+    Returns
+    -------
+    stamps : ndarray of int64
+        Stamp of the header, ns.
+    figures : ndarray of float64, shape (messages, layout.figures)
+        NaN where the message is damaged.
+    sound : ndarray of bool
+        The message is as its type says.
+    """
+    stamps = np.zeros(len(messages), np.int64)
+    figures = np.full((len(messages), layout.figures), np.nan)
+    sound = np.zeros(len(messages), bool)
+    alike: dict[tuple[int, bytes], list[int]] = {}
+    for place, message in enumerate(messages):
+        alike.setdefault((len(message), b"" if ros_1 else message[:2]), []).append(place)
+    for (size, encapsulation), places in alike.items():
+        order = "<" if ros_1 else _CDR.get(encapsulation)
+        before = size - 8 * layout.figures
+        if not ros_1:
+            # CDR aligns float64 to 8 bytes behind its own 4; some bytes may follow.
+            before -= (before - _ENCAPSULATION) % 8
+        if order is None or before < 16:
+            continue
+        table = np.frombuffer(b"".join(messages[place] for place in places), np.uint8)
+        table = table.reshape(len(places), size)
+        seconds, nanoseconds, name_size = _whole_numbers(table[:, 4:16], f"{order}u4").T
+        if not ros_1:
+            seconds = seconds.astype(np.uint32).view(np.int32)
+        ends = 16 + name_size.astype(np.int64)
+        begins = ends if ros_1 else _ENCAPSULATION + -(-(ends - _ENCAPSULATION) // 8) * 8
+        good = (begins == before) & (nanoseconds < _SECOND)
+        written = np.ascontiguousarray(table[good, before : before + 8 * layout.figures])
+        chosen = np.array(places)[good]
+        figures[chosen] = written.view(f"{order}f8")
+        stamps[chosen] = seconds[good].astype(np.int64) * _SECOND + nanoseconds[good]
+        sound[chosen] = True
+    return stamps, figures, sound
+
+
+def _whole_numbers(table: NDArray[np.uint8], kind: str) -> NDArray[np.uint32]:
+    return np.ascontiguousarray(table).view(kind).astype(np.uint32)
+
+
+# -------------------------------------------------------------------------------------- bags
 
 _BATCH = 1 << 14
 _SQLITE = b"SQLite format 3"
@@ -35,23 +134,7 @@ STAMP, LOG_TIME = "header.stamp", "log_time"
 """The columns of time."""
 
 
-class Source(Protocol):
-    """A bag of either kind."""
-
-    ros_1: bool
-    unclosed: bool
-
-    def topics(self) -> dict[str, str]:
-        """Return the topics, and the type of message of each."""
-
-    def counts(self) -> dict[str, int]:
-        """Return how many messages a topic has, where that is cheap to know."""
-
-    def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
-        """Yield time of recording (ns) and bytes of the messages of a topic."""
-
-    def close(self) -> None:
-        """Close the bag."""
+Source = Bag | Bag2
 
 
 class RosbagFile(LogFile):
@@ -73,8 +156,8 @@ class RosbagFile(LogFile):
     def _read(self, source: Source, topic: str, layout: Layout) -> Iterator[Batch]:
         sound = damaged = 0
         absent = dict.fromkeys(layout.covariances, 0)
-        first: np.int64 | None = None
-        wrap = WrapState()
+        wraps = None if self.log.time is None else self.log.time.wraps
+        clock = Clock(self, wraps, lambda first: date_of(int(first)))
         for times, messages in self._blocks(source, topic):
             stamps, figures, good = figures_of(messages, layout, source.ros_1)
             sound += int(good.sum())
@@ -86,12 +169,7 @@ class RosbagFile(LogFile):
                 figures, chosen = figures[good], chosen[good]
                 if not len(chosen):
                     continue
-                if first is None:
-                    first = chosen[0]
-                    self.started = date_of(int(first))
-                if self.log.time.wraps is not None:
-                    chosen = unwrapped(chosen, self.log.time.wraps, wrap)
-                time = self.seconds(chosen, first)
+                time = clock.seconds(chosen, np.ones(len(chosen), bool))
             yield Batch(
                 time,
                 {
@@ -132,13 +210,13 @@ class RosbagFile(LogFile):
         while True:
             times: list[int] = []
             messages: list[bytes] = []
-            held = 0
+            size = 0
             with explained(self.path):
                 for time, message in incoming:
                     times.append(time)
                     messages.append(message)
-                    held += len(message)
-                    if len(times) == _BATCH or held > LARGEST_BATCH:
+                    size += len(message)
+                    if len(times) == _BATCH or size > LARGEST_BATCH:
                         break
                 written = np.array(times, np.int64)
             if not times:
@@ -179,7 +257,7 @@ class RosbagFile(LogFile):
             and all(source.column in LAYOUTS[kind].columns for source in self.sources.values())
         }
         wanted = ", ".join(str(source.column) for source in self.sources.values())
-        found = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items())[:30])
+        present = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items())[:30])
         if stated:
             (name,) = stated
             chosen = [topic for topic in able if topic.strip("/") == name.strip("/")]
@@ -193,11 +271,11 @@ class RosbagFile(LogFile):
                 "with 'variable:' at each column in the sensor file"
             )
         cut = " (the bag is cut short, or was not closed)" if source.unclosed else ""
-        known = "; ".join(f"{kind}: {', '.join(LAYOUTS[kind].columns)}" for kind in LAYOUTS)
+        expected = "; ".join(f"{kind}: {', '.join(LAYOUTS[kind].columns)}" for kind in LAYOUTS)
         raise RecordingError(
             f"{self.path.name}: no topic {name + ' ' if name else ''}with {wanted}; found "
-            f"{found or 'none'}{cut}; expected a topic of {known}; mend 'variable' or 'column' in "
-            "the sensor file"
+            f"{present or 'none'}{cut}; expected a topic of {expected}; mend 'variable' or "
+            "'column' in the sensor file"
         )
 
     # ----------------------------------------------------------------------------- findings
@@ -205,31 +283,28 @@ class RosbagFile(LogFile):
     def _report(self, topic: str, unclosed: bool, damaged: int, absent: dict[str, int]) -> None:
         fate = "left out" if self.log.time is not None else "missing samples"
         if damaged:
-            self._warn(
+            self.note(
                 "damaged_message",
                 f"{damaged} messages of {topic} are not as their type says; {fate}",
                 damaged,
             )
         for quantity, count in absent.items():
             if count:
-                self._warn(
+                self.note(
                     "not_measured",
                     f"{count} messages of {topic} say (covariance -1) that they hold no "
                     f"{quantity}; missing samples",
                     count,
                 )
         if unclosed:
-            self._warn("truncated_file", "the bag was not closed; read as far as it goes", 1)
+            self.note("truncated_file", "the bag was not closed; read as far as it goes", 1)
         for path in _unmerged(self.path):
-            self._warn(
+            self.note(
                 "truncated_file",
                 f"{path.name} holds records that are not yet in the bag and are not read; merge "
                 "them with sqlite3 and 'pragma wal_checkpoint'",
                 1,
             )
-
-    def _warn(self, name: str, text: str, value: float) -> None:
-        self.findings.append(Finding(name, "warning", f"{self.path.name}: {text}", value))
 
 
 @contextmanager
@@ -241,11 +316,11 @@ def explained(path: Path) -> Iterator[None]:
         raise
     # They raise whatever their parsing meets: struct.error, KeyError, ...
     except Exception as error:
-        said = " ".join(str(error).replace(f"{path.parent}/", "").split())[:300]
+        reason = " ".join(str(error).replace(f"{path.parent}/", "").split())[:300]
         if isinstance(error, MemoryError):
-            said = "a record promises more bytes than memory can hold"
+            reason = "a record promises more bytes than memory can hold"
         raise RecordingError(
-            f"{path.name}: corrupt, or cut short ({said or type(error).__name__}); "
+            f"{path.name}: corrupt, or cut short ({reason or type(error).__name__}); "
             "expected a ROS bag; copy it again, or mend it ('ros2 bag reindex', 'mcap recover', "
             "'.recover' of sqlite3)"
         ) from None
@@ -254,10 +329,7 @@ def explained(path: Path) -> Iterator[None]:
 def opened(path: Path) -> Source:
     """Open a bag; its content tells which kind it is.
 
-    Parameters
-    ----------
-    path : Path
-        A file, or the folder of a ROS 2 bag.
+    ``path``: a file, or the folder of a ROS 2 bag.
 
     Raises
     ------
@@ -293,3 +365,68 @@ def _unmerged(path: Path) -> list[Path]:
     """Return the journals of SQLite that hold what was recorded last."""
     logs = path.glob("*-wal") if path.is_dir() else [path.with_name(f"{path.name}-wal")]
     return [log for log in logs if log.is_file() and log.stat().st_size]
+
+
+_RARE = 20
+"""Messages of a slow topic that are looked at."""
+
+
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+    """Return a table for each topic.
+
+    ``path``: a file, or the folder of a ROS 2 bag.
+
+    Raises
+    ------
+    RecordingError
+        If it is no bag, or has no topic.
+    """
+    source = opened(path)
+    try:
+        with explained(path):
+            topics, counts = source.topics(), source.counts()
+            if not topics:
+                raise RecordingError(f"{path.name}: the bag has no topic; expected sensor_msgs/Imu")
+            return [
+                _table(file_format, source, topic, kind, counts.get(topic))
+                for topic, kind in sorted(topics.items())
+            ]
+    finally:
+        source.close()
+
+
+def _table(
+    file_format: FileFormat, source: Source, topic: str, kind: str, rows: int | None
+) -> LogTable:
+    if kind not in LAYOUTS:
+        kinds = " or ".join(name.replace("/msg/", "/") for name in LAYOUTS)
+        return LogTable(
+            file_format, topic, rows=rows, about=kind, fault=f"is {kind}; only {kinds} are read"
+        )
+    layout = LAYOUTS[kind]
+    count = ROWS if layout.covariances else _RARE
+    columns = () if rows == 0 else _columns(source, topic, layout, count)
+    fault = None if columns else "has no message that can be read"
+    return LogTable(file_format, topic, columns, topic, rows=rows, about=kind, fault=fault)
+
+
+def _columns(source: Source, topic: str, layout: Layout, count: int) -> tuple[LogColumn, ...]:
+    messages = list(islice(source.messages(topic), count))
+    if not messages:
+        return ()
+    stamps, figures, sound = figures_of([data for _, data in messages], layout, source.ros_1)
+    if not sound.any():
+        return ()
+    columns = []
+    for name, place in layout.columns.items():
+        values = figures[sound, place]
+        covariance = layout.covariances.get(name.partition(".")[0])
+        if covariance is not None and (figures[sound, covariance] == -1).all():
+            continue  # the messages say that it is not measured
+        columns.append(LogColumn(name, name, "number", shown(values), values, layout.units[name]))
+    logged = np.array([time for time, _ in messages], np.int64)
+    for name, times in ((STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
+        columns.append(
+            LogColumn(name, name, "number", shown(times), times.astype(np.float64), "ns")
+        )
+    return tuple(columns)

@@ -32,10 +32,7 @@ _TIME = struct.Struct("<II")
 class Bag:
     """A ROS 1 bag.
 
-    Attributes
-    ----------
-    unclosed : bool
-        The bag was not closed, or is cut short; known after the last message.
+    ``unclosed``: it was not closed, or is cut short; known after the last message.
     """
 
     ros_1 = True
@@ -57,16 +54,7 @@ class Bag:
         RecordingError
             If this is no bag, or it is damaged.
         """
-        for _ in self._listed():
-            pass
-        return dict(self._connections.values())
-
-    def counts(self) -> dict[str, int]:
-        """Return nothing: only the whole bag tells how many messages a topic has."""
-        return {}
-
-    def _listed(self) -> Iterator[None]:
-        """Read connections where the index says they are, or from all of the bag."""
+        # The index says where the connections are; without one, all of the bag does.
         with self._path.open("rb") as file:
             try:
                 start = self._start(file)
@@ -78,7 +66,12 @@ class Bag:
                 self._connections.clear()
         if not self._connections:
             for _ in self.messages(""):
-                yield
+                pass
+        return dict(self._connections.values())
+
+    def counts(self) -> dict[str, int]:
+        """Return nothing: only the whole bag tells how many messages a topic has."""
+        return {}
 
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
         """Yield time of recording (ns) and bytes of the messages of a topic.

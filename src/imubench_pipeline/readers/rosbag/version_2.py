@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import sqlite3
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -80,14 +81,14 @@ class Bag2:
 
     def topics(self) -> dict[str, str]:
         """Return the topics, and the type of message of each."""
-        return {str(held.topic): str(held.msgtype) for held in self._connections}
+        return {str(connection.topic): str(connection.msgtype) for connection in self._connections}
 
     def counts(self) -> dict[str, int]:
         """Return how many messages a topic has."""
-        found: dict[str, int] = {}
-        for held in self._connections:
-            found[str(held.topic)] = found.get(str(held.topic), 0) + held.msgcount
-        return found
+        counts: Counter[str] = Counter()
+        for connection in self._connections:
+            counts[str(connection.topic)] += connection.msgcount
+        return counts
 
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
         """Yield time of recording (ns) and bytes of the messages of a topic."""
@@ -102,7 +103,7 @@ class Bag2:
     def _stored(self, topic: str, packed: bool) -> Iterator[tuple[int, object]]:
         """Yield the messages as they are stored; the library unpacks packed ones as a whole."""
         for reader in _storages(self._reader) if packed else [self._reader]:
-            wanted = [held for held in reader.connections if held.topic == topic]
+            wanted = [connection for connection in reader.connections if connection.topic == topic]
             for _, time, message in reader.messages(wanted) if wanted else ():
                 yield time, message
 
@@ -122,25 +123,22 @@ def _storages(reader: _Reader) -> list[Any]:
 def _check_overlap(storage: McapReader) -> None:
     """Raise if chunks of one time are larger than may be in memory together."""
     open_until: list[tuple[int, int]] = []
-    held = 0
+    size = 0
     for chunk in sorted(storage.chunks, key=lambda chunk: chunk.message_start_time):
         while open_until and open_until[0][0] < chunk.message_start_time:
-            held -= heapq.heappop(open_until)[1]
+            size -= heapq.heappop(open_until)[1]
         heapq.heappush(open_until, (chunk.message_end_time, chunk.uncompressed_size))
-        held += chunk.uncompressed_size
-        if held > LARGEST_OVERLAP:
+        size += chunk.uncompressed_size
+        if size > LARGEST_OVERLAP:
             raise ValueError(
-                f"chunks of one time have {held} bytes, expected at most {LARGEST_OVERLAP}"
+                f"chunks of one time have {size} bytes, expected at most {LARGEST_OVERLAP}"
             )
 
 
 def check_folder(path: Path) -> None:
     """Raise if what describes a bag is too long to be that, or a packed file expands too far.
 
-    Parameters
-    ----------
-    path : Path
-        The folder of a ROS 2 bag.
+    ``path``: the folder of a ROS 2 bag.
     """
     size = (path / "metadata.yaml").stat().st_size
     if size > LARGEST_METADATA:
@@ -156,12 +154,7 @@ def check_folder(path: Path) -> None:
 
 
 def check_database(path: Path) -> None:
-    """Raise if a database is cut short, or its tables are computed where they are read.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Raise if a database is cut short, or its tables are computed where they are read."""
     _check_whole(path)
     location = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
     with closing(sqlite3.connect(location, uri=True)) as database:
@@ -186,9 +179,9 @@ def _check_whole(path: Path) -> None:
     size = int.from_bytes(header[16:18], "big")
     pages = int.from_bytes(header[28:32], "big")
     # An old library leaves the count of pages as it was; then the two counters differ.
-    known = header[24:28] == header[92:96]
+    has_count = header[24:28] == header[92:96]
     expected = (1 << 16 if size == 1 else size) * pages
-    if known and path.stat().st_size < expected:
+    if has_count and path.stat().st_size < expected:
         raise RecordingError(
             f"{path.name}: cut short: {path.stat().st_size} of {expected} bytes; copy it again, or "
             "mend it with '.recover' of sqlite3"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from imubench_pipeline.readers.bounds import LONGEST_LINE
-from imubench_pipeline.readers.compressed import open_bytes
+from imubench_pipeline.readers.compressed import ended_early, open_bytes
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _SEEN = 1 << 16
@@ -37,9 +37,7 @@ class _Text:
             raise
 
     def _prepare(self, skipped: int) -> None:
-        begin = b""
-        while len(begin) < _SEEN and (block := self._bytes.read(_SEEN - len(begin))):
-            begin += block
+        begin = self._bytes.filled(_SEEN)
         mark = next((mark for mark in _BYTE_ORDER_MARKS if begin.startswith(mark)), b"")
         encoding = _BYTE_ORDER_MARKS.get(mark)
         self._decoder = (
@@ -82,7 +80,6 @@ class CompleteLines:
 
     Parameters
     ----------
-    path : Path
     findings : list of Finding
         Gets what was left out.
     skipped : int
@@ -91,13 +88,6 @@ class CompleteLines:
         Makes of complete lines what is read.
     most : int or None
         Bytes of the text after which no more is read; None: the whole file is.
-
-    Attributes
-    ----------
-    rest : bytes
-        What follows the last complete line.
-    error : RecordingError or None
-        Kept as well as raised: a parser between us and the caller may wrap the exception.
     """
 
     closed = False
@@ -116,7 +106,8 @@ class CompleteLines:
         self._ready = b""
         self._ended = False
         self._left = most
-        self.rest = b""
+        self.rest = b""  # what follows the last complete line
+        # Kept as well as raised: a parser between us and the caller may wrap the exception.
         self.error: RecordingError | None = None
         self._text = _Text(path, skipped)
 
@@ -185,35 +176,20 @@ class CompleteLines:
     def _end(self) -> None:
         self._ended = True
         if self._text.ended_early:
-            self._findings.append(
-                Finding(
-                    "truncated_file",
-                    "warning",
-                    f"{self._path.name}: the compressed file ends early; read as far as it goes",
-                    1,
-                )
-            )
+            self._findings.append(ended_early(self._path))
         if self.rest.strip(b"\0\r\n\t "):
             shown = self.rest[:60].decode("utf-8", "replace")
-            self._findings.append(
-                Finding(
-                    "incomplete_last_record",
-                    "note",
-                    f"{self._path.name}: the last record has no line break and may be cut short; "
-                    f"left out: {shown!r}",
-                    1,
-                )
+            detail = (
+                f"{self._path.name}: the last record has no line break and may be cut short; left "
+                f"out: {shown!r}"
             )
+            self._findings.append(Finding("incomplete_last_record", "note", detail, 1))
 
 
 def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
     """Yield the lines of a text log from its beginning; the last one may lack its line break.
 
-    Parameters
-    ----------
-    path : Path
-    most : int or None
-        Bytes that are read, about; None: the whole file is.
+    ``most``: bytes that are read, about; None: the whole file is.
     """
     with CompleteLines(path, [], most=most) as lines:
         while block := lines.read(_SEEN):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -11,15 +12,28 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import Batch, LogFile
-from imubench_pipeline.readers.text.cells import MISSING
+from imubench_pipeline.readers.file_format import (
+    FIRST,
+    NOTHING_STATED,
+    ROWS,
+    FileFormat,
+    LogColumn,
+    LogTable,
+)
+from imubench_pipeline.readers.stated_units import StatedUnit, stated
+from imubench_pipeline.readers.text.cells import MISSING, Decimal, is_missing, is_number
 from imubench_pipeline.readers.text.complete_lines import CompleteLines, first_lines
+from imubench_pipeline.readers.text.header import completed, says_units, stated_rate, stated_start
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
-from imubench_pipeline.readers.text.preamble import stated_rate, stated_start
 from imubench_pipeline.readers.text.records import Records
-from imubench_pipeline.readers.text.stamps import StampError
-from imubench_pipeline.readers.text.time import TextTime, time_columns
-from imubench_pipeline.readers.text.units import text_units
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.readers.text.stamps import (
+    StampError,
+    TextTime,
+    stamp_forms,
+    stamps_of,
+    time_columns,
+)
+from imubench_pipeline.tables.findings import RecordingError
 
 _BLOCK_BYTES = 1 << 20  # pyarrow reads 32 of them ahead
 _ADVICE = (
@@ -65,12 +79,11 @@ class CsvFile(LogFile):
                 raise self._bad_cell(line, column, error.text, time.expected) from None
             rows += len(part)
             yield Batch(
-                stamps,
-                {name: self.to_si(name, _numbers(part, at)) for name, at in columns.items()},
+                stamps, {name: self.to_si(name, _numbers(part, at)) for name, at in columns.items()}
             )
         if rows == 0:
             raise RecordingError(f"{self.path.name}: no complete record; expected at least one")
-        self._note(layout, records)
+        self._report(layout, records)
 
     def _parts(
         self, layout: TextLayout, figures: set[int], time: TextTime | None, records: Records
@@ -113,35 +126,33 @@ class CsvFile(LogFile):
                 if _NOTHING not in str(error):
                     raise self._explained(error, fault, layout, time) from None
         if fault.row is not None:
-            self._found(
+            self.note(
                 "incomplete_last_record",
                 f"the last record has {fault.row.actual_columns} of {fault.row.expected_columns} "
                 "columns; left out",
                 1,
+                "note",
             )
 
     # ------------------------------------------------------------------- findings, faults
 
-    def _found(self, finding: str, detail: str, value: int) -> None:
-        self.findings.append(Finding(finding, "note", f"{self.path.name}: {detail}", value))
-
-    def _note(self, layout: TextLayout, records: Records) -> None:
+    def _report(self, layout: TextLayout, records: Records) -> None:
         if layout.passed_over:
             count, (number, text) = len(layout.passed_over), layout.passed_over[0]
             if layout.header:
                 name, what = "not_records", "stand under the names and are no units"
             else:
                 name, what = "incomplete_first_record", "lack a part of their record"
-            self._found(
-                name, f"{count} lines from line {number} {what}; left out: {text[:60]!r}", count
-            )
+            detail = f"{count} lines from line {number} {what}; left out: {text[:60]!r}"
+            self.note(name, detail, count, "note")
         if records.restarts:
             cut = f" after a record cut short in {records.cut} places" if records.cut else ""
-            self._found(
+            self.note(
                 "restarted_log",
                 f"the header stands again {records.restarts} times{cut}: the logger was started "
                 "again; these lines are left out",
                 records.restarts,
+                "note",
             )
 
     def _wrong_width(self, row: pacsv.InvalidRow, layout: TextLayout) -> RecordingError:
@@ -151,19 +162,19 @@ class CsvFile(LogFile):
             f"{_ADVICE}"
         )
 
-    def _bad_cell(self, line: int, column: str, found: str, expected: str) -> RecordingError:
+    def _bad_cell(self, line: int, column: str, cell: str, expected: str) -> RecordingError:
         return RecordingError(
-            f"{self.path.name}, line {line}, column {column!r}: found {found[:40]!r}, expected "
+            f"{self.path.name}, line {line}, column {column!r}: found {cell[:40]!r}, expected "
             f"{expected}; {_ADVICE}"
         )
 
     def _line(self, row: int, layout: TextLayout, *, blank: bool) -> int:
         """Return the line of a record in the file; ``blank``: lines of spaces count as records."""
         stripped = b"\r\n" if blank else b"\r\n\t "
-        one, count = layout.records(), 0
+        records, count = layout.records(), 0
         for number, raw in enumerate(first_lines(self.path), start=1):
             if number > layout.lines_before:
-                count += sum(bool(line.strip(stripped)) for line in one(raw).split(b"\n"))
+                count += sum(bool(line.strip(stripped)) for line in records(raw).split(b"\n"))
             if count >= row:
                 return number
         return row + layout.lines_before
@@ -194,18 +205,11 @@ class CsvFile(LogFile):
 
 
 class _WrongWidth:
-    """The first record with too many or too few columns: no fault where it is the last one.
-
-    Attributes
-    ----------
-    row : InvalidRow or None
-    record : int
-        Its number among the records without lines of spaces, counted from 1.
-    """
+    """The first record with too many or too few columns: no fault where it is the last one."""
 
     def __init__(self) -> None:
         self.row: pacsv.InvalidRow | None = None
-        self.record = 0
+        self.record = 0  # its number without lines of spaces, from 1
         self._blank = 0
 
     def keep(self, row: pacsv.InvalidRow) -> str:
@@ -221,3 +225,100 @@ class _WrongWidth:
 
 def _numbers(part: pa.RecordBatch, position: int) -> NDArray[np.float64]:
     return np.asarray(part.column(str(position)).to_numpy(zero_copy_only=False), np.float64)
+
+
+# ---------------------------------------------------------------------- the units it states
+
+
+def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
+    """Return the units that a line beside the names says, by the positions of columns; and it."""
+    for raw in layout.preamble:
+        if raw == layout.header:
+            continue
+        text = raw.decode("utf-8", "replace")
+        sign = next((sign for sign in layout.comments if text.startswith(sign)), "")
+        cells = layout.split.names(text.lstrip(sign) if sign else text, len(layout.names))
+        if completed(cells, layout.names) and says_units(cells):
+            return {place: cell.strip("()[]{}<> ") for place, cell in enumerate(cells)}, raw
+    return {}, b""
+
+
+def text_units(layout: TextLayout, columns: Mapping[str, int]) -> dict[str, StatedUnit]:
+    """Return the units that a log states of its channels.
+
+    ``columns``: position of the column of each channel, and of what is beside them.
+    """
+    beside, _ = line_of_units(layout)
+    units = {}
+    for channel, place in columns.items():
+        label = layout.names[place] if layout.header else ""
+        where = f"the line of units, column {place + 1}"
+        if unit := stated(channel, beside.get(place), where, label):
+            units[channel] = unit
+    return units
+
+
+# ----------------------------------------------------------------------- what a log holds
+
+_NOTES = 12
+
+
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+    """Return the one table of a text log.
+
+    ``path``: a file, compressed or not, or a member of a zip archive.
+
+    Raises
+    ------
+    RecordingError
+        If it is no text, or has no records.
+    """
+    layout = find_layout(path, NOTHING_STATED, [], [])
+    before = [line.decode("utf-8", "replace") for line in layout.preamble]
+    units, units_line = line_of_units(layout)
+    rows = [row for row in layout.rows[:ROWS] if len(row) >= len(layout.names)]
+    rows = rows[:-1] or rows  # the last one may be cut short
+    named = layout.names != [str(number) for number in range(1, len(layout.names) + 1)]
+    columns = tuple(
+        _column(layout, place, [row[place] for row in rows], named, units.get(place))
+        for place in range(len(layout.names))
+    )
+    names = "with names" if named else "without names"
+    return [
+        LogTable(
+            file_format,
+            columns=columns,
+            rate=stated_rate(before),
+            started=stated_start(before),
+            about=f"delimiter {layout.split}, decimal sign {layout.decimal!r}, {names}",
+            notes=tuple(
+                text.strip().replace("\t", " ")
+                for raw, text in zip(layout.preamble, before, strict=True)
+                if raw not in (layout.header, units_line)
+            )[:_NOTES],
+        )
+    ]
+
+
+def _column(
+    layout: TextLayout, place: int, cells: list[str], named: bool, unit: str | None
+) -> LogColumn:
+    name = layout.names[place] if named else ""
+    source: str | int = name
+    if not name or layout.names.count(name) > 1 or not name.isprintable():
+        source = place + 1
+    first = tuple(cell.strip() for cell in cells[:FIRST])
+    unit = None if unit is None or is_missing(unit) else unit
+    present = [cell for cell in cells if not is_missing(cell)]
+    if present and all(is_number(cell, layout.decimal) for cell in present):
+        values = np.array([_figure(cell, layout.decimal) for cell in cells])
+        return LogColumn(source, name, "number", first, values, unit)
+    if forms := stamp_forms(present):
+        return LogColumn(source, name, "date", first, stamps_of(forms[0], cells), None, forms)
+    return LogColumn(source, name, "text", first, unit=unit)
+
+
+def _figure(cell: str, decimal: Decimal) -> float:
+    if is_missing(cell):
+        return np.nan
+    return float(cell.strip().replace(decimal, "."))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+
+import numpy as np
 
 from imubench_pipeline.readers.text.cells import is_missing, is_number
 
@@ -11,7 +13,7 @@ _RULED = re.compile(r"[-=_+]{2,}")
 _UNIT = re.compile(
     r"[(\[{<].*[)\]}>]|[-–.]*|"
     r"(?:[munpkMµμ]|milli|micro)?(?:s|sec|seconds?|g|rad|deg|degrees?|dps|m|T|gauss|Gauss|Hz|V|Pa|"
-    r"bar|[°º]?C|K|[°º])(?:\W.*|²)?|min|h|samples?|counts?|LSB",
+    r"bar|[°º]?C|K|[°º])(?:\W.*|²)?|min|h|samples?|counts?|LSB"
 )
 _WORDS = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 
@@ -30,14 +32,14 @@ def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
     int or None
         The one with the most names; of equals the first. None: no line has names.
     """
-    best, found = 0, None
+    best, header = 0, None
     for index, cells in enumerate(lines):
         if any(is_number(cell) for cell in cells) or says_units(cells):
             continue
         names = len({cell for cell in cells if not is_missing(cell)})
         if 2 * names >= len(cells) and names > best:
-            best, found = names, index
-    return found
+            best, header = names, index
+    return header
 
 
 def says_units(cells: Sequence[str]) -> bool:
@@ -74,3 +76,41 @@ def are_units(row: list[str], places: set[int]) -> bool:
     cells = [row[place].strip() for place in places if place < len(row)]
     texts = [cell for cell in cells if not is_missing(cell)]
     return bool(texts) and not any(is_number(text) or text[0].isdigit() for text in texts)
+
+
+_RATE = re.compile(
+    r"\b(?:update|sampl\w*|output|data|logging)[ _]?(?:data[ _]?)?(?:rate|freq\w*)\W{1,4}?"
+    r"(?P<figure>\d+(?:[.,]\d+)?)\s*(?P<kilo>k)?(?:hz|sps)\b",
+    re.IGNORECASE,
+)
+_START = re.compile(
+    r"\bstart(?:ed)?[ _]?(?:time|date|at)?\W{1,4}?"
+    r"(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ]+(?P<time>\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)",
+    re.IGNORECASE,
+)
+
+
+def stated_rate(lines: Iterable[str]) -> float | None:
+    """Return the sampling rate that lines such as ``// Update Rate: 100.0Hz`` state, Hz.
+
+    None where none is stated, or several that differ, such as one a sensor.
+    """
+    rates = set()
+    for line in lines:
+        for match in _RATE.finditer(line):
+            figure = float(match["figure"].replace(",", "."))
+            rates.add(figure * (1000.0 if match["kilo"] else 1.0))
+    (rate,) = rates if len(rates) == 1 else (None,)
+    return rate or None
+
+
+def stated_start(lines: Iterable[str]) -> str | None:
+    """Return the date and time (ISO 8601) of lines such as ``// Start Time: 2024-05-01 12:00``."""
+    for line in lines:
+        if match := _START.search(line):
+            text = f"{match['date'].replace('/', '-')}T{match['time'].replace(',', '.')}"
+            try:
+                return str(np.datetime64(text, "ms"))
+            except ValueError:
+                continue  # no such day
+    return None

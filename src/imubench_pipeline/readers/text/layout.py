@@ -12,7 +12,14 @@ from pathlib import Path
 
 from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.batch import stated_in
-from imubench_pipeline.readers.text.cells import Decimal, are_figures, is_datum, is_number
+from imubench_pipeline.readers.text.cells import (
+    MOST_COLUMNS,
+    Decimal,
+    Split,
+    are_figures,
+    is_datum,
+    is_number,
+)
 from imubench_pipeline.readers.text.complete_lines import first_lines
 from imubench_pipeline.readers.text.header import are_units, completed, is_heading, likely_header
 from imubench_pipeline.readers.text.records import Records, are_apart
@@ -21,7 +28,6 @@ from imubench_pipeline.readers.text.refusals import (
     refuse_decimals_apart,
     refuse_other_formats,
 )
-from imubench_pipeline.readers.text.split import MOST_COLUMNS, Split
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -35,46 +41,30 @@ _SCORED_LINES, _SCORED_CELLS, _SHOWN, _LONGEST_SHOWN = 50, 50, 20, 40
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a text log is laid out.
-
-    Attributes
-    ----------
-    file : str
-        Its name, for messages.
-    lines_before, bytes_before : int
-        Lines and bytes before the first record.
-    split : Split
-    quoted : bool
-    decimal : {".", ","}
-    names : list of str
-        The names of the columns; their positions where there is no header.
-    rows : list of list of str
-        The cells of the first records; the last of them may be cut short.
-    comments : tuple of str
-        Beginnings of lines that are comments.
-    header : bytes
-        The line of names; empty: none.
-    preamble : tuple of bytes
-        The lines before the first record, with the comments.
-    passed_over : tuple of (int, str)
-        Number and text of the lines before the first record that are neither names nor units.
-    blank_is_missing : bool
-        A blank line among the records is one whose only cell is empty.
-    """
+    """How a text log is laid out."""
 
     file: str
+    """Its name, for messages."""
     lines_before: int
     bytes_before: int
+    """Lines and bytes before the first record."""
     split: Split
     quoted: bool
     decimal: Decimal
     names: list[str]
+    """The names of the columns; their positions where there is no header."""
     rows: list[list[str]]
+    """The cells of the first records; the last of them may be cut short."""
     comments: tuple[str, ...]
+    """Beginnings of lines that are comments."""
     header: bytes
+    """The line of names; empty: none."""
     preamble: tuple[bytes, ...]
+    """The lines before the first record, with the comments."""
     passed_over: tuple[tuple[int, str], ...]
+    """Number and text of the lines before the first record that are neither names nor units."""
     blank_is_missing: bool
+    """A blank line among the records is one whose only cell is empty."""
 
     def position(self, column: Column, key: str) -> int:
         """Return the position, counted from 0, of a column that the sensor file names.
@@ -85,23 +75,23 @@ class TextLayout:
             If the file has no such column, or two of that name.
         """
         shown = [name[:_LONGEST_SHOWN] for name in self.names[:_SHOWN]]
-        found = ", ".join(shown) + (", ..." if len(self.names) > _SHOWN else "")
+        present = ", ".join(shown) + (", ..." if len(self.names) > _SHOWN else "")
         if isinstance(column, int):
             if column > len(self.names):
                 raise RecordingError(
                     f"{self.file}: no column {column} for {key}; found {len(self.names)} columns "
-                    f"({found}) with delimiter {self.split}; mend 'column' of {key}, or "
+                    f"({present}) with delimiter {self.split}; mend 'column' of {key}, or "
                     f"'delimiter', in {stated_in(key)}"
                 )
             return column - 1
         if column not in self.names:
             raise RecordingError(
-                f"{self.file}: no column {column!r} for {key}; found {found} with delimiter "
+                f"{self.file}: no column {column!r} for {key}; found {present} with delimiter "
                 f"{self.split}; mend 'column' of {key} in {stated_in(key)}"
             )
         if self.names.count(column) > 1:
             raise RecordingError(
-                f"{self.file}: column {column!r} for {key} stands twice in the header ({found}); "
+                f"{self.file}: column {column!r} for {key} stands twice in the header ({present}); "
                 "take it by its position, as a number"
             )
         return self.names.index(column)
@@ -128,14 +118,9 @@ def find_layout(
 ) -> TextLayout:
     """Find how a text log is laid out.
 
-    Parameters
-    ----------
-    path : Path
-    log : LogFormat
-        What is stated.
-    figures, times : sequence of str or int
-        The columns of figures and those of time stamps that are wanted, by name or position. Where
-        none is, the likeliest layout is found.
+    ``log``: what is stated.
+    ``figures`` and ``times``: the columns of figures and those of time stamps that are wanted, by
+    name or position. Where none is, the likeliest layout is found.
 
     Raises
     ------
@@ -219,7 +204,7 @@ class _Search:
         """Return the comments and the other lines of the beginning of a file."""
         comments: deque[_Line] = deque()
         lines: list[_Line] = []
-        number, start, held, told = 0, 0, 0, 0
+        number, start, line_bytes, comment_bytes = 0, 0, 0, 0
         # Whether a semicolon begins a comment or is the delimiter is not yet known.
         signs = tuple(sign for sign in self._signs(None) if sign != ";")
         for raw in first_lines(path, bounds.MOST_BYTES_BEFORE):
@@ -231,13 +216,13 @@ class _Search:
             line = _Line(number, here, raw.rstrip(b"\r\n"), _decoded(raw.rstrip(b"\r\n")))
             if line.text.startswith(signs):
                 comments.append(line)
-                told += len(line.raw)
-                while len(comments) > bounds.COMMENT_LINES or told > bounds.COMMENT_BYTES:
-                    told -= len(comments.popleft().raw)
+                comment_bytes += len(line.raw)
+                while len(comments) > bounds.COMMENT_LINES or comment_bytes > bounds.COMMENT_BYTES:
+                    comment_bytes -= len(comments.popleft().raw)
                 continue
             lines.append(line)
-            held += len(raw)
-            if len(lines) >= _LINES or (held > _BYTES and len(lines) > _UNIT_LINES):
+            line_bytes += len(raw)
+            if len(lines) >= _LINES or (line_bytes > _BYTES and len(lines) > _UNIT_LINES):
                 break
         if not lines and (number > bounds.MOST_LINES_BEFORE or start > bounds.MOST_BYTES_BEFORE):
             raise RecordingError(
@@ -284,10 +269,10 @@ class _Search:
         shown, fits = 0, False
         for line in [*lines, *comments] if self._names else []:
             names = self._names_in(split, line, width)
-            held = sum(name in names for name in self._names)
-            if held > shown:
-                shown, fits = held, any(completed(names, row) for row in even)
-            if held == len(self._names):
+            count = sum(name in names for name in self._names)
+            if count > shown:
+                shown, fits = count, any(completed(names, row) for row in even)
+            if count == len(self._names):
                 break
         cells = [cell for row in even for cell in row[:_SCORED_CELLS]]
         alike = len(even) / len(rows) * sum(map(is_datum, cells)) / max(len(cells), 1)
@@ -334,9 +319,9 @@ class _Search:
         else:
             header = None
         if self._log.header and header is None and first == 0:
-            told = [line for line in comments if line.number < lines[0].number]
-            if told and len(self._names_in(split, told[-1])) == width:
-                return told[-1], 0
+            before = [line for line in comments if line.number < lines[0].number]
+            if before and len(self._names_in(split, before[-1])) == width:
+                return before[-1], 0
             first = 1
         if first >= len(lines):
             raise RecordingError(
@@ -355,8 +340,8 @@ class _Search:
         record = split.cells(lines[-1].text)
         near = [line for line in comments if line.number < lines[-1].number] + lines[:-1]
         named = [completed(self._names_in(split, line, len(record)), record) for line in near]
-        found = likely_header(named)
-        return None if found is None else near[found]
+        place = likely_header(named)
+        return None if place is None else near[place]
 
     def _named(self, split: Split, lines: list[_Line], width: int) -> _Line | None:
         """Return the line that has all names that are wanted."""

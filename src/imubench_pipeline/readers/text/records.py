@@ -38,13 +38,6 @@ class Records:
         Columns are divided by runs of spaces or tabs, which become one space.
     blank_is_missing : bool
         A blank line between two records is one whose only cell is empty.
-
-    Attributes
-    ----------
-    restarts : int
-        How often the header stood among the records.
-    cut : int
-        Records cut short, in the line of which the log begins again.
     """
 
     def __init__(
@@ -70,8 +63,8 @@ class Records:
         self._runs = runs
         self._blank_is_missing = blank_is_missing
         self._blank = 0
-        self.restarts = 0
-        self.cut = 0
+        self.restarts = 0  # how often the header stood among the records
+        self.cut = 0  # records cut short, in the line of which the log begins again
 
     def __call__(self, lines: bytes) -> bytes:
         """Return the records of complete lines."""
@@ -106,7 +99,7 @@ class Records:
         return before + _BLANK_LINES.sub(_MISSING, ended) + b"\n"
 
     def _without_headers(self, lines: bytes) -> bytes:
-        kept = []
+        records = []
         for line in lines[:-1].split(b"\n"):
             text = line.rstrip(b"\r")
             if text == self._header:
@@ -117,17 +110,14 @@ class Records:
                 self.restarts += text.endswith(self._header)
                 self.cut += 1
             else:
-                kept.append(line + b"\n")
-        return b"".join(kept)
+                records.append(line + b"\n")
+        return b"".join(records)
 
 
 def are_apart(numbers: Sequence[int]) -> bool:
     """Return whether blank lines are between all records, and only set these apart.
 
-    Parameters
-    ----------
-    numbers : sequence of int
-        The lines of the first records.
+    ``numbers``: the lines of the first records.
     """
     return all(later > sooner + 1 for sooner, later in pairwise(numbers))
 

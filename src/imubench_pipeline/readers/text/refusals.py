@@ -19,12 +19,8 @@ _WHOLE = re.compile(r"\s*[-+]?\d+")
 def refuse_other_formats(file: str, line: bytes) -> None:
     """Raise `RecordingError` if a log begins as a page of the web or JSON does.
 
-    Parameters
-    ----------
-    file : str
-        Its name.
-    line : bytes
-        Its first line.
+    ``file``: its name.
+    ``line``: its first line.
     """
     begin = line.strip().lower()
     shown = line.strip()[:40].decode("utf-8", "replace")
@@ -43,12 +39,7 @@ def refuse_other_formats(file: str, line: bytes) -> None:
 def refuse_binary(file: str, number: int, line: bytes) -> None:
     """Raise `RecordingError` if a line holds zero bytes.
 
-    Parameters
-    ----------
-    file : str
-    number : int
-        Of the line, counted from 1.
-    line : bytes
+    ``number``: of the line, counted from 1.
     """
     zeros = line.count(b"\0")
     if not zeros:
@@ -72,7 +63,6 @@ def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequ
 
     Parameters
     ----------
-    file : str
     number : int
         Of the first record.
     line : str

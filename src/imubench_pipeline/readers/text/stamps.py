@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,11 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from imubench_pipeline.readers.batch import LogFile
+from imubench_pipeline.readers.stamps import Clock, date_of_nanoseconds, date_of_stamp
 from imubench_pipeline.readers.text.cells import is_missing
+from imubench_pipeline.readers.text.layout import TextLayout
+from imubench_pipeline.settings.sensor import TimeSource
 
 DAY = 24 * 3600 * 10**9
 """ns."""
@@ -56,9 +61,9 @@ def arrow_type(texts: Collection[str]) -> pa.DataType | None:
 
     None where it does not: a comma before the fraction, spaces around the stamp, a zone apart.
     """
-    found = [_ISO.fullmatch(text) for text in texts]
-    zones = {bool(one["zone"]) for one in found if one}
-    if not all(found) or len(zones) != 1:
+    stamps = [_ISO.fullmatch(text) for text in texts]
+    zones = {bool(stamp["zone"]) for stamp in stamps if stamp}
+    if not all(stamps) or len(zones) != 1:
         return None
     return pa.timestamp("ns", "UTC" if zones.pop() else None)
 
@@ -70,17 +75,13 @@ class TextStamps:
     ----------
     form : str
         ``iso8601`` or a pattern as for ``strptime``.
-
-    Attributes
-    ----------
-    dated : bool
-        Whether the stamps have a date; else they start again at midnight.
     """
 
     def __init__(self, form: str) -> None:
         pattern = _ISO_PATTERN if form == "iso8601" else _expression(form)
         self._expression = rf"^\s*{pattern}\s*$"
         self._fields = re.compile(self._expression).groupindex
+        # Without a date, stamps start again at midnight.
         self.dated = "d" in self._fields or "j" in self._fields
         self._zoned: bool | None = None
 
@@ -93,12 +94,12 @@ class TextStamps:
             If a stamp is neither in the pattern nor missing.
         """
         texts = pc.fill_null(texts, "")
-        found = pc.extract_regex(texts, self._expression)
-        time, sound = self._composed(found)
-        sound &= np.asarray(found.is_valid())
+        fields = pc.extract_regex(texts, self._expression)
+        time, sound = self._composed(fields)
+        sound &= np.asarray(fields.is_valid())
         if "z" in self._fields:
             # Local time among stamps with a zone would be off by hours.
-            zoned = np.asarray(pc.fill_null(pc.not_equal(found.field("z"), ""), False))
+            zoned = np.asarray(pc.fill_null(pc.not_equal(fields.field("z"), ""), False))
             if self._zoned is None and sound.any():
                 self._zoned = bool(zoned[sound.argmax()])
             sound &= zoned == self._zoned
@@ -108,15 +109,15 @@ class TextStamps:
                 raise StampError(int(row), text)
         return time, sound
 
-    def _composed(self, found: pa.StructArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def _composed(self, fields: pa.StructArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         def figures(name: str, default: int) -> NDArray[np.int64]:
             if name not in self._fields:
-                return np.full(len(found), default, np.int64)
-            text = found.field(name)
+                return np.full(len(fields), default, np.int64)
+            text = fields.field(name)
             if name == "f":
                 text = pc.utf8_rpad(text, 9, "0")
-            given = pc.if_else(pc.equal(text, ""), str(default), text)
-            return np.asarray(pc.fill_null(given, str(default)).cast(pa.int64()))
+            digits = pc.if_else(pc.equal(text, ""), str(default), text)
+            return np.asarray(pc.fill_null(digits, str(default)).cast(pa.int64()))
 
         year = figures("Y", 1970)
         if "y" in self._fields:
@@ -124,14 +125,14 @@ class TextStamps:
             year = np.where(short < 69, 2000, 1900) + short
         month = figures("m", 1)
         if "b" in self._fields:
-            names = pc.utf8_lower(pc.fill_null(found.field("b"), ""))
+            names = pc.utf8_lower(pc.fill_null(fields.field("b"), ""))
             month = np.asarray(pc.fill_null(pc.index_in(names, pa.array(_MONTHS)), -1)) + 1
         day = figures("d", 1)
         hour = figures("H", 0)
         if "I" in self._fields:
             hour = figures("I", 12) % 12
         if "p" in self._fields:
-            after_noon = pc.equal(pc.utf8_lower(pc.fill_null(found.field("p"), "")), "pm")
+            after_noon = pc.equal(pc.utf8_lower(pc.fill_null(fields.field("p"), "")), "pm")
             hour = hour + 12 * np.asarray(after_noon)
         minute, second = figures("M", 0), figures("S", 0)
         months = (year - 1970) * 12 + month - 1
@@ -141,14 +142,14 @@ class TextStamps:
         sound &= (hour < 24) & (minute < 60) & (second <= 60)
         sound &= (year > 1700) & (year < 2200)  # else ns overflow
         days = first + day - 1 + figures("j", 1) - 1
-        seconds = days * 86_400 + hour * 3600 + minute * 60 + second - self._zone(found)
+        seconds = days * 86_400 + hour * 3600 + minute * 60 + second - self._zone(fields)
         return seconds * 10**9 + figures("f", 0), sound
 
-    def _zone(self, found: pa.StructArray) -> NDArray[Any] | int:
+    def _zone(self, fields: pa.StructArray) -> NDArray[Any] | int:
         """Return the offset of the zone from UTC, s."""
         if "z" not in self._fields:
             return 0
-        zones = pc.fill_null(found.field("z"), "").dictionary_encode()
+        zones = pc.fill_null(fields.field("z"), "").dictionary_encode()
         offsets = np.array([_offset(zone) for zone in zones.dictionary.to_pylist()], np.int64)
         return offsets[np.asarray(zones.indices)] if len(offsets) else 0
 
@@ -164,12 +165,155 @@ def _offset(zone: str) -> int:
 def _expression(form: str) -> str:
     """Return the regular expression of a ``strptime`` pattern."""
     form = form.replace("%T", "%H:%M:%S").replace("%F", "%Y-%m-%d").replace("%R", "%H:%M")
-    found = ""
+    expression = ""
     for part in re.findall(r"[.,]%f|%.|\s+|[^%\s]", form):
         if part[1:] == "%f":
-            found += rf"(?:[.,]{_FIELDS['f']})?"  # loggers leave out a fraction of zero
+            expression += rf"(?:[.,]{_FIELDS['f']})?"  # loggers leave out a fraction of zero
         elif part.startswith("%"):
-            found += _FIELDS[part[1:]]
+            expression += _FIELDS[part[1:]]
         else:
-            found += r"\s+" if part.isspace() else re.escape(part)
-    return found
+            expression += r"\s+" if part.isspace() else re.escape(part)
+    return expression
+
+
+# ----------------------------------------------------------------------------------------- patterns
+
+_DATES = (
+    *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y:%m:%d", "%Y%m%d"),
+    *("%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y"),
+    *("%d-%b-%Y", "%d %b %Y", "%b %d %Y"),
+)
+_TIMES = ("%H:%M:%S.%f", "%I:%M:%S.%f %p", "%H:%M:%S:%f", "%H:%M")
+_BETWEEN = (" ", "T", "_", "-", " - ", ", ")
+_SHORTEST, _LONGEST = 5, 40
+_NO_SIGN = re.compile(r"%\w|[^\W_]+")
+
+
+def _by_signs() -> dict[str, list[str]]:
+    """Return the patterns by the signs between their fields."""
+    patterns: dict[str, list[str]] = {}
+    whole = (date + sign + time for date, sign, time in product(_DATES, _BETWEEN, _TIMES))
+    for form in chain(_TIMES, _DATES, whole):
+        for written in dict.fromkeys((form, form.replace(".%f", ""))):
+            patterns.setdefault(_NO_SIGN.sub("", written), []).append(form)
+    return patterns
+
+
+_BY_SIGNS = _by_signs()
+
+
+def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
+    """Return the patterns that all stamps fit, the likeliest first; none where they are no stamps.
+
+    A pattern with a date alone or a time of day alone is a part of one, that of a column. Where
+    day and month may be either, those are right that lie nearest together.
+
+    ``texts``: as written; missing ones are passed over.
+    """
+    stamps = [text.strip() for text in texts if not is_missing(text)]
+    if not stamps or not all(_SHORTEST <= len(stamp) <= _LONGEST for stamp in stamps):
+        return ()
+    if not all(any(sign.isdigit() for sign in stamp) for stamp in stamps):
+        return ()
+    forms = _BY_SIGNS.get(_NO_SIGN.sub("", stamps[0]), [])
+    if ":" in stamps[0]:
+        forms = ["iso8601", *forms]
+    written = pa.array(stamps)
+    fitting = {form: times for form in forms if (times := _fitting(form, written)) is not None}
+    spans = {form: np.ptp(times) for form, times in fitting.items()}
+    return tuple(form for form in fitting if spans[form] == min(spans.values()))
+
+
+def stamps_of(form: str, texts: Sequence[str]) -> NDArray[np.float64]:
+    """Return ns since 1970 or since midnight of stamps in a pattern; NaN where one is missing."""
+    times, present = TextStamps(form).nanoseconds(pa.array(texts))
+    return np.where(present, times, np.nan)
+
+
+def _fitting(form: str, texts: pa.Array) -> NDArray[np.int64] | None:
+    """Return stamps in a pattern; None where one is not."""
+    try:
+        times, present = TextStamps(form).nanoseconds(texts)
+    except StampError:
+        return None
+    return times if present.all() else None
+
+
+# ----------------------------------------------------------------------------------------- of a log
+
+_WHOLE = re.compile(r"-?\d{1,19}")
+
+
+class TextTime:
+    """Makes seconds of the stamps of a text log.
+
+    ``types`` says what pyarrow is to read, by position, a date in a column of its own first;
+    ``position`` is that of the stamps, and ``expected`` what a stamp is, for messages.
+    """
+
+    def __init__(self, file: LogFile, layout: TextLayout) -> None:
+        assert file.log.time is not None  # made where there are stamps
+        source = file.log.time
+        self._source = source
+        self._text: TextStamps | None = None
+        positions = [layout.position(column, "time") for column in time_columns(source)]
+        self.position = positions[-1]
+        stamps = [row[self.position] for row in layout.rows if self.position < len(row)]
+        present = [stamp for stamp in stamps if not is_missing(stamp)]
+        self.types = dict.fromkeys(positions, self._type(present))
+        daily = self._text is not None and not self._text.dated
+        self._clock = Clock(file, DAY if daily else source.wraps, self._started)
+        self.expected = f"a time stamp as {source.format or source.unit!r}"
+        if present:
+            self.expected += f", like {present[0]!r}"
+
+    def _type(self, stamps: list[str]) -> pa.DataType:
+        if self._source.format is None:
+            # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
+            whole = self._source.unit == "ns" and all(_WHOLE.fullmatch(s.strip()) for s in stamps)
+            return pa.int64() if whole else pa.float64()
+        if self._source.format == "iso8601" and self._source.date is None:
+            kind = arrow_type(stamps)
+            if kind is not None:
+                return kind
+        self._text = TextStamps(self._source.format)
+        return pa.string()
+
+    def seconds(self, part: pa.RecordBatch) -> NDArray[np.float64]:
+        """Return s since the first stamp of the file; NaN where the stamp is missing.
+
+        Raises
+        ------
+        StampError
+            If a stamp cannot be read.
+        RecordingError
+            If the first records have no stamp.
+        """
+        columns = [part.column(str(position)) for position in self.types]
+        return self._clock.seconds(*self._stamps(columns))
+
+    def _stamps(self, columns: list[pa.Array]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Return the stamps as numbers, and which of them are there."""
+        if self._text is not None:
+            texts = columns[0] if len(columns) == 1 else pc.binary_join_element_wise(*columns, " ")
+            return self._text.nanoseconds(texts)
+        (column,) = columns
+        present = np.asarray(column.is_valid())
+        if pa.types.is_timestamp(column.type):
+            column = column.cast(pa.int64())
+        stamps = np.asarray(column.fill_null(0) if column.null_count else column)
+        if stamps.dtype.kind == "f":
+            present &= np.isfinite(stamps)
+        return stamps, present
+
+    def _started(self, first: Any) -> str | None:
+        if self._source.format is not None:
+            return date_of_nanoseconds(first) if self._text is None or self._text.dated else None
+        return date_of_stamp(first, self._source)
+
+
+def time_columns(source: TimeSource | None) -> list[str | int]:
+    """Return the columns that stamps are taken from."""
+    if source is None:
+        return []
+    return [column for column in (source.date, source.column) if column is not None]

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from imubench_pipeline.recordings.quality import copies, held, joined, levels, stationarity
-from imubench_pipeline.recordings.quality.shared_noise import shared_noise
+from imubench_pipeline.recordings.quality.copies import shared_noise
 from imubench_pipeline.recordings.quality.summary import LARGEST, ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
@@ -87,14 +87,11 @@ def _parts(deviation: float) -> tuple[float, float]:
     Their difference d is normal; rounded at a random place it is k steps with a chance of
     1 - |d - k|, so that with G(x) = E[(d - x)⁺] the part is G(k - 1) - 2 G(k) + G(k + 1).
 
-    Parameters
-    ----------
-    deviation : float
-        Of d, in steps.
+    ``deviation``: of d, in steps.
     """
-    below, none, one, two = (_excess(x, deviation) for x in (-1.0, 0.0, 1.0, 2.0))
-    equal = below - 2.0 * none + one
-    return equal, 2.0 * (none - 2.0 * one + two) / (1.0 - equal)
+    below, none, single, two = (_excess(x, deviation) for x in (-1.0, 0.0, 1.0, 2.0))
+    equal = below - 2.0 * none + single
+    return equal, 2.0 * (none - 2.0 * single + two) / (1.0 - equal)
 
 
 def _excess(x: float, deviation: float) -> float:
@@ -119,7 +116,6 @@ def column_findings(
         Channels, and perhaps the temperature.
     rate : float
         Hz; the times of the findings follow from it.
-    settings : QualitySettings
     static : bool
         The sensor was to be at rest; where it was turned, changes are what was meant.
     """

@@ -9,8 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.excerpts import PIECE, Excerpt
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.summary import PIECE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding
 
 _LONGEST = 256
@@ -29,34 +28,28 @@ _SURE = -12.0
 
 @dataclass(frozen=True)
 class Held:
-    """Samples that repeat at a regular distance.
-
-    Attributes
-    ----------
-    every : int
-        Records from one to the next.
-    share : float
-        Part of the other samples that repeat.
-    """
+    """Samples that repeat at a regular distance."""
 
     every: int
+    """Records from one to the next."""
     share: float
+    """Part of the other samples that repeat."""
 
 
-def held(pieces: list[Excerpt]) -> Held | None:
+def regular_repeats(pieces: list[Excerpt]) -> Held | None:
     """Return at which distance samples repeat the one before; None where by chance alone."""
     whole = [piece.values for piece in pieces if len(piece.values) >= PIECE // 4]
     whole = whole[:: max(1, len(whole) // _PIECES)][:_PIECES]
-    found: list[Held] = []
+    regular: list[Held] = []
     for values in whole:
         repeats = np.flatnonzero(values[1:] == values[:-1])
-        one = _regular(repeats, len(values) - 1)
-        if one is not None:
-            found.append(one)
-    if not found or 2 * len(found) <= len(whole):
+        of_piece = _regular(repeats, len(values) - 1)
+        if of_piece is not None:
+            regular.append(of_piece)
+    if not regular or 2 * len(regular) <= len(whole):
         return None
-    every = int(np.median([one.every for one in found]))
-    return Held(every, float(np.median([one.share for one in found])))
+    every = int(np.median([of_piece.every for of_piece in regular]))
+    return Held(every, float(np.median([of_piece.share for of_piece in regular])))
 
 
 def _regular(repeats: NDArray[np.int64], records: int) -> Held | None:
@@ -68,10 +61,10 @@ def _regular(repeats: NDArray[np.int64], records: int) -> Held | None:
     share = (len(repeats) - most) / (records - turns)
     # All phases of all distances could have been the one.
     chance = most * np.log10(share + 1.0 / records) + np.log10(every * _LONGEST)
-    found = (most >= _ALWAYS * turns) & (second <= _OTHERS * turns) & (chance < _SURE)
-    if not found.any():
+    regular = (most >= _ALWAYS * turns) & (second <= _OTHERS * turns) & (chance < _SURE)
+    if not regular.any():
         return None
-    first = int(np.argmax(found))
+    first = int(np.argmax(regular))
     return Held(int(every[first]), float(share[first]))
 
 
@@ -96,12 +89,12 @@ def held_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     """Yield whether every n-th sample of a channel repeats the one before."""
     if column.repeats < column.present / (2 * _LONGEST):
         return
-    found = held(column.excerpts())
-    if found is None:
+    regular = regular_repeats(column.excerpts())
+    if regular is None:
         return
     detail = (
-        f"one sample in {found.every} of {channel} repeats the one before, in regular turn (of "
-        f"the others {100 * found.share:.2g} % do by chance): the logger asks more often than the "
-        "sensor samples, or fills in what it lost; record each sample once"
+        f"one sample in {regular.every} of {channel} repeats the one before, in regular turn (of "
+        f"the others {100 * regular.share:.2g} % do by chance): the logger asks more often than "
+        "the sensor samples, or fills in what it lost; record each sample once"
     )
-    yield Finding("held_samples", "warning", detail, found.every, channel)
+    yield Finding("held_samples", "warning", detail, regular.every, channel)

@@ -13,9 +13,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.excerpts import PIECE, Excerpt
 from imubench_pipeline.recordings.quality.register import hidden_step
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.summary import PIECE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
@@ -52,34 +51,29 @@ _MAD = 1.4826
 def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
     """Yield where the samples of another sensor seem to begin.
 
-    Parameters
-    ----------
-    channel : str
-    column : ColumnSummary
-    rate : float
-        Hz.
+    ``rate``: Hz.
     """
     blocks = column.blocks()
-    there = np.flatnonzero(blocks.spread > 0.0)
-    if len(there) < 4 * _NEAR:
+    filled = np.flatnonzero(blocks.spread > 0.0)
+    if len(filled) < 4 * _NEAR:
         return
-    mean, logs = blocks.mean[there], np.log(blocks.spread[there])
+    mean, logs = blocks.mean[filled], np.log(blocks.spread[filled])
     level, noise = _level_changes(mean), _noise_changes(logs)
     for place in dict.fromkeys(int(np.argmax(np.abs(series))) for series in (noise, level)):
         near = slice(max(0, place - 2), place + 3)
         if np.abs(level[near]).max() > _SURE:
             around = np.arange(max(1, place - _LEVEL), min(len(mean) - 1, place + _LEVEL + 1))
             place = int(around[np.argmax(np.abs(mean[around + 1] - mean[around - 1]))])
-        record = int(there[place]) * blocks.size + blocks.size // 2
-        told = {
+        record = int(filled[place]) * blocks.size + blocks.size // 2
+        changes = {
             "level": bool(np.abs(level[near]).max() > _SURE),
             "noise": bool(np.abs(noise[near]).max() > _SURE)
             and _stays(logs, place)
             and abs(np.median(logs[place:]) - np.median(logs[:place])) > _NOISE,
         }
-        if any(told.values()):
-            told["steps"] = _differ(*_registers(column.excerpts(), record, 3 * blocks.size))
-        changed = [name for name, changes in told.items() if changes]
+        if any(changes.values()):
+            changes["steps"] = _differ(*_registers(column.excerpts(), record, 3 * blocks.size))
+        changed = [name for name, differs in changes.items() if differs]
         if len(changed) < 2:
             continue
         ratio = math.exp(float(np.median(logs[place:]) - np.median(logs[:place])))
@@ -154,8 +148,7 @@ def register_of(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
         SI. ``step`` is infinite where no step shows; ``seen`` is the finest that would.
     """
     whole = [piece for piece in pieces if len(piece.values) >= PIECE // 4]
-    values = [piece.values[np.isfinite(piece.values)] for piece in whole]
-    values = [some for some in values if len(some) >= PIECE // 8]
+    values = [piece.present for piece in whole if len(piece.present) >= PIECE // 8]
     if not values:
         return None
     joint = np.concatenate(values[:: max(1, len(values) // 4)][:4])
@@ -169,11 +162,11 @@ def register_of(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
     return (step if step > seen else math.inf), seen
 
 
-def _differ(one: tuple[float, float] | None, other: tuple[float, float] | None) -> bool:
+def _differ(first: tuple[float, float] | None, other: tuple[float, float] | None) -> bool:
     """Tell whether two registers are different ones."""
-    if one is None or other is None:
+    if first is None or other is None:
         return False
-    (fine, _), (coarse, seen) = sorted((one, other))
+    (fine, _), (coarse, seen) = sorted((first, other))
     if math.isinf(coarse):
         # No step shows in one part: told if that of the other would show well.
         return math.isfinite(fine) and fine > _APART * seen
@@ -185,10 +178,10 @@ def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     levels, noises, units, sizes = [], [], [], []
     pieces = [piece for piece in column.excerpts() if len(piece.values) >= PIECE // 4]
     for piece in pieces:
-        found = _of_turns(piece.values)
-        if found is None:
+        turns = _of_turns(piece.values)
+        if turns is None:
             continue
-        level, noise, samples = found
+        level, noise, samples = turns
         levels.append(level)
         noises.append(noise)
         # Of white noise, and of a median; the differences make that of the noise 3/2 times as
@@ -198,13 +191,13 @@ def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     if not levels:
         return
     level, noise = float(np.median(levels)), float(np.median(noises))
-    told = {
+    changes = {
         "level": level > _SURE * float(np.median(units)),
         "noise": noise > max(_SURE * float(np.median(sizes)), _ALTERNATING),
     }
-    if any(told.values()):
-        told["steps"] = _differ(*(register_of(_every_other(pieces, first)) for first in (0, 1)))
-    changed = [name for name, changes in told.items() if changes]
+    if any(changes.values()):
+        changes["steps"] = _differ(*(register_of(_every_other(pieces, first)) for first in (0, 1)))
+    changed = [name for name, differs in changes.items() if differs]
     if len(changed) < 2 and not (changed == ["level"] and level > _APART):
         return
     detail = (
@@ -222,23 +215,23 @@ def _of_turns(values: Array) -> tuple[float, float, int] | None:
     """
     whole = len(values) // (2 * _PART) * 2 * _PART
     pairs = values[:whole].reshape(-1, _PART, 2)
-    there: NDArray[np.bool_] = np.isfinite(pairs[:, :, 0]) & np.isfinite(pairs[:, :, 1])
+    present: NDArray[np.bool_] = np.isfinite(pairs[:, :, 0]) & np.isfinite(pairs[:, :, 1])
     # Differences between samples of one sensor: neither drift nor the other's level.
     steps = np.diff(pairs, axis=1)
-    known = there[:, 1:] & there[:, :-1]
-    enough = known.sum(axis=1) >= _PART // 4
+    compared = present[:, 1:] & present[:, :-1]
+    enough = compared.sum(axis=1) >= _PART // 4
     if not enough.any():
         return None
-    there, known = there[enough], known[enough]
-    apart = np.where(there, pairs[enough, :, 0] - pairs[enough, :, 1], 0.0)
-    squares = np.where(known[:, :, None], steps[enough] ** 2, 0.0).sum(axis=1)
-    scatter = np.sqrt(0.5 * squares / known.sum(axis=1)[:, None])
+    present, compared = present[enough], compared[enough]
+    apart = np.where(present, pairs[enough, :, 0] - pairs[enough, :, 1], 0.0)
+    squares = np.where(compared[:, :, None], steps[enough] ** 2, 0.0).sum(axis=1)
+    scatter = np.sqrt(0.5 * squares / compared.sum(axis=1)[:, None])
     if not scatter.min() > 0.0:
         return None
     usual = float(np.median(np.sqrt((scatter**2).mean(axis=1))))
-    level = float(np.median(apart.sum(axis=1) / there.sum(axis=1)))
+    level = float(np.median(apart.sum(axis=1) / present.sum(axis=1)))
     noise = float(np.median(np.log(scatter[:, 0] / scatter[:, 1])))
-    return abs(level) / usual, abs(noise), 2 * int(there.sum())
+    return abs(level) / usual, abs(noise), 2 * int(present.sum())
 
 
 def _every_other(pieces: Sequence[Excerpt], first: int) -> list[Excerpt]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.blocks import BlockStatistics
+from imubench_pipeline.recordings.quality.summary import BlockStatistics
 from imubench_pipeline.typing import Array
 
 _NEIGHBOURS = 16
@@ -33,20 +33,14 @@ _AROUND = 5
 
 @dataclass(frozen=True)
 class Knock:
-    """One knock.
-
-    Attributes
-    ----------
-    first, last : int
-        First and one-past-last record to leave out.
-    size : float
-        Largest distance from the level, in standard deviations, or in what `suspects` takes for
-        them.
-    """
+    """One knock."""
 
     first: int
     last: int
+    """First and one-past-last record to leave out."""
     size: float
+    """Largest distance from the level, in standard deviations, or in what `suspects` takes for
+    them."""
 
 
 def suspects(
@@ -56,7 +50,6 @@ def suspects(
 
     Parameters
     ----------
-    blocks : BlockStatistics
     sigmas : float
         Distance from the level that counts, in standard deviations of the samples.
     step : float or None
@@ -70,8 +63,8 @@ def suspects(
         of their spreads, or more where that is small against the step.
     """
     least = _STEPS * (step or 0.0) / sigmas
-    there = np.isfinite(blocks.spread)
-    usual = np.median(blocks.spread[there]) if there.any() else np.inf
+    filled = np.isfinite(blocks.spread)
+    usual = np.median(blocks.spread[filled]) if filled.any() else np.inf
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
     quick = np.flatnonzero(reach > 0.5 * sigmas * usual)
     number, levels, noises = [], [], []

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.quality.register import hidden_step
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.summary import ColumnSummary, present_median
+from imubench_pipeline.typing import Array
 
 _SURE = 1e-9
 """Chance of a run by accident below which it is none."""
@@ -45,24 +46,16 @@ exp(-12)."""
 
 @dataclass(frozen=True)
 class Quantisation:
-    """The steps of a quantised column.
-
-    Attributes
-    ----------
-    step : float
-        Least significant bit, SI.
-    levels : float
-        Steps between the lowest and the highest sample, and one.
-    over_noise : float
-        Step over the standard deviation of the samples; infinite where they seldom change.
-    hidden : bool
-        The figures were rounded again, so that their differences are no multiples of it.
-    """
+    """The steps of a quantised column."""
 
     step: float
+    """Least significant bit, SI."""
     levels: float
+    """Steps between the lowest and the highest sample, and one."""
     over_noise: float
+    """Step over the standard deviation of the samples; infinite where they seldom change."""
     hidden: bool = False
+    """The figures were rounded again, so that their differences are no multiples of it."""
 
 
 def quantisation(column: ColumnSummary) -> Quantisation | None:
@@ -83,7 +76,7 @@ def quantisation(column: ColumnSummary) -> Quantisation | None:
 
 def noise_of(column: ColumnSummary) -> float:
     """Return the usual standard deviation of the samples of a block, SI."""
-    return _median(column.blocks().spread)
+    return present_median(column.blocks().spread)
 
 
 def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, float] | None:
@@ -94,7 +87,6 @@ def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, flo
 
     Parameters
     ----------
-    column : ColumnSummary
     steps : Quantisation or None
         Of the column.
 
@@ -105,19 +97,23 @@ def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, flo
     """
     if steps is not None and steps.over_noise > _COARSE:
         return None
-    pieces = [piece.values[np.isfinite(piece.values)] for piece in column.excerpts()]
-    values = np.concatenate([np.empty(0), *pieces])
-    if len(values) == 0:
+    at, counts = _counts(column)
+    if len(at) == 0:
         return None
-    at, counts = np.unique(values, return_counts=True)
     most = int(np.argmax(counts))
     around = np.delete(counts[max(0, most - _BESIDE) : most + _BESIDE + 1], min(most, _BESIDE))
     if at[most] in (column.low, column.high) or len(around) < 2 * _BESIDE:
         return None  # saturated, or too few levels
-    share = counts[most] / len(values)
+    share = counts[most] / counts.sum()
     if share < _PILED or counts[most] < _TIMES * max(around.max(), _BY_CHANCE):
         return None
     return float(at[most]), float(share)
+
+
+def _counts(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:
+    """Return the values that a column has in its excerpts, and how often each."""
+    pieces = [piece.present for piece in column.excerpts()]
+    return np.unique(np.concatenate([np.empty(0), *pieces]), return_counts=True)
 
 
 def kept_level(
@@ -127,7 +123,6 @@ def kept_level(
 
     Parameters
     ----------
-    column : ColumnSummary
     rate : float
         Hz.
     unit : str
@@ -138,16 +133,11 @@ def kept_level(
     Returns
     -------
     dict
-        ``mean``, SI; ``density``, see `density_of`; ``unit``; ``rate``; ``timed``.
+        ``mean``, SI, the usual one of a block, which a knock does not move; ``density``, see
+        `density_of`; ``unit``; ``rate``; ``timed``.
     """
-    density = density_of(column, rate)
-    return {
-        "mean": level_of(column),
-        "density": density,
-        "unit": unit,
-        "rate": rate,
-        "timed": timed,
-    }
+    level, density = present_median(column.blocks().mean), density_of(column, rate)
+    return {"mean": level, "density": density, "unit": unit, "rate": rate, "timed": timed}
 
 
 def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
@@ -175,16 +165,6 @@ def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]
     return min(spread, slow), max(spread, slow, least_bit / math.sqrt(12.0 * rate))
 
 
-def level_of(column: ColumnSummary) -> float:
-    """Return the usual mean of a block, SI: a knock does not move it."""
-    return _median(column.blocks().mean)
-
-
-def _median(values: NDArray[np.float64]) -> float:
-    there = values[np.isfinite(values)]
-    return float(np.median(there)) if len(there) else float("nan")
-
-
 def longest_by_chance(column: ColumnSummary) -> float:
     """Return how long a run of one value may be by chance, in samples."""
     share = min(column.repeats / max(column.present - 1, 1), 0.999)
@@ -200,7 +180,6 @@ def saturated(
 
     Parameters
     ----------
-    column : ColumnSummary
     steps : Quantisation or None
         Of the column.
     share : float
@@ -228,8 +207,7 @@ def _cut_off(column: ColumnSummary, steps: Quantisation | None, side: str, numbe
     """
     if steps is None:
         return True
-    pieces = [piece.values[np.isfinite(piece.values)] for piece in column.excerpts()]
-    at, counts = np.unique(np.concatenate([np.empty(0), *pieces]), return_counts=True)
+    at, counts = _counts(column)
     last, following = (0, 1) if side == "lowest" else (-1, -2)
     if len(at) < 2 or at[last] != (column.low if side == "lowest" else column.high):
         return True

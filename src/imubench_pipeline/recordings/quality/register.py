@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.excerpts import Excerpt
+from imubench_pipeline.recordings.quality.summary import Excerpt
 from imubench_pipeline.typing import Array
 
 _PIECES = 4
@@ -56,15 +56,14 @@ def hidden_step(pieces: Sequence[Excerpt]) -> float | None:
     float or None
         SI. None where the least difference of values is the step, or where there is none.
     """
-    chosen = [piece.values[np.isfinite(piece.values)] for piece in pieces]
-    chosen = [values for values in chosen if len(values) >= _FEWEST]
+    chosen = [piece.present for piece in pieces if len(piece.present) >= _FEWEST]
     chosen = chosen[:: max(1, len(chosen) // _PIECES)][:_PIECES]
     steps = [_hidden_step(values) for values in chosen]
-    found = [step for step in steps if step is not None]
-    if 2 * len(found) <= len(steps):
+    periods = [step for step in steps if step is not None]
+    if 2 * len(periods) <= len(steps):
         return None
-    step = float(np.median(found))
-    return step if max(abs(one / step - 1.0) for one in found) < 0.05 else None
+    step = float(np.median(periods))
+    return step if max(abs(period / step - 1.0) for period in periods) < 0.05 else None
 
 
 def _hidden_step(values: Array) -> float | None:
@@ -103,10 +102,10 @@ def _peak(levels: Array, counts: NDArray[np.int64], sigma: float) -> float | Non
     peaks &= (frequencies[inner] > 1.0 / (_COARSEST * sigma)) & (
         frequencies[inner] < 1.0 / (_FINEST * sigma)
     )
-    found = np.flatnonzero(peaks)
-    if len(found) == 0:
+    places = np.flatnonzero(peaks)
+    if len(places) == 0:
         return None
-    about = frequencies[found[0] + 1] + np.linspace(-0.75, 0.75, 61) / (2.0 * span)
+    about = frequencies[places[0] + 1] + np.linspace(-0.75, 0.75, 61) / (2.0 * span)
     return float(about[np.argmax([_height(levels, counts, f) for f in about])])
 
 

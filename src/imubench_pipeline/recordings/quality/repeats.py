@@ -53,23 +53,16 @@ _LAG, _COPY, _END, _FROM, _TO = range(5)
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a column that occurred before.
-
-    Attributes
-    ----------
-    first, last : int
-        First and one-past-last record of the second occurrence, as far as windows tell: it may
-        begin a little before and end a little after.
-    lag : int
-        Records from the first occurrence to the second.
-    changes : int
-        Changes of value within it.
-    """
+    """A part of a column that occurred before."""
 
     first: int
     last: int
+    """First and one-past-last record of the second occurrence, as far as windows tell: it may begin
+    a little before and end a little after."""
     lag: int
+    """Records from the first occurrence to the second."""
     changes: int
+    """Changes of value within it."""
 
 
 def _words() -> Words:
@@ -105,12 +98,12 @@ class Repeats:
 
     def stretches(self) -> list[Stretch]:
         """Return what occurred before, in the order of the column, at most 64 of them."""
-        found = self._stretches[: self._numbers[_FOUND]]
+        rows = self._stretches[: self._numbers[_FOUND]]
         return [
             Stretch(
                 int(row[_COPY]), int(row[_END]), int(row[_LAG]), int(row[_TO] - row[_FROM]) + WINDOW
             )
-            for row in found
+            for row in rows
         ]
 
 
@@ -135,7 +128,7 @@ def _take(
 ) -> None:
     """Take the bits of samples: each run of one value is a token of the rolling hash."""
     bits, rolled, limit = words[_BITS], words[_HASH], words[_LIMIT]
-    taken, begun, changes = numbers[_TAKEN], numbers[_BEGUN], numbers[_CHANGES]
+    position, begun, changes = numbers[_TAKEN], numbers[_BEGUN], numbers[_CHANGES]
     for i in range(values.size):
         value = values[i]
         if value == _MINUS_ZERO:
@@ -144,7 +137,7 @@ def _take(
             value = _NAN
         if value == bits:
             continue
-        here = taken + i
+        here = position + i
         token = _mixed(bits ^ np.uint64(here - begun) * _BASE)
         slot = changes & (WINDOW - 1)
         # After as many turns as a word has bits, the token that leaves is as it was.
@@ -161,7 +154,7 @@ def _take(
                 limit = limit >> np.uint64(1)
                 _thin(limit, keys, places, numbers)
     words[_BITS], words[_HASH], words[_LIMIT] = bits, rolled, limit
-    numbers[_TAKEN], numbers[_BEGUN], numbers[_CHANGES] = taken + values.size, begun, changes
+    numbers[_TAKEN], numbers[_BEGUN], numbers[_CHANGES] = position + values.size, begun, changes
 
 
 @njit(cache=True, nogil=True)
@@ -194,34 +187,34 @@ def _meet(
         return
     places[slot, 1] = end
     lag = end - places[slot, 0]
-    found = numbers[_FOUND]
-    if found > 0 and stretches[found - 1, _LAG] == lag:
+    count = numbers[_FOUND]
+    if count > 0 and stretches[count - 1, _LAG] == lag:
         patience = WINDOW + (_PATIENCE << numbers[_SHIFT])
-        if changes - stretches[found - 1, _TO] <= patience:
-            stretches[found - 1, _END] = end
-            stretches[found - 1, _TO] = changes
+        if changes - stretches[count - 1, _TO] <= patience:
+            stretches[count - 1, _END] = end
+            stretches[count - 1, _TO] = changes
             return
-    if found < _STRETCHES:
-        stretches[found, _LAG] = lag
-        stretches[found, _COPY] = begin
-        stretches[found, _END] = end
-        stretches[found, _FROM] = changes
-        stretches[found, _TO] = changes
-        numbers[_FOUND] = found + 1
+    if count < _STRETCHES:
+        stretches[count, _LAG] = lag
+        stretches[count, _COPY] = begin
+        stretches[count, _END] = end
+        stretches[count, _FROM] = changes
+        stretches[count, _TO] = changes
+        numbers[_FOUND] = count + 1
 
 
 @njit(cache=True, nogil=True)
 def _thin(limit: np.uint64, keys: Words, places: Numbers, numbers: Numbers) -> None:
     """Forget the windows with a hash above the limit."""
-    held = np.flatnonzero((keys != np.uint64(0)) & (keys <= limit))
-    kept_keys, kept_places = keys[held], places[held]
+    slots = np.flatnonzero((keys != np.uint64(0)) & (keys <= limit))
+    kept_keys, kept_places = keys[slots], places[slots]
     keys[:] = np.uint64(0)
     mask = np.uint64(_SLOTS - 1)
-    for k in range(held.size):
+    for k in range(slots.size):
         slot = kept_keys[k] & mask
         while keys[slot] != np.uint64(0):
             slot = (slot + np.uint64(1)) & mask
         keys[slot] = kept_keys[k]
         places[slot] = kept_places[k]
-    numbers[_HELD] = held.size
+    numbers[_HELD] = slots.size
     numbers[_SHIFT] += 1

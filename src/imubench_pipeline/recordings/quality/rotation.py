@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.recordings.quality.blocks import BlockStatistics
+from imubench_pipeline.recordings.quality.summary import BlockStatistics
 from imubench_pipeline.typing import Array
 
 _QUARTERS = 4
@@ -27,18 +27,12 @@ _SEEN = 0.01
 
 @dataclass(frozen=True)
 class GravityTurn:
-    """A steady turn of gravity against the sensor.
-
-    Attributes
-    ----------
-    rate : tuple of float
-        Of the sensor about x, y and z, rad/s, as far as gravity shows it: not about the vertical.
-    swept : float
-        Angle that it turns by over the log, rad.
-    """
+    """A steady turn of gravity against the sensor."""
 
     rate: tuple[float, float, float]
+    """Of the sensor about x, y and z, rad/s, as far as gravity shows it: not about the vertical."""
     swept: float
+    """Angle that it turns by over the log, rad."""
 
 
 def gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> GravityTurn | None:
@@ -49,18 +43,14 @@ def gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> GravityTurn | 
     steps d between neighbours with mean m, -w × m = d is solved for w by least squares, where
     |w| = 2 tan(θ/2) and θ is the angle of a block.
 
-    Parameters
-    ----------
-    axes : sequence of BlockStatistics
-        Of x, y and z, SI, over the same records.
-    rate : float
-        Of the samples, Hz.
+    ``axes``: of x, y and z, SI, over the same records.
+    ``rate``: of the samples, Hz.
     """
     whole = np.all([blocks.count > 0.9 * blocks.size for blocks in axes], axis=0)
     means = np.column_stack([np.where(whole, blocks.mean, np.nan) for blocks in axes])
     steps, middles = np.diff(means, axis=0), 0.5 * (means[1:] + means[:-1])
-    there = np.isfinite(steps).all(axis=1)
-    steps, middles = steps[there], middles[there]
+    present = np.isfinite(steps).all(axis=1)
+    steps, middles = steps[present], middles[present]
     if len(steps) < _FEWEST_BLOCKS:
         return None
     per_block = _turn(steps, middles)
@@ -85,5 +75,5 @@ def _turn(steps: Array, middles: Array) -> Array:
     total = float(np.trace(squares))
     normal = total * np.eye(3) - squares
     seen: Array = np.linalg.pinv(normal, rcond=_SEEN, hermitian=True)
-    found: Array = seen @ -np.cross(middles, steps).sum(axis=0)
-    return found
+    rate: Array = seen @ -np.cross(middles, steps).sum(axis=0)
+    return rate

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.recordings.quality.blocks import BlockStatistics
+from imubench_pipeline.recordings.quality.summary import BlockStatistics, present_median
 from imubench_pipeline.typing import Array
 
 _PARTS = 20
@@ -27,53 +27,34 @@ _MAD = 1.4826
 
 @dataclass(frozen=True)
 class Step:
-    """A sudden change of the mean.
-
-    Attributes
-    ----------
-    sample : int
-        Record at which it happens, to half a window.
-    size : float
-        SI.
-    sigmas : float
-        Its size over the spread of the other steps.
-    window : int
-        Records of a window.
-    """
+    """A sudden change of the mean."""
 
     sample: int
+    """Record at which it happens, to half a window."""
     size: float
+    """SI."""
     sigmas: float
+    """Its size over the spread of the other steps."""
     window: int
+    """Records of a window."""
 
 
 @dataclass(frozen=True)
 class WarmUp:
-    """A beginning that drifts.
-
-    Attributes
-    ----------
-    end : int
-        Record at which the drift is like that of the rest.
-    drift : float
-        Change of the mean over it, SI.
-    usual : float
-        Median change over a part of the rest, SI.
-    """
+    """A beginning that drifts."""
 
     end: int
+    """Record at which the drift is like that of the rest."""
     drift: float
+    """Change of the mean over it, SI."""
     usual: float
+    """Median change over a part of the rest, SI."""
 
 
 def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     """Find sudden changes of the mean.
 
-    Parameters
-    ----------
-    blocks : BlockStatistics
-    sigmas : float
-        How far a step lies out of the others, in their robust standard deviations.
+    ``sigmas``: how far a step lies out of the others, in their robust standard deviations.
     """
     size = max(1, len(blocks.mean) // 400)
     means = _means(blocks, size)
@@ -81,33 +62,29 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
         return []
     # Over two windows, so that a step inside a window shows whole.
     away = means[2:] - means[:-2]
-    scale = _MAD * _median(np.abs(away - _median(away)))
+    scale = _MAD * present_median(np.abs(away - present_median(away)))
     if not scale > 0.0:
         return []
     far = np.flatnonzero(np.abs(away) > sigmas * scale)
     if len(far) == 0:
         return []
-    found = []
+    moves = []
     for group in np.split(far, np.flatnonzero(np.diff(far) > 3) + 1):
         peak = group[np.argmax(np.abs(away[group]))]
         # A step stays; what comes back at once is a knock.
-        before = _median(means[max(0, group[0] - 4) : group[0] + 1])
-        after = _median(means[group[-1] + 2 : group[-1] + 7])
+        before = present_median(means[max(0, group[0] - 4) : group[0] + 1])
+        after = present_median(means[group[-1] + 2 : group[-1] + 7])
         change = after - before
         if abs(change) > 0.5 * abs(float(away[peak])):
             sample = (int(peak) + 1) * size * blocks.size + size * blocks.size // 2
-            found.append(Step(sample, change, abs(float(away[peak])) / scale, size * blocks.size))
-    return found
+            moves.append(Step(sample, change, abs(float(away[peak])) / scale, size * blocks.size))
+    return moves
 
 
 def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
     """Find a beginning that drifts more than the rest.
 
-    Parameters
-    ----------
-    blocks : BlockStatistics
-    times : float
-        How many times the median drift of a part counts.
+    ``times``: how many times the median drift of a part counts.
     """
     size = len(blocks.mean) // _PARTS
     if size < _FEWEST_BLOCKS:
@@ -116,9 +93,9 @@ def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
     for k in range(_PARTS):
         part = blocks.mean[k * size : (k + 1) * size]
         third = size // 3
-        drifts[k] = _median(part[-third:]) - _median(part[:third])
+        drifts[k] = present_median(part[-third:]) - present_median(part[:third])
     rest = np.abs(drifts[_PARTS // 2 :])
-    usual, first = _median(rest), float(drifts[0])
+    usual, first = present_median(rest), float(drifts[0])
     most = float(np.max(rest[np.isfinite(rest)], initial=0.0))
     # Parts that do not drift at all are those of a coarse register: nothing to compare with.
     if not (usual > 0.0 and abs(first) > times * usual and abs(first) > 2.0 * most):
@@ -141,7 +118,7 @@ def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
     if size < _FEWEST_BLOCKS:
         return None
     spreads = np.array(
-        [_median(part) for part in blocks.spread[: size * _PARTS].reshape(_PARTS, size)]
+        [present_median(part) for part in blocks.spread[: size * _PARTS].reshape(_PARTS, size)]
     )
     calm = float(np.min(spreads[spreads > 0.0], initial=np.inf))
     noisy = int(np.argmax(np.nan_to_num(spreads)))
@@ -159,7 +136,6 @@ def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[t
 
     Parameters
     ----------
-    blocks : BlockStatistics
     times : float
         Times the median spread that count as motion.
     least : float
@@ -170,7 +146,7 @@ def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[t
     list of (int, int)
         First and one-past-last record of each.
     """
-    usual = _median(blocks.spread)
+    usual = present_median(blocks.spread)
     if not usual > 0.0:
         return []
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
@@ -193,10 +169,4 @@ def _means(blocks: BlockStatistics, size: int) -> Array:
     grouped = mean[: whole * size].reshape(whole, size)
     if np.isfinite(grouped).all():
         return np.median(grouped, axis=1)
-    return np.array([_median(group) for group in grouped])
-
-
-def _median(values: Array) -> float:
-    """Return the median of the values that are there; NaN where none is."""
-    there = values[np.isfinite(values)]
-    return float(np.median(there)) if len(there) else float("nan")
+    return np.array([present_median(group) for group in grouped])

@@ -11,10 +11,178 @@ from dataclasses import dataclass, field
 import numpy as np
 from numba import njit
 
-from imubench_pipeline.recordings.quality.blocks import FIRST_SIZE, BlockStatistics, Gathering
-from imubench_pipeline.recordings.quality.excerpts import Excerpt, Excerpts
 from imubench_pipeline.recordings.quality.repeats import Repeats
 from imubench_pipeline.typing import Array
+
+FIRST_SIZE = 256
+"""Records of a block, until there are many blocks."""
+
+_MANY = 1 << 15
+"""Two blocks are made one where there are twice as many as this."""
+
+
+@dataclass(frozen=True)
+class BlockStatistics:
+    """Statistics of consecutive blocks of records."""
+
+    size: int
+    """Records of a block; the last one may have fewer."""
+    count: Array
+    """Samples present, shape (b,)."""
+    mean: Array
+    spread: Array
+    low: Array
+    high: Array
+    """Mean, standard deviation and extremes of the samples present, SI, shape (b,); NaN where there
+    are none."""
+
+
+def _no_rows() -> Array:
+    return np.empty((0, 5))
+
+
+@dataclass
+class Gathering:
+    """Blocks as they come; each a row of count, mean, spread, lowest and highest sample."""
+
+    _size: int = FIRST_SIZE
+    _rows: list[Array] = field(default_factory=list)
+    _number: int = 0
+    _waiting: Array = field(default_factory=_no_rows)
+
+    def add(self, rows: Array) -> None:
+        """Take consecutive blocks of `FIRST_SIZE` records, shape (n, 5)."""
+        fresh = np.concatenate([self._waiting, rows])
+        while True:
+            together = self._size // FIRST_SIZE
+            whole = min(len(fresh) // together, 2 * _MANY - self._number)
+            self._rows.append(_united(fresh[: whole * together], together))
+            self._number += whole
+            fresh = fresh[whole * together :]
+            if self._number < 2 * _MANY:
+                break
+            self._rows = [_united(np.concatenate(self._rows), 2)]
+            self._number, self._size = _MANY, 2 * self._size
+        self._waiting = fresh.copy()
+
+    def blocks(self, last: Array) -> BlockStatistics:
+        """Return all blocks; ``last``, shape (n, 5), are those that were not added yet."""
+        fresh = np.concatenate([self._waiting, last])
+        rows = np.concatenate([*self._rows, _united(fresh, self._size // FIRST_SIZE)])
+        return BlockStatistics(self._size, *(np.ascontiguousarray(column) for column in rows.T))
+
+
+def _united(rows: Array, together: int) -> Array:
+    """Make one block of so many; the last one may be of fewer."""
+    if together == 1 or len(rows) == 0:
+        return rows.copy()
+    begins = np.arange(0, len(rows), together)
+    count, mean, spread, low, high = rows.T
+    present = count > 0
+    total = np.add.reduceat(count, begins)
+    weight = np.maximum(total, 1.0)
+    united = np.add.reduceat(np.where(present, count * mean, 0.0), begins) / weight
+    # About the mean of the new block: no digit is lost to a large bias.
+    away = mean - np.repeat(united, together)[: len(rows)]
+    squares = np.add.reduceat(np.where(present, count * (spread**2 + away**2), 0.0), begins)
+    empty = total == 0
+    return np.column_stack(
+        [
+            total,
+            np.where(empty, np.nan, united),
+            np.where(empty, np.nan, np.sqrt(squares / weight)),
+            np.fmin.reduceat(low, begins),
+            np.fmax.reduceat(high, begins),
+        ]
+    )
+
+
+def present_median(values: Array) -> float:
+    """Return the median of the values that are there, shape (n,); NaN where none is."""
+    present = values[np.isfinite(values)]
+    return float(np.median(present)) if len(present) else float("nan")
+
+
+PIECE = 4096
+"""Records of a piece."""
+
+MOST = 16
+"""Every second piece is forgotten when there are so many; a shorter log is kept whole."""
+
+
+@dataclass(frozen=True)
+class Excerpt:
+    """Consecutive records of a column."""
+
+    first: int
+    """Number of the first record."""
+    values: Array
+    """SI, shape (n,); NaN where the sample is missing."""
+
+    @property
+    def present(self) -> Array:
+        """The samples that are there."""
+        return self.values[np.isfinite(self.values)]
+
+
+@dataclass
+class Excerpts:
+    """Pieces as the column streams past: every one, every second, every fourth and so on.
+
+    Block statistics do not tell which samples are multiples of what, or which repeat every third
+    one. Some ten thousand samples do, however long the log is.
+    """
+
+    _stride: int = 1
+    _reached: int = 0
+    _pieces: list[Array] = field(default_factory=list)
+    _open: list[Array] = field(default_factory=list)
+
+    def add(self, values: Array) -> None:
+        """Take the next records of the column."""
+        start = 0
+        while start < len(values):
+            number, inside = divmod(self._reached, PIECE)
+            stop = min(len(values), start + PIECE - inside)
+            if number % self._stride == 0:
+                self._open.append(values[start:stop].copy())
+            self._reached += stop - start
+            start = stop
+            if self._reached % PIECE == 0 and self._open:
+                self._pieces.append(np.concatenate(self._open))
+                self._open = []
+                if len(self._pieces) == MOST:
+                    self._pieces = self._pieces[::2]
+                    self._stride *= 2
+
+    def pieces(self) -> list[Excerpt]:
+        """Return the pieces in order; the last one as far as it goes."""
+        pieces = [*self._pieces, np.concatenate(self._open)] if self._open else self._pieces
+        return [Excerpt(k * self._stride * PIECE, values) for k, values in enumerate(pieces)]
+
+
+def together(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
+    """Return the samples of two columns at the same records, those present in both.
+
+    Parameters
+    ----------
+    first, other : list of Excerpt
+        Of columns that advance together.
+
+    Returns
+    -------
+    list of (ndarray, ndarray)
+        A pair for each piece that both have, of equal shapes.
+    """
+    places = {piece.first: piece.values for piece in other}
+    pairs = []
+    for piece in first:
+        values = places.get(piece.first)
+        if values is not None and len(values) == len(piece.values):
+            present = np.isfinite(piece.values) & np.isfinite(values)
+            pairs.append((piece.values[present], values[present]))
+    return pairs
+
 
 LARGEST = 1e75
 """SI. What is larger was never measured; its fourth power would overflow. It counts as infinite."""
@@ -41,6 +209,16 @@ def _start() -> Array:
     return state
 
 
+class _Count:
+    """A count in the state of a column."""
+
+    def __init__(self, place: int) -> None:
+        self._place = place
+
+    def __get__(self, column: ColumnSummary, _: type) -> int:
+        return int(column._state[self._place])
+
+
 @dataclass
 class ColumnSummary:
     """A column as it streams past; NaN is a missing sample."""
@@ -50,31 +228,35 @@ class ColumnSummary:
     _excerpts: Excerpts = field(default_factory=Excerpts)
     repeated: Repeats = field(default_factory=Repeats)
 
+    present = _Count(_PRESENT)
+    """Samples that are finite numbers."""
+    missing = _Count(_MISSING)
+    """Records without a number."""
+    not_finite = _Count(_INFINITE)
+    """Infinities, and figures beyond `LARGEST`."""
+    repeats = _Count(_REPEATS)
+    """Samples that equal the one before."""
+    pairs = _Count(_PAIRS)
+    """Neighbours that were compared: in all pieces in which any are equal."""
+    far_pairs = _Count(_FAR_PAIRS)
+    """Samples that were compared with that `FAR` before, where neighbours were."""
+    far_repeats = _Count(_FAR_REPEATS)
+    """Samples among them that equal that."""
+    steps = _Count(_CHANGES)
+    """Neighbours that differ, as far as they were compared since the smallest step."""
+    single_steps = _Count(_SINGLE)
+    """Neighbours among them that differ by the smallest step."""
+
     def add(self, values: Array) -> Array:
         """Count a piece of the column and return it with what is not finite made missing."""
         rows = np.empty((len(values) // FIRST_SIZE + 2, 5))
         number, infinite = _take(np.ascontiguousarray(values), self._state, rows)
         if number:
             self._blocks.add(rows[:number])
-        kept = np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
-        self._excerpts.add(kept)
-        self.repeated.add(kept)
-        return kept
-
-    @property
-    def present(self) -> int:
-        """Samples that are finite numbers."""
-        return int(self._state[_PRESENT])
-
-    @property
-    def missing(self) -> int:
-        """Records without a number."""
-        return int(self._state[_MISSING])
-
-    @property
-    def not_finite(self) -> int:
-        """Infinities, and figures beyond `LARGEST`."""
-        return int(self._state[_INFINITE])
+        finite = np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
+        self._excerpts.add(finite)
+        self.repeated.add(finite)
+        return finite
 
     @property
     def longest_gap(self) -> tuple[int, int]:
@@ -100,36 +282,6 @@ class ColumnSummary:
     def longest_run(self) -> tuple[int, int]:
         """Length of the longest run of one value, and the record one past its end."""
         return int(self._state[_LONGEST]), int(self._state[_LONGEST_END])
-
-    @property
-    def repeats(self) -> int:
-        """Samples that equal the one before."""
-        return int(self._state[_REPEATS])
-
-    @property
-    def pairs(self) -> int:
-        """Neighbours that were compared: in all pieces in which any are equal."""
-        return int(self._state[_PAIRS])
-
-    @property
-    def far_pairs(self) -> int:
-        """Samples that were compared with that `FAR` before, where neighbours were."""
-        return int(self._state[_FAR_PAIRS])
-
-    @property
-    def far_repeats(self) -> int:
-        """Samples among them that equal that."""
-        return int(self._state[_FAR_REPEATS])
-
-    @property
-    def steps(self) -> int:
-        """Neighbours that differ, as far as they were compared since the smallest step."""
-        return int(self._state[_CHANGES])
-
-    @property
-    def single_steps(self) -> int:
-        """Neighbours among them that differ by the smallest step."""
-        return int(self._state[_SINGLE])
 
     @property
     def step(self) -> float:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
-from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.run.nightly.recovery import temporary
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.digests import read_sealed_json

@@ -17,8 +17,10 @@ a record, with the stamp of the first.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from datetime import datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,9 +28,89 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import Batch, LogFile
-from imubench_pipeline.readers.ubx.frames import Frames
-from imubench_pipeline.readers.wrapping import WrapState, unwrapped
-from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+from imubench_pipeline.readers.compressed import blocks
+from imubench_pipeline.readers.file_format import ROWS, FileFormat, LogColumn, LogTable, shown
+from imubench_pipeline.readers.stamps import WrapState, unwrapped
+from imubench_pipeline.tables.findings import Finding, RecordingError
+
+_SYNC = b"\xb5\x62"
+_AROUND = 8
+"""Bytes of a message beside its payload: sync, class and id, length, checksum."""
+
+_CLASSES = frozenset(b"\x01\x02\x03\x04\x05\x06\x09\x0a\x0b\x0c\x0d\x10\x13\x21\x27\x28\x2a")
+"""Those that u-blox uses; what else follows the first two bytes is no message."""
+
+
+class Frames:
+    """The UBX messages of a log: class and id, and payload.
+
+    NMEA and RTCM between them are passed over. After a damaged message the next one is looked
+    for right behind its first bytes, since its length may be what is damaged.
+
+    ``right``, ``wrong`` and ``cut`` count, by class and id, messages, those with a wrong checksum,
+    and those that reach beyond the end of the log; ``read``: bytes read so far.
+    """
+
+    def __init__(self, path: Path, findings: list[Finding]) -> None:
+        self._path = path
+        self._findings = findings
+        self.right: Counter[bytes] = Counter()
+        self.wrong: Counter[bytes] = Counter()
+        self.cut: Counter[bytes] = Counter()
+        self.read = 0
+
+    def kinds(self) -> str:
+        """Say of which class and id most messages are."""
+        most = self.right.most_common(10)
+        return ", ".join(f"{key.hex(' ')} ({count})" for key, count in most) or "none"
+
+    def __iter__(self) -> Iterator[tuple[bytes, bytes]]:
+        source = blocks(self._path, self._findings)
+        data, ended = b"", False
+        while not ended:
+            block = next(source, b"")
+            ended = not block
+            self.read += len(block)
+            data += block
+            first, second = _sums(data)
+            at = 0
+            while (sync := data.find(_SYNC, at)) >= 0:
+                at = sync
+                if len(data) > at + 2 and data[at + 2] not in _CLASSES:
+                    at += 2
+                    continue
+                end = at + _AROUND + int.from_bytes(data[at + 4 : at + 6], "little")
+                if end > len(data):
+                    if not ended:
+                        break
+                    self.cut[data[at + 2 : at + 4]] += 1
+                    at += 2
+                    continue
+                body, key = at + 2, data[at + 2 : at + 4]
+                right = (first[end - 2] - first[body]) & 0xFF == data[end - 2]
+                over = second[end - 2] - second[body] - (end - 2 - body) * first[body]
+                if right and over & 0xFF == data[end - 1]:
+                    self.right[key] += 1
+                    at = end
+                    yield key, data[body + 4 : end - 2]
+                else:
+                    self.wrong[key] += 1
+                    at += 2
+            else:
+                # The last byte may be the first one of the next message.
+                at = max(at, len(data) - 1)
+            data = data[at:]
+
+
+def _sums(data: bytes) -> tuple[bytes, bytes]:
+    """Return the sums of all bytes before each place, and the sums of these, modulo 256.
+
+    Those of a message are their differences: what begins as a message and is none costs nothing.
+    """
+    first = np.cumsum(np.frombuffer(data, np.uint8), dtype=np.uint8)
+    second = np.cumsum(first, dtype=np.uint8)
+    return b"\0" + first.tobytes(), b"\0" + second.tobytes()
+
 
 _MEAS, RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
 KINDS = {_MEAS: "ESF-MEAS", RAW: "ESF-RAW"}
@@ -90,14 +172,14 @@ class UbxFile(LogFile):
     def _batch(
         self, words: Words, clock: _Clock, records: _Records, ended: bool
     ) -> Iterator[Batch]:
-        columns, values, tags, places = words.taken()
+        columns, values, tags, places = words.drained()
         table, stamps = records.grouped(columns, values, clock.stamps(tags, places), ended)
         if len(table):
-            held = dict(zip(self._columns(), np.ascontiguousarray(table.T), strict=True))
+            figures = dict(zip(self._columns(), np.ascontiguousarray(table.T), strict=True))
             yield Batch(
                 None if self.log.time is None else self.seconds(stamps, clock.first),
                 {
-                    name: self.to_si(name, held[str(source.column)])
+                    name: self.to_si(name, figures[str(source.column)])
                     for name, source in self.sources.items()
                 },
             )
@@ -120,11 +202,11 @@ class UbxFile(LogFile):
         time = self.log.time
         if time is None:
             return
-        known = ("time_tag", "sTtag") if kind == RAW else ("time_tag",)
-        if time.column not in known:
+        columns = ("time_tag", "sTtag") if kind == RAW else ("time_tag",)
+        if time.column not in columns:
             raise RecordingError(
                 f"{self.path.name}: no time column {time.column!r}; {KINDS[kind]} has "
-                f"{' and '.join(known)}; mend 'column' of 'time' in the sensor file"
+                f"{' and '.join(columns)}; mend 'column' of 'time' in the sensor file"
             )
         in_ms = kind == RAW and time.column == "time_tag"
         if time.format is not None or (in_ms and time.unit != "ms"):
@@ -149,38 +231,35 @@ class UbxFile(LogFile):
         for number, (key, payload) in enumerate(frames):
             if key in words:
                 words[key].add(payload)
-            if number % 1000 == 0 and self._told(frames, words):
+            if number % 1000 == 0 and self._is_clear(frames, words):
                 break
-        self._told(frames, words)
-        held = [key for key in KINDS if words[key].present]
-        if len(held) == 1:
-            return held[0]
-        if held:
+        self._is_clear(frames, words)
+        present = [key for key in KINDS if words[key].present]
+        if len(present) == 1:
+            return present[0]
+        if present:
             raise RecordingError(
                 f"{self.path.name}: both ESF-MEAS and ESF-RAW hold the columns; say which with "
                 "'variable: ESF-RAW' (every sample) or 'variable: ESF-MEAS' at each column"
             )
-        others = ", ".join(
-            f"{key.hex(' ')} ({count})" for key, count in frames.right.most_common(10)
-        )
         types = ", ".join(
-            f"{KINDS[key]} with data types {found.types()}"
-            for key, found in words.items()
-            if found.types()
+            f"{KINDS[key]} with data types {of_kind.types()}"
+            for key, of_kind in words.items()
+            if of_kind.types()
         )
         raise RecordingError(
             f"{self.path.name}: found {types or 'no ESF-MEAS and no ESF-RAW'} among "
-            f"{frames.right.total()} UBX messages (class and id {others or 'none'}), "
+            f"{frames.right.total()} UBX messages (class and id {frames.kinds()}), "
             f"{frames.wrong.total()} with a wrong checksum; expected the data types of "
             f"{_types_of(self._columns())}; switch ESF-RAW or ESF-MEAS on in the receiver, or "
             "mend 'column' in the sensor file"
         )
 
-    def _told(self, frames: Frames, words: dict[bytes, Words]) -> bool:
+    def _is_clear(self, frames: Frames, words: dict[bytes, Words]) -> bool:
         """Tell whether the log so far says where the columns are."""
-        for found in words.values():
-            found.taken()
-        return frames.read > _LOOKED_AT and any(found.present for found in words.values())
+        for of_kind in words.values():
+            of_kind.drained()
+        return frames.read > _LOOKED_AT and any(of_kind.present for of_kind in words.values())
 
     # ----------------------------------------------------------------------------- findings
 
@@ -199,25 +278,12 @@ class UbxFile(LogFile):
             else "; state 'time' (column time_tag, unit ms), for without it what follows is "
             "shifted in time"
         )
-        found: tuple[tuple[int, str, Severity, str], ...] = (
-            (
-                frames.wrong[kind],
-                "wrong_checksum",
-                "warning",
-                f"{name} messages have a wrong checksum; left out{shifts}",
-            ),
-            (
-                frames.cut[kind],
-                "incomplete_last_record",
-                "note",
-                f"{name} messages are cut short by the end of the log; left out",
-            ),
-        )
-        self.findings += [
-            Finding(finding, severity, f"{self.path.name}: {count} {text}", count)
-            for count, finding, severity, text in found
-            if count
-        ]
+        if wrong := frames.wrong[kind]:
+            detail = f"{wrong} {name} messages have a wrong checksum; left out{shifts}"
+            self.note("wrong_checksum", detail, wrong)
+        if cut := frames.cut[kind]:
+            detail = f"{cut} {name} messages are cut short by the end of the log; left out"
+            self.note("incomplete_last_record", detail, cut, "note")
 
 
 def _types_of(columns: list[str]) -> str:
@@ -227,16 +293,7 @@ def _types_of(columns: list[str]) -> str:
 class Words:
     """The measurements of the messages read so far that are not yet in a batch.
 
-    Parameters
-    ----------
-    kind : bytes
-        Class and id of the messages.
-    columns : list of str
-
-    Attributes
-    ----------
-    seen : ndarray of int64
-        How often each data type was there.
+    ``kind``: class and id of the messages; ``seen``: how often each data type was there.
     """
 
     def __init__(self, kind: bytes, columns: list[str]) -> None:
@@ -248,11 +305,11 @@ class Words:
         self._parts: list[bytes] = []
         self._counts: list[int] = []
         self._tags: list[int] = []
-        self._held = 0
+        self._waiting = 0
         self.seen = np.zeros(256, np.int64)
 
     def __len__(self) -> int:
-        return self._held
+        return self._waiting
 
     @property
     def present(self) -> bool:
@@ -276,9 +333,9 @@ class Words:
             self._parts.append(payload[8 : 8 + 4 * max(count, 0)])
             self._counts.append(max(count, 0))
             self._tags.append(int.from_bytes(payload[:4], "little"))
-        self._held += max(count, 0)
+        self._waiting += max(count, 0)
 
-    def taken(
+    def drained(
         self,
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
         """Take out column, figure, tag and place of the measurements that are wanted."""
@@ -289,7 +346,7 @@ class Words:
         else:
             words, tags = written, np.repeat(np.array(self._tags, np.int64), self._counts)
             types = words >> 24 & 0x3F
-        self._parts, self._counts, self._tags, self._held = [], [], [], 0
+        self._parts, self._counts, self._tags, self._waiting = [], [], [], 0
         self.seen += np.bincount(types, minlength=256)
         columns = self._place[types]
         wanted = np.flatnonzero(columns >= 0)
@@ -304,16 +361,14 @@ class _Clock:
     def __init__(self, file: UbxFile, kind: bytes) -> None:
         self._file = file
         self._time = file.log.time
-        self._tick = TICK_MS if kind == RAW and self._column() == "time_tag" else 1
+        column = None if self._time is None else self._time.column
+        self._tick = TICK_MS if kind == RAW and column == "time_tag" else 1
         self._wraps: float | None = 2.0**32 if kind == _MEAS else None
         if self._time is not None and self._time.wraps is not None:
             self._wraps = self._time.wraps / self._tick
         self._state = WrapState()
         self._date: tuple[datetime, int] | None = None
         self.first: Any = None
-
-    def _column(self) -> str | int | None:
-        return None if self._time is None else self._time.column
 
     def note_date(self, payload: bytes, place: int) -> None:
         """Remember the date of a NAV-PVT message that comes before the word at a place."""
@@ -332,7 +387,7 @@ class _Clock:
         if not len(tags) or self._time is None:
             return tags
         if self._wraps is None:
-            self._wraps = _found_wrap(tags, self._state.last)
+            self._wraps = _wrap_of(tags, self._state.last)
         stamps = unwrapped(tags, self._wraps or _NEVER, self._state) * self._tick
         if self.first is None:
             self.first = stamps[0]
@@ -347,7 +402,7 @@ class _Clock:
         return stamps
 
 
-def _found_wrap(tags: NDArray[np.int64], last: int | None) -> float | None:
+def _wrap_of(tags: NDArray[np.int64], last: int | None) -> float | None:
     """Return where tags start again from 0; None where they do not, or it cannot be told."""
     if tags.max() >= 1 << 24:
         return 2.0**32
@@ -377,12 +432,12 @@ class _Records:
         if self._stamp is None:
             self._stamp = np.zeros(1, stamps.dtype)
         table = np.empty((len(columns) + 1, len(self._open)))
-        found = np.empty(len(columns) + 1, stamps.dtype)
-        count = _group(columns, values, stamps, self._open, self._stamp, self._state, table, found)
+        times = np.empty(len(columns) + 1, stamps.dtype)
+        count = _group(columns, values, stamps, self._open, self._stamp, self._state, table, times)
         if ended and self._state[1]:
-            table[count], found[count] = self._open, self._stamp[0]
+            table[count], times[count] = self._open, self._stamp[0]
             count += 1
-        return table[:count], found[:count]
+        return table[:count], times[:count]
 
 
 @njit(cache=True, nogil=True)
@@ -394,7 +449,7 @@ def _group(
     row_stamp: NDArray[Any],
     state: NDArray[np.int64],
     table: NDArray[np.float64],
-    found: NDArray[Any],
+    times: NDArray[Any],
 ) -> int:
     """Fill records; return how many are complete.
 
@@ -408,7 +463,7 @@ def _group(
             state[0] = column
         if state[1] and (column == state[0] or not np.isnan(row[column])):
             table[count] = row
-            found[count] = row_stamp[0]
+            times[count] = row_stamp[0]
             count += 1
             row[:] = np.nan
             state[1] = 0
@@ -417,3 +472,55 @@ def _group(
             state[1] = 1
         row[column] = values[i]
     return count
+
+
+# ----------------------------------------------------------------------- what a log holds
+
+_DESCRIBED_IN, _LOOKED_FOR = 1 << 22, 1 << 26
+"""Bytes after which a log is known, and those in which a first message is looked for."""
+
+
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+    """Return a table for each message that holds inertial figures.
+
+    Raises
+    ------
+    RecordingError
+        If there is none.
+    """
+    names = list(COLUMNS)
+    words = {kind: Words(kind, names) for kind in KINDS}
+    frames = Frames(path, [])
+    for key, payload in frames:
+        if key in words and len(words[key]) < ROWS * len(names):
+            words[key].add(payload)
+        if frames.read > (_DESCRIBED_IN if any(map(len, words.values())) else _LOOKED_FOR):
+            break
+    present = [kind for kind in KINDS if len(words[kind])]
+    described = [_table(file_format, kind, words[kind], frames) for kind in present]
+    if not any(table.columns for table in described):
+        raise RecordingError(
+            f"{path.name}: no inertial figures in ESF-MEAS or ESF-RAW among {frames.right.total()} "
+            f"UBX messages (class and id {frames.kinds()}); switch ESF-RAW on in the receiver"
+        )
+    return sorted(described, key=lambda table: table.name != KINDS[RAW])
+
+
+def _table(file_format: FileFormat, kind: bytes, words: Words, frames: Frames) -> LogTable:
+    """Describe one kind of message."""
+    places, figures, tags, _ = words.drained()
+    name = KINDS[kind]
+    columns = []
+    for place, column in enumerate(COLUMNS):
+        values = figures[places == place]
+        if len(values):
+            unit = UNITS[column.split("_")[0]]
+            columns.append(LogColumn(column, column, "number", shown(values), values, unit))
+    if columns:
+        first = tags[places == places[0]].astype(np.float64)
+        ticks = first * TICK_MS if kind == RAW else first
+        columns.append(LogColumn("time_tag", "time_tag", "number", shown(ticks), ticks, "ms"))
+        if kind == RAW:
+            columns.append(LogColumn("sTtag", "sTtag", "number", shown(first), first))
+    about = f"{frames.right[kind]} messages at the beginning"
+    return LogTable(file_format, name, tuple(columns), variable=name, about=about)

@@ -1,0 +1,139 @@
+"""Stamps as numbers: s since the first one, its date, and counters that start again from 0."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.batch import SECONDS, LogFile
+from imubench_pipeline.settings.sensor import TimeSource
+from imubench_pipeline.tables.findings import RecordingError
+
+_YEAR_2001 = 978_307_200 * 10**9
+_YEAR_2100 = 4_102_444_800 * 10**9
+
+
+class Clock:
+    """Makes s since the first stamp of a file of its stamps.
+
+    Parameters
+    ----------
+    file : LogFile
+        Gets ``started`` with the first stamp.
+    wraps : float or None
+        Where stamps start again from 0, in their unit; None: they do not.
+    started : callable
+        Returns ISO 8601 date and time of the first stamp; None where that does not tell it.
+    """
+
+    def __init__(
+        self, file: LogFile, wraps: float | None, started: Callable[[Any], str | None]
+    ) -> None:
+        self._file = file
+        self._wraps = wraps
+        self._started = started
+        self._state = WrapState()
+        self.first: Any = None
+
+    def seconds(self, stamps: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Return s since the first stamp, shape (n,); NaN where the stamp is not present.
+
+        Raises
+        ------
+        RecordingError
+            If the first records have no stamp.
+        """
+        if self._wraps is not None:
+            stamps = stamps.copy()
+            stamps[present] = unwrapped(stamps[present], self._wraps, self._state)
+        if self.first is None:
+            if not present.any():
+                raise RecordingError(
+                    f"{self._file.path.name}: no time stamp in the first {len(stamps)} records; "
+                    "mend 'column' of 'time' in the sensor file, or drop 'time' and state 'rate'"
+                )
+            self.first = stamps[present.argmax()]
+            self._file.started = self._started(self.first) or self._file.started
+        seconds = self._file.seconds(stamps, self.first)
+        return seconds if present.all() else np.where(present, seconds, np.nan)
+
+
+@dataclass
+class WrapState:
+    """What is known of a counter after the stamps read so far."""
+
+    last: Any = None
+    """The last stamp that was there, as written."""
+    turns: int = 0
+    """How often the counter has started again."""
+
+
+def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:
+    """Make the stamps of a counter that starts again from 0 go on.
+
+    A step back by more than half of ``wraps`` is a new start. A step forward by more than half
+    is a record from before the start that comes late, or a damaged stamp, which so harms itself
+    alone.
+
+    Parameters
+    ----------
+    stamps : ndarray of int or float
+        The next stamps, as written; NaN where one is missing.
+    wraps : float
+        Where the counter starts again from 0, in the unit of the stamps.
+    state : WrapState
+        Carried on from block to block; changed in place.
+
+    Returns
+    -------
+    ndarray
+        int64 for whole numbers, with no digit lost; else float64, NaN where it was NaN.
+    """
+    whole = stamps.dtype.kind in "iu" and float(wraps).is_integer()
+    going_on = stamps.astype(np.int64 if whole else np.float64)
+    present = np.ones(len(stamps), bool) if whole else ~np.isnan(going_on)
+    written = going_on[present]
+    if not len(written):
+        return going_on
+    before = written[0] if state.last is None else state.last
+    steps = np.diff(written, prepend=before)
+    half = wraps / 2
+    turns = state.turns + np.cumsum((steps < -half).astype(np.int64) - (steps > half))
+    going_on[present] = written + turns * (int(wraps) if whole else wraps)
+    state.last, state.turns = written[-1], int(turns[-1])
+    return going_on
+
+
+def date_of(nanoseconds: int) -> str | None:
+    """Return ISO 8601 date and time (UTC) of ns since 1970.
+
+    None where the figure lies outside the years 2001 to 2099: then it counts from something
+    else, such as the start of the device or of a simulation.
+    """
+    if not _YEAR_2001 <= nanoseconds < _YEAR_2100:
+        return None
+    return date_of_nanoseconds(nanoseconds)
+
+
+def date_of_stamp(first: float, source: TimeSource) -> str | None:
+    """Return ISO 8601 date and time (UTC) of a numeric stamp, as `date_of` does.
+
+    ``first``: as written, in ticks of ``source``; integer ns lose no digit.
+    ``source``: its unit and scale; None is returned for a count of samples.
+    """
+    if source.unit not in SECONDS:
+        return None
+    if source.unit == "ns" and source.scale == 1:
+        return date_of(int(first))
+    nanoseconds = float(first) * SECONDS[source.unit] * source.scale * 1e9
+    return date_of(round(nanoseconds)) if math.isfinite(nanoseconds) else None
+
+
+def date_of_nanoseconds(since_1970: Any) -> str:
+    """Return ISO 8601 date and time of ns since 1970 that are known to be a date."""
+    return str(np.datetime64(int(since_1970), "ns"))[:23]

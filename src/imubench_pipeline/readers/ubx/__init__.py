@@ -1,1 +1,0 @@
-"""UBX messages of u-blox receivers."""

@@ -1,0 +1,524 @@
+"""VectorNav ASCII output: asynchronous sentences such as ``$VNYMR,...*68``.
+
+Columns are named as in `FIELDS`, with or without the name of the sentence: ``gyro_x`` or
+``VNYMR.gyro_x``. The name is needed only in a log that holds several sentences with that column.
+
+gyro is in rad/s, accel in m/s^2, temperature in degC as the device writes it. Time columns:
+``host_time``, what a logging host wrote before the ``$``; ``counter``, the figure after ``T`` that
+the device appends on request (SerialCount).
+
+VNISL and VNISE are estimates of a filter, not measurements, and VNDTV holds increments: they are
+passed over.
+"""
+
+from __future__ import annotations
+
+import re
+from binascii import crc_hqx
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile
+from imubench_pipeline.readers.compressed import BLOCK_BYTES, blocks
+from imubench_pipeline.readers.file_format import (
+    FIRST,
+    ROWS,
+    FileFormat,
+    LogColumn,
+    LogTable,
+    shown,
+)
+from imubench_pipeline.readers.stamps import Clock, date_of
+from imubench_pipeline.readers.text.cells import is_number
+from imubench_pipeline.readers.text.stamps import StampError, stamps_of
+from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+
+_APPENDED = re.compile(rb"(?:,S[0-9A-Fa-f]{4})?(?:,T(\d{1,18}))?$")
+"""What the device appends on request: a status, and a counter or time."""
+
+_BYTE = {form % value: value for value in range(256) for form in (b"%02X", b"%02x")}
+
+
+def _axes(*names: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{axis}" for name in names for axis in "xyz")
+
+
+_ATTITUDE = ("yaw", "pitch", "roll")
+_MEASURED = _axes("mag", "accel", "gyro")
+FIELDS: dict[str, tuple[str, ...]] = {
+    "VNYMR": (*_ATTITUDE, *_MEASURED),
+    "VNQMR": ("quat_x", "quat_y", "quat_z", "quat_w", *_MEASURED),
+    "VNMAR": _MEASURED,
+    "VNIMU": (*_MEASURED, "temperature", "pressure"),
+    "VNCMV": (*_MEASURED, "temperature"),
+    "VNACC": _axes("accel"),
+    "VNGYR": _axes("gyro"),
+    "VNYBA": (*_ATTITUDE, *_axes("linear_accel", "gyro")),  # without gravity
+    "VNYIA": (*_ATTITUDE, *_axes("inertial_accel", "gyro")),  # in the frame of the Earth
+}
+"""The fields of each sentence that holds angular rate or acceleration."""
+
+UNITS = {
+    **dict.fromkeys(_axes("gyro"), "rad/s"),
+    **dict.fromkeys(_axes("accel", "linear_accel", "inertial_accel"), "m/s^2"),
+    **dict.fromkeys(_ATTITUDE, "deg"),
+    **dict.fromkeys(_axes("mag"), "gauss"),
+    "temperature": "degC",
+    "pressure": "kPa",
+}
+"""The unit that the format fixes for each field that has one."""
+
+
+@dataclass(slots=True)
+class Row:
+    """One record: what stands before its sentence, its fields, and the counter it ends with."""
+
+    before: bytes
+    body: bytes
+    counter: bytes = b""
+
+
+class Sentences:
+    """Sorts the sentences of one kind from all else, and counts."""
+
+    def __init__(self, kind: str, stamped: bool) -> None:
+        self._head = kind.encode() + b","
+        self._commas = len(FIELDS[kind])
+        self._stamped = stamped
+        self.right = 0
+        self.wrong = 0
+        self.unread = 0
+        self.garbage = 0
+        self.others: Counter[str] = Counter()
+
+    def add(self, text: bytes) -> list[Row]:
+        """Return the records of some lines; one with an empty body is a missing sample."""
+        befores: list[bytes] = []
+        bodies: list[bytes] = []
+        checks: list[bytes] = []
+        for line in text.split(b"\n"):
+            before, _, rest = line.partition(b"$")
+            if not rest:
+                self.garbage += bool(line.strip(b"\r\0 \t"))
+                continue
+            # A sentence whose line break was lost runs into the next one.
+            for piece in rest.split(b"$"):
+                body, _, check = piece.rpartition(b"*")
+                befores.append(before)
+                bodies.append(body or piece)
+                checks.append(check.rstrip() if body else b"")
+                before = b""
+        rows: list[Row] = []
+        for good, before, body in zip(
+            right_checksums(bodies, checks), befores, bodies, strict=True
+        ):
+            if good and body.startswith(self._head):
+                self.right += 1
+                rows.append(self._row(before, body))
+            elif good:
+                self.others[body.partition(b",")[0].decode("ascii", "replace")] += 1
+            elif body.startswith(self._head) or self._damaged_name(body):
+                self.wrong += 1
+                if not self._stamped:
+                    rows.append(Row(b"", b""))
+            else:
+                self.garbage += 1
+        return rows
+
+    def _damaged_name(self, body: bytes) -> bool:
+        """Tell whether this was a sentence of our kind: as many fields, and no known name."""
+        name = body.partition(b",")[0].decode("ascii", "replace")
+        other = name in self.others or name in FIELDS
+        return not other and body.count(b",") == self._commas
+
+    def _row(self, before: bytes, body: bytes) -> Row:
+        row = Row(before, body[len(self._head) :])
+        if body.count(b",") != self._commas:
+            appended = _APPENDED.search(row.body)
+            if appended is not None:
+                row.counter = appended[1] or b""
+                row.body = row.body[: appended.start()]
+        return row
+
+
+def position_of(kind: str, column: str | int) -> int:
+    """Return the place of a column in a kind of sentence, from 0; -1: it has no such column."""
+    fields = FIELDS[kind]
+    if isinstance(column, int):
+        return column - 1 if column <= len(fields) else -1
+    sentence, _, name = column.rpartition(".")
+    return fields.index(name) if name in fields and sentence in ("", kind) else -1
+
+
+def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
+    """Yield the text of a log in blocks of whole lines.
+
+    A last line without its line break is kept if its checksum is right; else it was cut short
+    by the end of the recording, which is noted in ``findings``.
+    """
+    rest = b""
+    for block in blocks(path, findings):
+        text = rest + block
+        cut = text.rfind(b"\n") + 1
+        rest = text[cut:]
+        if len(rest) > BLOCK_BYTES:
+            raise RecordingError(
+                f"{path.name}: no line break in {BLOCK_BYTES} bytes; expected the text of a "
+                "VectorNav sensor; is this the right file?"
+            )
+        yield text[:cut]
+    body, _, check = rest.rpartition(b"$")[2].rpartition(b"*")
+    if right_checksums([body], [check.rstrip()])[0] and b"$" in rest:
+        yield rest
+    elif rest.strip(b"\0\r\t "):
+        shown = rest[:60].decode("ascii", "replace")
+        detail = (
+            f"{path.name}: the last line has no line break and no right checksum; left out: "
+            f"{shown!r}"
+        )
+        findings.append(Finding("incomplete_last_record", "note", detail, 1))
+
+
+def right_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:
+    """Tell which sentences have a right checksum: XOR of 8 bits, or CRC of 16."""
+    if not bodies:
+        return []
+    # A zero byte before each changes no XOR, and makes each begin somewhere.
+    joined = np.frombuffer(b"\0" + b"\0".join(bodies), np.uint8)
+    lengths = np.fromiter(map(len, bodies), np.int64, len(bodies)) + 1
+    sums = np.bitwise_xor.reduceat(joined, np.cumsum(lengths) - lengths).tolist()
+    return [
+        _BYTE.get(check, -1) == xor
+        if len(check) != 4
+        else b"%04X" % crc_hqx(body, 0) == check.upper()
+        for xor, body, check in zip(sums, bodies, checks, strict=True)
+    ]
+
+
+def fields_of(
+    kind: str, rows: list[Row], positions: set[int]
+) -> tuple[dict[int, NDArray[np.float64]], int]:
+    """Return some fields of some records by place, and how many sentences could not be read."""
+    commas = len(FIELDS[kind]) - 1
+    whole = [number for number, row in enumerate(rows) if row.body.count(b",") == commas]
+    present = sum(1 for row in rows if row.body)
+    fields = {position: np.full(len(rows), np.nan) for position in positions}
+    read, unread = _numbers([rows[number].body for number in whole], commas + 1, positions)
+    for position, values in read.items():
+        fields[position][whole] = values
+    return fields, unread + present - len(whole)
+
+
+def _numbers(
+    texts: list[bytes], width: int, positions: set[int]
+) -> tuple[dict[int, NDArray[np.float64]], int]:
+    """Return some cells of lines of text, by place, and how many lines could not be read."""
+    names = [str(position) for position in range(width)]
+    wanted = [str(position) for position in sorted(positions)]
+    # Arrow takes no plus sign.
+    joined = b"\n".join(texts).replace(b"+", b"")
+    if texts and joined:
+        try:
+            table = pacsv.read_csv(
+                pa.py_buffer(joined),
+                read_options=pacsv.ReadOptions(use_threads=False, column_names=names),
+                parse_options=pacsv.ParseOptions(quote_char=False),
+                convert_options=pacsv.ConvertOptions(
+                    column_types=dict.fromkeys(wanted, pa.float64()), include_columns=wanted
+                ),
+            )
+        except pa.ArrowInvalid:
+            table = None
+        if table is not None and len(table) == len(texts):
+            columns = {int(name): table.column(name).to_numpy() for name in wanted}
+            return columns, 0
+    return _numbers_one_by_one(texts, positions)
+
+
+def _numbers_one_by_one(
+    texts: list[bytes], positions: set[int]
+) -> tuple[dict[int, NDArray[np.float64]], int]:
+    fields = {position: np.full(len(texts), np.nan) for position in positions}
+    unread = 0
+    for number, text in enumerate(texts):
+        cells = text.split(b",")
+        for position in positions:
+            try:
+                fields[position][number] = float(cells[position])
+            except ValueError:
+                unread += 1
+                break
+    return fields, unread
+
+
+_LOOKED_AT = 1000
+_NAMES, _LONGEST_NAME = 10, 12
+_ZONE = re.compile(rb"(Z|[+-]\d\d:?\d\d)$")
+AROUND_STAMP = b" \t,;:|[]()\"'\r\0"
+HOST, COUNTER = "host_time", "counter"
+"""The columns of time."""
+
+
+class VectorNavFile(LogFile):
+    """A log of VectorNav's ASCII sentences."""
+
+    fixed_units: ClassVar = {"gyro": "rad/s", "accel": "m/s^2"}
+    fixed_by: ClassVar = "the format of VectorNav"
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the records in the order of the file (see `LogFile.batches`)."""
+        self._check_time()
+        kind = self._kind()
+        records = Sentences(kind, self.log.time is not None)
+        positions = {
+            name: position_of(kind, source.column) for name, source in self.sources.items()
+        }
+        wraps = None if self.log.time is None else self.log.time.wraps
+        clock = Clock(self, wraps, self._started)
+        for text in lines_of(self.path, self.findings):
+            rows = records.add(text)
+            if not rows:
+                continue
+            time = None
+            if self.log.time is not None:
+                stamps, missing = self._stamps(rows)
+                if clock.first is None and missing.all():
+                    raise self._without_stamp(rows)
+                time = clock.seconds(stamps, ~missing)
+            fields, unread = fields_of(kind, rows, set(positions.values()))
+            records.unread += unread
+            columns = {
+                name: self.to_si(name, fields[position]) for name, position in positions.items()
+            }
+            yield Batch(time, columns)
+        self._report(kind, records)
+
+    # ---------------------------------------------------------------- which sentence it is
+
+    def _kind(self) -> str:
+        """Return the one kind of sentence that the columns are taken from."""
+        wanted = [source.column for source in self.sources.values()]
+        able = [kind for kind in FIELDS if all(position_of(kind, c) >= 0 for c in wanted)]
+        if not able:
+            named = ", ".join(str(column) for column in wanted)
+            expected = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
+            raise RecordingError(
+                f"{self.path.name}: no VectorNav sentence has the columns {named} together; mend "
+                f"'column' in the sensor file, expected those of one sentence of {expected}"
+            )
+        if len(able) == 1:
+            return able[0]
+        present = self._present()
+        both = [kind for kind in able if kind in present]
+        if len(both) == 1:
+            return both[0]
+        seen = _listed(present) or "no sentence with a right checksum"
+        if not both:
+            raise RecordingError(
+                f"{self.path.name}: found {seen}; expected one of {', '.join(able)}, each with "
+                "a checksum of 2 or 4 digits; mend 'column' in the sensor file, or set the "
+                "output of the device (registers 6 and 30)"
+            )
+        raise RecordingError(
+            f"{self.path.name}: {' and '.join(both)} both hold the columns; say which in the "
+            f"sensor file, as in 'column: {both[0]}.{FIELDS[both[0]][-1]}'"
+        )
+
+    def _present(self) -> set[str]:
+        """Return the names of the sentences at the beginning of the file."""
+        names: Counter[str] = Counter()
+        for text in lines_of(self.path, []):
+            pieces = [piece.rpartition(b"*") for piece in text.replace(b"\n", b"$").split(b"$")]
+            right = right_checksums([p[0] for p in pieces], [p[2].rstrip() for p in pieces])
+            names.update(
+                piece[0].partition(b",")[0].decode("ascii", "replace")
+                for good, piece in zip(right, pieces, strict=True)
+                if good and piece[0]
+            )
+            if names.total() >= _LOOKED_AT:
+                break
+        return set(names)
+
+    # --------------------------------------------------------------------------- stamps
+
+    def _check_time(self) -> None:
+        time = self.log.time
+        if time is not None and time.column not in (HOST, COUNTER):
+            raise RecordingError(
+                f"{self.path.name}: no time column {time.column!r}; a VectorNav log has "
+                f"{HOST!r}, a stamp before the '$', and {COUNTER!r}, the figure after 'T' at "
+                "the end; mend 'column' of 'time', or drop 'time' and state 'rate'"
+            )
+
+    def _stamps(self, rows: list[Row]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Return the stamps of some records, and which of them are missing."""
+        assert self.log.time is not None
+        if self.log.time.column == COUNTER:
+            texts = [row.counter for row in rows]
+        else:
+            texts = [row.before.strip(AROUND_STAMP) for row in rows]
+        if self.log.time.format == "iso8601":
+            return _dates(texts)
+        whole = self.log.time.unit == "ns" or self.log.time.column == COUNTER
+        # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
+        stamps = np.zeros(len(texts), np.int64 if whole else np.float64)
+        missing = np.zeros(len(texts), bool)
+        for number, text in enumerate(texts):
+            try:
+                stamps[number] = int(text) if whole else float(text)
+            except (ValueError, OverflowError):
+                missing[number] = True
+        if not whole:
+            missing |= ~np.isfinite(stamps)
+        return stamps, missing
+
+    def _without_stamp(self, rows: list[Row]) -> RecordingError:
+        at_host = self.log.time is not None and self.log.time.column == HOST
+        where = "before the '$'" if at_host else "'T' and a count at the end"
+        return RecordingError(
+            f"{self.path.name}: no stamp that can be read in the first {len(rows)} sentences; "
+            f"expected {where}, found {rows[0].before[:40].decode('ascii', 'replace')!r} "
+            f"before {rows[0].body[-40:].decode('ascii', 'replace')!r}; mend 'time' in the "
+            "sensor file, or drop it and state 'rate'"
+        )
+
+    def _started(self, first: Any) -> str | None:
+        time = self.log.time
+        if time is None or time.column != HOST or time.unit == "samples":
+            return None
+        stamp = first.item()
+        scale = SECONDS[time.unit or "ns"] * 1e9
+        return date_of(stamp if isinstance(stamp, int) else round(stamp * scale))
+
+    # ------------------------------------------------------------------------- findings
+
+    def _report(self, kind: str, records: Sentences) -> None:
+        if not records.right:
+            raise RecordingError(
+                f"{self.path.name}: no ${kind} sentence with a right checksum, {records.wrong} "
+                f"with a wrong one; expected ${kind},...* and 2 or 4 digits; is 'column' in the "
+                "sensor file right, and the checksum on (register 30)?"
+            )
+        fate = "left out" if self.log.time is not None else "missing samples"
+        others = _listed(records.others)
+        self._count(
+            records.wrong,
+            "wrong_checksum",
+            f"${kind} sentences are cut short or have a wrong checksum; {fate}",
+        )
+        self._count(
+            records.unread,
+            "unreadable_sentence",
+            f"${kind} sentences have a right checksum but not the {len(FIELDS[kind])} numbers "
+            "expected; their figures are missing",
+        )
+        self._count(
+            records.others.total(),
+            "other_sentences",
+            f"other sentences ({others}) passed over",
+            "note",
+        )
+        self._count(
+            records.garbage,
+            "not_sentences",
+            "lines or parts of lines are no sentence; passed over",
+            "note",
+        )
+
+    def _count(self, count: int, name: str, text: str, severity: Severity = "warning") -> None:
+        if count:
+            self.note(name, f"{count} {text}", count, severity)
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name[:_LONGEST_NAME] for name in sorted(names)[:_NAMES])
+
+
+def _dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return ISO 8601 stamps as ns since 1970 (UTC), and which cannot be read."""
+    stamps = np.zeros(len(texts), np.int64)
+    missing = np.zeros(len(texts), bool)
+    for number, text in enumerate(texts):
+        zone = "UTC" if _ZONE.search(text) else None
+        try:
+            date = pa.scalar(text.decode("ascii")).cast(pa.timestamp("ns", zone))
+            stamps[number] = date.value
+        except (pa.ArrowInvalid, UnicodeDecodeError):
+            missing[number] = True
+    return stamps, missing
+
+
+# ----------------------------------------------------------------------- what a log holds
+
+_DESCRIBED_IN = 1 << 21  # bytes
+
+
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+    """Return a table for each kind of sentence that holds inertial figures.
+
+    Raises
+    ------
+    RecordingError
+        If there is none with a right checksum.
+    """
+    sentences = {kind: Sentences(kind, stamped=True) for kind in FIELDS}
+    rows: dict[str, list[Row]] = {kind: [] for kind in FIELDS}
+    read = 0
+    for text in lines_of(path, []):
+        for kind, of_kind in sentences.items():
+            if b"$" + kind.encode() in text:
+                rows[kind] += of_kind.add(text)
+        read += len(text)
+        if read > _DESCRIBED_IN:
+            break
+    present = [kind for kind, of_kind in rows.items() if of_kind]
+    if not present:
+        raise RecordingError(
+            f"{path.name}: no sentence of {', '.join(FIELDS)} with a right checksum at its "
+            "beginning; set the output of the device (registers 6 and 30)"
+        )
+    return [_table(file_format, kind, rows[kind], len(present) == 1) for kind in present]
+
+
+def _table(file_format: FileFormat, kind: str, rows: list[Row], alone: bool) -> LogTable:
+    fields, _ = fields_of(kind, rows[:ROWS], set(range(len(FIELDS[kind]))))
+    columns = [
+        LogColumn(
+            name if alone else f"{kind}.{name}",
+            name,
+            "number",
+            shown(fields[place]),
+            fields[place],
+            UNITS.get(name),
+        )
+        for place, name in enumerate(FIELDS[kind])
+    ]
+    columns += _time(HOST, [row.before.strip(AROUND_STAMP) for row in rows[:ROWS]])
+    columns += _time(COUNTER, [row.counter for row in rows[:ROWS]])
+    about = f"{len(rows)} sentences at the beginning"
+    return LogTable(file_format, kind, tuple(columns), about=about)
+
+
+def _time(name: str, cells: list[bytes]) -> list[LogColumn]:
+    """Return a column of stamps, if it is there."""
+    texts = [cell.decode("ascii", "replace") for cell in cells]
+    first = tuple(text for text in texts[:FIRST])
+    if not any(texts):
+        return []
+    if all(is_number(text, ".") for text in texts if text):
+        values = np.array([float(text) if text else np.nan for text in texts])
+        return [LogColumn(name, name, "number", first, values)]
+    try:
+        return [
+            LogColumn(name, name, "date", first, stamps_of("iso8601", texts), None, ("iso8601",))
+        ]
+    except StampError:
+        return [LogColumn(name, name, "text", first)]

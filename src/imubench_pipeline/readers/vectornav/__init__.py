@@ -1,1 +1,0 @@
-"""ASCII sentences of VectorNav."""
