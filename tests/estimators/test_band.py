@@ -113,7 +113,7 @@ def test_a_band_ends_where_what_a_filter_takes_is_less_than_what_is_known(
 
 
 @pytest.mark.parametrize(
-    "coefficients", few([(TWO_TAPS,)], [(low_pass(20.0),)]), ids=["two taps", "20 Hz"]
+    "coefficients", few([TWO_TAPS], [(low_pass(20.0),)]), ids=["two taps", "20 Hz"]
 )
 def test_a_gentle_filter_costs_little_of_the_band(rng, coefficients: Coefficients) -> None:
     for _ in range(4):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.release.mutant_runs import PACKAGE, copied, prepare
-from tests.release.mutants import KILLED, SURVIVED, TIMED_OUT, judged_as
+from tests.release.mutant_tests import KILLED, SURVIVED, TIMED_OUT, judged_as
 
 pytestmark = pytest.mark.release
 

@@ -182,8 +182,10 @@ def values_of(name: str, inside: ast.FunctionDef, tree: ast.Module) -> set[str]:
     arguments = [argument.arg for argument in inside.args.args if argument.arg != "self"]
     if name in arguments:
         place = arguments.index(name)
-        for caller, call in calls(tree, inside.name):
-            found |= texts(call.args[place], caller, tree)
+        for module in [tree] if list(calls(tree, inside.name)) else trees():  # else in a subclass
+            for caller, call in calls(module, inside.name):
+                if len(call.args) > place:  # else a method of another class
+                    found |= texts(call.args[place], caller, module)
     return found
 
 
@@ -191,6 +193,12 @@ def texts(node: ast.expr, inside: ast.FunctionDef, tree: ast.Module) -> set[str]
     found = values_of(node.id, inside, tree) if isinstance(node, ast.Name) else literals(node)
     assert found, f"{inside.name}, line {node.lineno}: what is {ast.unparse(node)}?"
     return found
+
+
+@lru_cache(maxsize=1)
+def trees() -> dict[ast.Module, str]:
+    """Return the modules of the source, with their names."""
+    return {ast.parse(path.read_text()): path.stem for path in sorted(SOURCE.rglob("*.py"))}
 
 
 def calls(tree: ast.Module, name: str) -> Iterator[tuple[ast.FunctionDef, ast.Call]]:
@@ -208,12 +216,11 @@ def calls(tree: ast.Module, name: str) -> Iterator[tuple[ast.FunctionDef, ast.Ca
 def emitted() -> dict[str, str]:
     """Return the findings that the source can emit, each with a module that does."""
     found = {}
-    for path in sorted(SOURCE.rglob("*.py")):
-        tree = ast.parse(path.read_text())
+    for tree, name_of_module in trees().items():
         for function, call in calls(tree, "Finding"):
             named = [keyword.value for keyword in call.keywords if keyword.arg == "finding"]
             for name in texts([*call.args, *named][0], function, tree):
-                found[name] = path.stem
+                found[name] = name_of_module
     return found
 
 
