@@ -5,6 +5,8 @@ import os
 # A worker of pytest-xdist has one processor: the threads of the linear algebra would wait for each
 # other on it, which takes half as long again.
 os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "NUMBA")}
+# Some hundred processes are started: each would compile its imports, for 3 s.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 from collections.abc import Iterable
 from pathlib import Path
