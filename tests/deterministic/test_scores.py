@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from imubench_pipeline.estimators.deterministic.means import means_of
 from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
-from imubench_pipeline.estimators.deterministic.scores import Gain, best_scores
+from imubench_pipeline.estimators.deterministic.scores import FALSE_ALARM, Gain, best_scores
 from tests.deterministic.logs import RATE, SIGMA, static_log, times
 
 
@@ -52,3 +53,22 @@ def test_leverages_sum_up_to_the_number_of_amplitudes() -> None:
     ordinates = Ordinates(means_of([log], len(log), RATE))
     regressors = [Regressor("step", 0, 300.0), Regressor("sinusoid", 0, 0.004)]
     assert ordinates.fit(regressors).leverage.sum() == pytest.approx(3.0)
+
+
+def test_the_threshold_of_a_step_counts_the_places_that_noise_tells_apart() -> None:
+    log = static_log(3, hours=0.5)
+    ordinates = Ordinates(means_of([log], len(log), RATE))
+    fit = ordinates.fit([])
+    scores = best_scores(ordinates, fit, fit.density)
+    step = next(score for score in scores if score.regressor.kind == "step")
+    n = ordinates.sizes[0]
+    # The matched filter of noise at all places, and how alike it is at neighbouring ones.
+    scale = np.sqrt(ordinates.weights(fit.density))
+    rows = np.concatenate([ordinates.columns(Regressor("step", 0, float(p))) for p in range(1, n)])
+    rows *= scale
+    rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+    alike = np.sum(rows[1:] * rows[:-1], axis=1)[n // 4 : -n // 4].mean()
+    apart = (n - 1) * np.sqrt(2.0 * (1.0 - alike))
+    # Rice: a normal process crosses a level so often; and it begins above it with a chance.
+    chance = stats.chi2(1).sf(step.threshold) + apart / np.pi * np.exp(-0.5 * step.threshold)
+    assert chance == pytest.approx(FALSE_ALARM["step"], rel=0.1)
