@@ -1,4 +1,5 @@
 import math
+import re
 
 import numpy as np
 import pandas as pd
@@ -110,6 +111,9 @@ def test_sensitivity_for_known_noise_is_generalised_least_squares():
     found = regressors.at(0.0, weights)
     assert math.sqrt(found.covariance[0, 0]) == pytest.approx(bound, rel=0.02)
     assert found.beta[0] == pytest.approx(exact, abs=0.15 * bound)
+    # What the fit takes from the log is the freedom of its one parameter.
+    left = regressors.without(spectrum, found, weights)
+    assert spectrum.ordinates.sum() - left.ordinates.sum() == pytest.approx(1.0, abs=0.01)
 
 
 def test_sensitivity_lag_and_bias_are_found_and_taken_out():
@@ -149,7 +153,8 @@ def test_temperature_that_cannot_be_told_from_time_is_said():
     fit = fitted(log, readings)
     assert fit.sensitivity.status == "not_identified"
     assert fit.sensitivity.value is None
-    assert "ramp" in fit.sensitivity.reason
+    said = re.search(r"too close to a ramp.* explain (\d+) %", fit.sensitivity.reason)
+    assert said is not None and 95 <= int(said[1]) <= 100
     assert not fit.compensated
 
 
