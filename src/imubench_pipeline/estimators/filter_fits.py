@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.goodness import goodness
 from imubench_pipeline.estimators.low_pass import BOXCAR, Filter, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, whittle_of
-from imubench_pipeline.estimators.whittle_kernels import best_powers
+from imubench_pipeline.estimators.whittle_kernels import TOLERANCE, best_powers
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.typing import Array
 
@@ -368,7 +368,7 @@ class FilterFits:
     def _powers(self, columns: Array) -> tuple[Array, float]:
         norm = columns.mean(axis=0)
         powers, _, cost = best_powers(
-            np.ascontiguousarray(columns / norm), self.whittle.bins(), False
+            np.ascontiguousarray(columns / norm), self.whittle.bins(), False, TOLERANCE
         )
         return powers / norm * self.whittle.scale, cost
 

@@ -102,11 +102,14 @@ def mode_at(start: Array, times: Array, problem: Problem) -> tuple[Array, Array,
     b, linear = fixed.shape
     p = linear + times.size
     columns = np.empty((b, p))
-    columns[:, :linear] = fixed
     shape = np.empty(b)
+    for i in range(b):
+        for j in range(linear):
+            columns[i, j] = fixed[i, j]
     for g in range(times.size):
         shape_at(times[g], table, shape)
-        columns[:, linear + g] = shape
+        for i in range(b):
+            columns[i, linear + g] = shape[i]
     x = start.copy()
     model, data, parts = np.empty(b), density.copy(), np.empty((b, p))
     best = -np.inf

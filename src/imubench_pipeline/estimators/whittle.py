@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle_kernels import (
+    TOLERANCE,
     Bins,
     Problem,
     ShapeTable,
     best_powers,
-    one_process,
     shape_at,
-    two_processes,
 )
+from imubench_pipeline.estimators.whittle_search import one_process, two_processes
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
 from imubench_pipeline.typing import Array
@@ -247,7 +247,7 @@ class Whittle:
         processes = [self.gauss_markov(float(time)) for time in times]
         columns = np.ascontiguousarray(np.column_stack([fixed, *processes]))
         norm = columns.mean(axis=0)
-        powers, ramp, cost = best_powers(columns / norm, bins, terms.ramp)
+        powers, ramp, cost = best_powers(columns / norm, bins, terms.ramp, TOLERANCE)
         powers = powers / norm * self.scale
         powers[: len(size)] /= size
         return Maximum(terms, powers, times, ramp, cost)

@@ -1,7 +1,4 @@
-"""The compiled inner loops of the Whittle likelihood.
-
-Data and densities are in units in which they are near 1.
-"""
+"""The compiled inner loops of the Whittle likelihood; data and densities are in units near 1."""
 
 from __future__ import annotations
 
@@ -13,19 +10,10 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.typing import Array
 
-_SCAN_STEP = 4
-_PAIR_STEP = 12
-_CLOSEST_PAIR = 2.5
-"""Least ratio of two correlation times that are told apart."""
+TOLERANCE = 1e-7
+"""Of the cost."""
 
-_TOLERANCE = 1e-7
-_SCAN_TOLERANCE = 1e-2
-"""Of the cost, where correlation times are compared only."""
-
-_POLISH_TOLERANCE = 1e-6
 _MOST_STEPS = 60
-_MOST_TURNS = 8
-_GOLDEN = 0.6180339887498949
 
 
 class Bins(NamedTuple):
@@ -161,16 +149,10 @@ def _non_negative(gram: Array, target: Array, guess: Array) -> Array:
 
 
 @njit(cache=True)
-def best_powers(columns: Array, bins: Bins, with_ramp: bool) -> tuple[Array, float, float]:
-    """Return the squared parameters, R and the cost that fit best."""
-    return _best_powers(columns, bins, with_ramp, _TOLERANCE)
-
-
-@njit(cache=True)
-def _best_powers(
+def best_powers(
     columns: Array, bins: Bins, with_ramp: bool, tolerance: float
 ) -> tuple[Array, float, float]:
-    """Return those that fit best, to a tolerance of the cost."""
+    """Return the squared parameters, R and the cost that fit best, to a tolerance of the cost."""
     nu, density, cross, ramp = bins
     b, p = columns.shape
     R = 0.0
@@ -232,137 +214,18 @@ def _best_powers(
 
 
 @njit(cache=True)
-def _cost_at(places: Array, problem: Problem, tolerance: float) -> float:
+def cost_at(places: Array, problem: Problem, tolerance: float) -> float:
     """Return the cost at logarithms of correlation times, profiled over everything else."""
     fixed, bins, with_ramp, table = problem
     b, p = fixed.shape
     columns = np.empty((b, p + places.size))
-    columns[:, :p] = fixed
     shape = np.empty(b)
+    for i in range(b):  # a slice would have numba compile its errors for seconds
+        for j in range(p):
+            columns[i, j] = fixed[i, j]
     for g in range(places.size):
         shape_at(places[g], table, shape)
-        columns[:, p + g] = shape / shape.mean()
-    return _best_powers(columns, bins, with_ramp, tolerance)[2]
-
-
-@njit(cache=True)
-def _polish(
-    places: Array, which: int, low: float, high: float, problem: Problem
-) -> tuple[float, float]:
-    """Minimise the cost over one correlation time by golden section."""
-    tried = places.copy()
-    a, d = low, high
-    b, c = d - _GOLDEN * (d - a), a + _GOLDEN * (d - a)
-    tried[which] = b
-    cost_b = _cost_at(tried, problem, _POLISH_TOLERANCE)
-    tried[which] = c
-    cost_c = _cost_at(tried, problem, _POLISH_TOLERANCE)
-    while d - a > 5e-4:
-        if cost_b <= cost_c:
-            d, c, cost_c = c, b, cost_b
-            b = d - _GOLDEN * (d - a)
-            tried[which] = b
-            cost_b = _cost_at(tried, problem, _POLISH_TOLERANCE)
-        else:
-            a, b, cost_b = b, c, cost_c
-            c = a + _GOLDEN * (d - a)
-            tried[which] = c
-            cost_c = _cost_at(tried, problem, _POLISH_TOLERANCE)
-    return (b, cost_b) if cost_b <= cost_c else (c, cost_c)
-
-
-@njit(cache=True)
-def _scan(
-    places: Array, which: int, low: float, high: float, problem: Problem
-) -> tuple[float, float]:
-    """Return the best of one correlation time on a grid between limits, and its cost."""
-    tried, table = places.copy(), problem.table
-    best, lowest = places[which], np.inf
-    for i in range(0, table.logarithms.shape[0], _SCAN_STEP):
-        tried[which] = table.first + i * table.step
-        if low <= tried[which] <= high:
-            cost = _cost_at(tried, problem, _SCAN_TOLERANCE)
-            if cost < lowest:
-                best, lowest = tried[which], cost
-    return best, lowest
-
-
-@njit(cache=True)
-def one_process(problem: Problem) -> Array:
-    """Scan the correlation time, then polish the best."""
-    first, step, logarithms = problem.table
-    last = first + step * (logarithms.shape[0] - 1)
-    place = np.array([first])
-    best, lowest = _scan(place, 0, first, last, problem)
-    reach = _SCAN_STEP * step
-    place[0] = best
-    low, high = max(first, best - reach), min(last, best + reach)
-    polished, cost = _polish(place, 0, low, high, problem)
-    place[0] = polished if cost < lowest else best
-    return place
-
-
-@njit(cache=True)
-def two_processes(problem: Problem) -> Array:
-    """Begin with the best pair of a coarse grid and with the best single process; take the better.
-
-    A strong process has a sharp correlation time, beside which no pair of a coarse grid shows that
-    it needs another.
-    """
-    first, step, logarithms = problem.table
-    last = first + step * (logarithms.shape[0] - 1)
-    apart = np.log(_CLOSEST_PAIR)
-    lowest = np.inf
-    pair = np.array([first, last])
-    places = np.empty(2)
-    for i in range(0, logarithms.shape[0], _PAIR_STEP):
-        for j in range(i + _PAIR_STEP, logarithms.shape[0], _PAIR_STEP):
-            places[0], places[1] = first + i * step, first + j * step
-            if places[1] - places[0] < apart:
-                continue
-            cost = _cost_at(places, problem, _SCAN_TOLERANCE)
-            if cost < lowest:
-                lowest = cost
-                pair = places.copy()
-    pair, lowest = _descend(pair, lowest, problem)
-    single = one_process(problem)[0]
-    for which in (1, 0):
-        beside = np.array([single, single])
-        low, high = (single + apart, last) if which == 1 else (first, single - apart)
-        if high <= low:
-            continue
-        beside[which], cost = _scan(beside, which, low, high, problem)
-        if cost == np.inf:
-            continue
-        beside, cost = _descend(beside, cost, problem)
-        if cost < lowest:
-            pair, lowest = beside, cost
-    return pair
-
-
-@njit(cache=True)
-def _descend(pair: Array, lowest: float, problem: Problem) -> tuple[Array, float]:
-    """Polish each of two correlation times in turn."""
-    first, step, logarithms = problem.table
-    last = first + step * (logarithms.shape[0] - 1)
-    apart = np.log(_CLOSEST_PAIR)
-    best = pair.copy()
-    reach = _PAIR_STEP * step
-    for _ in range(_MOST_TURNS):
-        before = lowest
-        for g in range(2):
-            low, high = max(first, best[g] - reach), min(last, best[g] + reach)
-            if g == 0:
-                high = min(high, best[1] - apart)
-            else:
-                low = max(low, best[0] + apart)
-            if high <= low:
-                continue
-            polished, cost = _polish(best, g, low, high, problem)
-            if cost < lowest:
-                lowest = cost
-                best[g] = polished
-        reach = max(0.7 * reach, 0.1 * step)
-        if before - lowest < 1e-4:
-            break
-    return best, lowest
+        mean = shape.mean()
+        for i in range(b):
+            columns[i, p + g] = shape[i] / mean
+    return best_powers(columns, bins, with_ramp, tolerance)[2]

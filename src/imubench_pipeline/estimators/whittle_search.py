@@ -1,0 +1,142 @@
+"""The correlation times that fit a spectrum best.
+
+One kernel is called some hundred times, from here: numba takes all that a kernel calls into it, and
+would compile each level of the search for seconds when it is first used.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imubench_pipeline.estimators.whittle_kernels import Problem, cost_at
+from imubench_pipeline.typing import Array
+
+_SCAN_STEP = 4
+_PAIR_STEP = 12
+_CLOSEST_PAIR = 2.5
+"""Least ratio of two correlation times that are told apart."""
+
+_SCAN_TOLERANCE = 1e-2
+"""Of the cost, where correlation times are compared only."""
+
+_POLISH_TOLERANCE = 1e-6
+_MOST_TURNS = 8
+_GOLDEN = 0.6180339887498949
+
+
+def _polish(
+    places: Array, which: int, low: float, high: float, problem: Problem
+) -> tuple[float, float]:
+    """Minimise the cost over one correlation time by golden section."""
+    tried = places.copy()
+    a, d = low, high
+    b, c = d - _GOLDEN * (d - a), a + _GOLDEN * (d - a)
+    tried[which] = b
+    cost_b = cost_at(tried, problem, _POLISH_TOLERANCE)
+    tried[which] = c
+    cost_c = cost_at(tried, problem, _POLISH_TOLERANCE)
+    while d - a > 5e-4:
+        if cost_b <= cost_c:
+            d, c, cost_c = c, b, cost_b
+            b = d - _GOLDEN * (d - a)
+            tried[which] = b
+            cost_b = cost_at(tried, problem, _POLISH_TOLERANCE)
+        else:
+            a, b, cost_b = b, c, cost_c
+            c = a + _GOLDEN * (d - a)
+            tried[which] = c
+            cost_c = cost_at(tried, problem, _POLISH_TOLERANCE)
+    return (b, cost_b) if cost_b <= cost_c else (c, cost_c)
+
+
+def _scan(
+    places: Array, which: int, low: float, high: float, problem: Problem
+) -> tuple[float, float]:
+    """Return the best of one correlation time on a grid between limits, and its cost."""
+    tried, table = places.copy(), problem.table
+    best, lowest = places[which], np.inf
+    for i in range(0, table.logarithms.shape[0], _SCAN_STEP):
+        tried[which] = table.first + i * table.step
+        if low <= tried[which] <= high:
+            cost = cost_at(tried, problem, _SCAN_TOLERANCE)
+            if cost < lowest:
+                best, lowest = tried[which], cost
+    return best, lowest
+
+
+def one_process(problem: Problem) -> Array:
+    """Scan the correlation time, then polish the best."""
+    first, step, logarithms = problem.table
+    last = first + step * (logarithms.shape[0] - 1)
+    place = np.array([first])
+    best, lowest = _scan(place, 0, first, last, problem)
+    reach = _SCAN_STEP * step
+    place[0] = best
+    low, high = max(first, best - reach), min(last, best + reach)
+    polished, cost = _polish(place, 0, low, high, problem)
+    place[0] = polished if cost < lowest else best
+    return place
+
+
+def two_processes(problem: Problem) -> Array:
+    """Begin with the best pair of a coarse grid and with the best single process; take the better.
+
+    A strong process has a sharp correlation time, beside which no pair of a coarse grid shows that
+    it needs another.
+    """
+    first, step, logarithms = problem.table
+    last = first + step * (logarithms.shape[0] - 1)
+    apart = np.log(_CLOSEST_PAIR)
+    lowest = np.inf
+    pair = np.array([first, last])
+    places = np.empty(2)
+    for i in range(0, logarithms.shape[0], _PAIR_STEP):
+        for j in range(i + _PAIR_STEP, logarithms.shape[0], _PAIR_STEP):
+            places[0], places[1] = first + i * step, first + j * step
+            if places[1] - places[0] < apart:
+                continue
+            cost = cost_at(places, problem, _SCAN_TOLERANCE)
+            if cost < lowest:
+                lowest = cost
+                pair = places.copy()
+    pair, lowest = _descend(pair, lowest, problem)
+    single = one_process(problem)[0]
+    for which in (1, 0):
+        beside = np.array([single, single])
+        low, high = (single + apart, last) if which == 1 else (first, single - apart)
+        if high <= low:
+            continue
+        beside[which], cost = _scan(beside, which, low, high, problem)
+        if cost == np.inf:
+            continue
+        beside, cost = _descend(beside, cost, problem)
+        if cost < lowest:
+            pair, lowest = beside, cost
+    return pair
+
+
+def _descend(pair: Array, lowest: float, problem: Problem) -> tuple[Array, float]:
+    """Polish each of two correlation times in turn."""
+    first, step, logarithms = problem.table
+    last = first + step * (logarithms.shape[0] - 1)
+    apart = np.log(_CLOSEST_PAIR)
+    best = pair.copy()
+    reach = _PAIR_STEP * step
+    for _ in range(_MOST_TURNS):
+        before = lowest
+        for g in range(2):
+            low, high = max(first, best[g] - reach), min(last, best[g] + reach)
+            if g == 0:
+                high = min(high, best[1] - apart)
+            else:
+                low = max(low, best[0] + apart)
+            if high <= low:
+                continue
+            polished, cost = _polish(best, g, low, high, problem)
+            if cost < lowest:
+                lowest = cost
+                best[g] = polished
+        reach = max(0.7 * reach, 0.1 * step)
+        if before - lowest < 1e-4:
+            break
+    return best, lowest
