@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
-from scipy.linalg import block_diag
 
 from imubench_pipeline.typing import Array
 
@@ -62,12 +62,12 @@ class StateSpace:
     def together(cls, spaces: Sequence[StateSpace]) -> StateSpace:
         """Return the model of the sum of independent ones, their states in order."""
         return cls(
-            np.asarray(block_diag(*(space.transition for space in spaces))),
-            np.asarray(block_diag(*(space.process_noise for space in spaces))),
+            _block_diagonal([space.transition for space in spaces]),
+            _block_diagonal([space.process_noise for space in spaces]),
             np.concatenate([space.output for space in spaces]),
             sum(space.measurement_noise for space in spaces),
             np.concatenate([space.initial_mean for space in spaces]),
-            np.asarray(block_diag(*(space.initial_variance for space in spaces))),
+            _block_diagonal([space.initial_variance for space in spaces]),
         )
 
     def of_either_sign(self) -> StateSpace:
@@ -105,11 +105,22 @@ class ContinuousSpace:
         return cls(none, none, np.zeros(0))
 
 
+def _block_diagonal(parts: Sequence[Array]) -> Array:
+    """Return square matrices along a diagonal; scipy's takes long."""
+    ends = np.cumsum([len(part) for part in parts])
+    whole = np.zeros((ends[-1], ends[-1]))
+    for part, end in zip(parts, ends, strict=True):
+        whole[end - len(part) : end, end - len(part) : end] = part
+    return whole
+
+
 def root_of(covariance: Array) -> Array:
     """Return the lower triangular root of a covariance, shape (m, m).
 
     What does not vary has a row of zeros.
     """
+    if len(covariance) == 1:  # of most terms, and asked for by each log of an ensemble
+        return np.sqrt(covariance)
     varying = np.flatnonzero(np.diag(covariance))
     root, own = np.zeros_like(covariance), np.ix_(varying, varying)
     root[own] = np.linalg.cholesky(covariance[own])
@@ -141,7 +152,20 @@ def draw_block_sums(
     space has one state, seen as it is, without measurement noise; ``start``, shape (1,), is the
     first; a block has ``width`` samples.
     """
-    p, drive = float(space.transition[0, 0]), float(space.process_noise[0, 0])
+    step = _over_block(float(space.transition[0, 0]), float(space.process_noise[0, 0]), width)
+    normal = rng.standard_normal((2, blocks))
+    sums = np.empty(blocks)
+    _add_up(sums, float(start[0]), normal[0], normal[1], *step)
+    return sums
+
+
+@lru_cache(maxsize=64)  # an ensemble asks some hundred times for the same
+def _over_block(p: float, drive: float, width: int) -> tuple[float, float, float, float, float]:
+    """Return what a state does in a block.
+
+    Decay and reach of the state before; the noise in the state after, that of the sum with it, and
+    that of the sum alone.
+    """
     # The sample i of a block is p^i x + sum_{j<i} p^(i-1-j) w_j.
     powers = p ** np.arange(width + 1)
     reach = np.concatenate(([0.0], np.cumsum(powers)))
@@ -153,30 +177,17 @@ def draw_block_sums(
     to_state = math.sqrt(moments[0, 0])
     shared = moments[0, 1] / to_state
     own = math.sqrt(max(moments[1, 1] - shared**2, 0.0))
-    normal = rng.standard_normal((2, blocks))
-    sums = np.empty(blocks)
-    _add_up(
-        sums,
-        float(start[0]),
-        powers[width],
-        reach[width],
-        normal[0],
-        normal[1],
-        to_state,
-        shared,
-        own,
-    )
-    return sums
+    return powers[width], reach[width], to_state, shared, own
 
 
 @njit(cache=True, nogil=True)
 def _add_up(
     sums: Array,
     state: float,
-    decay: float,
-    gain: float,
     first: Array,
     second: Array,
+    decay: float,
+    gain: float,
     to_state: float,
     shared: float,
     own: float,
