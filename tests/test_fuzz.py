@@ -21,7 +21,7 @@ from tests.fuzz.mutations import mutated
 from tests.fuzz.supervision import HANG_S, Fuzzing
 from tests.readers.test_ubx import raw, samples, truth
 
-SECONDS = 1.0
+SECONDS = 0.3
 QUICK = ("csv",)
 """Readers that are fuzzed for a moment in every run of the tests, and the others in `release`."""
 

@@ -103,7 +103,7 @@ def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
     assert left.index("turn it over") < left.index("what failed")
 
 
-@pytest.mark.parametrize("flags", few([("--quiet",)], [(("--verbose",),)]))
+@pytest.mark.parametrize("flags", few([], [(("--quiet",),), (("--verbose",),)]))
 def test_who_asks_for_more_or_less_gets_what_snakemake_says(
     folder: Path, flags: tuple[str, ...]
 ) -> None:

@@ -154,6 +154,10 @@ def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
     assert set(lines[1:3]) == {"  allan of s/r", "  ranking"}
     assert lines[3].endswith("run the same command again: it goes on where this run stopped")
     assert Path(lines[4].removeprefix("log: ")).is_file()
+
+
+@pytest.mark.release
+def test_a_quiet_run_says_that_a_step_failed(tmp_path: Path) -> None:
     assert snakemake(tmp_path, "exit 3", "--quiet", "all")[0] == "a step failed; why stands above"
 
 

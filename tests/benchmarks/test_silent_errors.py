@@ -186,7 +186,7 @@ def test_case_has_a_log_of_its_own_with_a_truth(name):
         assert len(log.stamps) == len(log.samples)
 
 
-@pytest.mark.parametrize("name", few(["papers_four", "lost_samples"], ["white", "white_walk"]))
+@pytest.mark.parametrize("name", few(["papers_four"], ["lost_samples", "white", "white_walk"]))
 def test_clean_log_has_no_silent_error(name):
     *_, found, _, error = silent_errors.of_log((name, 0))
     assert not error

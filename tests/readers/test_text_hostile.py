@@ -63,7 +63,7 @@ READ = {
     *("one row", "20000 columns", "lines of delimiters", "a number of 500 kB"),
     *("zeros at the end", "zeros after a cut record", "zeros between", "comments and a record"),
 }
-PACKED = sorted(FILES)[::4]
+PACKED = sorted(FILES)[::8]
 """They are read packed, too, and packed and cut: what unpacks knows nothing of what it hands on."""
 
 LIMIT_MB, LIMIT_S = 500, 12

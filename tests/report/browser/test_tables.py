@@ -164,6 +164,7 @@ def test_a_long_table_is_sorted_whole(read: Open, many: Path) -> None:
     assert count(table) == f"the first 100 of {SENSORS * EACH} rows"
 
 
+@pytest.mark.release  # long: three hundred lines in each figure
 def test_a_report_of_many_recordings_is_drawn(read: Open, many: Path) -> None:
     reader = read(many)
     figure = reader.figure("overlay")
