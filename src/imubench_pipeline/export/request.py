@@ -23,7 +23,7 @@ from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.export.temperature import TemperatureEffect, temperature_effect
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import left_out
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables import read, tables_folder
 
 Tables = Mapping[str, pa.Table]
 
@@ -77,7 +77,7 @@ def load(path: Path) -> dict[str, pa.Table]:
     ExportError
         If a table is missing or of another form.
     """
-    folder = path / "tables" if (path / "tables").is_dir() else path
+    folder = tables_folder(path)
     try:
         return {name: read(name, [folder / f"{name}.parquet"]) for name in NEEDED}
     except (OSError, ValueError) as error:
@@ -86,7 +86,7 @@ def load(path: Path) -> dict[str, pa.Table]:
 
 def recordings_of(path: Path) -> Path:
     """Return the folder of the recordings of a run, of a path as `load` takes it."""
-    return (path if (path / "tables").is_dir() else path.parent) / "recordings"
+    return tables_folder(path).parent / "recordings"
 
 
 def made(tables: Tables, request: Request, recordings: Path | None = None) -> str | bytes:

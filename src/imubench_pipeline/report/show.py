@@ -81,9 +81,9 @@ class _ShowError(ValueError):
 
 
 def _load(results: Path) -> dict[str, Rows]:
-    from imubench_pipeline.tables import read
+    from imubench_pipeline.tables import read, tables_folder
 
-    folder = _tables_folder(results)
+    folder = tables_folder(results)
     missing = [name for name in _NEEDED if not (folder / f"{name}.parquet").is_file()]
     if missing:
         raise _ShowError(
@@ -96,12 +96,10 @@ def _load(results: Path) -> dict[str, Rows]:
         raise _ShowError(f"{error}\n`snakemake -c2` makes the tables again") from error
 
 
-def _tables_folder(results: Path) -> Path:
-    return results / "tables" if (results / "tables").is_dir() else results
-
-
 def _where(results: Path) -> str:
-    page = _tables_folder(results).parent / "report/index.html"
+    from imubench_pipeline.tables import tables_folder
+
+    page = tables_folder(results).parent / "report/index.html"
     if page.is_file():
         return f"Report: {page}"
     return f"No report at {page}; `snakemake -c2` makes it"

@@ -43,6 +43,7 @@ def run(options: argparse.Namespace) -> int:
     from imubench_pipeline.settings.validation import ConfigError
     from imubench_pipeline.settings.yaml_files import read_settings
     from imubench_pipeline.steps.shortlist import NEEDED, rows_of_run
+    from imubench_pipeline.tables import tables_folder
 
     try:
         path = Path(options.requirement)
@@ -57,8 +58,7 @@ def run(options: argparse.Namespace) -> int:
         sensors = read_sensors(options.sensors)
         tables = {}
         if options.results is not None:
-            folder = options.results / "tables"
-            folder = folder if folder.is_dir() else options.results
+            folder = tables_folder(options.results)
             tables = {table: folder / f"{table}.parquet" for table in NEEDED}
         rows = list(rows_of_run({name: asked}, sensors, tables))
     except (ConfigError, OSError, ValueError) as error:

@@ -17,7 +17,7 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables import read, tables_folder
 
 Rows = list[dict[str, Any]]
 _NEEDED = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
@@ -38,7 +38,7 @@ def with_estimates(
     ConfigError
         If there is no estimate of the sensor, or of the recording.
     """
-    folder = results / "tables" if (results / "tables").is_dir() else results
+    folder = tables_folder(results)
     try:
         tables = {table: read(table, [folder / f"{table}.parquet"]) for table in _NEEDED}
     except (OSError, ValueError) as error:

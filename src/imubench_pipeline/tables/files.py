@@ -136,6 +136,12 @@ def write_arrow(table: pa.Table, path: Path) -> None:
             write_sealed(table, temporary, compression)
 
 
+def tables_folder(results: Path) -> Path:
+    """Return the folder of the tables of a run; ``results`` may be that folder itself."""
+    inside = results / "tables"
+    return inside if inside.is_dir() else results
+
+
 def read(table: str, paths: Sequence[Path]) -> pa.Table:
     """Read and join files of one table, in the order given."""
     return joined(table, [read_part(table, path) for path in paths])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables import read, tables_folder
 from imubench_pipeline.tables.schemas import TABLES
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _load(results: Path) -> dict[str, pa.Table]:
     """Read the tables of a run; ``results`` may be the folder ``tables`` itself."""
-    folder = results / "tables" if (results / "tables").is_dir() else results
+    folder = tables_folder(results)
     paths = {name: folder / f"{name}.parquet" for name in TABLES}
     missing = [name for name in NEEDED if not paths[name].is_file()]
     if missing:
