@@ -162,9 +162,9 @@ class Undisturbed:
             elif (results / name).read_bytes() != (expected / name).read_bytes():
                 found.append(f"{name} differs")
         for name in sorted({path.relative_to(results) for path in visible(results)} - names):
-            of = Path(*name.parts[name.parts[0] == "seals" :][:3])
+            of = Path(*name.parts[name.parts[0] in ("seals", "logs") :][:3])
             gone = of.parts[0] == "recordings" and not (expected / of).exists()
-            if not gone and name.parts[0] != "nightly":
+            if not gone and of.parts[0] != "nightly":
                 found.append(f"{name} should not be there")
         return found
 

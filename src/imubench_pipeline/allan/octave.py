@@ -254,9 +254,11 @@ def _sections(
             whole = np.isfinite(theta[samples.size])
             if whole:
                 _one_lane(own, samples.size + 1, theta, grid, sums[section])
-                edges[section, :own_points] = theta[:own_points]
+                for i in range(own_points):  # no slice: numba would compile its errors for seconds
+                    edges[section, i] = theta[i]
         if holes and whole:
-            counts[section] = np.arange(points + 1) * DECIMATION
+            for i in range(points):
+                counts[section, i] = i * DECIMATION
             counts[section, points] = own
         elif holes:
             theta[0] = 0.0
@@ -265,8 +267,9 @@ def _sections(
             totals[section] = theta[own]
             counts[section, points] = present[own]
             _with_holes(own, samples.size + 1, theta, present, grid, sums[section])
-            edges[section, :own_points] = theta[:own_points]
-            counts[section, :own_points] = present[:own_points]
+            for i in range(own_points):
+                edges[section, i] = theta[i]
+                counts[section, i] = present[i]
     return sums, totals, edges, counts
 
 
@@ -302,7 +305,9 @@ def _lanes(
 ) -> None:
     """Sum the clusters that begin in a section in lanes, and decimate its phase."""
     rows = SECTION // _LANES
-    lengths = np.diff(offsets)
+    lengths = np.empty(_LANES)
+    for lane in range(_LANES):  # numba would compile np.diff for seconds
+        lengths[lane] = offsets[lane + 1] - offsets[lane]
     for level in range(_LEVELS):
         # A lane goes on where the next one begins.
         for i in range(_REACH):
