@@ -34,6 +34,8 @@ GLOBAL_STEPS = dict.fromkeys(
 )
 
 
+METHODS = ['estimate={"methods": ["likelihood", "weighted"]}']
+
 BAD = {
     "corrupt": "line ",
     "empty": "the file is empty",
@@ -79,7 +81,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Project:
     put_bad_logs(folder / "logs/two")
     (folder / "logs/unknown").mkdir()
     put_log(folder / "logs/unknown/a.csv", 5, samples=10)
-    return Project(folder, folder / "results", linked(folder / "place"))
+    return Project(folder, folder / "results", linked(folder / "place"), METHODS)
 
 
 @pytest.fixture(scope="module")
@@ -202,9 +204,9 @@ def test_exports_and_pages_say_what_does_not_decide(project: Project) -> None:
 
 
 def test_to_include_it_makes_the_tables_and_the_report_anew(project: Project) -> None:
-    project.settings = ["decide={include: [one/c]}"]
+    project.settings = [*METHODS, "decide={include: [one/c]}"]
     jobs = project.jobs()
-    project.settings = []
+    project.settings = METHODS
     assert set(jobs) == {
         "sensor_tables", "tables", "ranking", "shortlist", "repeatability", "fusion", "exports",
         "figures", "report",
@@ -228,7 +230,7 @@ def test_a_second_run_has_nothing_to_do(project: Project) -> None:
 
 
 def test_one_core_and_two_give_the_same_of_each_recording(project: Project, tmp_path: Path) -> None:
-    alone = Project(project.folder, tmp_path / "results", linked(tmp_path))
+    alone = Project(project.folder, tmp_path / "results", linked(tmp_path), METHODS)
     own, others = (made.results / "recordings/one/a" for made in (alone, project))
     last = (own / f"{name}.parquet" for name in ("scores", "datasheet", "error_budget"))
     assert alone.run(*map(str, last), cores=1).returncode == 0
@@ -238,7 +240,7 @@ def test_one_core_and_two_give_the_same_of_each_recording(project: Project, tmp_
 
 @pytest.mark.release
 def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path) -> None:
-    alone = Project(project.folder, tmp_path / "results", linked(tmp_path))
+    alone = Project(project.folder, tmp_path / "results", linked(tmp_path), METHODS)
     rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
     assert alone.run(*rules, cores=1).returncode == 0
     made = sorted((alone.results / "tables").iterdir())
@@ -321,7 +323,7 @@ def test_steps_that_were_killed_after_an_edit_are_run_again(project: Project) ->
 
 @pytest.mark.release
 def test_who_includes_it_has_it_decide(project: Project) -> None:
-    project.settings = ["decide={include: [one/c]}"]
+    project.settings = [*METHODS, "decide={include: [one/c]}"]
     done = project.run()
     assert done.returncode == 0, done.stdout + done.stderr
     about = {row["recording"]: row for row in project.table("recordings") if row["sensor"] == "one"}
