@@ -2,6 +2,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import jsonschema
@@ -112,3 +113,26 @@ def test_a_reader_that_goes_away_is_no_fault(tmp_path: Path, command: str) -> No
     )
     os.close(writing)
     assert (done.stderr, done.returncode) == ("", 141)
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("exprot", "did you mean export?"),
+        ("q\x1b[31m", "no command 'q\\x1b[31m'. There are: schema,"),
+    ],
+)
+def test_a_wrong_command_is_answered_with_the_right_ones(
+    command: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([command])
+    assert ended.value.code == 2
+    assert said in capsys.readouterr().err
+
+
+def test_the_command_has_a_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"imubench {version('imubench_pipeline')}\n"

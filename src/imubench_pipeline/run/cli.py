@@ -8,6 +8,8 @@ import json
 import os
 import sys
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,9 +46,17 @@ _CLOSED_PIPE = 141
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = argparse.ArgumentParser(prog="imubench", description="Inertial sensor benchmark.")
-    commands = parser.add_subparsers(dest="command", required=True)
+    parser.add_argument(
+        "--version", action="version", version=f"imubench {version('imubench_pipeline')}"
+    )
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, command in _COMMANDS.items():
         command.add_arguments(commands.add_parser(name, help=command.help))
+    first = next(iter(sys.argv[1:] if arguments is None else arguments), "-")
+    if first not in _COMMANDS and not first.startswith("-"):
+        close = get_close_matches(first, _COMMANDS, n=1)
+        meant = f", did you mean {close[0]}?" if close else "."
+        parser.error(f"no command {first!r}{meant} There are: {', '.join(_COMMANDS)}")
     options = parser.parse_args(arguments)
     try:
         status = _COMMANDS[options.command].run(options)
