@@ -21,7 +21,7 @@ from tests.fuzz.mutations import mutated
 from tests.fuzz.supervision import HANG_S, Fuzzing
 from tests.readers.test_ubx import raw, samples, truth
 
-SECONDS = 0.3
+SECONDS, MOMENT = 1.0, 0.3
 QUICK = ("csv",)
 """Readers that are fuzzed for a moment in every run of the tests, and the others in `release`."""
 
@@ -29,7 +29,8 @@ _read: Counter[str] = Counter()
 
 
 def test_every_format_is_fuzzed() -> None:
-    assert set(READERS) == set(FILE_FORMATS)
+    lacks = set(FILE_FORMATS) - set(READERS)
+    assert set(READERS) == set(FILE_FORMATS), f"_SEEDS of tests/fuzz/inputs.py lacks {lacks}"
 
 
 def _is_bad(path: Path) -> bool:
@@ -101,7 +102,7 @@ def test_a_reader_that_fails_with_every_log_is_caught(tmp_path: Path) -> None:
     [name if name in QUICK else pytest.param(name, marks=pytest.mark.release) for name in READERS],
 )
 def test_readers_survive_a_moment(tmp_path: Path, reader: str) -> None:
-    found = Fuzzing(reader, SECONDS, tmp_path).run()
+    found = Fuzzing(reader, MOMENT, tmp_path).run()
     assert not found.failures, found.folders
     assert found.inputs > 10
     assert len(found.outcomes) > 3

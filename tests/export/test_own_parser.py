@@ -135,6 +135,11 @@ def sensor(model: NoiseModel, said: str) -> Imu:
     )
 
 
+def test_every_program_has_a_parser() -> None:
+    lacks = TARGETS.keys() - PARSERS.keys()
+    assert not lacks, f"PARSERS lacks {lacks}"
+
+
 @pytest.mark.parametrize("name", TARGETS)
 @settings(max_examples=5, deadline=None)
 @given(model=models, said=names)

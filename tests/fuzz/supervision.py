@@ -178,7 +178,7 @@ class _Running:
         self.tried = 0
         self.seconds = 0.0
         self._mine = mine
-        self._errors = (mine / "errors.txt").open("wb")
+        self._errors = tempfile.TemporaryFile()
         command = [sys.executable, "-X", "faulthandler", "-m", "tests.fuzz.worker"]
         command += [str(seeds), str(mine), "--target", target]
         command += ["--seed", seed, "--seconds", str(seconds)]
@@ -214,10 +214,11 @@ class _Running:
                 break
         status = self._process.wait()
         stream.close()
-        self._errors.close()
         self.seconds = time.monotonic() - begin
+        self._errors.seek(0)
+        said_last = self._errors.read().decode("utf-8", "replace")[-5000:]
+        self._errors.close()
         if status and not fault:
-            said_last = (self._mine / "errors.txt").read_text("utf-8", "replace")[-5000:]
             end = f"signal {-status}" if status < 0 else f"exit status {status}"
             fault = f"{said_last}\n{end}"
         return fault

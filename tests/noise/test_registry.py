@@ -106,7 +106,8 @@ def test_every_kind_is_registered() -> None:
         more = kinds.pop().__subclasses__()
         kinds += more
         known.update(kind for kind in more if kind.__module__.startswith(terms.__name__))
-    assert {kind for kind in known if not inspect.isabstract(kind)} == set(TERMS)
+    lacks = {kind for kind in known if not inspect.isabstract(kind)} - set(TERMS)
+    assert not lacks, f"TERMS of noise/terms/__init__.py lacks {lacks}"
 
 
 @pytest.mark.parametrize("kind", TERMS)
@@ -123,7 +124,7 @@ def test_a_model_holds_it_once(kind: type[Term]) -> None:
 
 @pytest.mark.parametrize("kind", TERMS)
 def test_pages_know_it(kind: type[Term]) -> None:
-    assert kind.symbol in TERM_LOOKS
+    assert kind.symbol in TERM_LOOKS, f"TERM_LOOKS of report/static_figures/terms.py lacks {kind}"
     for quantity in ("gyro", "accel"):
         assert "{" not in TERM_NAMES[quantity][kind.symbol]
     symbols = [one.symbol for one in kind.parameters]

@@ -135,7 +135,7 @@ def _parameters(model: NoiseModel) -> dict[str, object]:
         name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")
     }
     parameters["T_B"] = model.T_B
-    parameters["further"] = [term.values for term in model.further]
+    parameters["further"] = [{"term": term.symbol} | term.values for term in model.further]
     parameters["sinusoids"] = [line.values for line in model.sinusoids]
     return parameters
 

@@ -128,7 +128,7 @@ def _mark_readings(
             axes.axhline(level * scale, color=colour, lw=0.5, ls=(0, (1, 2)))
         mark_point(axes, term.symbol, where, level * scale)
         axes.annotate(
-            f"{factor}${reading.symbol}$",
+            f"{factor}{SYMBOLS[reading.symbol]}",
             (where, level * scale),
             xytext=(-5.0 if at_end else 5.0, -8.0 if below else 4.0),
             ha="right" if at_end else "left",
