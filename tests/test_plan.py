@@ -45,11 +45,14 @@ def test_recordings_are_found_in_order(project: dict[str, Any]) -> None:
     assert [path.name for path in plan.recordings["s", "c"].files] == ["x.csv"]
 
 
-def test_two_logs_of_one_name_are_an_error(project: dict[str, Any]) -> None:
+def test_two_logs_of_one_name_are_both_rejected(project: dict[str, Any]) -> None:
     put(project, "a.csv")
     put(project, "a.csv.gz")
-    with pytest.raises(ConfigError, match=r"a\.csv and .*a\.csv\.gz would both be"):
-        Plan(project)
+    plan = Plan(project)
+    assert list(plan.recordings) == [("s", "a"), ("s", "a (2)")]
+    for name in ("a", "a (2)"):
+        error = json.loads(plan.ingest_settings("s", name))["error"]
+        assert "a.csv and " in error and "a.csv.gz would both be the recording s/a" in error
 
 
 def test_a_sensor_without_a_file_rejects_its_logs_only(project: dict[str, Any]) -> None:

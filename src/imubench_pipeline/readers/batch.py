@@ -28,6 +28,9 @@ from imubench_pipeline.units import conversion
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in a unit of time stamps."""
 
+_LEAST = 1e-75
+"""SI. Less was never measured, and its square is 0: a column of such figures is one of zeros."""
+
 
 def stated_in(key: str) -> str:
     """Return where it is to be mended from which column a channel, or what is beside, is read."""
@@ -113,4 +116,6 @@ class LogFile(ABC):
             raw = raw - source.offset
         with np.errstate(over="ignore"):  # infinite, and counted as such
             figures = raw * (source.scale * factor)
+        if len(figures) and max(np.fmax.reduce(figures), -np.fmin.reduce(figures)) < _LEAST:
+            figures = np.where(np.isnan(figures), np.nan, 0.0)
         return figures + zero if zero else figures

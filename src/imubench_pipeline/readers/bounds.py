@@ -41,6 +41,9 @@ LARGEST_RECORD = 1 << 26
 LARGEST_CHUNKS = 1 << 28
 """Bytes of the chunks of all columns of an HDF5 file together: each is unpacked as a whole."""
 
+MOST_CHUNKS = 1 << 17
+"""Of an HDF5 data set: the library takes 2 kB for each."""
+
 LARGEST_ARROW_BATCH = 1 << 28
 """Bytes of a compressed record batch of Feather or Arrow IPC, which is unpacked as a whole."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from imubench_pipeline.readers import log_files
+from imubench_pipeline.settings.validation import cut
 
 PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
 """How the names of files end that are still being transferred."""
@@ -17,7 +18,11 @@ COMPRESSED = frozenset({".gz", ".zst", ".xz", ".bz2", ".zip"})
 
 _NOT_LOGS = {".yaml", ".yml", ".md"} | PARTIAL
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
-_LONGEST_NAME = 120
+_LONGEST_NAME, _MOST_BYTES = 120, 160
+"""Letters, and bytes: the name of a page is longer, and systems take 255 bytes."""
+
+_PERIODIC = re.compile(r"(.+?)\1{19,}$")
+"""An end that repeats itself: Snakemake ends a run over names that do so twenty times."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +98,8 @@ def sensor_of(folder: Path) -> str:
 
 
 def _usable(name: str) -> str:
-    return _UNUSABLE_IN_NAMES.sub("_", name)[:_LONGEST_NAME]
+    short = _UNUSABLE_IN_NAMES.sub("_", name)[:_LONGEST_NAME].encode()[:_MOST_BYTES]
+    return _PERIODIC.sub(r"\1", short.decode("utf-8", "ignore"))
 
 
 def _fault(path: Path, name: str) -> str | None:
@@ -101,21 +107,33 @@ def _fault(path: Path, name: str) -> str | None:
     shown = ascii(path.name)
     folder = path.parent.name
     for what, name_shown, stem in (("file", shown, name), ("folder", ascii(folder), folder)):
-        if _UNUSABLE_IN_NAMES.search(stem) or len(stem) > _LONGEST_NAME:
+        if _usable(stem) != stem:
             return (
-                f"the {what} name {name_shown} cannot be used; expected at most {_LONGEST_NAME} "
-                f"letters, digits, spaces and . _ - + ( ) in it: rename the {what}"
+                f"the {what} name {cut(name_shown, str)} cannot be used; expected at most "
+                f"{_LONGEST_NAME} letters ({_MOST_BYTES} bytes), digits, spaces and . _ - + ( ) in "
+                f"it, and no end that repeats itself: rename the {what}"
             )
     try:
         if not log_files(path):
             return f"the folder {shown} has no files"
         for file in log_files(path):
+            if not _is_text(file.name):
+                return f"{shown} holds a file of the name {file.name!a}: rename it in UTF-8"
             file.stat()
             with file.open("rb"):
                 pass
     except OSError as error:
         return f"{shown} cannot be read ({error.strerror})"
     return None
+
+
+def _is_text(name: str) -> bool:
+    """Return whether a name is text in the encoding of the system."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _stem(path: Path) -> str:

@@ -23,6 +23,12 @@ _SHARED = 0.2
 """Part of the records that repeat a stamp beyond which a stamp belongs to a group of samples."""
 
 _SAME = 1e-5
+_SHORTEST, _LONGEST = 1e-15, 1e11
+"""s; what a log can span."""
+
+_MOST_HOLES, _MOST_POINTS = 100, 10_000_000
+"""Samples that may be missing for each that is there, and beside them: each takes memory."""
+
 """Relative difference of two intervals at which stamps are put on the same grid points."""
 
 
@@ -80,6 +86,11 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     RecordingError
         If the stamps do not advance.
     """
+    if math.isfinite(span := _span(stamps)) and span > 0.0 and not _SHORTEST <= span <= _LONGEST:
+        raise RecordingError(
+            f"the time stamps span {span:.3g} s; is 'unit' of 'time' the right one of s, ms, us, "
+            "ns?"
+        )
     typical = typical_interval(stamps)
     if typical is None:
         raise RecordingError("the time stamps do not advance; is the right column named?")
@@ -91,6 +102,12 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     if abs(mean / interval - 1.0) > _SAME:
         # The mean over the recording is far better known than the typical interval: once more.
         track = tracked(stamps, mean, settings.longest_hole)
+    if track.grid > _MOST_POINTS + _MOST_HOLES * track.rows:
+        raise RecordingError(
+            f"of {track.grid} samples at {1.0 / interval:.6g} Hz {track.rows} are there; expected "
+            f"one of {_MOST_HOLES}: is 'unit' of 'time' the right one? Else cut the log at its "
+            "holes"
+        )
     # Many holes that are together longer than the log are pauses of the host, not losses.
     bursts = track.grid > 2 * track.rows and track.holes > 0.05 * track.rows
     shared = track.duplicates > _SHARED * track.rows

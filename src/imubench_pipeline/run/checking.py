@@ -12,10 +12,13 @@ from imubench_pipeline.estimators.frame import FEWEST_BINS, frame_of
 from imubench_pipeline.estimators.likelihood import fit_models
 from imubench_pipeline.estimators.spectral_findings import band_finding, line_findings
 from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.recordings.drop_zone import Recording
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import ChannelLog, static_logs
+from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import Finding
 
 
@@ -24,16 +27,27 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
     for (sensor, name), recording in plan.recordings.items():
         if recording.simulated:
             continue
-        with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
-            settings = plan.ingest_settings(sensor, name)
-            quality = ingest_as_planned(
-                recording.path, settings, sensor, name, Path(folder), guarded=True
-            )
-            quality.findings.extend(implausible_of(quality, plan.sensors.get(sensor)))
-            for channel, log in static_logs(Path(folder)).items():
-                for finding in spectral_findings(channel, log, plan.bandwidth(sensor, name)):
-                    quality.findings.append(dict(finding.row(sensor, name)))
+        try:
+            quality = _checked(plan, sensor, name, recording)
+        except Exception as error:  # the others are checked all the same
+            reason = one_line(f"{recording.path.name}: {type(error).__name__}: {error}")
+            failure = Failure(sensor, name, "check", "error", reason)
+            quality = Quality({"status": "failed"}, [dict(failure.finding().row(sensor, name))], {})
         yield sensor, name, quality
+
+
+def _checked(plan: Plan, sensor: str, name: str, recording: Recording) -> Quality:
+    """Read a recording as the run would, and look for what it would find; nothing is kept."""
+    with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
+        settings = plan.ingest_settings(sensor, name)
+        quality = ingest_as_planned(
+            recording.path, settings, sensor, name, Path(folder), guarded=True
+        )
+        quality.findings.extend(implausible_of(quality, plan.sensors.get(sensor)))
+        for channel, log in static_logs(Path(folder)).items():
+            for finding in spectral_findings(channel, log, plan.bandwidth(sensor, name)):
+                quality.findings.append(dict(finding.row(sensor, name)))
+    return quality
 
 
 def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) -> list[Finding]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -85,10 +86,22 @@ class Plan:
         for recording in [*self._found_logs(), *self._to_simulate()]:
             other = self.recordings.setdefault((recording.sensor, recording.name), recording)
             if other is not recording:
-                raise ConfigError(
+                fault = (
                     f"{other.path} and {recording.path} would both be the recording "
                     f"{recording.sensor}/{recording.name}; rename or remove one"
                 )
+                if recording.simulated or recording.held_back:
+                    raise ConfigError(fault)
+                self._leave_out_both(other, recording, fault)
+
+    def _leave_out_both(self, first: Recording, second: Recording, fault: str) -> None:
+        """Reject two logs of one name: which of them is meant, nobody can tell."""
+        self.recordings[first.sensor, first.name] = replace(first, error=first.error or fault)
+        number = 2
+        while (second.sensor, name := f"{second.name} ({number})") in self.recordings:
+            number += 1
+        left_out = replace(second, name=name, error=second.error or fault)
+        self.recordings[second.sensor, name] = left_out
 
     def _found_logs(self) -> list[Recording]:
         if not self.run.logs.is_dir():

@@ -26,6 +26,9 @@ DEEPEST = 40
 MOST = 200_000
 """Keys and values of a file; what an alias stands for counts where it stands."""
 
+LONGEST_FIGURE = 100
+"""Letters of a number or a date: what is read of base 60, which YAML has, takes their square."""
+
 if TYPE_CHECKING:
     _SAFE = yaml.SafeLoader
 else:
@@ -35,6 +38,8 @@ else:
 _Model = TypeVar("_Model", bound=BaseModel)
 
 _MERGED = "tag:yaml.org,2002:merge"
+_TEXTS = {"tag:yaml.org,2002:str", "tag:yaml.org,2002:binary"}
+_LARGEST_KEY = 1 << 31
 
 
 class _Loader(_SAFE):
@@ -46,6 +51,9 @@ class _Loader(_SAFE):
             if key_node.tag == _MERGED:
                 continue
             key = self.construct_object(key_node, deep=True)
+            if isinstance(key, float) or (isinstance(key, int) and abs(key) > _LARGEST_KEY):
+                # A table of numbers that were chosen for it takes the square of their count.
+                raise _fault(key_node, f"found the key {cut(key)}; expected a name")
             if isinstance(key, Hashable):
                 if key in seen:
                     raise _fault(key_node, f"the key {cut(key)} stands twice; remove one")
@@ -53,6 +61,10 @@ class _Loader(_SAFE):
         return super().construct_mapping(node, deep=deep)
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        figure = isinstance(node, yaml.ScalarNode) and node.tag not in _TEXTS
+        if figure and len(node.value) > LONGEST_FIGURE:
+            kind = cut(node.tag.rpartition(":")[2], str)
+            raise _fault(node, f"{len(node.value)} letters are no {kind}; expected a shorter one")
         try:
             return super().construct_object(node, deep=deep)
         except (ValueError, LookupError, AttributeError) as error:

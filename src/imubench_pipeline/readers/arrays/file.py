@@ -29,7 +29,13 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Column, Table, UnusableError
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
-from imubench_pipeline.readers.bounds import LARGEST_CHUNKS, LARGEST_RECORD, MOST_ARRAYS
+from imubench_pipeline.readers.bounds import (
+    LARGEST_CHUNKS,
+    LARGEST_RATIO,
+    LARGEST_RECORD,
+    MOST_ARRAYS,
+    UNSUSPICIOUS,
+)
 from imubench_pipeline.readers.file_format import (
     FIRST,
     NOTHING_STATED,
@@ -98,7 +104,8 @@ class ArrayFile(LogFile):
         rows = rows_of_block(
             sum(table.row_bytes(wanted[table]) for table in tables), LARGEST_RECORD
         )
-        read = 0
+        read, size = 0, self.path.stat().st_size
+        most = max(UNSUSPICIOUS, LARGEST_RATIO * size)
         streams = [table.blocks(wanted[table], rows) for table in tables]
         for parts in zip(*streams, strict=True):
             of_table = dict(zip(tables, parts, strict=True))
@@ -108,6 +115,11 @@ class ArrayFile(LogFile):
             }
             count = len(next(iter(block.values())))
             read += count
+            if 8 * read * len(places) > most:
+                raise UnusableError(
+                    f"its {size} bytes hold more than {read - count} records; expected figures "
+                    f"that take at most {LARGEST_RATIO} times the size of their file"
+                )
             if count:
                 yield block
         if read == 0:

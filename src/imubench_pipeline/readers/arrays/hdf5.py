@@ -23,7 +23,12 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.table import Array, Table, UnusableError
-from imubench_pipeline.readers.bounds import DEEPEST_GROUP, LARGEST_CHUNKS, MOST_OBJECTS
+from imubench_pipeline.readers.bounds import (
+    DEEPEST_GROUP,
+    LARGEST_CHUNKS,
+    MOST_CHUNKS,
+    MOST_OBJECTS,
+)
 
 _CACHE_SLOTS, _CACHE_WEIGHT, _LEAST_CACHE = 521, 0.75, 1 << 20
 """As the library has them."""
@@ -226,6 +231,11 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
         raise UnusableError(
             f"{written} of {chunks} chunks of {name} were written, the others would read as "
             "zeros; cut it to what was recorded, or copy the file again"
+        )
+    if chunks > MOST_CHUNKS:
+        raise UnusableError(
+            f"{name} lies in {chunks} chunks; expected at most {MOST_CHUNKS}: repack it with "
+            "h5repack -l"
         )
 
 
