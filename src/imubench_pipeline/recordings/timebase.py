@@ -23,8 +23,8 @@ _SHARED = 0.2
 """Part of the records that repeat a stamp beyond which a stamp belongs to a group of samples."""
 
 _SAME = 1e-5
-_SHORTEST, _LONGEST = 1e-15, 1e11
-"""s; what a log can span."""
+_SHORTEST, _LONGEST = 1e-18, 1e8
+"""s; between two samples, also where their unit is taken for another one."""
 
 _MOST_HOLES, _MOST_POINTS = 100, 10_000_000
 """Samples that may be missing for each that is there, and beside them: each takes memory."""
@@ -86,15 +86,15 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     RecordingError
         If the stamps do not advance.
     """
-    if math.isfinite(span := _span(stamps)) and span > 0.0 and not _SHORTEST <= span <= _LONGEST:
-        raise RecordingError(
-            f"the time stamps span {span:.3g} s; is 'unit' of 'time' the right one of s, ms, us, "
-            "ns?"
-        )
     typical = typical_interval(stamps)
     if typical is None:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     interval = typical.mean
+    if not _SHORTEST <= interval <= _LONGEST:
+        raise RecordingError(
+            f"the time stamps are {interval:.3g} s apart; is 'unit' of 'time' the right one of s, "
+            "ms, us, ns?"
+        )
     if typical.with_losses is not None and _is(stated, typical.with_losses, settings):
         interval = typical.with_losses
     track = tracked(stamps, interval, settings.longest_hole)
