@@ -65,6 +65,50 @@ def test_a_sensor_without_a_file_rejects_its_logs_only(project: dict[str, Any]) 
     assert json.loads(plan.datasheet_settings("t"))["datasheet"] == {}
 
 
+def test_a_broken_sensor_file_rejects_its_logs_only(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    put(project, "../t/a.csv")
+    (Path(project["sensors"]) / "t.yaml").write_text("vendor: [\n")
+    plan = Plan(project)
+    assert "error" not in json.loads(plan.ingest_settings("s", "a"))
+    error = json.loads(plan.ingest_settings("t", "a"))["error"]
+    assert "t.yaml, line 2: not readable as YAML" in error and plan.unusable == {"t": error}
+    simulated = Path(project["sensors"]).parent / "simulated.yaml"
+    simulated.write_text("recordings: [{sensor: t, recording: a, channels: {}, duration: 1 s}]\n")
+    with pytest.raises(ConfigError, match=r"simulated.yaml|t.yaml, line 2"):
+        Plan(project | {"simulated": str(simulated)})
+
+
+def test_a_log_in_no_folder_of_a_sensor_is_rejected(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    put(project, "../lost.csv")
+    put(project, "../README.md")
+    plan = Plan(project)
+    assert list(plan.recordings) == [("(no sensor)", "lost"), ("s", "a")]
+    error = json.loads(plan.ingest_settings("(no sensor)", "lost"))["error"]
+    assert "lost.csv lies beside the folders of the sensors" in error
+
+
+def test_notes_of_no_log_are_told(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    put(project, "b.yaml", "{}")
+    put(project, "a.yml", "{}")
+    plan = Plan(project)
+    error = json.loads(plan.ingest_settings("s", "b"))["error"]
+    assert "b.yaml: notes of no log" in error
+    error = json.loads(plan.ingest_settings("s", "a"))["error"]
+    assert "rename it to a.yaml" in error
+    assert list(plan.recordings) == [("s", "a"), ("s", "b")]
+
+
+def test_a_folder_is_no_file_of_notes(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    put(project, "a.yaml/b.csv")
+    plan = Plan(project)
+    assert plan.recordings["s", "a"].notes is None
+    assert [path.name for path in plan.recordings["s", "a.yaml"].files] == ["b.csv"]
+
+
 def test_wrong_notes_reject_their_log_only(project: dict[str, Any]) -> None:
     put(project, "a.csv")
     put(project, "a.yaml", "divice: 7\n")

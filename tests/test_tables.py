@@ -33,6 +33,11 @@ def test_a_value_that_is_not_there_is_null(tmp_path: Path) -> None:
     assert pq.read_table(tmp_path / "a.parquet")["rms"].null_count == 1
 
 
+def test_texts_show_each_of_their_signs() -> None:
+    made = build("scores", [SCORE | {"recording": "a\x1b[2J\u202eb"}])
+    assert made["recording"].to_pylist() == [r"a\x1b[2J\u202eb"]
+
+
 def test_columns_carry_unit_and_meaning(tmp_path: Path) -> None:
     write("allan", [], tmp_path / "a.parquet")
     field = pq.read_schema(tmp_path / "a.parquet").field("tau")

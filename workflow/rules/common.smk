@@ -29,6 +29,9 @@ try:
 except ConfigError as error:
     raise WorkflowError(str(error)) from None
 
+for reason in plan.unusable.values():
+    logger.warning(reason)
+
 # What a rule does is named by its `script:`, and Snakemake calls the function of this name for it.
 # This one forks a process that has the imports. On a cluster what fails is tried again by Snakemake.
 script = Scripts(plan.faults, None if workflow.remote_exec else limits_of_steps(plan))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,11 @@ PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
 COMPRESSED = frozenset({".gz", ".zst", ".xz", ".bz2", ".zip"})
 """How the names of files end that are compressed."""
 
-_NOT_LOGS = {".yaml", ".yml", ".md"} | PARTIAL
+NO_SENSOR = "(no sensor)"
+"""Stands for the sensor of logs that lie beside the folders of the sensors."""
+
+_NOTES = ".yaml"
+_NOT_LOGS = {_NOTES, ".yml", ".md"} | PARTIAL
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
 _LONGEST_NAME, _MOST_BYTES = 120, 160
 """Letters, and bytes: the name of a page is longer, and systems take 255 bytes."""
@@ -64,27 +69,59 @@ class Recording:
 
 
 def found_logs(logs: Path) -> list[Recording]:
-    """Return the recordings of a drop zone, in order; two logs of one name are there twice."""
+    """Return the recordings of a drop zone, in order; two logs of one name are there twice.
+
+    What nobody can analyse is among them, with the reason: logs that lie in no folder of a sensor,
+    and notes of which there is no log. Hidden files, backups of editors (``~``), what is written on
+    logs (``.md``) and files that are still being transferred are passed over.
+    """
     recordings = []
-    for folder in sorted(path for path in logs.iterdir() if path.is_dir()):
-        for path in sorted(folder.iterdir()):
-            if path.name.startswith(".") or path.name.endswith("~"):
-                continue
-            if not path.is_dir() and path.suffix.lower() in _NOT_LOGS:
-                continue
-            name = path.name if path.is_dir() else _stem(path)
-            notes = folder / f"{name}.yaml"
-            recordings.append(
-                Recording(
-                    sensor_of(folder),
-                    _usable(name),
-                    path,
-                    notes if os.path.lexists(notes) else None,
-                    simulated=False,
-                    error=_fault(path, name),
-                )
+    for path in sorted(logs.iterdir()):
+        if path.is_dir():
+            recordings += _logs_of(path)
+        elif _is_log(path):
+            fault = _fault(path, _stem(path)) or (
+                f"{path.name} lies beside the folders of the sensors; expected it in "
+                f"{logs / '<sensor>'}, a folder of the name of its sensor file: move it there"
             )
+            recordings.append(_found(NO_SENSOR, path, _stem(path), fault))
     return recordings
+
+
+def _logs_of(folder: Path) -> Iterator[Recording]:
+    """Yield the recordings in the folder of a sensor."""
+    sensor = sensor_of(folder)
+    used: set[Path] = set()
+    paths = [path for path in sorted(folder.iterdir()) if path.is_dir() or _is_log(path)]
+    for path in paths:
+        name = path.name if path.is_dir() else _stem(path)
+        notes, misnamed = folder / f"{name}{_NOTES}", folder / f"{name}.yml"
+        used |= {notes, misnamed}
+        there = os.path.lexists(notes) and not notes.is_dir()
+        fault = _fault(path, name)
+        if fault is None and misnamed.is_file():
+            fault = f"{misnamed.name}: notes end in {_NOTES}; rename it to {notes.name}"
+        yield _found(sensor, path, name, fault, notes if there else None)
+    for path in sorted({*folder.glob("*.yaml"), *folder.glob("*.yml")} - used - {*paths}):
+        if not path.name.startswith("."):
+            fault = (
+                f"{path.name}: notes of no log; expected one of the name {path.stem} beside them: "
+                "rename the notes, or bring the log; a sensor file belongs to those of the others"
+            )
+            yield _found(sensor, path, path.stem, _fault(path, path.stem) or fault)
+
+
+def _is_log(path: Path) -> bool:
+    """Tell whether a file of the drop zone is to be a log, by its name."""
+    if path.name.startswith(".") or path.name.endswith("~"):
+        return False
+    return path.suffix.lower() not in _NOT_LOGS
+
+
+def _found(
+    sensor: str, path: Path, name: str, error: str | None, notes: Path | None = None
+) -> Recording:
+    return Recording(sensor, _usable(name), path, notes, simulated=False, error=error)
 
 
 def name_of(file: str) -> str:

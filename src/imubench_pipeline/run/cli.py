@@ -185,6 +185,7 @@ def _check(options: argparse.Namespace) -> int:
     # Numerics are loaded for this command only: the others answer at once.
     from imubench_pipeline.run.checking import check
     from imubench_pipeline.run.plan import Plan
+    from imubench_pipeline.tables.texts import printable
 
     try:
         over: dict[str, object] = {"logs": str(options.logs), "simulated": None}
@@ -196,14 +197,17 @@ def _check(options: argparse.Namespace) -> int:
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2
-    worst = 0
+    for reason in plan.unusable.values():
+        print(reason, file=sys.stderr)
+    worst = int(bool(plan.unusable))
     for sensor, recording, quality in check(plan):
         serious = [f for f in quality.findings if f["severity"] != "note"]
         worst = max(worst, int(bool(serious)))
         status = quality.recording["status"]
         print(f"{sensor}/{recording}: {status if status != 'ok' or not serious else 'warnings'}")
         for finding in quality.findings:
-            print(f"  {finding['severity']:8} {finding['finding']}: {finding['detail']}")
+            detail = printable(finding["detail"])
+            print(f"  {finding['severity']:8} {finding['finding']}: {detail}")
         sys.stdout.flush()
     return worst
 

@@ -30,7 +30,7 @@ from imubench_pipeline.settings.sensor import (
     Sensor,
     kind_of,
     merged_log,
-    read_sensors,
+    read_sensor_files,
 )
 from imubench_pipeline.settings.simulated_recordings import (
     Board,
@@ -68,16 +68,24 @@ class Plan:
     Raises
     ------
     ConfigError
-        If the configuration, a sensor file or the list of simulated recordings cannot be used,
-        or two logs would make one recording.
+        If the configuration or the list of simulated recordings cannot be used, or a log would
+        make the same recording as one of these.
     """
 
     def __init__(self, config: Mapping[str, object]) -> None:
         self.run: Run = read_run(config)
         self.faults = Faults(self.run.results)
-        self.sensors: dict[str, Sensor] = read_sensors(self.run.sensors)
+        declared = read_sensor_files(self.run.sensors)
+        self.sensors: dict[str, Sensor] = {}
+        self.unusable: dict[str, str] = {}
+        """Why a sensor file is of no use, by sensor: all logs of that sensor are rejected."""
+        for name, sensor in declared.items():
+            if isinstance(sensor, ConfigError):
+                self.unusable[name] = str(sensor)
+            else:
+                self.sensors[name] = sensor
         self.requirements: dict[str, Requirement] = read_requirements(self.run.requirements)
-        simulated = read_simulated(self.run.simulated, self.sensors)
+        simulated = read_simulated(self.run.simulated, declared)
         self.boards: dict[str, Board] = simulated.boards
         self._simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
@@ -264,6 +272,8 @@ class Plan:
         notes = RecordingNotes()
         if recording.notes:
             notes = parse(RecordingNotes, self._notes(recording), str(recording.notes))
+        if recording.sensor in self.unusable:
+            raise ConfigError(self.unusable[recording.sensor])
         if recording.sensor not in self.sensors:
             expected = self.run.sensors / f"{recording.sensor}.yaml"
             raise ConfigError(

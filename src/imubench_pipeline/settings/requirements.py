@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from imubench_pipeline.settings.validation import Between, Frequency, Strict, Text, checked, of_size
-from imubench_pipeline.settings.yaml_files import read_folder
+from imubench_pipeline.settings.yaml_files import read_folder, usable
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
 Error = Literal["attitude", "heading", "velocity", "position", "north"]
@@ -197,7 +197,7 @@ def read_requirements(folder: Path | None) -> dict[str, Requirement]:
 
     Raises `ConfigError`.
     """
-    return {} if folder is None else read_folder(Requirement, folder, "requirement")
+    return {} if folder is None else usable(read_folder(Requirement, folder, "requirement"))
 
 
 def requirements_of(sections: Mapping[str, object]) -> dict[str, Requirement]:

@@ -13,8 +13,16 @@ from pydantic import Field, model_validator
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.two_position import TwoPosition
-from imubench_pipeline.settings.validation import Between, Frequency, Strict, Text, of_size, parse
-from imubench_pipeline.settings.yaml_files import read_folder
+from imubench_pipeline.settings.validation import (
+    Between,
+    ConfigError,
+    Frequency,
+    Strict,
+    Text,
+    of_size,
+    parse,
+)
+from imubench_pipeline.settings.yaml_files import read_folder, usable
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
 
 QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
@@ -338,6 +346,17 @@ def kind_of(notes: object) -> Kind:
 
 def read_sensors(folder: Path) -> dict[str, Sensor]:
     """Read every sensor file of a folder, by name; raises `ConfigError`."""
+    return usable(read_sensor_files(folder))
+
+
+def read_sensor_files(folder: Path) -> dict[str, Sensor | ConfigError]:
+    """Read every sensor file of a folder, by name; why, of those that are of no use.
+
+    Raises
+    ------
+    ConfigError
+        If there is no folder.
+    """
     return read_folder(Sensor, folder, "sensor")
 
 

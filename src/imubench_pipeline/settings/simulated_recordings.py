@@ -287,7 +287,7 @@ class ToSimulate:
     boards: dict[str, Board]
 
 
-def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimulate:
+def read_simulated(path: Path | None, sensors: Mapping[str, Sensor | ConfigError]) -> ToSimulate:
     """Read what is simulated; nothing where ``path`` is None. Raises `ConfigError`."""
     if path is None:
         return ToSimulate([], {})
@@ -318,7 +318,7 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimula
     return ToSimulate(recordings, boards)
 
 
-def _board(path: Path, sensors: Mapping[str, Sensor]) -> Board:
+def _board(path: Path, sensors: Mapping[str, Sensor | ConfigError]) -> Board:
     board = read_settings(Board, path)
     for number, entry in enumerate(board.sensors):
         _check(entry, sensors, f"{path}: sensors.{number}")
@@ -328,17 +328,20 @@ def _board(path: Path, sensors: Mapping[str, Sensor]) -> Board:
     return _found_from(board, path)
 
 
-def _check(entry: OfASensor, sensors: Mapping[str, Sensor], key: str) -> None:
-    if entry.sensor not in sensors:
+def _check(entry: OfASensor, sensors: Mapping[str, Sensor | ConfigError], key: str) -> None:
+    sensor = sensors.get(entry.sensor)
+    if isinstance(sensor, ConfigError):
+        raise sensor
+    if sensor is None:
         raise ConfigError(
             f"{key}.sensor: found {entry.sensor!r}; expected one of the sensor "
             f"files: {', '.join(sensors)}"
         )
-    unknown = set(entry.channels) - set(sensors[entry.sensor].log.channels)
+    unknown = set(entry.channels) - set(sensor.log.channels)
     if unknown:
         raise ConfigError(
             f"{key}.channels: {', '.join(sorted(unknown))} not channels "
-            f"of {entry.sensor}: {', '.join(sensors[entry.sensor].log.channels)}"
+            f"of {entry.sensor}: {', '.join(sensor.log.channels)}"
         )
 
 

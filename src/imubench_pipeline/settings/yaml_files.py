@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -112,11 +112,34 @@ def read_settings(model: type[_Model], path: Path) -> _Model:
     return parse(model, read_yaml(path), str(path))
 
 
-def read_folder(model: type[_Model], folder: Path, each: str) -> dict[str, _Model]:
-    """Read every ``.yaml`` file of a folder, by name; raises `ConfigError`."""
+def read_folder(model: type[_Model], folder: Path, each: str) -> dict[str, _Model | ConfigError]:
+    """Read every ``.yaml`` file of a folder, by name; of one that is of no use return why.
+
+    Raises
+    ------
+    ConfigError
+        If there is no folder.
+    """
     if not folder.is_dir():
         raise ConfigError(f"{folder}: no such folder; expected one YAML file a {each}")
-    return {path.stem: read_settings(model, path) for path in sorted(folder.glob("*.yaml"))}
+    return {path.stem: _read(model, path) for path in sorted(folder.glob("*.yaml"))}
+
+
+def _read(model: type[_Model], path: Path) -> _Model | ConfigError:
+    try:
+        return read_settings(model, path)
+    except ConfigError as error:
+        return error
+
+
+def usable(read: Mapping[str, _Model | ConfigError]) -> dict[str, _Model]:
+    """Return what `read_folder` has read, if all of it is of use; else raise the first error."""
+    models = {}
+    for name, model in read.items():
+        if isinstance(model, ConfigError):
+            raise model
+        models[name] = model
+    return models
 
 
 def _text_of(path: Path) -> str:

@@ -17,7 +17,7 @@ import pyarrow.csv as pacsv
 from imubench_pipeline.tables.columns import Column
 from imubench_pipeline.tables.parquet import SEAL, checked_parquet, seal_broken, write_sealed
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
-from imubench_pipeline.tables.texts import with_safe_cells
+from imubench_pipeline.tables.texts import printable, with_safe_cells
 
 _SMALL = 1_000_000  # bytes
 
@@ -54,7 +54,8 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
     table : str
         A key of `imubench_pipeline.tables.schemas.TABLES`, or of ``PARTS_OF`` there.
     rows : iterable of mapping
-        One mapping a row; a column that a row leaves out is null. NaN becomes null.
+        One mapping a row; a column that a row leaves out is null. NaN becomes null, and
+        texts are `printable`.
 
     Raises
     ------
@@ -69,6 +70,8 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
     arrays = []
     for column in columns:
         values = [row.get(column.name) for row in listed]
+        if pa.types.is_string(column.type):
+            values = [None if text is None else printable(text) for text in values]
         array = pa.array(values, type=column.type, from_pandas=True)
         if column.required and array.null_count:
             raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
@@ -123,7 +126,7 @@ def write_arrow(table: pa.Table, path: Path) -> None:
     """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically.
 
     Texts in CSV are such as no spreadsheet takes for formulas (`imubench_pipeline.tables.texts`);
-    Parquet has them as they are.
+    Parquet has them without that.
     """
     with replacing(path) as temporary:
         if path.suffix == ".csv":

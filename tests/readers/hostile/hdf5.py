@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -91,7 +93,27 @@ def long_names(made: h5py.File) -> None:
         made["\n\x1b[2J" * 1000 + str(number)] = np.ones(100)
 
 
+def one_unit_for_all(folder: Path) -> Path:
+    """Write 300 data sets whose units are one text of 60 MB."""
+    path, longest, short = folder / "log.h5", 60_000_000, 77
+    with h5py.File(path, "w") as made:
+        for number in range(300):
+            made[f"w{number}"] = np.ones(100)
+            made[f"w{number}"].attrs["units"] = "u" * (short if number else longest)
+        made["wx"], made["ax"] = np.ones(100), np.ones(100)
+    content = path.read_bytes()
+    # A reference is the length of a text and its place: that of a heap, below 4 GB, and a number.
+    of_longest = content.index(struct.pack("<I", longest))
+    reference = content[of_longest : of_longest + 16]
+    others = re.compile(re.escape(struct.pack("<I", short)) + rb".{4}\0{4}.{4}", re.DOTALL)
+    content, changed = others.subn(lambda _: reference, content)
+    assert changed == 299
+    path.write_bytes(content)
+    return path
+
+
 HDF5 = {
+    "one unit of 60 MB for 300": Attack(one_unit_for_all, "^read: 100$", "^listed: "),
     "names that clear a terminal": Attack(
         hdf5(long_names), "no variable or column 'wx' .*; the file has .*; mend 'column'", "^listed"
     ),

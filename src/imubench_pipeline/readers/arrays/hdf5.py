@@ -276,7 +276,7 @@ def _texts_of_variable_length(path: str, *_: int) -> dict[str, str]:
     """
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _READING, path, *_NAMES],
+            [sys.executable, "-c", _READING, path, str(_LONGEST_STORED), *_NAMES],
             capture_output=True,
             timeout=_LONGEST_WAIT,
             check=True,
@@ -291,7 +291,7 @@ _READING = """
 import json, sys
 import h5py
 
-found = {}
+units = {}
 
 def visit(name, item):
     if isinstance(item, h5py.Dataset):
@@ -302,5 +302,5 @@ def visit(name, item):
 
 with h5py.File(sys.argv[1], "r") as file:
     file.visititems(visit)
-print(json.dumps(found))
+print(json.dumps(units))
 """
