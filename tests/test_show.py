@@ -122,7 +122,7 @@ def test_what_was_compared_comes_first(results: Path, capsys: pytest.CaptureFixt
     assert text.startswith(
         "Recordings: 4 of 4 sensors; 3 analysed, 1 rejected; 1 simulated from published parameters"
     )
-    assert after(text, "Rejected: 1") == "bad/run: no column 'wx'; found [bold]wy [31m"
+    assert after(text, "Rejected: 1") == "bad/run: no column 'wx'; found [bold]wy\\x1b[31m"
     assert after(text, "Warnings: 1").startswith(
         "good/run gyro_x (suspicious unit): is it in degrees? is it"
     )

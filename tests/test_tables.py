@@ -34,8 +34,8 @@ def test_a_value_that_is_not_there_is_null(tmp_path: Path) -> None:
 
 
 def test_texts_show_each_of_their_signs() -> None:
-    made = build("scores", [SCORE | {"recording": "a\x1b[2J\u202eb"}])
-    assert made["recording"].to_pylist() == [r"a\x1b[2J\u202eb"]
+    made = build("scores", [SCORE | {"recording": "a\x1b[2J\n\u202eb"}])
+    assert made["recording"].to_pylist() == ["a\\x1b[2J\n\\u202eb"]
 
 
 def test_columns_carry_unit_and_meaning(tmp_path: Path) -> None:

@@ -226,10 +226,10 @@ def test_logs_that_settled_are_taken_and_what_is_known_flags_nothing_again(
 
 def test_a_failed_run_says_why_and_is_no_state_to_compare_with(project: Project) -> None:
     before = (project.nightly / "state.json").read_bytes()
-    put_sensor(project.folder / "sensors/two.yaml", vendr="V")
+    (project.folder / "sensors").rename(project.folder / "elsewhere")
     status, said = project.run()
     assert status == 2
-    assert "two.yaml: vendr: unknown key; did you mean 'vendor'?" in said
+    assert "sensors: no such folder; expected one YAML file a sensor" in said
     assert project.summary()["outcome"] == "failed"
     assert (project.nightly / "state.json").read_bytes() == before
     assert (project.nightly / "latest.txt").read_text() in said

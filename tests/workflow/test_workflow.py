@@ -3,6 +3,7 @@
 import contextlib
 import html
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -290,11 +291,9 @@ def test_a_removed_log_runs_the_global_steps(project: Project) -> None:
 
 
 def test_a_wrong_setting_stops_the_run_before_it_begins(project: Project) -> None:
-    put_sensor(project.folder / "sensors/three.yaml", vendr="V")
-    done = project.run("-n")
-    (project.folder / "sensors/three.yaml").unlink()
+    done = replace(project, settings=[*project.settings, "qualty={}"]).run("-n")
     assert done.returncode != 0
-    assert "three.yaml: vendr: unknown key; did you mean 'vendor'?" in done.stdout + done.stderr
+    assert "qualty: unknown key; did you mean 'quality'?" in done.stdout + done.stderr
     assert "Traceback" not in done.stdout + done.stderr
 
 

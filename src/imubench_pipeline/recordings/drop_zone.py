@@ -75,8 +75,8 @@ def found_logs(logs: Path) -> list[Recording]:
     and notes of which there is no log. Hidden files, backups of editors (``~``), what is written on
     logs (``.md``) and files that are still being transferred are passed over.
     """
-    recordings = []
-    for path in sorted(logs.iterdir()):
+    recordings: list[Recording] = []
+    for path in _shown(logs):
         if path.is_dir():
             recordings += _logs_of(path)
         elif _is_log(path):
@@ -92,7 +92,7 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
     """Yield the recordings in the folder of a sensor."""
     sensor = sensor_of(folder)
     used: set[Path] = set()
-    paths = [path for path in sorted(folder.iterdir()) if path.is_dir() or _is_log(path)]
+    paths = [path for path in _shown(folder) if path.is_dir() or _is_log(path)]
     for path in paths:
         name = path.name if path.is_dir() else _stem(path)
         notes, misnamed = folder / f"{name}{_NOTES}", folder / f"{name}.yml"
@@ -102,8 +102,8 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
         if fault is None and misnamed.is_file():
             fault = f"{misnamed.name}: notes end in {_NOTES}; rename it to {notes.name}"
         yield _found(sensor, path, name, fault, notes if there else None)
-    for path in sorted({*folder.glob("*.yaml"), *folder.glob("*.yml")} - used - {*paths}):
-        if not path.name.startswith("."):
+    for path in _shown(folder):
+        if path.suffix in (_NOTES, ".yml") and path not in used and path not in paths:
             fault = (
                 f"{path.name}: notes of no log; expected one of the name {path.stem} beside them: "
                 "rename the notes, or bring the log; a sensor file belongs to those of the others"
@@ -111,10 +111,14 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
             yield _found(sensor, path, path.stem, _fault(path, path.stem) or fault)
 
 
+def _shown(folder: Path) -> list[Path]:
+    """Return what lies in a folder, in order, without what is hidden and backups of editors."""
+    names = (path for path in folder.iterdir() if not path.name.startswith("."))
+    return sorted(path for path in names if not path.name.endswith("~"))
+
+
 def _is_log(path: Path) -> bool:
     """Tell whether a file of the drop zone is to be a log, by its name."""
-    if path.name.startswith(".") or path.name.endswith("~"):
-        return False
     return path.suffix.lower() not in _NOT_LOGS
 
 

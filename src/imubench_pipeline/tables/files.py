@@ -55,7 +55,7 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
         A key of `imubench_pipeline.tables.schemas.TABLES`, or of ``PARTS_OF`` there.
     rows : iterable of mapping
         One mapping a row; a column that a row leaves out is null. NaN becomes null, and
-        texts are `printable`.
+        of texts what does not show is escaped.
 
     Raises
     ------
@@ -71,12 +71,17 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
     for column in columns:
         values = [row.get(column.name) for row in listed]
         if pa.types.is_string(column.type):
-            values = [None if text is None else printable(text) for text in values]
+            values = [None if text is None else _shown(text) for text in values]
         array = pa.array(values, type=column.type, from_pandas=True)
         if column.required and array.null_count:
             raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
         arrays.append(array)
     return pa.Table.from_arrays(arrays, schema=schema(table))
+
+
+def _shown(text: str) -> str:
+    """Return a text of which each character shows; a reason may have several lines."""
+    return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 
 @contextlib.contextmanager

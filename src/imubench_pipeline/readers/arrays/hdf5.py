@@ -295,10 +295,11 @@ units = {}
 
 def visit(name, item):
     if isinstance(item, h5py.Dataset):
-        for key in sys.argv[2:]:
+        for key in sys.argv[3:]:
             if key in item.attrs:
                 text = item.attrs[key]
-                found["/" + name] = text if isinstance(text, str) else text.decode()
+                text = text if isinstance(text, str) else text.decode()
+                units["/" + name] = text[: int(sys.argv[2])]
 
 with h5py.File(sys.argv[1], "r") as file:
     file.visititems(visit)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-MOST_COLUMNS = 1 << 14
+MOST_COLUMNS = 1 << 15
 """A line with more is no record of a log."""
 
 _APART = re.compile(r"\s{2,}|\t")
