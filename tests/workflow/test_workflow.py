@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
+from imubench_pipeline.run.cli import main
 from tests.workflow.project import CHANNELS, Project, linked, put_log, put_sensor
 
 pytestmark = pytest.mark.workflow
@@ -135,6 +136,25 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
     figures = {path.name for path in (project.results / "report/figures").iterdir()}
     assert {"allan_gyro_x.svg", "allan_accel_x.pdf"} <= figures
     assert not list(project.results.rglob("*.part"))
+
+
+def test_logs_that_are_analysed_at_once_have_the_same_numbers(
+    project: Project, tmp_path: Path
+) -> None:
+    config = tmp_path / "config.yaml"
+    config.write_text(yaml.safe_dump({"estimate": {"methods": ["likelihood", "weighted"]}}))
+    logs = [str(project.folder / "logs/one" / name) for name in ("a.csv", "b.csv.gz", "c.csv")]
+    sensor = str(project.folder / "sensors/one.yaml")
+    status = main(
+        ["analyse", *logs, "--sensor", sensor, "--config", str(config), "--output", str(tmp_path)]
+    )
+    assert status == 0
+    for table in ("parameters", "allan", "models", "recordings"):
+        lines = (project.results / f"tables/{table}.csv").read_text().splitlines()
+        of_run = [line for line in lines if line.startswith(('"sensor"', '"one"'))]
+        assert (tmp_path / f"{table}.csv").read_text().splitlines() == of_run
+    assert "V one" in (tmp_path / "report.html").read_text()
+    assert (tmp_path / "figures/allan_gyro_x.svg").is_file()
 
 
 def test_bad_logs_are_rejected_and_stop_nothing_else(project: Project, said: str) -> None:

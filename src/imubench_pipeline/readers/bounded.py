@@ -12,12 +12,17 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from threading import Lock
 from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _READ = 1 << 20
+
+_FORKING = Lock()
+"""Held while a pipe is open in two processes that ought to have one end each: what another thread
+forks meanwhile would keep it open."""
 
 
 class BoundError(Exception):
@@ -58,12 +63,14 @@ def bounded(
     BoundError
         If it takes more, or is ended by the system.
     """
-    ours, theirs = os.pipe()
-    process = os.fork()
+    with _FORKING:
+        ours, theirs = os.pipe()
+        process = os.fork()
+        if process:
+            os.close(theirs)
     if process == 0:
         os.close(ours)
         _answer(theirs, memory, lambda: function(*arguments, **named))
-    os.close(theirs)
     try:
         answer = _received(ours, seconds)
     finally:

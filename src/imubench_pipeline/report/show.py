@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 import io
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 Rows = list[Mapping[str, Any]]
 
@@ -36,14 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the comparison; return the exit status."""
-    # Only this command draws: the others answer at once.
-    from rich.console import Console
+    # Only what draws loads this: the other commands answer at once.
     from rich.text import Text
 
     from imubench_pipeline.report.terminal import parts
 
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a sign that a terminal lacks stops nothing
     try:
         tables = _load(arguments.results)
         _check(tables["ranking"], "requirement", arguments.requirement)
@@ -52,28 +52,42 @@ def run(arguments: argparse.Namespace) -> int:
     except _ShowError as error:
         print(error, file=sys.stderr)
         return 2
-    console = Console(width=arguments.width, highlight=False, markup=False, emoji=False)
-    # Another program reads whole lines.
-    whole = arguments.width is None and not console.is_terminal
-    with console.capture() as captured:
-        for part in parts(
+
+    def shown(width: int) -> Iterator[RenderableType]:
+        yield from parts(
             tables,
             requirement=arguments.requirement,
             channel=arguments.channel,
             method=arguments.method,
             system=arguments.units,
-            width=console.width,
-        ):
+            width=width,
+        )
+        yield Text(_where(arguments.results), no_wrap=True, overflow="ignore")
+
+    show(shown, arguments.width)
+    return 0
+
+
+def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = None) -> None:
+    """Print what a function makes for so many columns; by default those of the terminal."""
+    from rich.console import Console
+    from rich.text import Text
+
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a sign that a terminal lacks stops nothing
+    console = Console(width=width, highlight=False, markup=False, emoji=False)
+    # Another program reads whole lines.
+    whole = width is None and not console.is_terminal
+    with console.capture() as captured:
+        for part in parts(console.width):
             if isinstance(part, Text) and whole:
                 console.print(part, soft_wrap=True)
             elif isinstance(part, Text):
                 console.print(part, no_wrap=part.no_wrap, overflow=part.overflow)
             else:
                 console.print(part)
-        console.print(_where(arguments.results), soft_wrap=True)
     # Written at once, so that who calls sees that the reader has gone, as `head` has.
     sys.stdout.writelines(f"{line.rstrip()}\n" for line in captured.get().splitlines())
-    return 0
 
 
 class _ShowError(ValueError):

@@ -16,11 +16,13 @@ from imubench_pipeline.report.practical import (
     PageUnit,
     System,
     duration_text,
+    number_text,
     page_unit,
     symbol_text,
 )
 from imubench_pipeline.report.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.report.terminal_table import fitting
+from imubench_pipeline.report.words import counted
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.typing import Row
@@ -72,11 +74,71 @@ def parts(
         and channel in (None, row["channel"])
     ]
     which = f"method {method}" if method else "the recommended method"
+    yield from _parameter_tables(chosen, f"{which}, with 95 % intervals", about, system, width)
+
+
+def logs(
+    tables: Mapping[str, Sequence[Row]], system: System, width: int
+) -> Iterator[RenderableType]:
+    """Yield what a few logs tell, one after the other: what they are, what is wrong, parameters.
+
+    The width is in columns of the terminal.
+    """
+    for row in tables["recordings"]:
+        key = (row["sensor"], row["recording"])
+        own = {
+            name: [line for line in rows if (line["sensor"], line["recording"]) == key]
+            for name, rows in tables.items()
+        }
+        yield Text(one_line(row["recording"]) + _length(row, own["parameters"]), style="bold")
+        if row["status"] != "ok":
+            yield Text(f"  {row['status']}: {one_line(row['reason'] or '', _LONGEST_FINDING)}\n")
+            continue
+        yield from _listed("Warnings", map(_of_log, serious(own["findings"])))
+        yield from _listed("In doubt", map(_doubt, own["doubts"]))
+        notes = [line for line in own["findings"] if line["severity"] == "note"]
+        yield from _listed("Notes", map(_of_log, notes), cut=True)
+        recommended = [line for line in own["parameters"] if line["recommended"]]
+        yield from _parameter_tables(recommended, "95 % intervals below", {key: row}, system, width)
+        if not own["parameters"]:
+            yield Text(
+                f"  {row['kind'].replace('_', ' ')}: no noise is estimated of a turned sensor\n"
+            )
+
+
+def _length(row: Row, parameters: Sequence[Row]) -> str:
+    """Return how long a log is, and of what."""
+    if row["duration"] is None:
+        return ""
+    channels = len({line["channel"] for line in parameters})
+    words = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
+    words += [counted(channels, "channel")]
+    if row["temperature_min"] is not None:
+        low, high = (number_text(row[f"temperature_{end}"], 3) for end in ("min", "max"))
+        words.append(f"{low} to {high} °C")
+    return ": " + ", ".join(words) + ", simulated" * row["simulated"]
+
+
+def _of_log(row: Row) -> str:
+    name = row["finding"].replace("_", " ")
+    place = f"{row['channel']} ({name})" if row["channel"] else name
+    return one_line(f"{place}: {row['detail']}", _LONGEST_FINDING)
+
+
+def _doubt(row: Row) -> str:
+    about = " ".join(filter(None, (row["channel"], row["parameters"]))) or "all"
+    return one_line(f"{about}: {row['reason']}", _LONGEST_FINDING)
+
+
+def _parameter_tables(
+    rows: Sequence[Row], which: str, about: About, system: System, width: int
+) -> Iterator[RenderableType]:
+    """Yield a table for the gyroscopes, and one for the accelerometers."""
     for quantity, title in _TITLES.items():
-        own = [row for row in chosen if quantity_of(row["channel"]) == quantity]
+        own = [row for row in rows if quantity_of(row["channel"]) == quantity]
         if own:
             heads, lines = _parameter_lines(quantity, own, about, system)
-            yield fitting(f"{title}: {which}, with 95 % intervals", heads, lines, width, names=0)
+            yield fitting(f"{title}: {which}", heads, lines, width, names=0)
             yield Text()
 
 
@@ -177,9 +239,11 @@ def _parameter_lines(
         name = (row["sensor"], row["recording"], row["channel"])
         by_channel.setdefault(name, []).append(row)
     lines: list[list[str | Text]] = []
+    alone = len(about) == 1  # its name stands above
     for (sensor, recording, channel), own in by_channel.items():
         row = about[sensor, recording]
         badge = " (simulated)" * row["simulated"]
+        shown = channel if alone else f"{sensor} / {recording} {channel}{badge}"
         cells = (
             _cell(
                 [estimate for estimate in own if estimate["parameter"] == symbol],
@@ -188,9 +252,9 @@ def _parameter_lines(
             )
             for symbol, unit in units.items()
         )
-        lines.append([one_line(f"{sensor} / {recording} {channel}{badge}"), *cells])
+        lines.append([one_line(shown), *cells])
     return [
-        "recording",
+        "channel" if alone else "recording",
         *(f"{symbol_text(symbol)}\n{unit.sign}" for symbol, unit in units.items()),
     ], lines
 

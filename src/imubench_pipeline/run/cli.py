@@ -21,6 +21,7 @@ from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
+from imubench_pipeline.run.analysis import command as analysis
 from imubench_pipeline.run.nightly import command as nightly
 from imubench_pipeline.run.verification import command as verification
 from imubench_pipeline.settings.config import Run, read_config
@@ -259,6 +260,9 @@ class _Command(NamedTuple):
 
 
 _COMMANDS = {
+    "analyse": _Command(
+        "estimate the noise parameters of logs, at once", analysis.add_arguments, analysis.run
+    ),
     "schema": _Command(
         "write the JSON Schema of a configuration file, for editors", _add_schema, _schema
     ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -342,13 +342,20 @@ def _figure(name: str, parameter: Parameter, unit: str) -> dict[str, Any]:
 
 
 def estimation(
-    quality: Path, curve: Path, sensor: str, recording: str, settings: str
+    quality: Path,
+    curve: Path,
+    sensor: str,
+    recording: str,
+    settings: str,
+    channels: Container[str] | None = None,
 ) -> Estimation:
-    """Return the rows that the channels leave; none of a rejected recording."""
+    """Return the rows that the channels leave, all or some; none of a rejected recording."""
     sections = json.loads(settings)
     into = Estimation()
     measured = curves(curve, Quality.read(quality))
     for channel, log in kept_static_logs(quality.parent).items():
+        if channels is not None and channel not in channels:
+            continue
         key = Key(sensor, recording, channel)
         how = EstimateSettings.model_validate(sections["estimate"])
         estimate_channel(key, log, measured[channel], how, sections["bandwidth"], into)

@@ -1,0 +1,266 @@
+"""The steps of the workflow, one after the other, for a few logs that somebody waits for.
+
+The same functions as the rules call, with the same settings, so that the numbers are the same. The
+work is shared among forks of one process, as in a run, but of one recording the channels are
+estimated side by side. What is compiled at the first use is compiled beside the reading of the
+first log.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields
+from itertools import chain
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import pyarrow as pa
+
+from imubench_pipeline.estimators import likelihood
+from imubench_pipeline.readers.bounded import BoundError, bounded
+from imubench_pipeline.recordings.ingest import write_failed
+from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.run.resources import limits_of_steps
+from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
+from imubench_pipeline.steps import allan as allan_step
+from imubench_pipeline.steps import datasheet as datasheet_step
+from imubench_pipeline.steps.error_budget import error_tables
+from imubench_pipeline.steps.estimate import Estimation, estimation
+from imubench_pipeline.steps.ingest import write_recording
+from imubench_pipeline.steps.reconstruct import write_reconstruction
+from imubench_pipeline.steps.sensor_tables import joined_tables
+from imubench_pipeline.steps.tables import tables_of_all
+from imubench_pipeline.tables import build, write, write_arrow
+from imubench_pipeline.tables.failures import Cause, Failure, write_empty
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
+
+T = TypeVar("T")
+K = TypeVar("K", bound=tuple[str, ...])
+Say = Callable[[str], None]
+
+_OF_INGEST = {"quality": "quality.json"} | {
+    name: f"{name}.parquet" for name in ("envelope", "histogram")
+}
+_OF_ESTIMATE = tuple(field.name for field in fields(Estimation) if field.name != "paths")
+_OF_COMPARISON = ("datasheet", "datasheet_curve", "error_budget", "backtest")
+_BEFORE_RECONSTRUCTION = ("allan", "parameters", "allan_compensated")
+_OF_RECONSTRUCTION = ("reconstruction", "scores")
+_OUTPUTS: dict[str, tuple[str, ...]] = {
+    "ingest": ("envelope", "histogram"),
+    "estimate": (),  # they are written together
+    "datasheet": _OF_COMPARISON,
+    "reconstruct": _OF_RECONSTRUCTION,
+}
+"""The tables that a step leaves."""
+_ENOUGH = 1 << 12
+"""Samples of a log that calls all that is compiled."""
+_LONGEST_COMPILATION, _MEMORY_OF_IT = 600.0, 4 << 30
+_SLOW = 3.0
+"""s; who waits for longer is told for what."""
+
+
+def analysed(plan: Plan, cores: int, say: Say, *, pages: bool) -> dict[str, pa.Table]:
+    """Run the steps of all recordings of a plan; return every joined table.
+
+    A step that fails for a recording leaves that out, and `failures` says so.
+
+    Parameters
+    ----------
+    plan : Plan
+        Whose results are in a folder of their own.
+    cores : int
+        Processes that compute at a time.
+    say : callable
+        Is told what goes on.
+    pages : bool
+        Whether what the pages show beside the estimates is computed, too; else those tables are
+        empty.
+    """
+    with ThreadPoolExecutor(cores) as beside:
+        return _Chain(plan, beside, say, pages=pages).run()
+
+
+class _Chain:
+    def __init__(self, plan: Plan, beside: ThreadPoolExecutor, say: Say, *, pages: bool) -> None:
+        self._plan, self._beside, self._say, self._pages = plan, beside, say, pages
+        self._limits = limits_of_steps(plan)
+        self._failed: dict[tuple[str, str], Failure] = {}
+
+    def run(self) -> dict[str, pa.Table]:
+        recordings = list(self._plan.recordings)
+        compiling = self._beside.submit(self._compile)
+        channels = self._each("ingest", recordings, self._read)
+        compiling.result()
+        _compile_all()  # from the cache, so that no fork does so again
+        estimated = self._each(
+            "estimate",
+            [(*key, channel) for key in recordings for channel in channels.get(key, ())],
+            self._estimate,
+        )
+        for key in recordings:
+            self._write_estimates(key, [estimated[each] for each in estimated if each[:2] == key])
+        if self._pages:
+            self._each("reconstruct", recordings, self._reconstruct)
+            self._each("datasheet", recordings, self._compare)
+        return self._joined()
+
+    def _compile(self) -> None:
+        """Have a process of its own compile what estimates need, where that was not done before."""
+        told = threading.Timer(
+            _SLOW, self._say, ["compiling, once after the installation: some seconds"]
+        )
+        told.start()
+        try:
+            bounded(_LONGEST_COMPILATION, _MEMORY_OF_IT, _compile_all)
+        finally:
+            told.cancel()
+
+    # ------------------------------------------------------------------ the steps of a recording
+
+    def _read(self, sensor: str, recording: str) -> list[str]:
+        """Read a log and take its curves; return its channels."""
+        folder = self._folder(sensor, recording)
+        outputs = {name: folder / file for name, file in _OF_INGEST.items()}
+        source = self._plan.recordings[sensor, recording].path
+        settings = self._plan.ingest_settings(sensor, recording)
+        write_recording(source, settings, sensor, recording, outputs)
+        how = AllanSettings.model_validate_json(self._plan.settings("allan"))
+        rows = list(allan_step.curves(folder, sensor, recording, how))
+        write("allan", rows, folder / "curve.parquet")
+        return list(dict.fromkeys(str(row["channel"]) for row in rows))
+
+    def _estimate(self, sensor: str, recording: str, channel: str) -> Estimation:
+        folder = self._folder(sensor, recording)
+        rows = estimation(
+            folder / "quality.json",
+            folder / "curve.parquet",
+            sensor,
+            recording,
+            self._plan.estimate_settings(sensor, recording),
+            channels={channel},
+        )
+        rows.paths.clear()
+        return rows
+
+    def _write_estimates(self, key: tuple[str, str], parts: Sequence[Estimation]) -> None:
+        folder = self._folder(*key)
+        failure = self._failed.get(key)
+        for table in _OF_ESTIMATE:
+            path = folder / f"{table}.parquet"
+            if failure is not None:
+                write_empty([path], failure)
+            else:
+                write(table, chain.from_iterable(getattr(part, table) for part in parts), path)
+
+    def _compare(self, sensor: str, recording: str) -> None:
+        """Hold a recording against its datasheet, and say what its noise means in use."""
+        folder, plan = self._folder(sensor, recording), self._plan
+        stated = (folder, sensor, recording, plan.datasheet_settings(sensor))
+        write("datasheet", datasheet_step.rows(*stated), folder / "datasheet.parquet")
+        write(
+            "datasheet_curve",
+            datasheet_step.curve_rows(*stated),
+            folder / "datasheet_curve.parquet",
+        )
+        inputs = {
+            name: folder / f"{name}.parquet"
+            for name in ("parameters", "draws", "temperature", "deterministic")
+        } | {"quality": folder / "quality.json"}
+        names = {"sensor": sensor, "recording": recording}
+        for table, rows in error_tables(inputs, names, plan.error_budget_settings(sensor)).items():
+            write(table, rows, folder / f"{table}.parquet")
+
+    def _reconstruct(self, sensor: str, recording: str) -> None:
+        folder = self._folder(sensor, recording)
+        settings = ReconstructionSettings.model_validate_json(self._plan.settings("reconstruction"))
+        inputs = (
+            "quality.json",
+            "allan.parquet",
+            "parameters.parquet",
+            "allan_compensated.parquet",
+        )
+        write_reconstruction(
+            [folder / name for name in inputs],
+            [folder / f"{name}.parquet" for name in _OF_RECONSTRUCTION],
+            settings,
+        )
+
+    # ---------------------------------------------------------------------------- all together
+
+    def _joined(self) -> dict[str, pa.Table]:
+        """Join the tables of each sensor, and those of all; the others are empty."""
+        plan = self._plan
+        steps = [*_OF_ESTIMATE, *((*_OF_COMPARISON, *_OF_RECONSTRUCTION) if self._pages else ())]
+        names = [name for name in steps if name not in OF_ONE_RECORDING]
+        parts: dict[str, list[Path]] = {}
+        for sensor in dict.fromkeys(sensor for sensor, _ in plan.recordings):
+            folders = [self._folder(*key) for key in plan.recordings if key[0] == sensor]
+            own = {name: [folder / f"{name}.parquet" for folder in folders] for name in names}
+            own["quality"] = [folder / _OF_INGEST["quality"] for folder in folders]
+            tables = joined_tables(
+                own, plan.truths(sensor), plan.catalogue("price_class"), plan.settings("decide")
+            )
+            for name, table in tables.items():
+                path = plan.run.results / "sensors" / sensor / f"{name}.parquet"
+                write_arrow(table, path)
+                parts.setdefault(name, []).append(path)
+        every = tables_of_all(parts)
+        absent = (name for name in TABLES if name not in every and name not in OF_ONE_RECORDING)
+        return every | {name: build(name, ()) for name in absent}
+
+    def _folder(self, sensor: str, recording: str) -> Path:
+        return self._plan.run.results / "recordings" / sensor / recording
+
+    def _each(self, step: str, keys: Sequence[K], function: Callable[..., T]) -> dict[K, T]:
+        """Call a step for each key, of a recording that is not left out; return what came of it."""
+        pending = {key: self._beside.submit(self._bounded, step, function, key) for key in keys}
+        return {key: value for key, done in pending.items() if (value := done.result()) is not None}
+
+    def _bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:
+        """Call a step in a process of its own; where it fails, its recording is left out."""
+        sensor, recording, *_ = key
+        if (sensor, recording) in self._failed:
+            return None
+        limit = self._limits(sensor, recording)
+        begun = time.monotonic()
+        try:
+            value = bounded(limit.seconds, limit.memory, function, *key)
+        except BoundError as error:
+            self._leave_out(step, sensor, recording, "time", f"the step {step} {error}")
+            return None
+        except Exception as error:  # the others go on
+            words = one_line(f"the step {step} failed: {type(error).__name__}: {error}")
+            self._leave_out(step, sensor, recording, "error", words)
+            return None
+        if time.monotonic() - begun > _SLOW:
+            self._say(f"{'/'.join(key[1:])}: {step} done")
+        return value
+
+    def _leave_out(self, step: str, sensor: str, recording: str, cause: Cause, reason: str) -> None:
+        failure = Failure(sensor, recording, step, cause, reason)
+        self._failed[sensor, recording] = failure
+        folder = self._folder(sensor, recording)
+        if step == "ingest":
+            write_failed(
+                self._plan.ingest_settings(sensor, recording), failure, folder / "quality.json"
+            )
+        write_empty((folder / f"{name}.parquet" for name in _OUTPUTS[step]), failure)
+
+
+def _compile_all() -> None:
+    """Have all that estimates are computed with compiled, or loaded if it was compiled before."""
+    rng = np.random.default_rng(1)
+    samples = rng.standard_normal(_ENOUGH) + 0.05 * np.cumsum(rng.standard_normal(_ENOUGH))
+    likelihood.fit_blocks(
+        lambda: iter([samples]),
+        samples=_ENOUGH,
+        rate=100.0,
+        holes=False,
+        segments=((0, _ENOUGH),),
+        rng=rng,
+    )

@@ -1,0 +1,127 @@
+"""`imubench analyse`: the noise parameters of logs, at once."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pyarrow as pa
+
+    from imubench_pipeline.report.practical import System
+    from imubench_pipeline.run.plan import Plan
+
+_DESCRIPTION = (
+    "Read static logs, say what is wrong with them, and estimate the noise parameters of each "
+    "axis, as a run of the workflow does. Exit status: 0 analysed, 1 a log was rejected or a step "
+    "failed, 2 a log or the sensor file is not there, or does not say what is needed."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command is given."""
+    parser.description = _DESCRIPTION
+    parser.add_argument(
+        "logs", type=Path, nargs="+", metavar="LOG", help="log file, or folder of a recording"
+    )
+    parser.add_argument(
+        "--sensor",
+        type=Path,
+        metavar="FILE",
+        help="sensor file, or a name in config/sensors; default: what the log says itself",
+    )
+    parser.add_argument("--rate", metavar="FREQUENCY", help="of a log without stamps, as '100 Hz'")
+    parser.add_argument("--gyro-unit", metavar="UNIT", help="where the log does not say it")
+    parser.add_argument("--accel-unit", metavar="UNIT", help="where the log does not say it")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        help="write report.html, figures (SVG, PDF) and tables (CSV) into it",
+    )
+    parser.add_argument(
+        "--config",
+        type=Path,
+        default=Path("config/config.yaml"),
+        metavar="FILE",
+        help="settings of the estimates; default: config/config.yaml, if it is there",
+    )
+    parser.add_argument(
+        "--units",
+        choices=("practical", "si"),
+        default="practical",
+        help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
+    )
+    parser.add_argument(
+        "-c", "--cores", type=_cores, default=os.cpu_count() or 1, metavar="N", help="default: all"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Analyse logs, print the parameters and write what is asked for; return the exit status."""
+    # A process computes with one core, and forks for the others.
+    for library in ("OMP", "OPENBLAS", "MKL"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    from imubench_pipeline.run.analysis.chain import analysed
+    from imubench_pipeline.run.analysis.project import Stated, lay_out
+    from imubench_pipeline.run.plan import Plan
+    from imubench_pipeline.settings.config import read_config
+    from imubench_pipeline.settings.validation import ConfigError
+
+    with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
+        try:
+            stated = Stated(arguments.rate, arguments.gyro_unit, arguments.accel_unit)
+            paths = lay_out(
+                arguments.logs, arguments.sensor, stated, Path("config/sensors"), Path(folder)
+            )
+            plan = Plan(read_config(arguments.config) | paths)
+        except ConfigError as error:
+            print(f"imubench analyse: {error}", file=sys.stderr)
+            return 2
+        tables = analysed(plan, arguments.cores, _say, pages=arguments.output is not None)
+        _print(tables, arguments.units)
+        if arguments.output is not None:
+            _write(plan, tables, arguments)
+    statuses = set(tables["recordings"]["status"].to_pylist())
+    return 0 if statuses == {"ok"} else 1
+
+
+def _cores(text: str) -> int:
+    cores = int(text)
+    if cores < 1:
+        raise argparse.ArgumentTypeError(f"found {cores}; expected at least 1")
+    return cores
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _print(tables: Mapping[str, pa.Table], system: System) -> None:
+    from imubench_pipeline.report.show import show
+    from imubench_pipeline.report.terminal import logs
+
+    needed = ("recordings", "findings", "failures", "doubts", "parameters")
+    rows = {name: tables[name].to_pylist() for name in needed}
+    show(lambda width: logs(rows, system, width))
+
+
+def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Namespace) -> None:
+    """Write the page, the figures and the tables."""
+    from imubench_pipeline.report.publish import one_file, site_of
+    from imubench_pipeline.report.static_figures.of_run import draw_comparison
+    from imubench_pipeline.tables import write_arrow, write_content
+
+    folder: Path = arguments.output
+    site = site_of(tables, plan.report_settings(), plan.run.results)
+    write_content(one_file(site), folder / "report.html")
+    for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
+        write_arrow(tables[name], folder / f"{name}.csv")
+    draw_comparison(tables, arguments.units, folder / "figures")
+    print(f"{folder / 'report.html'}: open it in a browser")

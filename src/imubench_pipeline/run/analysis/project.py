@@ -1,0 +1,199 @@
+"""Logs of a command line as a project of their own: links to them, and their sensor files."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+
+from imubench_pipeline.readers.bounded import BoundError, bounded
+from imubench_pipeline.readers.inspection import Inspection, inspect
+from imubench_pipeline.readers.inspection.draft import UNKNOWN
+from imubench_pipeline.recordings.drop_zone import name_of, sensor_of
+from imubench_pipeline.settings.sensor import Sensor, quantity_of
+from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.settings.yaml_files import read_settings
+from imubench_pipeline.tables import write_json
+from imubench_pipeline.tables.findings import RecordingError
+
+INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
+"""Time and memory in which a log is looked into, or rejected."""
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What the command line says of logs that do not say it themselves; None: nothing."""
+
+    rate: str | None = None
+    gyro_unit: str | None = None
+    accel_unit: str | None = None
+
+    def unit_of(self, channel: str) -> str | None:
+        """Return the unit that is stated for a channel."""
+        return self.gyro_unit if quantity_of(channel) == "gyro" else self.accel_unit
+
+    def __bool__(self) -> bool:
+        return any((self.rate, self.gyro_unit, self.accel_unit))
+
+
+class UnfilledError(ConfigError):
+    """A log does not say all that is needed of it, and nobody else does."""
+
+
+def lay_out(
+    logs: Sequence[Path],
+    sensor: Path | None,
+    stated: Stated,
+    catalogue: Path,
+    folder: Path,
+) -> dict[str, str | None]:
+    """Make a project of logs: a drop zone of links, and the sensor files for them.
+
+    Parameters
+    ----------
+    logs : sequence of Path
+        Files of logs, or folders of recordings.
+    sensor : Path or None
+        The sensor file of all of them, or its name in the catalogue. None: each log has what it
+        says itself, as `imubench inspect` drafts it.
+    stated : Stated
+        Fills in what a draft leaves open.
+    catalogue : Path
+        A folder of sensor files, for names.
+    folder : Path
+        Where the project is made; it is there.
+
+    Returns
+    -------
+    dict
+        The paths in the configuration of the run.
+
+    Raises
+    ------
+    ConfigError
+        If a log is not there, or of two logs it cannot be told which is which, or the sensor file
+        is of no use, or a log does not say what is needed (`UnfilledError`).
+    """
+    missing = [log for log in logs if not log.exists()]
+    if missing:
+        raise ConfigError(f"{missing[0]}: no such file; expected a log, or the folder of one")
+    declared = None if sensor is None else _sensor_file(sensor, catalogue)
+    if declared is not None and stated:
+        raise ConfigError(
+            "--rate, --gyro-unit and --accel-unit fill in what a log does not say; with --sensor "
+            "they have no place: state them in the sensor file"
+        )
+    (folder / "sensors").mkdir()
+    for log, name in zip(logs, _names(logs), strict=True):
+        path = log.resolve()
+        if declared is not None:
+            of, described = sensor_of(declared.with_suffix("")), declared
+            target = folder / "sensors" / f"{of}.yaml"
+            if not target.is_symlink():
+                target.symlink_to(described.resolve())
+        else:
+            of = name
+            target = folder / "sensors" / f"{of}.yaml"
+            write_json(_drafted(log, stated), target)  # which is YAML, too
+        place = folder / "logs" / of
+        place.mkdir(parents=True, exist_ok=True)
+        (place / (name + path.name.removeprefix(name_of(path.name)))).symlink_to(path)
+        notes = path.with_name(f"{name_of(path.name)}.yaml")
+        if notes.is_file() and (declared is None or notes != declared.resolve()):
+            (place / f"{name}.yaml").symlink_to(notes)
+    return {
+        "logs": str(folder / "logs"),
+        "sensors": str(folder / "sensors"),
+        "results": str(folder / "results"),
+        "simulated": None,
+        "requirements": None,
+    }
+
+
+def _sensor_file(sensor: Path, catalogue: Path) -> Path:
+    """Return the file of a sensor that is given by its path, or by its name in the catalogue."""
+    if not sensor.is_file():
+        named = catalogue / f"{sensor.name}.yaml"
+        if len(sensor.parts) > 1 or not named.is_file():
+            raise ConfigError(
+                f"{sensor}: no such sensor file, and none of that name in {catalogue}; expected "
+                "one, such as imubench inspect LOG --output FILE drafts"
+            )
+        sensor = named
+    read_settings(Sensor, sensor)
+    return sensor
+
+
+def _names(logs: Sequence[Path]) -> list[str]:
+    """Return the names of the recordings: with that of their folder where two are alike."""
+    names = [name_of(log.resolve().name) for log in logs]
+    times = Counter(names)
+    longer = [
+        f"{name_of(log.resolve().parent.name)}_{name}" if times[name] > 1 else name
+        for log, name in zip(logs, names, strict=True)
+    ]
+    for name, count in Counter(longer).items():
+        if count > 1:
+            alike = [str(log) for log, other in zip(logs, longer, strict=True) if other == name]
+            raise ConfigError(
+                f"{' and '.join(alike)} would have one name, {name}; expected each log once, "
+                "under a name of its own"
+            )
+    return longer
+
+
+def _drafted(log: Path, stated: Stated) -> Mapping[str, object]:
+    """Return the sensor file that a log tells itself, filled in by what is stated."""
+    try:
+        inspected: Inspection = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, log)
+    except BoundError as error:
+        raise ConfigError(
+            f"{log}: to look into it {error}; expected the log of an inertial sensor"
+        ) from None
+    except (RecordingError, OSError) as error:
+        raise ConfigError(str(error)) from None
+    described = deepcopy(inspected.draft.sensor())
+    written = described["log"]
+    if stated.rate and "time" not in written:
+        written["rate"] = stated.rate
+    for channel, source in written["channels"].items():
+        unit = stated.unit_of(channel)
+        if unit and source["unit"] == UNKNOWN:
+            source["unit"] = unit
+    open_keys = _open(written)
+    if open_keys:
+        raise UnfilledError(_what_is_missing(log, inspected, open_keys))
+    return parse(Sensor, described, f"drafted from {log}").model_dump(
+        mode="json", exclude_unset=True
+    )
+
+
+def _open(written: Mapping[str, object]) -> list[str]:
+    """Return what is left open: the rate, or a unit or column of a quantity."""
+    keys = ["rate"] * (written.get("rate") == UNKNOWN)
+    channels = written["channels"]
+    assert isinstance(channels, Mapping)
+    for channel, source in channels.items():
+        for key in ("column", "unit"):
+            if source.get(key) == UNKNOWN:
+                keys.append(f"{quantity_of(channel)} {key}")
+    return list(dict.fromkeys(keys))
+
+
+def _what_is_missing(log: Path, inspected: Inspection, keys: Sequence[str]) -> str:
+    """Return what a log does not say, and how to say it."""
+    options = {
+        "rate": "--rate '100 Hz'",
+        "gyro unit": "--gyro-unit deg/s (or rad/s, dps, ...: see the logger's manual)",
+        "accel unit": "--accel-unit g (or m/s^2, mg, ...)",
+    }
+    lines = [f"{log}: the log does not say: {', '.join(keys)}"]
+    if all(key in options for key in keys):
+        lines += [f"  add {options[key]}" for key in keys]
+        lines.append("or write a sensor file once, for all logs of this sensor:")
+    else:
+        lines.append("its columns have no names that tell; write a sensor file:")
+    lines.append("  imubench inspect LOG --output mine.yaml, fill it in, then --sensor mine.yaml")
+    return "\n".join(lines)
