@@ -20,6 +20,10 @@ _LIBRARIES = (
     "snakemake",
 )
 
+_RUN = (
+    "snakemake -c2",
+    "makes everything, and afterwards only what new logs or changed settings ask for",
+)
 _COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
     ("show", {}, "prints the comparison in the terminal"),
     ("figures", {"--sensor": "NAME"}, "draws the figures of channels for print, as SVG and PDF"),
@@ -35,9 +39,14 @@ _COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
 
 def _context(site: Site) -> dict[str, Any]:
     return {
-        "commands": [
-            (imubench(name, site.results_name, options), words)
-            for name, options, words in _COMMANDS
+        "commands": [(site.at_once, "makes these pages again")]
+        if site.at_once
+        else [
+            _RUN,
+            *(
+                (imubench(name, site.results_name, options), words)
+                for name, options, words in _COMMANDS
+            ),
         ],
         "versions": {"python": platform.python_version()} | {n: version(n) for n in _LIBRARIES},
         "settings": {

@@ -94,7 +94,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "command": site.again(view, "scores"),
         # Of one that is left out there is nothing to draw.
         "figures_command": None
-        if view.left_out
+        if view.left_out or site.at_once
         else imubench(
             "figures", site.results_name, {"--sensor": view.sensor, "--recording": view.name}
         ),

@@ -90,9 +90,14 @@ class Site:
         """The folder of the results, as the commands of the pages name it."""
         return str(self.settings.get("results", "results"))
 
+    @property
+    def at_once(self) -> str | None:
+        """The command that made all of it at once, and left no results; None: a run did."""
+        return self.settings.get("at_once")
+
     def again(self, view: RecordingView, table: str) -> str:
         """Return the command that makes the results of a recording again, up to a table."""
-        return made_again(
+        return self.at_once or made_again(
             f"{self.results_name}/recordings/{view.sensor}/{view.name}/{table}.parquet",
             self.settings.get("given", []),
         )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
+import shlex
 import sys
 import tempfile
 from pathlib import Path
@@ -92,6 +94,19 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if statuses == {"ok"} else 1
 
 
+def _called(arguments: argparse.Namespace) -> str:
+    """Return the command with its options, for a shell."""
+    options = {
+        "--sensor": arguments.sensor,
+        "--rate": arguments.rate,
+        "--gyro-unit": arguments.gyro_unit,
+        "--accel-unit": arguments.accel_unit,
+        "--output": arguments.output,
+    }
+    words = [f"{name}={value}" for name, value in options.items() if value is not None]
+    return shlex.join(["imubench", "analyse", *words, "--", *map(str, arguments.logs)])
+
+
 def _cores(text: str) -> int:
     cores = int(text)
     if cores < 1:
@@ -119,7 +134,9 @@ def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Names
     from imubench_pipeline.tables import write_arrow, write_content
 
     folder: Path = arguments.output
-    site = site_of(tables, plan.report_settings(), plan.run.results)
+    # The results are gone with the process: what makes them again is this command.
+    told = json.loads(plan.report_settings()) | {"at_once": _called(arguments)}
+    site = site_of(tables, json.dumps(told), plan.run.results)
     write_content(one_file(site), folder / "report.html")
     for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
         write_arrow(tables[name], folder / f"{name}.csv")
