@@ -29,23 +29,23 @@ localrules:
 onstart:
     from imubench_pipeline.run.progress import follow
 
-    follow()
+    follow(jobs_of_recordings(workflow.dag), partial(outcome, plan.run.results))
     remove_temporary(plan.run.results, BEGUN)
 
 
 # Tables are read at the end of a run alone: a run should begin at once.
 onsuccess:
     from imubench_pipeline.report.run_summary import summary
+    from imubench_pipeline.run.progress import OURS
 
     remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
-    print(summary(plan.run.results))
+    logger.info(summary(plan.run.results), extra=OURS)
     if left_out := plan.faults.left_out():
         raise WorkflowError(left_out)
 
 
 onerror:
-    import sys
     from imubench_pipeline.report.run_summary import failure
 
     remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
-    print(failure(log, plan.run.results), file=sys.stderr)
+    logger.error(failure(log, plan.run.results))

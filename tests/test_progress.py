@@ -1,6 +1,5 @@
 """The progress of a run, in a terminal and in a pipe."""
 
-import logging
 import os
 import pty
 import re
@@ -16,17 +15,19 @@ pytestmark = pytest.mark.workflow
 
 WORKFLOW = """
 rule all:
-    input: expand("{recording}.done", recording=["a", "b", "bad"])
+    input: expand("s/{recording}.done", recording=["a", "b", "bad"])
 rule ingest:
-    output: "{recording}.done"
+    output: "{sensor}/{recording}.done"
     script: "ingest.py"
 onstart:
     from imubench_pipeline.run.progress import follow
-    follow()
+    of = (job.wildcards for job in workflow.dag.needrun_jobs() if job.name == "ingest")
+    follow(((w.sensor, w.recording) for w in of), lambda s, r: f"{s}/{r}: of 3 channels")
 onsuccess:
-    print("the summary")
+    from imubench_pipeline.run.progress import OURS
+    logger.info("the summary", extra=OURS)
 onerror:
-    print("what failed")
+    logger.error("what failed")
 """
 SCRIPT = """
 import os, time
@@ -49,7 +50,7 @@ def in_terminal(folder: Path, *flags: str, **variables: str) -> tuple[str, str]:
     """Return all that was written to a terminal, and what of it stays to be seen."""
     outer, inner = pty.openpty()
     process = subprocess.Popen(
-        [sys.executable, "-m", "snakemake", "-c1", "--keep-going", *flags],
+        [sys.executable, "-m", "snakemake", "-c1", "--logger", "imubench", "--keep-going", *flags],
         cwd=folder, stdin=inner, stdout=inner, stderr=inner,
         env={**os.environ, "TERM": "xterm", "COLUMNS": "100", **variables},
     )  # fmt: skip
@@ -87,10 +88,13 @@ def seen(text: str) -> str:
 
 def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
     written, left = in_terminal(folder)
-    assert re.search(r"first steps: ingest (a|b|bad) 0:00", written)
-    assert re.search(r"1 of 4 steps, about \d+ s left: ingest (a|b|bad) 0:00", written)
+    assert re.search(r"first steps: ingest s/(a|b|bad) 0:00", written)
+    assert re.search(r"1 of 4 steps, about \d+ s left: ingest s/(a|b|bad) 0:00", written)
     assert "steps, about" not in left and "rule ingest:" not in left
-    assert "Job stats" in left and left.index("Job stats") < left.index("the summary")
+    assert "Job stats" not in left
+    lines = [line.strip() for line in left.splitlines() if line.strip()]
+    assert sorted(lines[:3]) == [f"s/{name}: of 3 channels" for name in ("a", "b", "bad")]
+    assert lines[3] == "the summary" and lines[4].startswith("Complete log")
     (log,) = (folder / ".snakemake/log").iterdir()
     assert log.read_text().count("rule ingest:") == 3
 
@@ -99,7 +103,7 @@ def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
     _, left = in_terminal(folder, FAIL="1")
     assert "Traceback (most recent call last):\n" in left
     assert "ValueError: upside down\nturn it over\n" in left
-    assert "Error in rule ingest:" in left and "output: bad.done" in left
+    assert "Error in rule ingest:" in left and "output: s/bad.done" in left
     assert left.index("turn it over") < left.index("what failed")
 
 
@@ -112,19 +116,13 @@ def test_who_asks_for_more_or_less_gets_what_snakemake_says(
     assert ("rule ingest:" in left) == (flags == ("--verbose",))
 
 
-def test_a_pipe_gets_the_lines_of_snakemake(folder: Path) -> None:
+def test_a_pipe_gets_a_line_for_each_recording(folder: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "snakemake", "-c1"], cwd=folder, capture_output=True, text=True,
-        check=True, timeout=60, env={**os.environ, "FORCE_COLOR": "1"},
+        [sys.executable, "-m", "snakemake", "-c1", "--logger", "imubench"], cwd=folder,
+        capture_output=True, text=True, check=True, timeout=60,
+        env={**os.environ, "FORCE_COLOR": "1"},
     )  # fmt: skip
-    assert done.stderr.count("rule ingest:") == 3 and "\x1b" not in done.stderr
-    assert "4 of 4 steps (100%) done" in done.stderr and done.stdout == "the summary\n"
-
-
-def test_another_logger_is_left_alone() -> None:
-    from imubench_pipeline.run.progress import follow
-
-    logger = logging.getLogger("snakemake.logging")
-    before = list(logger.handlers)
-    follow()
-    assert logger.handlers == before
+    lines = done.stderr.splitlines()
+    assert sorted(lines[:3]) == [f"s/{name}: of 3 channels" for name in ("a", "b", "bad")]
+    assert lines[3] == "the summary"
+    assert lines[4].startswith("Complete log") and len(lines) == 5

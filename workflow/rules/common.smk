@@ -3,9 +3,11 @@
 import atexit
 import gc
 import time
+from functools import partial
 
 from snakemake.iocontainers import Wildcards
 
+from imubench_pipeline.recordings.kept import outcome
 from imubench_pipeline.run.nightly.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
@@ -137,6 +139,13 @@ def jobs_of(rule):
     }
     recordings = chosen.get(rule.name, plan.recordings)
     return [{"sensor": sensor, "recording": name} for sensor, name in recordings]
+
+
+def jobs_of_recordings(dag):
+    """The recording of each job of this run that is of one."""
+    for job in dag.needrun_jobs():
+        if "recording" in job.wildcards.keys():
+            yield job.wildcards.sensor, job.wildcards.recording
 
 
 def made_again(wildcards):

@@ -87,6 +87,24 @@ class Quality:
         return None
 
 
+def outcome(results: Path, sensor: str, recording: str) -> str:
+    """Return in one line what became of a recording in a run: used, with doubts, or rejected."""
+    name = f"{sensor}/{recording}"
+    try:
+        quality = Quality.read(results / "recordings" / sensor / recording / "quality.json")
+    except (OSError, RecordingError) as error:
+        return f"{name}: {error}"
+    about = quality.recording
+    if about["status"] != "ok":
+        return f"{name}: {about['status']}: {about.get('reason')}"
+    kinds = dict.fromkeys(
+        row["finding"].replace("_", " ") for row in quality.findings if row["severity"] != "note"
+    )
+    hours = about["duration"] / 3600.0
+    told = f"{name}: {hours:.3g} h at {about['rate']:.6g} Hz, {len(quality.channels)} channels"
+    return told + (f"; in doubt: {', '.join(kinds)}" if kinds else "")
+
+
 def identified(paths: Iterable[Path]) -> dict[str, dict[str, Any]]:
     """Return size, digest, and digest of the metadata of Parquet files, by name."""
     return {

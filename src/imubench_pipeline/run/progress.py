@@ -1,15 +1,18 @@
-"""While a run goes on: one line in the terminal that says how far it is.
+"""While a run goes on: how far it is, a line for each recording that ends, and what is wrong.
 
-Where there is no terminal, Snakemake's own lines stay as they are. They go to its log file in
-either case.
+This is a logger plugin of Snakemake (`snakemake_logger_plugin_imubench`), which a profile asks for
+by ``logger: imubench``. In a terminal one line moves; in a pipe there is one now and then. All that
+Snakemake says itself stands in its log file, which is named at the end.
 """
 
 from __future__ import annotations
 
 import logging
+import sys
 import time
-from collections.abc import Mapping
-from typing import Any, TextIO
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 from rich.console import Console, RenderableType
 from rich.live import Live
@@ -17,65 +20,92 @@ from rich.progress_bar import ProgressBar
 from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
+from snakemake.logging import ColorizingTextHandler
+from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
 from imubench_pipeline.report.run_summary import one_line
 
-_LOGGER = "snakemake.logging"
-_TO_TERMINAL = "DefaultStreamHandler"
+OURS: Mapping[str, Any] = {"imubench": True}
+"""Marks a record that is shown as it is: ``logger.info(text, extra=OURS)``."""
+
 _SHOWN_BY_THE_LINE = {
     LogEvent.JOB_INFO,
     LogEvent.JOB_STARTED,
     LogEvent.JOB_FINISHED,
     LogEvent.PROGRESS,
+    LogEvent.RUN_INFO,
     LogEvent.SHELLCMD,
     LogEvent.RESOURCES_INFO,
 }
-_OF_THE_SCHEDULER = ("Select jobs to execute...", "Execute ")
+_NAMED_LOG = "Complete log"
 _BAR = 16
 _ROOM_FOR_BAR = 60
 _STYLES = {logging.ERROR: "red", logging.WARNING: "yellow"}
+_LONGEST = 200
+_BETWEEN_LINES = 10.0
+"""s, at least, between two lines of progress in a pipe."""
+
+Recording = tuple[str, str]
+"""Sensor and name."""
+
+_expected: Counter[Recording] = Counter()
+_told: list[Callable[[str, str], str]] = []
 
 
-def follow() -> None:
-    """Show the progress of the jobs of this run, if Snakemake writes to a terminal.
+def follow(jobs: Iterable[Recording], told: Callable[[str, str], str]) -> None:
+    """Have a line shown for each recording that ends.
 
-    Nothing changes where another logger was asked for, or all details (``--verbose``).
+    Parameters
+    ----------
+    jobs : iterable of (str, str)
+        The recording of each job of this run that is of one.
+    told : callable
+        Returns what became of a recording.
     """
-    logger = logging.getLogger(_LOGGER)
-    for handler in logger.handlers:
-        if (
-            handler.name == _TO_TERMINAL
-            and isinstance(handler, logging.StreamHandler)
-            and handler.stream.isatty()
-            and not Console(file=handler.stream).is_dumb_terminal
-            and not logger.isEnabledFor(logging.DEBUG)
-        ):
-            logger.removeHandler(handler)
-            logger.addHandler(_OneLine(handler))
-            return
+    _expected.clear()
+    _expected.update(jobs)
+    _told[:] = [told]
 
 
-class _OneLine(logging.Handler):
-    """Stands in for Snakemake's handler: what is more than progress is printed above the line.
+class LogHandler(LogHandlerBase):
+    """Shows how far a run is, and what is more than progress.
 
-    The line is there while jobs run. It is a single one, because a step writes its errors to the
-    terminal by itself: a taller display would be drawn over them.
+    The line of a terminal is there while jobs run. It is a single one, because a step writes its
+    errors to the terminal by itself: a taller display would be drawn over them. Who asks Snakemake
+    for a dry run or for all details gets what it says itself.
     """
 
-    def __init__(self, replaced: logging.StreamHandler[TextIO]) -> None:
-        super().__init__()
-        self._replaced = replaced
-        self._console = Console(file=replaced.stream, highlight=False, markup=False, emoji=False)
+    writes_to_stream = True
+    writes_to_file = False
+    has_filter = False
+    has_formatter = False
+    needs_rulegraph = False
+
+    def __post_init__(self) -> None:
+        """Take the stream that Snakemake would write to."""
+        asked = self.common_settings
+        stream = sys.stdout if asked.stdout else sys.stderr
+        self._whole: ColorizingTextHandler | None = None
+        if asked.dryrun or asked.verbose or asked.debug_dag:
+            self._whole = ColorizingTextHandler(nocolor=asked.nocolor, stream=stream)
+        colours = "auto" if not asked.nocolor else None
+        self._console = Console(
+            file=stream, highlight=False, markup=False, emoji=False, color_system=colours
+        )
+        self._moves = stream.isatty() and not self._console.is_dumb_terminal
         self._running: dict[int, tuple[str, float]] = {}
-        self._begin = time.monotonic()
+        self._of: dict[int, Recording] = {}
+        self._begin = self._last_line = time.monotonic()
         self._spinner = Spinner("dots")
         self._live: Live | None = None
         self._done, self._total = 0, 0
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show a record."""
-        if not self._replaced.filter(record):
+        if self._whole is not None:
+            self._whole.setFormatter(self.formatter)
+            self._whole.emit(record)
             return
         about: Mapping[str, Any] = record.__dict__
         event = about.get("event")
@@ -85,11 +115,13 @@ class _OneLine(logging.Handler):
             self._ended(about.get("job_id"))
         elif event == LogEvent.PROGRESS:
             self._done, self._total = about["done"], about["total"]
-        if event in _SHOWN_BY_THE_LINE or record.getMessage().startswith(_OF_THE_SCHEDULER):
+            self._say_in_pipe()
+        if event in _SHOWN_BY_THE_LINE:
             return
-        text = self._replaced.format(record)
-        if text:
-            self._console.print(Text(text, style=_STYLES.get(record.levelno, "")), soft_wrap=True)
+        text = self.format(record)
+        shown = record.levelno >= logging.WARNING or "imubench" in about
+        if text and (shown or text.startswith(_NAMED_LOG)):
+            self._print(text, _STYLES.get(record.levelno, ""))
         if event == LogEvent.JOB_ERROR:
             self._ended(about.get("jobid"))
 
@@ -99,11 +131,26 @@ class _OneLine(logging.Handler):
         self._hide()
         super().close()
 
+    def _print(self, text: str, style: str = "") -> None:
+        self._console.print(Text(text, style=style), soft_wrap=True)
+
+    def _say_in_pipe(self) -> None:
+        """Print how far the run is, where no line moves, now and then."""
+        now = time.monotonic()
+        if not self._moves and now - self._last_line >= _BETWEEN_LINES and self._done < self._total:
+            self._last_line = now
+            self._print(self._far(now))
+
     def _started(self, about: Mapping[str, Any]) -> None:
         of = "/".join(str(value) for value in (about.get("wildcards") or {}).values())
         label = one_line(f"{about.get('rule_name')} {of}")
         self._running[about["jobid"]] = (label, time.monotonic())
-        if self._live is None:
+        sensor, recording = (
+            (about.get("wildcards") or {}).get(key) for key in ("sensor", "recording")
+        )
+        if sensor and recording:
+            self._of[about["jobid"]] = (str(sensor), str(recording))
+        if self._live is None and self._moves:
             self._live = Live(
                 get_renderable=self._line,
                 console=self._console,
@@ -117,8 +164,18 @@ class _OneLine(logging.Handler):
     def _ended(self, job: int | None) -> None:
         if job is not None:
             self._running.pop(job, None)
+            self._tell(self._of.pop(job, None))
         if not self._running:
             self._hide()
+
+    def _tell(self, recording: Recording | None) -> None:
+        """Say what became of a recording of which the last job has ended."""
+        if recording is None or recording not in _expected:
+            return
+        _expected[recording] -= 1
+        if _expected[recording] == 0:
+            for told in _told:
+                self._print(one_line(told(*recording), _LONGEST))
 
     def _hide(self) -> None:
         if self._live is not None:
@@ -143,10 +200,11 @@ class _OneLine(logging.Handler):
         running = ", ".join(
             f"{label} {_clock(now - begin)}" for label, begin in list(self._running.values())
         )
-        if not self._done:
-            return f"first steps: {running}"
+        return f"{self._far(now)}: {running}" if self._done else f"first steps: {running}"
+
+    def _far(self, now: float) -> str:
         left = (now - self._begin) / self._done * (self._total - self._done)
-        return f"{self._done} of {self._total} steps, about {_rough(left)} left: {running}"
+        return f"{self._done} of {self._total} steps, about {_rough(left)} left"
 
 
 def _clock(seconds: float) -> str:
