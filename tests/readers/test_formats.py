@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import shutil
 import subprocess
 import sys
@@ -54,6 +55,35 @@ def test_a_log_is_told_by_its_content(file_format: FileFormat, log: Path) -> Non
     assert content_of(log) == (file_format, "")
     renamed = log.rename(log.with_name("log"))
     assert content_of(renamed) == (file_format, "")
+
+
+WITHOUT = """
+import json, sys
+from pathlib import Path
+sys.modules |= dict.fromkeys(["rosbags", "lz4", "h5py"])
+from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.readers.formats import FILE_FORMATS
+said = {}
+for name, file_format in FILE_FORMATS.items():
+    try:
+        file_format.load()
+    except RecordingError as error:
+        said[name] = str(error)
+print(json.dumps(said))
+"""
+
+
+def test_a_library_that_is_not_installed_is_named() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=True, timeout=60
+    )
+    said = json.loads(done.stdout)
+    extras = {name: form.extra for name, form in FILE_FORMATS.items() if form.extra}
+    assert set(said) == set(extras) == {"rosbag", "matlab", "hdf5"}
+    for name, extra in extras.items():
+        library = {"ros": "rosbags", "hdf5": "h5py"}[extra]
+        assert f"{library}" in said[name]
+        assert f"is not installed: pip install 'imubench_pipeline[{extra}]'" in said[name]
 
 
 def test_a_log_is_read(file_format: FileFormat, log: Path) -> None:

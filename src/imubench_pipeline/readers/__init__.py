@@ -163,4 +163,4 @@ def _open(file: Path, log: LogFormat, sources: dict[str, ColumnSource]) -> LogFi
     inside = None if is_member(file) else _present(file, log)
     if inside is not None:
         file = only_log(file, inside)  # a log that is packed alone, among others
-    return format_of(file, log.reader).code().log_file(file, log, sources)
+    return format_of(file, log.reader).load().log_file(file, log, sources)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.settings.sensor import LogFormat, Reader
+from imubench_pipeline.tables.findings import RecordingError
 
 Kind = Literal["number", "date", "text", "other"]
 
@@ -80,6 +81,26 @@ class FileFormat:
     measured_by_name: bool = False
     """The format has names for what is measured alone: its linear acceleration has gravity in it.
     """
+    extra: str | None = None
+    """The extra of the package with the library that the code takes; None: it takes none."""
+
+    def load(self) -> Code:
+        """Return the code.
+
+        Raises
+        ------
+        RecordingError
+            If the library that it takes is not installed.
+        """
+        try:
+            return self.code()
+        except ModuleNotFoundError as error:
+            if self.extra is None:
+                raise
+            raise RecordingError(
+                f"to read a {self.title}, {error.name} is needed, which is not installed: "
+                f"pip install 'imubench_pipeline[{self.extra}]'"
+            ) from None
 
     def tables(self, path: Path) -> list[LogTable]:
         """Return what a log holds, told from its beginning.
@@ -91,7 +112,7 @@ class FileFormat:
         RecordingError
             If it cannot be read, or holds nothing.
         """
-        return self.code().tables(path, self)
+        return self.load().tables(path, self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,9 +89,8 @@ class LogHandler(LogHandlerBase):
         self._whole: ColorizingTextHandler | None = None
         if asked.dryrun or asked.verbose or asked.debug_dag:
             self._whole = ColorizingTextHandler(nocolor=asked.nocolor, stream=stream)
-        colours = "auto" if not asked.nocolor else None
         self._console = Console(
-            file=stream, highlight=False, markup=False, emoji=False, color_system=colours
+            file=stream, highlight=False, markup=False, emoji=False, no_color=asked.nocolor
         )
         self._moves = stream.isatty() and not self._console.is_dumb_terminal
         self._running: dict[int, tuple[str, float]] = {}

@@ -424,7 +424,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
         If it cannot be read.
     """
     check_not_empty(path)
-    file = file_format.code().log_file(path, NOTHING_STATED, {})
+    file = file_format.load().log_file(path, NOTHING_STATED, {})
     assert isinstance(file, ArrayFile)  # the readers of these files
     with explained(path), ExitStack() as stack:
         tables = list(islice(file.tables(stack), _MOST_TABLES))

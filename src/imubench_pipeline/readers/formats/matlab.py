@@ -19,4 +19,5 @@ FORMAT = FileFormat(
     time_columns=(),
     settings=("variable",),
     code=_code,
+    extra="hdf5",
 )

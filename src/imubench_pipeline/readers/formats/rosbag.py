@@ -21,5 +21,6 @@ FORMAT = FileFormat(
     time_columns=("header.stamp", "log_time"),
     settings=("variable",),
     code=_code,
+    extra="ros",
     measured_by_name=True,
 )
