@@ -23,7 +23,11 @@ def available(threads: int | None) -> int:
         If it is below 1.
     """
     if threads is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return (
+            len(os.sched_getaffinity(0))
+            if hasattr(os, "sched_getaffinity")
+            else os.cpu_count() or 1
+        )
     if threads < 1:
         raise ValueError(f"threads is {threads}, expected 1 or more, or None for all cores")
     return threads

@@ -21,7 +21,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
 from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
-from imubench_pipeline.allan.phase import PRESENT, Phase, Span, full_sums, integrate, spans_of, split
+from imubench_pipeline.allan.phase import (
+    PRESENT,
+    Phase,
+    Span,
+    full_sums,
+    integrate,
+    spans_of,
+    split,
+)
 from imubench_pipeline.allan.threads import available, read_ahead
 from imubench_pipeline.typing import Array
 

@@ -18,13 +18,14 @@ from imubench_pipeline.library.given import (
     Units,
     check_present,
     columns_of,
-    has_columns,
     dimension_of,
+    has_columns,
     numbers,
     rate_of,
 )
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary
+from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
 from imubench_pipeline.steps.allan import curve_of
@@ -126,6 +127,23 @@ class Curves(Shown, Mapping[str, Curve]):
         return Summary(title, _HEADS, [_row(curve) for curve in self.values()])
 
 
+def measured(log: ChannelLog, sizes: ArrayLike | None, overlap: Overlap, threads: int) -> Curve:
+    """Return the curve of a channel of a log, at cluster sizes, shape (m,), or those by default.
+
+    Raises
+    ------
+    ValueError
+        If too many samples are missing.
+    """
+    curve = curve_of(log, sizes, overlap, threads=threads)
+    if not len(curve.tau):
+        raise ValueError(
+            f"{log.channel}: so many samples are missing that no cluster is nine tenths full; "
+            "expected a log with fewer missing, or another rate"
+        )
+    return Curve.of(curve, log.channel)
+
+
 def _row(curve: Curve) -> list[str]:
     from imubench_pipeline.library.drawing import deviation_unit
 
@@ -218,10 +236,10 @@ def allan_variance(
     >>> curves = imu.allan_variance(samples, "100 Hz", channels="gyro", units={"gyro": "deg/s"})
     >>> curves
     Allan curves
-      channel  tau  from    to    at the shortest  lowest     at tau
-      gyro_x   35   0.01 s  50 s  361 °/h          2.05 °/h   39.8 s
-      gyro_y   35   0.01 s  50 s  359 °/h          4.8 °/h    50 s
-      gyro_z   35   0.01 s  50 s  358 °/h          0.914 °/h  50 s
+      channel  tau  from    to      at the shortest  lowest    at tau
+      gyro_x   34   0.01 s  39.8 s  362 °/h          3.52 °/h  39.8 s
+      gyro_y   34   0.01 s  39.8 s  351 °/h          3.85 °/h  31.6 s
+      gyro_z   34   0.01 s  39.8 s  354 °/h          3.75 °/h  39.8 s
     """
     cores = available(threads)
     if isinstance(data, Log):
@@ -231,8 +249,8 @@ def allan_variance(
             )
         return Curves(
             (
-                Curve.of(curve_of(log, cluster_sizes, overlap, threads=cores), name)
-                for name, log in data.chosen(channels).items()
+                measured(log, cluster_sizes, overlap, cores)
+                for log in data.chosen(channels).values()
             ),
             data.name,
         )

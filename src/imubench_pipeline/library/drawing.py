@@ -17,7 +17,6 @@ from imubench_pipeline.report.practical import PageUnit, page_unit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SLOPES = {-1.0: "-1", -0.5: "-1/2", 0.5: "+1/2", 1.0: "+1"}
 _OWN = PageUnit("unit of the samples", 1.0)
 
 
@@ -45,7 +44,7 @@ def deviation_unit(quantity: str | None) -> PageUnit:
 
 
 def draw_curves(axes: Axes, curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
-    """Draw Allan deviations with their 95 % limits, and slopes through the lowest point."""
+    """Draw Allan deviations with their 95 % limits, and the slopes of noise."""
     unit = deviation_unit(quantity)
     looks = cycle(sensor_appearances([*curves]).values())
     for (name, curve), look in zip(curves.items(), looks, strict=False):
@@ -89,13 +88,20 @@ def draw_ratios(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
     """Draw ratios with their 95 % intervals, one below the other: keys label, value and limits."""
     places = range(len(rows), 0, -1)
     for place, row in zip(places, rows, strict=True):
-        lower, upper = row["lower"], row["upper"]
-        if lower is not None and upper is not None and 0.0 < lower <= upper < math.inf:
-            axes.plot([lower, upper], [place, place], color="#0072B2", linewidth=1.5)
+        lower, upper = row["lower"] or None, row["upper"]
+        look: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.5, "markersize": 5.0}
+        if lower is not None and upper is not None:
+            axes.plot([lower, upper], [place, place], **look)
+        elif upper is not None:  # anything below
+            axes.plot(upper, place, marker="<", **look)
+        elif lower is not None:
+            axes.plot(lower, place, marker=">", **look)
         if row["ratio"] is not None:
-            axes.plot(row["ratio"], place, color="#0072B2", marker="o", markersize=4.0)
+            axes.plot(row["ratio"], place, marker="o", **look)
     axes.axvline(1.0, color="0.4", linewidth=0.8)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("{x:g}")
     axes.set_yticks(list(places), [row["label"] for row in rows])
     axes.set_ylim(0.0, len(rows) + 1.0)
     axes.grid(True, axis="x", color="0.9")
@@ -111,22 +117,25 @@ def _finish(axes: Axes, unit: PageUnit) -> None:
 
 
 def _draw_slopes(axes: Axes, curve: AllanCurve, unit: PageUnit) -> None:
-    """Draw the slopes by which noise is told, in grey: falling ones to, rising ones from the lowest."""
-    lowest = int(np.argmin(curve.deviation))
-    tau, level = curve.tau[lowest], curve.deviation[lowest] * unit.per_si
-    if not level > 0.0:
-        return
+    """Draw the slopes of white noise and of a random walk, in grey, through the ends of a curve."""
+    told = curve.up_to(1.0 / 9.0)
     limits = axes.get_xlim(), axes.get_ylim()
-    for slope, name in _SLOPES.items():
-        end = curve.tau[0] if slope < 0.0 else curve.tau[-1]
-        axes.plot(
-            [tau, end],
-            [level, level * (end / tau) ** slope],
-            color="0.6",
-            linewidth=0.7,
-            linestyle=":",
-            zorder=1.0,
-            label=f"_slope {name}",
-        )
+    for place, slope, name in ((0, -0.5, "−1/2"), (max(len(told) - 1, 0), 0.5, "+1/2")):
+        level = curve.deviation * unit.per_si
+        line = level[place] * (curve.tau / curve.tau[place]) ** slope
+        axes.plot(curve.tau, line, color="0.6", linewidth=0.8, linestyle=":", zorder=1.0)
+        inside = np.flatnonzero((line > limits[1][0]) & (line < limits[1][1]))
+        if len(inside):
+            at = inside[len(inside) * 3 // 4 if slope < 0.0 else len(inside) // 4]
+            axes.annotate(
+                name,
+                (curve.tau[at], line[at]),
+                xytext=(-3.0, -3.0),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                color="0.4",
+                fontsize="small",
+            )
     axes.set_xlim(*limits[0])
     axes.set_ylim(*limits[1])

@@ -12,7 +12,7 @@ from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.threads import available
 from imubench_pipeline.estimators.estimate import CURVE, SHOWN, Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
-from imubench_pipeline.library.curves import Curve, Curves
+from imubench_pipeline.library.curves import Curve, Curves, measured
 from imubench_pipeline.library.given import Channels, Units, columns_of, rate_of
 from imubench_pipeline.library.logs import Log, log_of
 from imubench_pipeline.library.shown import Shown, Summary, cut
@@ -21,7 +21,6 @@ from imubench_pipeline.report.practical import System, interval_text, page_unit,
 from imubench_pipeline.settings.config import AllanSettings, EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.settings.validation import parse
-from imubench_pipeline.steps.allan import curve_of
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
@@ -149,7 +148,9 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
             If there are several.
         """
         if len(self) != 1:
-            raise ValueError(f"there are models of {', '.join(self)}; expected .models, or [channel]")
+            raise ValueError(
+                f"there are models of {', '.join(self)}; expected .models, or [channel]"
+            )
         return next(iter(self.values())).model
 
     def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Any:
@@ -261,15 +262,14 @@ def estimate(
     left_out: dict[str, str] = {}
     for channel, kept in log.chosen(channels).items():
         sizes = cluster_sizes(kept.grid, per_decade=grid.per_decade, longest=grid.longest)
-        curve = curve_of(kept, sizes, grid.overlap, threads=available(threads))
+        curve = measured(kept, sizes, grid.overlap, available(threads))
         key = Key(log.sensor, log.recording, channel)
         estimate_channel(key, kept, curve, how, log.bandwidth, into)
         found = into.estimates[channel].get(method)
         if found is None:
             left_out[channel] = _why_not(into, channel)
         else:
-            measured = Curve.of(curve, channel)
-            estimates.append(ChannelEstimate.of(found, channel, measured, log.name))
+            estimates.append(ChannelEstimate.of(found, channel, curve, log.name))
     if not estimates:
         raise ValueError(
             f"{log.name}: no channel is estimated by {method}: {'; '.join(left_out.values())}"
@@ -343,5 +343,3 @@ def _table(estimates: Any, units: System) -> pd.DataFrame:
                 kept["unit"] = unit.sign
             rows.append(kept)
     return pd.DataFrame(rows)
-
-

@@ -1,8 +1,8 @@
 """Samples as users have them, arrays and tables, taken as channels with units.
 
 What stands in an array is in SI unless its units are given: so is all of this library. A table says
-its units, in the names of its columns (``gyro_x [deg/s]``), in its ``attrs`` or beside it; a unit is
-never guessed from the figures.
+its units, in the names of its columns (``gyro_x [deg/s]``), in its ``attrs`` or beside it; a unit
+is never guessed from the figures.
 """
 
 from __future__ import annotations
@@ -130,8 +130,8 @@ def check_present(values: Array, name: str) -> None:
         raise ValueError(f"{name} is empty; expected two samples or more")
     if not np.isfinite(values).any():
         raise ValueError(
-            f"{name}: none of the {len(values)} samples is a finite number; expected a channel that "
-            "was recorded: leave it out, or look into what made the array"
+            f"{name}: none of the {len(values)} samples is a finite number; expected a channel "
+            "that was recorded: leave it out, or look into what made the array"
         )
 
 
@@ -180,9 +180,7 @@ def _unit_beside(name: str, units: Units) -> str | None:
     return units.get(name) or units.get(quantity_of(name))
 
 
-def _positions(
-    data: object, names: list[str] | None, units: Units
-) -> Iterator[tuple[str, Column]]:
+def _positions(data: object, names: list[str] | None, units: Units) -> Iterator[tuple[str, Column]]:
     """Yield the columns of an array."""
     array = numbers(data, "the array")
     if array.ndim not in (1, 2) or not array.size:
@@ -206,7 +204,10 @@ def _positions(
             mend = f"expected a column for each of {', '.join(names)}"
         raise ValueError(f"the array has shape {array.shape}; {mend}")
     for place, name in enumerate(names):
-        yield name, Column(table[:, place], _unit_beside(name, units) or SI_UNITS[dimension_of(name)])
+        yield (
+            name,
+            Column(table[:, place], _unit_beside(name, units) or SI_UNITS[dimension_of(name)]),
+        )
 
 
 def _named_columns(
@@ -245,8 +246,8 @@ def _named_columns(
         unit = _one_unit(name, {source: unit for source, unit in sources.items() if unit})
         if unit is None and stated:
             raise UnitError(
-                f"{name}: the table does not say its unit, which is never guessed; expected such as "
-                f"units={{'gyro': 'deg/s', 'accel': 'm/s^2'}}, or columns such as '{name} "
+                f"{name}: the table does not say its unit, which is never guessed; expected such "
+                f"as units={{'gyro': 'deg/s', 'accel': 'm/s^2'}}, or columns such as '{name} "
                 f"[{SI_UNITS[dimension_of(name)]}]'"
             )
         yield name, Column(values, unit or SI_UNITS[dimension_of(name)])

@@ -1,4 +1,4 @@
-"""Logs as the workflow reads them: files and arrays put onto a time base, judged, and kept in SI."""
+"""Logs as the workflow reads them: files and arrays on a time base, judged, and kept in SI."""
 
 from __future__ import annotations
 
@@ -178,7 +178,9 @@ class Log(Shown):
         names = [*self.channels, *([TEMPERATURE] if self._has_temperature else [])]
         columns = {f"{name} [{SI_UNITS[dimension_of(name)]}]": self[name] for name in names}
         length = len(next(iter(columns.values())))
-        table = pd.DataFrame(columns, index=pd.Index(np.arange(length) / self.rate, name="time [s]"))
+        table = pd.DataFrame(
+            columns, index=pd.Index(np.arange(length) / self.rate, name="time [s]")
+        )
         table.attrs = {
             "sensor": self.sensor,
             "recording": self.recording,
@@ -191,8 +193,13 @@ class Log(Shown):
         rows = []
         for name, log in self._logs.items():
             rows.append(
-                [name, f"{number_text(log.rate, 6)} Hz", f"{log.grid:,}", self.units[name]]
-                + ["yes" if log.holes else "no"]
+                [
+                    name,
+                    f"{number_text(log.rate, 6)} Hz",
+                    f"{log.grid:,}",
+                    self.units[name],
+                    "yes" if log.holes else "no",
+                ]
             )
         serious = [finding for finding in self.findings if finding.severity != "note"]
         notes = [f"{f.severity}: {f.finding}: {cut(f.detail, 100)}" for f in serious[:_SERIOUS]]
@@ -254,7 +261,7 @@ def read_log(
     >>> log = imu.read_log("run.csv", units={"gyro": "deg/s"})
     >>> log.channels
     ('gyro_z', 'accel_z')
-    >>> log["gyro_z"].shape, log.rate
+    >>> log["gyro_z"].shape, round(log.rate, 6)
     ((2000,), 100.0)
     """
     source = Path(path)
@@ -301,7 +308,12 @@ def log_of(columns: Mapping[str, Column], rate: float, name: str) -> Log:
         else:
             channels[channel] = entry
     log = LogFormat.model_validate(
-        {"reader": "numpy", "rate": f"{rate!r} Hz", "channels": channels, "temperature": temperature}
+        {
+            "reader": "numpy",
+            "rate": f"{rate!r} Hz",
+            "channels": channels,
+            "temperature": temperature,
+        }
     )
     with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
         file = Path(folder) / f"{name}.npy"

@@ -1,7 +1,7 @@
 """Simulated noise of a model: call it, as in ``simulate(model, "100 Hz", duration="1 h", seed=1)``.
 
-``help(simulate.simulate)`` says what it takes. The rest of the room is a whole sensor: noise, drift,
-low-pass, register and motion of all axes, from settings, a datasheet or estimates.
+``help(simulate.simulate)`` says what it takes. The rest of the room is a whole sensor: noise,
+drift, low-pass, register and motion of all axes, from settings, a datasheet or estimates.
 """
 
 import sys

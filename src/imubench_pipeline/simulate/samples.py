@@ -104,7 +104,7 @@ def simulate(
     return noise.simulate(_model(model), frequency, number, rng or np.random.default_rng(seed))
 
 
-def _model(source: NoiseModel | HasModel) -> NoiseModel:
+def _model(source: object) -> NoiseModel:
     model = source if isinstance(source, NoiseModel) else getattr(source, "model", None)
     if not isinstance(model, NoiseModel):
         raise ValueError(
