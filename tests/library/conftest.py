@@ -3,7 +3,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -24,8 +23,10 @@ log:
 """
 
 
-@pytest.fixture(autouse=True)
-def without_a_screen() -> Iterator[None]:
+@pytest.fixture
+def no_screen() -> Iterator[None]:
+    import matplotlib as mpl
+
     mpl.use("agg")
     yield
     from matplotlib import pyplot as plt
@@ -35,14 +36,14 @@ def without_a_screen() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def drop_zone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """`logs/sensor_1/run.csv` and `sensors/sensor_1.yaml`: an hour and a half, one knock."""
+    """`logs/sensor_1/run.csv` and `sensors/sensor_1.yaml`: an hour, one knock."""
     folder = tmp_path_factory.mktemp("zone")
-    samples = 54_000
+    samples = 36_000
     gyro, accel = (
         simulate(model, RATE, samples, channel_rng(5, name))
         for name, model in (("gyro", GYRO), ("accel", ACCEL))
     )
-    gyro[30_000] += 0.1
+    gyro[20_000] += 0.1
     columns = np.arange(samples) / RATE, np.degrees(gyro), (accel + 9.80665) / 9.80665
     (folder / "logs/sensor_1").mkdir(parents=True)
     (folder / "sensors").mkdir()

@@ -16,7 +16,7 @@ LOUD = imu.NoiseModel(N=1.5 * GYRO.N, K=GYRO.K)
 
 @pytest.fixture(scope="module")
 def loud():
-    samples = imu.simulate({"gyro_x": LOUD}, RATE, duration="90 min", seed=2)
+    samples = imu.simulate({"gyro_x": LOUD}, RATE, duration="1 h", seed=2)
     return imu.estimate(samples, RATE, name="loud")
 
 
@@ -103,6 +103,7 @@ def test_an_interval_alone_says_which_is_lower() -> None:
     assert Ratio(None, 1.01, None).verdict == "higher"
 
 
+@pytest.mark.usefixtures("no_screen")
 def test_a_comparison_is_shown_drawn_and_given_as_a_table(comparison, loud) -> None:
     assert "run lower" in repr(comparison) and repr(comparison).startswith("Comparison of run (a)")
     assert comparison._repr_html_().count("<tr>") == len(comparison) + 1

@@ -129,6 +129,7 @@ def test_what_cannot_be_used_says_why(data: object, arguments: dict, expected: s
     assert ("unit" in expected and "units" not in expected) <= isinstance(error.value, UnitError)
 
 
+@pytest.mark.usefixtures("no_screen")
 def test_curves_are_shown_drawn_and_given_as_tables(samples: np.ndarray) -> None:
     curves = imu.allan_variance(samples, RATE)
     assert "gyro_x   31   0.1 s" in repr(curves) and len(repr(curves)) < 1000

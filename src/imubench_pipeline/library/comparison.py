@@ -178,13 +178,11 @@ def compare(
     Examples
     --------
     >>> import imubench_pipeline as imu
-    >>> quiet, loud = imu.NoiseModel(N=1e-4), imu.NoiseModel(N=1.5e-4)
-    >>> a, b = (
-    ...     imu.estimate(imu.simulate(model, "10 Hz", duration="1 h", seed=1), "10 Hz",
-    ...                  channels="gyro_x", name=name)
-    ...     for name, model in (("quiet", quiet), ("loud", loud))
-    ... )
-    >>> imu.compare(a, b, names=["quiet", "loud"])[0].verdict
+    >>> loud = imu.simulate(imu.NoiseModel(N=1.5e-4), "10 Hz", duration="10 min", seed=1)
+    >>> quiet = imu.simulate(imu.NoiseModel(N=1.0e-4), "10 Hz", duration="10 min", seed=2)
+    >>> a = imu.estimate(loud, "10 Hz", channels="gyro_x")
+    >>> b = imu.estimate(quiet, "10 Hz", channels="gyro_x")
+    >>> imu.compare(a, b, names=["loud", "quiet"])[0].verdict
     'quiet lower'
     """
     if len(logs) < 2:

@@ -236,8 +236,8 @@ def estimate(
     Examples
     --------
     >>> import imubench_pipeline as imu
-    >>> gyro = imu.NoiseModel(N=8.7e-5, K=2e-6)
-    >>> samples = imu.simulate(gyro, "10 Hz", duration="2 h", seed=1)
+    >>> gyro = imu.NoiseModel(N=8.7e-5, K=2e-5)
+    >>> samples = imu.simulate(gyro, "10 Hz", duration="20 min", seed=1)
     >>> estimates = imu.estimate(samples, "10 Hz", channels="gyro_z")
     >>> estimates.model.name
     'N+K'
@@ -253,6 +253,9 @@ def estimate(
         log = data
     else:
         log = log_of(columns_of(data, channels, units), rate_of(rate, data), name)
+    chosen = log.chosen(channels)
+    if method == "compensated" and not any(kept.temperature for kept in chosen.values()):
+        raise ValueError(f"{log.name} has no readings of the temperature; expected another method")
     # What other methods find wrong of a curve is doubted by the likelihood: it is always asked.
     asked = tuple(dict.fromkeys(("likelihood", method)))
     how = parse(EstimateSettings, {**settings, "methods": asked}, "estimate")
@@ -260,7 +263,7 @@ def estimate(
     into = Estimation()
     estimates: list[ChannelEstimate] = []
     left_out: dict[str, str] = {}
-    for channel, kept in log.chosen(channels).items():
+    for channel, kept in chosen.items():
         sizes = cluster_sizes(kept.grid, per_decade=grid.per_decade, longest=grid.longest)
         curve = measured(kept, sizes, grid.overlap, available(threads))
         key = Key(log.sensor, log.recording, channel)
@@ -283,11 +286,12 @@ def estimate(
 
 def _why_not(into: Estimation, channel: str) -> str:
     """Return why temperature was not taken out of a channel."""
-    rows = [row for row in into.temperature if row["channel"] == channel]
-    if not rows:
-        return "the log has no readings of the temperature"
-    reasons = [row["reason"] for row in rows if row["parameter"] == "sensitivity"]
-    return f"temperature does not explain it ({reasons[0] or 'by likelihood'}): use likelihood"
+    reasons = [
+        row["reason"] or "the data do not favour it"
+        for row in into.temperature
+        if (row["channel"], row["parameter"]) == (channel, "sensitivity")
+    ]
+    return "; ".join(reasons) or "its clock has no readings of the temperature"
 
 
 def _rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
