@@ -321,12 +321,13 @@ def _rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
 
 def _reasons(estimates: Any) -> list[str]:
     """Return why values are in doubt."""
-    return [
+    reasons = (
         f"{estimate.channel} {symbol_text(symbol)}: {cut(parameter.reason, 150)}"
         for estimate in estimates
         for _, symbol, parameter in estimate.components()
         if parameter.status == "doubtful" and parameter.reason and symbol not in CURVE
-    ]
+    )
+    return list(dict.fromkeys(reasons))
 
 
 def _table(estimates: Any, units: System) -> pd.DataFrame:
