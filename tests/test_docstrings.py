@@ -25,15 +25,16 @@ PUBLIC = ["units",
           "datasheets/coverage", "datasheets/deltas", "datasheets/suspicion",
           "simulate/discretisation", "simulate/flicker_band", "simulate/from_datasheet",
           "simulate/from_estimates", "simulate/imu", "simulate/model",
-          "simulate/profile_files", "simulate/profiles", "simulate/simulation", "simulate/sources",
-          "simulate/spectra", "simulate/writing",
+          "simulate/profile_files", "simulate/profiles", "simulate/samples",
+          "simulate/simulation", "simulate/sources", "simulate/spectra", "simulate/writing",
           "navigation/drift", "navigation/error_budget/budget", "navigation/error_budget/in_use",
           "navigation/error_budget/parts",
           "navigation/error_budget/printed_errors", "navigation/expected_errors",
           "navigation/fusion/board", "navigation/fusion/equivalence", "navigation/fusion/kalman",
           "navigation/fusion/prediction", "navigation/fusion/samples", "navigation/fusion/weights",
-          "navigation/repeatability", "navigation/selection", "navigation/shortlist/classes",
-          "navigation/shortlist/figures", "navigation/shortlist/rows",
+          "navigation/ratios", "navigation/repeatability", "navigation/selection",
+          "navigation/shortlist/classes", "navigation/shortlist/figures",
+          "navigation/shortlist/rows",
           "navigation/suitability/abilities", "navigation/suitability/conditions",
           "navigation/verdicts/basis", "navigation/verdicts/evidence",
           "navigation/verdicts/judgement", "navigation/verdicts/next_steps",
@@ -50,6 +51,8 @@ PUBLIC = ["units",
           "experiments/earth_rate/transients", "experiments/earth_rate/turning",
           "export/choice", "export/growth", "export/mapping", "export/overbound", "export/request",
           "export/temperature",
+          "library/comparison", "library/curves", "library/estimates", "library/given",
+          "library/logs",
           "report/comparison", "report/datasheets", "report/earth_rate", "report/fusion",
           "report/html", "report/meaning", "report/palette", "report/parameters", "report/payload",
           "report/practical", "report/publish", "report/site", "report/turned", "report/view",
@@ -67,6 +70,7 @@ def functions(path: Path) -> list[ast.FunctionDef]:
         node
         for node in [*body, *(node for one in classes for node in one.body)]
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
+        if "overload" not in map(ast.unparse, node.decorator_list)  # signatures of the next one
     ]
 
 

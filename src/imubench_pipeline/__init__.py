@@ -1,5 +1,20 @@
 """Benchmark of inertial sensors: from static logs to a cross-IMU report.
 
+The front door
+--------------
+``import imubench_pipeline as imu`` gives
+
+===========================  ======================================================================
+imu.read_log(path, sensor)   a log of any format in SI, on a time base, with what is wrong of it
+imu.allan_variance(data)     Allan curves with 95 % limits, of a log, an array or a table
+imu.estimate(data)           noise parameters with 95 % intervals, status and reason, and models
+imu.compare(a, b)            how many times the noise of one log is that of another
+imu.simulate(model, rate)    samples of a noise model
+imu.NoiseModel(N=, B=, ...)  Allan variance, spectrum and state space of a sum of noise terms
+imu.convert(x, unit, to)     figures from one unit of a vendor to another
+imu.__version__
+===========================  ======================================================================
+
 Units
 -----
 SI throughout: rad/s and m/s^2 for samples, s for times, Hz for rates, ordinary frequencies and
@@ -35,8 +50,9 @@ From the lowest: `units`, `earth` and `typing`; `settings` (what users declare),
 variance), `tables` (columns, reading, writing), `noise` (what each noise is), `readers` (log
 files), `recordings` (logs, judged and kept), `estimators` (parameters), `datasheets`, `simulate` (a
 whole sensor), `navigation` (what noise means in use), `experiments` (known rates), `export`,
-`report`, `steps` (one module a rule of the workflow), `run` (plan, processes, commands). Only the
-last three know the files and the settings of a run together. ``docs/architecture.md`` says what may
+`report`, `steps` (one module a rule of the workflow), `library` (the front door) and `run` (plan,
+processes, commands). Only `report`, `steps` and `run` know the files and the settings of a run
+together. ``docs/architecture.md`` says what may
 use what.
 
 References
@@ -47,3 +63,57 @@ References
    Tutorial", IEEE Control Systems Magazine 42(6), 2022.
 .. [3] W. J. Riley, "Handbook of Frequency Stability Analysis", NIST Special Publication 1065, 2008.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from imubench_pipeline.library.comparison import compare
+    from imubench_pipeline.library.curves import allan_variance
+    from imubench_pipeline.library.estimates import estimate
+    from imubench_pipeline.library.logs import read_log
+    from imubench_pipeline.noise import NoiseModel
+    from imubench_pipeline.simulate import simulate
+    from imubench_pipeline.units import convert
+
+    __version__: str
+
+__all__ = [
+    "NoiseModel",
+    "__version__",
+    "allan_variance",
+    "compare",
+    "convert",
+    "estimate",
+    "read_log",
+    "simulate",
+]
+
+_WHERE = {
+    "NoiseModel": "noise",
+    "allan_variance": "library.curves",
+    "compare": "library.comparison",
+    "convert": "units",
+    "estimate": "library.estimates",
+    "read_log": "library.logs",
+}
+"""The module of each name, imported when it is asked for: numerics take a second to load."""
+
+
+def __getattr__(name: str) -> Any:
+    from importlib import import_module, metadata
+
+    if name == "__version__":
+        return metadata.version(__name__)
+    if name == "simulate":
+        return import_module(f"{__name__}.simulate")  # the room, which is called
+    if name not in _WHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_WHERE[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pint
@@ -434,6 +434,81 @@ def from_si(value: float, unit: str, dimension: str) -> float:
     """Convert one SI value to ``unit`` (see `conversion`)."""
     factor, offset = conversion(unit, dimension)
     return (value - offset) / factor
+
+
+def convert(value: Any, unit: str, to: str) -> Any:
+    """Convert a figure from one unit to another of the same dimension.
+
+    Parameters
+    ----------
+    value : float or ndarray
+        In ``unit``.
+    unit, to : str
+        As vendors write them (see `conversion`).
+
+    Returns
+    -------
+    float or ndarray
+        In ``to``, in the shape of ``value``.
+
+    Raises
+    ------
+    UnitError
+        If a unit is not known, or they are of different dimensions.
+
+    Examples
+    --------
+    >>> round(convert(0.3, "deg/sqrt(h)", "mdps/sqrt(Hz)"), 6)
+    5.0
+    """
+    _parsed(unit)
+    wrong = UnitError(f"{unit!r} is no unit of an inertial sensor; expected one such as deg/h")
+    for dimension in reversed(SI_UNITS):
+        try:
+            si = to_si(value, unit, dimension)
+        except UnitError:
+            continue
+        try:
+            return from_si(si, to, dimension)
+        except UnitError as error:  # g may be a mass
+            wrong = error
+    raise wrong
+
+
+def in_si(value: float | str, dimension: str, name: str) -> float:
+    """Return a setting above 0 in SI: a number is in SI, a text has its unit.
+
+    Parameters
+    ----------
+    value : float or str
+        Such as 100.0 or ``100 Hz``.
+    dimension : str
+        A key of `SI_UNITS`.
+    name : str
+        What it is called, for the error.
+
+    Raises
+    ------
+    UnitError
+        If a text is no number with a unit of the dimension.
+    ValueError
+        If it is neither a number nor a text, or not above 0 and finite.
+    """
+    if isinstance(value, str):
+        with naming(f"{name}: "):
+            number = quantity_to_si(value, dimension)
+    else:
+        try:
+            number = math.nan if isinstance(value, bool) else float(value)
+        except (TypeError, ValueError):
+            number = math.nan
+    if not 0.0 < number < math.inf:
+        example = _WRITTEN.get(dimension, f"1 {SI_UNITS[dimension]}")
+        raise ValueError(
+            f"{name} is {value!r}, expected a {_said(dimension)} above 0: a number in "
+            f"{SI_UNITS[dimension]}, or a text with its unit such as {example!r}"
+        )
+    return number
 
 
 _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.].*)$")

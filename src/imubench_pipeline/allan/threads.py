@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -11,6 +12,25 @@ from numpy.typing import NDArray
 
 _SHARES = 4
 """Shares of the work a thread takes, one after the other: no thread waits long for the last."""
+
+
+def available(threads: int | None) -> int:
+    """Return a number of threads; None: one for each core that this process may use.
+
+    Raises
+    ------
+    ValueError
+        If it is below 1.
+    """
+    if threads is None:
+        return (
+            len(os.sched_getaffinity(0))
+            if hasattr(os, "sched_getaffinity")
+            else os.cpu_count() or 1
+        )
+    if threads < 1:
+        raise ValueError(f"threads is {threads}, expected 1 or more, or None for all cores")
+    return threads
 
 
 def in_threads(

@@ -21,8 +21,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
 from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
-from imubench_pipeline.allan.phase import Phase, Span, full_sums, integrate, spans_of, split
-from imubench_pipeline.allan.threads import read_ahead
+from imubench_pipeline.allan.phase import (
+    PRESENT,
+    Phase,
+    Span,
+    full_sums,
+    integrate,
+    spans_of,
+    split,
+)
+from imubench_pipeline.allan.threads import available, read_ahead
 from imubench_pipeline.typing import Array
 
 _MANY_CLUSTERS = 100
@@ -36,7 +44,7 @@ Edges = Callable[[int], tuple[Array, NDArray[Any] | None, int]]
 """Cumulative sums and counts at the edges of adjacent clusters of about a size, and the size."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class AllanCurve:
     """An Allan variance over tau.
 
@@ -92,6 +100,10 @@ class AllanCurve:
         if not len(self.share):
             object.__setattr__(self, "share", np.ones(len(self.tau)))
 
+    def __repr__(self) -> str:
+        span = f", {self.tau[0]:.4g} to {self.tau[-1]:.4g} s" if len(self.tau) else ""
+        return f"<{type(self).__name__}: {len(self.tau)} tau{span}, of {self.samples} samples>"
+
     @property
     def deviation(self) -> Array:
         """Allan deviation in the unit of the samples, shape (m,)."""
@@ -139,6 +151,7 @@ def allan_variance(
     overlap: Literal["full", "octave"] = "full",
     valid: ArrayLike | None = None,
     segments: Sequence[Span] | None = None,
+    threads: int | None = None,
 ) -> AllanCurve:
     """Return the overlapping Allan variance of a log.
 
@@ -158,6 +171,8 @@ def allan_variance(
         False where the sample is missing.
     segments : sequence of (int, int), optional
         First and one-past-last sample of each segment; no difference spans two.
+    threads : int, optional
+        By default one for each core. The result has the same bits for any number.
 
     Returns
     -------
@@ -167,8 +182,9 @@ def allan_variance(
     Raises
     ------
     ValueError
-        If the log is not one-dimensional, the rate not positive, a size not positive, or the
-        segments do not lie in the log one after the other.
+        If the log is not one-dimensional, the rate not positive, a size not positive, the segments
+        do not lie in the log one after the other, or so many samples are missing that no size has
+        a difference.
 
     References
     ----------
@@ -185,12 +201,27 @@ def allan_variance(
         if mask.shape != values.shape:
             raise ValueError(f"valid has shape {mask.shape}, expected {values.shape}")
         values = np.where(mask, values, np.nan)
-    holes = not bool(np.isfinite(values).all())
+    present = np.isfinite(values)
+    holes, number, cores = not bool(present.all()), len(values), available(threads)
     if overlap == "octave":
-        return of_blocks([values], len(values), rate, cluster_sizes, holes=holes, segments=segments)
-    return of_phase(
-        integrate([values], len(values), holes=holes, segments=segments), rate, cluster_sizes
-    )
+        curve = of_blocks(
+            [values],
+            number,
+            rate,
+            cluster_sizes,
+            holes=holes,
+            segments=segments,
+            threads=cores,
+        )
+    else:
+        phase = integrate([values], number, holes=holes, segments=segments)
+        curve = of_phase(phase, rate, cluster_sizes, threads=cores)
+    if not len(curve.tau) and holes:
+        raise ValueError(
+            f"{int(present.sum())} of {number} samples are finite numbers, and no two adjacent "
+            f"clusters have {PRESENT:.0%} of theirs; expected a log with fewer missing"
+        )
+    return curve
 
 
 def of_blocks(

@@ -30,6 +30,7 @@ from imubench_pipeline.settings.sensor import (
     Sensor,
     kind_of,
     merged_log,
+    of_ingest,
     read_sensor_files,
 )
 from imubench_pipeline.settings.simulated_recordings import (
@@ -162,9 +163,10 @@ class Plan:
         return self._of_ingest[key]
 
     def _ingest(self, recording: Recording) -> dict[str, object]:
+        kind = self.kind(recording.sensor, recording.name)
         settings: dict[str, object] = {
             "simulated": recording.simulated,
-            "kind": self.kind(recording.sensor, recording.name),
+            "kind": kind,
             "quality": self.run.quality.model_dump(mode="json"),
         }
         try:
@@ -176,12 +178,8 @@ class Plan:
                     notes.check_gyro(log)
                 except ValueError as error:
                     raise ConfigError(f"{recording.notes}: {error}") from None
-            if settings["kind"] != "rate_table":
-                log = log.model_copy(update={"table_rate": None})
-            written = log.model_dump(mode="json", exclude={"bandwidth"})
-            stated = notes.model_dump(mode="json", exclude={"log", *EXPERIMENTS})
             files = versions_of(recording, self.run.results)
-            return settings | {"notes": stated, "log": written, "files": files}
+            return settings | of_ingest(log, notes, kind) | {"files": files}
         except ConfigError as error:
             return settings | {"error": str(error)}
 

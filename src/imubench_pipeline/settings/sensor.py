@@ -371,6 +371,17 @@ def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
     return parse(LogFormat, merged, f"{file}: log")
 
 
+def of_ingest(log: LogFormat, notes: RecordingNotes, kind: Kind) -> dict[str, Any]:
+    """Return what of a log's format, of its notes, and of what was done, the ingest depends on."""
+    if kind != "rate_table":
+        log = log.model_copy(update={"table_rate": None})
+    return {
+        "kind": kind,
+        "notes": notes.model_dump(mode="json", exclude={"log", *EXPERIMENTS}),
+        "log": log.model_dump(mode="json", exclude={"bandwidth"}),
+    }
+
+
 def _merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Return ``base`` with the keys of ``over``; a key that is null there is taken out."""
     merged = dict(base)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
-from imubench_pipeline.allan import cluster_sizes, of_blocks, of_phase
+from numpy.typing import ArrayLike
+
+from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks, of_phase
 from imubench_pipeline.allan.phase import integrate
 from imubench_pipeline.estimators.rows import allan_rows
 from imubench_pipeline.recordings.kept import kept_static_logs
+from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Row
@@ -18,10 +22,22 @@ def curves(folder: Path, sensor: str, recording: str, settings: AllanSettings) -
     """Yield the rows of the table ``allan``; none of a rejected recording."""
     for channel, log in kept_static_logs(folder).items():
         sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
-        blocks, holes, segments = log.blocks(), log.holes, log.segments
-        if settings.overlap == "octave":
-            curve = of_blocks(blocks, log.grid, log.rate, sizes, holes=holes, segments=segments)
-        else:
-            phase = integrate(blocks, log.grid, holes=holes, segments=segments)
-            curve = of_phase(phase, log.rate, sizes)
+        curve = curve_of(log, sizes, settings.overlap)
         yield from allan_rows(Key(sensor, recording, channel), curve)
+
+
+def curve_of(
+    log: ChannelLog,
+    sizes: ArrayLike | None,
+    overlap: Literal["full", "octave"],
+    *,
+    threads: int = 1,
+) -> AllanCurve:
+    """Return the Allan variance of a channel, with the same bits for any number of threads."""
+    blocks, holes, segments = log.blocks(), log.holes, log.segments
+    if overlap == "full":
+        phase = integrate(blocks, log.grid, holes=holes, segments=segments)
+        return of_phase(phase, log.rate, sizes, threads=threads)
+    return of_blocks(
+        blocks, log.grid, log.rate, sizes, holes=holes, segments=segments, threads=threads
+    )

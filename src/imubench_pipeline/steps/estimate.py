@@ -58,6 +58,8 @@ class Estimation:
     deterministic: list[Row] = field(default_factory=list)
     estimate_findings: list[Row] = field(default_factory=list)
     """Rows of the table ``findings``."""
+    estimates: dict[str, dict[str, Estimate]] = field(default_factory=dict)
+    """By channel and method: what the rows of the tables ``parameters`` and ``draws`` stand for."""
     paths: dict[Path, TemperaturePath] = field(default_factory=dict)
     """Of the temperature, by the file of the log: its channels have one."""
 
@@ -101,6 +103,7 @@ def estimate_channel(
             estimate = estimates[method]
             if method != "compensated":
                 estimate = verdict.applied(estimate)
+            into.estimates.setdefault(key.channel, {})[method] = estimate
             into.parameters += parameter_rows(key, estimate, recommended=method == best)
             into.draws += draw_rows(key, estimate)
     into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": channel.unit})

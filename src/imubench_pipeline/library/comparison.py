@@ -1,0 +1,263 @@
+"""Logs or estimates beside each other: by channel and parameter, how many times, and how surely."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS, Parameter
+from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, Method, estimate
+from imubench_pipeline.library.logs import Log
+from imubench_pipeline.library.shown import Shown, Summary, cut
+from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
+from imubench_pipeline.navigation.ratios import Ratio, ratio_of_deviations, ratio_of_parameters
+from imubench_pipeline.report.practical import limit_digits, number_text, page_unit, symbol_text
+from imubench_pipeline.settings.config import FusionSettings
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.units import in_si
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+_TAU = ("1 s", "10 s", "100 s", "1000 s")
+_FUSION = FusionSettings()
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One figure of one channel of two logs; values in SI."""
+
+    channel: str
+    symbol: str
+    """A parameter, or ``adev``."""
+    tau: float | None  # s, of the Allan deviation
+    names: tuple[str, str]
+    values: tuple[float | None, float | None]
+    ratio: Ratio
+
+    @property
+    def verdict(self) -> str:
+        """Which is lower, by its name, or that they are not told apart."""
+        lower = {"lower": self.names[0], "higher": self.names[1]}.get(self.ratio.verdict)
+        return f"{lower} lower" if lower else self.ratio.verdict
+
+    @property
+    def label(self) -> str:
+        """What is compared."""
+        return symbol_text(self.symbol) if self.tau is None else f"σ({self.tau:g} s)"
+
+
+class Comparison(Shown, Sequence[Compared]):
+    """Noise parameters and Allan deviations of logs, as ratios with 95 % intervals.
+
+    A verdict is that of one interval; of twenty sensors that are alike one is called lower.
+    """
+
+    def __init__(self, compared: Sequence[Compared], names: Sequence[str]) -> None:
+        self._compared = list(compared)
+        self.names = tuple(names)
+
+    def __getitem__(self, place: Any) -> Any:
+        return self._compared[place]
+
+    def __len__(self) -> int:
+        return len(self._compared)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw each ratio with its interval, on a logarithmic axis."""
+        from imubench_pipeline.library.drawing import axes_or_new, draw_ratios
+
+        axes: Axes = axes_or_new(ax)
+        draw_ratios(
+            axes,
+            [
+                {
+                    "label": f"{each.channel} {each.label}" + self._pair(each),
+                    "ratio": each.ratio.value,
+                    "lower": each.ratio.lower,
+                    "upper": each.ratio.upper,
+                }
+                for each in self
+            ],
+        )
+        two = f"{self.names[0]} / {self.names[1]}" if len(self.names) == 2 else "the first / second"
+        axes.set_xlabel(f"ratio {two}")
+        return axes
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a row for each channel, figure and pair; values are in SI, ratios are a over b."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "channel": each.channel,
+                "parameter": each.symbol,
+                "tau": each.tau,
+                "a": each.names[0],
+                "b": each.names[1],
+                "value_a": each.values[0],
+                "value_b": each.values[1],
+                "unit": SI_UNITS[quantity_of(each.channel)][
+                    "B" if each.symbol == "adev" else each.symbol
+                ],
+                "ratio": each.ratio.value,
+                "lower": each.ratio.lower,
+                "upper": each.ratio.upper,
+                "verdict": each.verdict,
+                "reason": each.ratio.reason,
+            }
+            for each in self
+        )
+
+    def _pair(self, each: Compared) -> str:
+        return "" if len(self.names) == 2 else f" {each.names[0]} / {each.names[1]}"
+
+    def _summary(self) -> Summary:
+        heads = ["channel", "", "a", "b", "unit", "a / b", "95 % interval", "verdict", "because"]
+        several = len(self.names) > 2
+        rows = []
+        for each in self:
+            unit = page_unit(quantity_of(each.channel), each.symbol, "practical")
+            row = [each.channel, each.label, *(unit.text(value, 3) for value in each.values)]
+            row += [unit.sign, *_ratio_texts(each.ratio), each.verdict]
+            row.append(cut(each.ratio.reason or "", 50))
+            rows.append([f"{each.names[0]} / {each.names[1]}", *row] if several else row)
+        if several:
+            heads = ["a / b of", *heads]
+        a, b, *more = self.names
+        title = f"{a} (a) and {b} (b)" if not more else ", ".join(self.names)
+        return Summary(f"Comparison of {title}", heads, rows)
+
+
+def _ratio_texts(ratio: Ratio) -> tuple[str, str]:
+    value = "–" if ratio.value is None else number_text(ratio.value, 3)
+    digits = limit_digits(ratio.lower, ratio.upper)
+    if ratio.lower is None and ratio.upper is None:
+        return value, "–"
+    if ratio.upper is None:
+        return value, f"above {number_text(ratio.lower or 0.0, digits)}"
+    return value, f"{number_text(ratio.lower or 0.0, digits)} to {number_text(ratio.upper, digits)}"
+
+
+def compare(
+    *logs: Log | Estimates,
+    names: Sequence[str] | None = None,
+    tau: Sequence[float | str] = _TAU,
+    method: Method = "likelihood",
+) -> Comparison:
+    """Compare the noise of logs, channel by channel.
+
+    Parameters
+    ----------
+    *logs : Log or Estimates
+        Two or more; a log is estimated first.
+    names : sequence of str, optional
+        What they are called; by default as the recordings, with their sensors where these are the
+        same.
+    tau : sequence of float or str
+        Averaging times at which Allan deviations of the models are compared, s or with their unit;
+        those that the logs do not tell, beyond a ninth of the shorter one, are left out.
+    method : str
+        Of the estimates of logs.
+
+    Returns
+    -------
+    Comparison
+        Of each pair, for each channel that both have: ratio with its 95 % interval and a verdict,
+        of N, B and lowest point of the curve, K, and the Allan deviation at each tau. Parameters
+        are held against each other by their limits, Allan deviations by the joint draws of both.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two, or no channel is in both of a pair.
+
+    Examples
+    --------
+    >>> import imubench_pipeline as imu
+    >>> loud = imu.simulate(imu.NoiseModel(N=1.5e-4), "10 Hz", duration="10 min", seed=1)
+    >>> quiet = imu.simulate(imu.NoiseModel(N=1.0e-4), "10 Hz", duration="10 min", seed=2)
+    >>> a = imu.estimate(loud, "10 Hz", channels="gyro_x")
+    >>> b = imu.estimate(quiet, "10 Hz", channels="gyro_x")
+    >>> imu.compare(a, b, names=["loud", "quiet"])[0].verdict
+    'quiet lower'
+    """
+    if len(logs) < 2:
+        raise ValueError(f"{len(logs)} given; expected two or more logs, or estimates")
+    estimates = [_estimated(log, method) for log in logs]
+    called = list(names) if names is not None else _names(estimates)
+    if len(called) != len(logs) or len(set(called)) < len(called):
+        raise ValueError(
+            f"names are {', '.join(called)}; expected {len(logs)} of them, all distinct"
+        )
+    seconds = [in_si(each, "time", "tau") for each in tau]
+    compared = [
+        figure
+        for (a, first), (b, second) in combinations(zip(called, estimates, strict=True), 2)
+        for figure in _pair((a, b), first, second, seconds)
+    ]
+    return Comparison(compared, called)
+
+
+def _estimated(log: object, method: Method) -> Estimates:
+    if isinstance(log, Estimates):
+        return log
+    if isinstance(log, Log):
+        return estimate(log, method=method)
+    raise ValueError(f"found {type(log).__name__}; expected what read_log or estimate returns")
+
+
+def _names(estimates: Sequence[Estimates]) -> list[str]:
+    for names in ([each.log.recording for each in estimates], [each.name for each in estimates]):
+        if len(set(names)) == len(names):
+            return names
+    return [f"{name} ({place})" for place, name in enumerate(names, start=1)]
+
+
+def _pair(
+    names: tuple[str, str], first: Estimates, second: Estimates, seconds: Sequence[float]
+) -> Iterator[Compared]:
+    channels = [channel for channel in first if channel in second]
+    if not channels:
+        raise ValueError(
+            f"{names[0]} has {', '.join(first)}, {names[1]} {', '.join(second)}; expected one "
+            "channel or more that both have"
+        )
+    for channel in channels:
+        pair = first[channel], second[channel]
+        for symbol in COMPARED:
+            a, b = (_parameter(one, symbol) for one in pair)
+            if a is not None and b is not None:
+                ratio = ratio_of_parameters(a, b)
+                yield Compared(channel, symbol, None, names, (a.value, b.value), ratio)
+        a_log, b_log = (_as_fused(one) for one in pair)
+        for tau in seconds:
+            if tau > _FUSION.longest * min(a_log.duration, b_log.duration):
+                continue
+            ratio = ratio_of_deviations(
+                a_log, b_log, tau, longest=_FUSION.longest, draws=_FUSION.draws, seed=_FUSION.seed
+            )
+            deviations = a_log.variance(tau) ** 0.5, b_log.variance(tau) ** 0.5
+            yield Compared(channel, "adev", tau, names, deviations, ratio)
+
+
+def _parameter(estimate: ChannelEstimate, symbol: str) -> Parameter | None:
+    return {**estimate.parameters, **estimate.curve}.get(symbol)
+
+
+def _as_fused(estimate: ChannelEstimate) -> FusionChannel:
+    """Return a channel as `navigation.fusion` takes it."""
+    curve = estimate.measured
+    assert curve is not None
+    sensor, _, recording = estimate.log.partition("/")
+    return FusionChannel(
+        sensor=sensor,
+        recording=recording,
+        channel=estimate.channel,
+        simulated=False,
+        duration=curve.samples / curve.rate,
+        estimate=estimate,
+    )

@@ -1,0 +1,281 @@
+"""Allan curves of logs, arrays and tables, by channel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imubench_pipeline import allan
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.allan.threads import available
+from imubench_pipeline.estimators.rows import allan_rows
+from imubench_pipeline.library.given import (
+    Channels,
+    Units,
+    check_present,
+    columns_of,
+    dimension_of,
+    has_columns,
+    numbers,
+    rate_of,
+)
+from imubench_pipeline.library.logs import Log
+from imubench_pipeline.library.shown import Shown, Summary
+from imubench_pipeline.recordings.recording import ChannelLog
+from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
+from imubench_pipeline.steps.allan import curve_of
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.units import SI_UNITS
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Overlap = Literal["full", "octave"]
+
+_HEADS = ("channel", "tau", "from", "to", "at the shortest", "lowest", "at tau")
+_COLUMNS = ("tau", "adev", "lower", "upper", "edf", "cluster_size", "averaged", "exponent", "share")
+
+
+@dataclass(frozen=True, repr=False)
+class Curve(Shown, AllanCurve):
+    """An Allan curve that can be drawn, and given as a table.
+
+    Attributes
+    ----------
+    channel : str or None
+        Of a channel it is in SI; without one it is in the unit of the samples.
+    """
+
+    channel: str | None = None
+
+    @classmethod
+    def of(cls, curve: AllanCurve, channel: str | None) -> Curve:
+        """Return a curve with the channel that it is of."""
+        values = {field.name: getattr(curve, field.name) for field in fields(AllanCurve)}
+        return cls(**values, channel=channel)
+
+    @property
+    def quantity(self) -> str | None:
+        """``gyro`` or ``accel``; None: not known."""
+        return None if self.channel is None else quantity_of(self.channel)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the deviation with 95 % limits, and the slopes of noise terms in grey."""
+        from imubench_pipeline.library.drawing import axes_or_new, draw_curves
+
+        axes: Axes = axes_or_new(ax)
+        draw_curves(axes, {self.channel or "Allan deviation": self}, self.quantity)
+        return axes
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a row for each tau: deviation, 95 % limits, degrees of freedom; units in attrs."""
+        return _table([self])
+
+    def _summary(self) -> Summary:
+        title = f"Allan curve{'' if self.channel is None else f' of {self.channel}'}"
+        return Summary(f"{title}, {self.samples:,} samples", _HEADS, [_row(self)])
+
+
+class Curves(Shown, Mapping[str, Curve]):
+    """Allan curves by channel, in SI.
+
+    Attributes
+    ----------
+    name : str
+        What they are of.
+    """
+
+    def __init__(self, curves: Iterable[Curve], name: str = "") -> None:
+        self._curves = {str(curve.channel): curve for curve in curves}
+        self.name = name
+
+    def __getitem__(self, channel: str) -> Curve:
+        return self._curves[channel]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._curves)
+
+    def __len__(self) -> int:
+        return len(self._curves)
+
+    def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Any:
+        """Draw the curves, gyros and accelerometers apart; return the axes, shape (quantities,)."""
+        from imubench_pipeline.library.drawing import draw_curves, panels
+
+        by_quantity: dict[str, dict[str, AllanCurve]] = {}
+        for channel, curve in self.items():
+            by_quantity.setdefault(quantity_of(channel), {})[channel] = curve
+        axes = panels(len(by_quantity)) if ax is None else np.atleast_1d(np.asarray(ax)).ravel()
+        if len(axes) != len(by_quantity):
+            raise ValueError(f"{len(axes)} axes; expected one for each of {', '.join(by_quantity)}")
+        for panel, (quantity, curves) in zip(axes, by_quantity.items(), strict=True):
+            draw_curves(panel, curves, quantity)
+        return axes
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a row for each channel and tau, as the workflow's table ``allan``, in SI."""
+        return _table(self.values())
+
+    def _summary(self) -> Summary:
+        title = f"Allan curves{f' of {self.name}' if self.name else ''}"
+        return Summary(title, _HEADS, [_row(curve) for curve in self.values()])
+
+
+def measured(log: ChannelLog, sizes: ArrayLike | None, overlap: Overlap, threads: int) -> Curve:
+    """Return the curve of a channel of a log, at cluster sizes, shape (m,), or those by default.
+
+    Raises
+    ------
+    ValueError
+        If too many samples are missing.
+    """
+    curve = curve_of(log, sizes, overlap, threads=threads)
+    if not len(curve.tau):
+        raise ValueError(
+            f"{log.channel}: so many samples are missing that no cluster is nine tenths full; "
+            "expected a log with fewer missing, or another rate"
+        )
+    return Curve.of(curve, log.channel)
+
+
+def _row(curve: Curve) -> list[str]:
+    from imubench_pipeline.library.drawing import deviation_unit
+
+    unit = deviation_unit(curve.quantity)
+    lowest = int(np.argmin(curve.deviation))
+    sign = "" if curve.quantity is None else f" {unit.sign}"
+    return [
+        curve.channel or "-",
+        str(len(curve.tau)),
+        *(f"{number_text(tau, 3)} s" for tau in (curve.tau[0], curve.tau[-1])),
+        *(f"{unit.text(curve.deviation[place], 3)}{sign}" for place in (0, lowest)),
+        f"{number_text(curve.tau[lowest], 3)} s",
+    ]
+
+
+def _table(curves: Iterable[Curve]) -> pd.DataFrame:
+    import pandas as pd
+
+    rows = []
+    for curve in curves:
+        unit = None if curve.channel is None else SI_UNITS[dimension_of(curve.channel)]
+        for row in allan_rows(Key("", "", curve.channel or ""), curve):
+            kept = {key: row[key] for key in _COLUMNS}
+            rows.append(({"channel": curve.channel, "unit": unit} if unit else {}) | kept)
+    table = pd.DataFrame(rows)
+    table.attrs["units"] = {"tau": "s"}
+    return table
+
+
+def allan_variance(
+    data: Any,
+    rate: float | str | None = None,
+    *,
+    channels: Channels | None = None,
+    units: Units | None = None,
+    cluster_sizes: ArrayLike | None = None,
+    overlap: Overlap = "full",
+    valid: ArrayLike | None = None,
+    segments: Sequence[tuple[int, int]] | None = None,
+    threads: int | None = None,
+) -> Curve | Curves:
+    """Return the overlapping Allan variance, with confidence limits.
+
+    Parameters
+    ----------
+    data : Log, array_like, DataFrame, or mapping of str to array_like
+        A log; samples of shape (L,), (L, 3) or (L, 6), SI unless ``units`` say otherwise; or a
+        table whose columns are channels with units, such as ``gyro_x [deg/s]``. NaN marks a
+        missing sample.
+    rate : float or str, optional
+        Sampling rate, Hz, or with its unit: ``"100 Hz"``. A log has its own.
+    channels : str or sequence of str, optional
+        Of an array of several columns what they are, ``"gyro"`` and ``"accel"`` for three axes (six
+        are gyro_x to accel_z); of a log or table, those to take.
+    units : mapping of str to str, optional
+        By ``gyro`` and ``accel``, or by channel: ``{"gyro": "deg/s", "accel": "g"}``.
+    cluster_sizes : array_like of int, optional
+        n of each tau, log-spaced by default.
+    overlap : {"full", "octave"}
+        Every cluster, or those that start 1/48 of their length apart: as sure, and many times
+        faster.
+    valid : array_like of bool, shape (L,), optional
+        False where a sample is missing.
+    segments : sequence of (int, int), optional
+        First and one-past-last sample of each segment; no difference spans two. A log has its own.
+    threads : int, optional
+        By default one for each core. The result has the same bits for any number.
+
+    Returns
+    -------
+    Curve or Curves
+        Of samples of shape (L,) one `imubench_pipeline.allan.AllanCurve` in their unit, else
+        a mapping of channels to curves in SI. Of an array, knocks are not left out, as they are
+        from a log.
+
+    Raises
+    ------
+    ValueError
+        If the shape, the rate, a unit (`UnitError`) or another argument cannot be used, or a
+        channel has no number.
+
+    References
+    ----------
+    IEEE Std 952-2020; see `imubench_pipeline.allan.allan_variance`.
+
+    Examples
+    --------
+    >>> import numpy as np, imubench_pipeline as imu
+    >>> samples = np.random.default_rng(1).normal(0.0, 0.1, (10_000, 3))
+    >>> curves = imu.allan_variance(samples, "100 Hz", channels="gyro", units={"gyro": "deg/s"})
+    >>> curves
+    Allan curves
+      channel  tau  from    to      at the shortest  lowest    at tau
+      gyro_x   34   0.01 s  39.8 s  362 °/h          3.52 °/h  39.8 s
+      gyro_y   34   0.01 s  39.8 s  351 °/h          3.85 °/h  31.6 s
+      gyro_z   34   0.01 s  39.8 s  354 °/h          3.75 °/h  39.8 s
+    """
+    cores = available(threads)
+    if isinstance(data, Log):
+        if rate is not None or units is not None or valid is not None or segments is not None:
+            raise ValueError(
+                "a log has its own rate, units, missing samples and segments; expected none of them"
+            )
+        return Curves(
+            (
+                measured(log, cluster_sizes, overlap, cores)
+                for log in data.chosen(channels).values()
+            ),
+            data.name,
+        )
+    hertz = rate_of(rate, data)
+
+    def of_samples(samples: Any, channel: str | None) -> Curve:
+        curve = allan.allan_variance(
+            samples,
+            hertz,
+            cluster_sizes=cluster_sizes,
+            overlap=overlap,
+            valid=valid,
+            segments=segments,
+            threads=cores,
+        )
+        return Curve.of(curve, channel)
+
+    if channels is None and units is None and not has_columns(data):
+        samples = numbers(data, "the array")
+        if samples.ndim == 1:
+            check_present(samples, "the array")
+            return of_samples(samples, None)
+    columns = columns_of(data, channels, units)
+    return Curves(
+        of_samples(column.in_si(name), name)
+        for name, column in columns.items()
+        if name != TEMPERATURE
+    )

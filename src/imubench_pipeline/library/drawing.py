@@ -1,0 +1,141 @@
+"""Drawing onto the axes of a user, who may go on with them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.report.palette import sensor_appearances
+from imubench_pipeline.report.practical import PageUnit, page_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_OWN = PageUnit("unit of the samples", 1.0)
+
+
+def panels(count: int, wide: int = 3) -> Any:
+    """Return new axes, shape (count,), at most so many in a row."""
+    from matplotlib import pyplot as plt
+
+    columns = min(count, wide)
+    rows = math.ceil(count / columns)
+    size = (5.0 * columns, 3.8 * rows)
+    _, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
+    for unused in axes.ravel()[count:]:
+        unused.set_axis_off()
+    return axes.ravel()[:count]
+
+
+def axes_or_new(ax: Axes | None) -> Any:
+    """Return the axes that are given, or new ones."""
+    return panels(1)[0] if ax is None else ax
+
+
+def deviation_unit(quantity: str | None) -> PageUnit:
+    """Return the unit in which an Allan deviation is drawn; that of the samples, if not known."""
+    return _OWN if quantity is None else page_unit(quantity, "adev", "practical")
+
+
+def draw_curves(axes: Axes, curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
+    """Draw Allan deviations with their 95 % limits, and the slopes of noise."""
+    unit = deviation_unit(quantity)
+    looks = cycle(sensor_appearances([*curves]).values())
+    for (name, curve), look in zip(curves.items(), looks, strict=False):
+        draw_measured(axes, curve, unit, name, look.light)
+    _finish(axes, unit)
+    _draw_slopes(axes, next(iter(curves.values())), unit)
+
+
+def draw_measured(axes: Axes, curve: AllanCurve, unit: PageUnit, name: str, colour: str) -> None:
+    """Draw an Allan deviation with its 95 % limits."""
+    lower, upper = (limit * unit.per_si for limit in curve.limits())
+    axes.fill_between(curve.tau, lower, upper, color=colour, alpha=0.2, linewidth=0)
+    axes.plot(curve.tau, curve.deviation * unit.per_si, color=colour, label=name, linewidth=1.2)
+
+
+def draw_model(axes: Axes, curve: AllanCurve, model: NoiseModel, quantity: str) -> None:
+    """Draw a measured curve, the terms of a model, and their sum."""
+    from imubench_pipeline.report.static_figures.names import TERM_NAMES
+    from imubench_pipeline.report.static_figures.terms import SUM_LOOK, TERM_LOOKS
+
+    unit = deviation_unit(quantity)
+    draw_measured(axes, curve, unit, "log, 95 % limits", "black")
+    for term in model.terms:
+        values = ", ".join(
+            f"{symbol} = {each.text(abs(value), 3)} {each.sign}"
+            for symbol, value in term.values.items()
+            for each in [page_unit(quantity, symbol, "practical")]
+        )
+        deviation = np.sqrt(term.allan_variance(curve.tau)) * unit.per_si
+        label = f"{TERM_NAMES[quantity][term.symbol]}, {values}"
+        axes.plot(curve.tau, deviation, label=label, **TERM_LOOKS[term.symbol])
+    if model.terms:
+        total = np.sqrt(model.allan_variance(curve.tau, curve.rate)) * unit.per_si
+        axes.plot(curve.tau, total, label=f"model: {model.name}", **SUM_LOOK)
+        shown = np.concatenate([total, curve.deviation * unit.per_si])
+        axes.set_ylim(float(shown.min()) / 5.0, float(shown.max()) * 2.0)
+    _finish(axes, unit)
+
+
+def draw_ratios(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Draw ratios with their 95 % intervals, one below the other: keys label, value and limits."""
+    places = range(len(rows), 0, -1)
+    for place, row in zip(places, rows, strict=True):
+        lower, upper = row["lower"] or None, row["upper"]
+        look: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.5, "markersize": 5.0}
+        if lower is not None and upper is not None:
+            axes.plot([lower, upper], [place, place], **look)
+        elif upper is not None:  # anything below
+            axes.plot(upper, place, marker="<", **look)
+        elif lower is not None:
+            axes.plot(lower, place, marker=">", **look)
+        if row["ratio"] is not None:
+            axes.plot(row["ratio"], place, marker="o", **look)
+    axes.axvline(1.0, color="0.4", linewidth=0.8)
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("{x:g}")
+    axes.set_yticks(list(places), [row["label"] for row in rows])
+    axes.set_ylim(0.0, len(rows) + 1.0)
+    axes.grid(True, axis="x", color="0.9")
+
+
+def _finish(axes: Axes, unit: PageUnit) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("averaging time τ (s)")
+    axes.set_ylabel(f"Allan deviation ({unit.sign})")
+    axes.grid(True, which="major", color="0.9")
+    axes.legend(fontsize="small", frameon=False)
+
+
+def _draw_slopes(axes: Axes, curve: AllanCurve, unit: PageUnit) -> None:
+    """Draw the slopes of white noise and of a random walk, in grey, through the ends of a curve."""
+    told = curve.up_to(1.0 / 9.0)
+    limits = axes.get_xlim(), axes.get_ylim()
+    for place, slope, name in ((0, -0.5, "−1/2"), (max(len(told) - 1, 0), 0.5, "+1/2")):
+        level = curve.deviation * unit.per_si
+        line = level[place] * (curve.tau / curve.tau[place]) ** slope
+        axes.plot(curve.tau, line, color="0.6", linewidth=0.8, linestyle=":", zorder=1.0)
+        inside = np.flatnonzero((line > limits[1][0]) & (line < limits[1][1]))
+        if len(inside):
+            at = inside[len(inside) * 3 // 4 if slope < 0.0 else len(inside) // 4]
+            axes.annotate(
+                name,
+                (curve.tau[at], line[at]),
+                xytext=(-3.0, -3.0),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                color="0.4",
+                fontsize="small",
+            )
+    axes.set_xlim(*limits[0])
+    axes.set_ylim(*limits[1])

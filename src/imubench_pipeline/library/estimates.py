@@ -1,0 +1,350 @@
+"""Noise parameters of logs, arrays and tables, as the workflow estimates them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from imubench_pipeline.allan import cluster_sizes
+from imubench_pipeline.allan.threads import available
+from imubench_pipeline.estimators.estimate import CURVE, SHOWN, Estimate, Parameter
+from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.library.curves import Curve, Curves, measured
+from imubench_pipeline.library.given import Channels, Units, columns_of, rate_of
+from imubench_pipeline.library.logs import Log, log_of
+from imubench_pipeline.library.shown import Shown, Summary, cut
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.report.practical import System, interval_text, page_unit, symbol_text
+from imubench_pipeline.settings.config import AllanSettings, EstimateSettings
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.settings.validation import parse
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel
+from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.keys import Key
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Method = Literal["likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"]
+
+_HEADS = ("channel", "", "value", "95 % interval", "unit", "status")
+
+
+@dataclass(frozen=True, repr=False)
+class ChannelEstimate(Shown, Estimate):
+    """The noise parameters of one channel.
+
+    Attributes
+    ----------
+    channel : str
+    measured : Curve or None
+        The Allan curve that they go with.
+    log : str
+        Sensor and recording.
+    """
+
+    channel: str = ""
+    measured: Curve | None = field(default=None, compare=False)
+    log: str = "/"
+
+    @classmethod
+    def of(cls, estimate: Estimate, channel: str, measured: Curve, log: str) -> ChannelEstimate:
+        """Return an estimate with the channel and the curve that it is of."""
+        values = {each.name: getattr(estimate, each.name) for each in fields(Estimate)}
+        return cls(**values, channel=channel, measured=measured, log=log)
+
+    @property
+    def quantity(self) -> str:
+        """``gyro`` or ``accel``."""
+        return quantity_of(self.channel)
+
+    def __getitem__(self, parameter: str) -> Parameter:
+        """Return a parameter in SI: Q, N, B, T_B, K, R, B_curve, sigma_min or tau_min."""
+        known = {**self.parameters, **self.curve}
+        if parameter not in known:
+            raise KeyError(f"no parameter {parameter!r}; {self.method} has {', '.join(known)}")
+        return known[parameter]
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the measured curve with 95 % limits, the terms of the model, and their sum."""
+        from imubench_pipeline.library.drawing import axes_or_new, draw_model
+
+        axes: Axes = axes_or_new(ax)
+        assert self.measured is not None
+        draw_model(axes, self.measured, self.model, self.quantity)
+        axes.set_title(self.channel)
+        return axes
+
+    def to_pandas(self, units: System = "si") -> pd.DataFrame:
+        """Return a row for each parameter: see `Estimates.to_pandas`."""
+        return _table([self], units)
+
+    def _summary(self) -> Summary:
+        title = f"{self.channel} of {self.log}: {self.model.name}, by {self.method}"
+        return Summary(title, _HEADS, list(_rows(self)), _reasons([self]))
+
+
+class Estimates(Shown, Mapping[str, ChannelEstimate]):
+    """The noise parameters of a log, by channel.
+
+    Attributes
+    ----------
+    log : Log
+        What they are of: files and arrays alike are judged before.
+    method : str
+    findings : tuple of Finding
+        What was found of the log, and by the estimation.
+    left_out : dict of str to str
+        Channels without an estimate, and why.
+    """
+
+    def __init__(
+        self,
+        estimates: Sequence[ChannelEstimate],
+        log: Log,
+        method: str,
+        findings: Sequence[Finding],
+        left_out: Mapping[str, str],
+    ) -> None:
+        self._estimates = {estimate.channel: estimate for estimate in estimates}
+        self.log, self.method = log, method
+        self.findings, self.left_out = tuple(findings), dict(left_out)
+
+    def __getitem__(self, channel: str) -> ChannelEstimate:
+        return self._estimates[channel]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._estimates)
+
+    def __len__(self) -> int:
+        return len(self._estimates)
+
+    @property
+    def name(self) -> str:
+        """Sensor and recording."""
+        return self.log.name
+
+    @property
+    def curves(self) -> Curves:
+        """The Allan curves that the estimates go with."""
+        return Curves((one.measured for one in self.values() if one.measured), self.name)
+
+    @property
+    def models(self) -> dict[str, NoiseModel]:
+        """The noise model of each channel."""
+        return {channel: estimate.model for channel, estimate in self.items()}
+
+    @property
+    def model(self) -> NoiseModel:
+        """The noise model of the only channel.
+
+        Raises
+        ------
+        ValueError
+            If there are several.
+        """
+        if len(self) != 1:
+            raise ValueError(
+                f"there are models of {', '.join(self)}; expected .models, or [channel]"
+            )
+        return next(iter(self.values())).model
+
+    def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Any:
+        """Draw curve and terms of each channel; return the axes, shape (channels,)."""
+        from imubench_pipeline.library.drawing import panels
+
+        axes = panels(len(self)) if ax is None else np.atleast_1d(np.asarray(ax)).ravel()
+        if len(axes) != len(self):
+            raise ValueError(f"{len(axes)} axes; expected one for each of {', '.join(self)}")
+        for panel, estimate in zip(axes, self.values(), strict=True):
+            estimate.plot(panel)
+        return axes
+
+    def to_pandas(self, units: System = "si") -> pd.DataFrame:
+        """Return a row for each channel and parameter, as the workflow's table ``parameters``.
+
+        Parameters
+        ----------
+        units : {"si", "practical"}
+            Of value and limits: SI, or deg/sqrt(h), deg/h, ug and the like; column ``unit`` says
+            which.
+        """
+        return _table(self.values(), units)
+
+    def _summary(self) -> Summary:
+        names = {estimate.model.name for estimate in self.values()}
+        model = f": {names.pop()}" if len(names) == 1 else ""
+        title = f"Estimates of {self.name}{model}, by {self.method}"
+        rows = [row for estimate in self.values() for row in _rows(estimate)]
+        notes = _reasons(self.values())
+        notes += [f"{channel}: {reason}" for channel, reason in self.left_out.items()]
+        serious = [f.finding for f in self.findings if f.severity != "note"]
+        if serious:
+            notes.append(f"warnings: {', '.join(dict.fromkeys(serious))} (see .findings)")
+        return Summary(title, _HEADS, rows, notes)
+
+
+def estimate(
+    data: Any,
+    rate: float | str | None = None,
+    *,
+    method: Method = "likelihood",
+    channels: Channels | None = None,
+    units: Units | None = None,
+    name: str = "samples",
+    threads: int | None = None,
+    **settings: Any,
+) -> Estimates:
+    """Estimate the noise parameters of each channel, with 95 % intervals.
+
+    Parameters
+    ----------
+    data : Log, array_like, DataFrame, or mapping of str to array_like
+        As `imubench_pipeline.allan_variance` takes it, but of an array of shape (L,) the channel
+        must be named. Arrays are judged as files are: knocks are left out, and findings say what
+        is wrong.
+    rate : float or str, optional
+        Sampling rate, Hz, or with its unit: ``"100 Hz"``. A log has its own.
+    method : str
+        ``likelihood``, or another of the workflow: ``likelihood_gm`` (the papers' N, B, T_B, K),
+        ``compensated`` (without what temperature explains), ``weighted``, ``curve``, ``paper``.
+    channels : str or sequence of str, optional
+        Of an array what the columns are; of a log or table those to take.
+    units : mapping of str to str, optional
+        By ``gyro`` and ``accel``, or by channel; arrays are in SI without them.
+    name : str
+        Of an array or table: what the log is called.
+    threads : int, optional
+        Of the Allan variance; by default one for each core.
+    **settings
+        ``longest``, ``band`` and ``seed`` as under ``estimate`` of a run's configuration.
+
+    Returns
+    -------
+    Estimates
+        Of a log with the names that it has in a run, the numbers of that run.
+
+    Raises
+    ------
+    ValueError
+        If the data, a unit (`UnitError`), the method or a setting cannot be used.
+
+    Examples
+    --------
+    >>> import imubench_pipeline as imu
+    >>> gyro = imu.NoiseModel(N=8.7e-5, K=2e-5)
+    >>> samples = imu.simulate(gyro, "10 Hz", duration="20 min", seed=1)
+    >>> estimates = imu.estimate(samples, "10 Hz", channels="gyro_z")
+    >>> estimates.model.name
+    'N+K'
+    >>> N = estimates["gyro_z"]["N"]
+    >>> N.lower < 8.7e-5 < N.upper
+    True
+    """
+    if method not in get_args(Method):
+        raise ValueError(f"method is {method!r}, expected one of {', '.join(get_args(Method))}")
+    if isinstance(data, Log):
+        if rate is not None or units is not None:
+            raise ValueError("a log has its own rate and units; expected none of them beside it")
+        log = data
+    else:
+        log = log_of(columns_of(data, channels, units), rate_of(rate, data), name)
+    chosen = log.chosen(channels)
+    if method == "compensated" and not any(kept.temperature for kept in chosen.values()):
+        raise ValueError(f"{log.name} has no readings of the temperature; expected another method")
+    # What other methods find wrong of a curve is doubted by the likelihood: it is always asked.
+    asked = tuple(dict.fromkeys(("likelihood", method)))
+    how = parse(EstimateSettings, {**settings, "methods": asked}, "estimate")
+    grid = AllanSettings()
+    into = Estimation()
+    estimates: list[ChannelEstimate] = []
+    left_out: dict[str, str] = {}
+    for channel, kept in chosen.items():
+        sizes = cluster_sizes(kept.grid, per_decade=grid.per_decade, longest=grid.longest)
+        curve = measured(kept, sizes, grid.overlap, available(threads))
+        key = Key(log.sensor, log.recording, channel)
+        estimate_channel(key, kept, curve, how, log.bandwidth, into)
+        found = into.estimates[channel].get(method)
+        if found is None:
+            left_out[channel] = _why_not(into, channel)
+        else:
+            estimates.append(ChannelEstimate.of(found, channel, curve, log.name))
+    if not estimates:
+        raise ValueError(
+            f"{log.name}: no channel is estimated by {method}: {'; '.join(left_out.values())}"
+        )
+    names = [each.name for each in fields(Finding)]
+    rows = [{name: row[name] for name in names} for row in into.estimate_findings]
+    return Estimates(
+        estimates, log, method, [*log.findings, *(Finding(**row) for row in rows)], left_out
+    )
+
+
+def _why_not(into: Estimation, channel: str) -> str:
+    """Return why temperature was not taken out of a channel."""
+    reasons = [
+        row["reason"] or "the data do not favour it"
+        for row in into.temperature
+        if (row["channel"], row["parameter"]) == (channel, "sensitivity")
+    ]
+    return "; ".join(reasons) or "its clock has no readings of the temperature"
+
+
+def _rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
+    """Yield the rows of what is shown of an estimate, in engineers' units."""
+    order = {symbol: place for place, symbol in enumerate(SHOWN)}
+    components = [
+        (component, symbol, parameter)
+        for component, symbol, parameter in estimate.components()
+        if symbol in order and (parameter.value is not None or parameter.upper is not None)
+    ]
+    for component, symbol, parameter in sorted(components, key=lambda c: (c[0], order[c[1]])):
+        unit = page_unit(estimate.quantity, symbol, "practical")
+        limits = {"lower": parameter.lower, "upper": parameter.upper}
+        if parameter.value is None and not parameter.lower and parameter.upper is not None:
+            interval = f"below {unit.text(parameter.upper, 3)}"
+        else:
+            interval = interval_text(limits, unit)
+        yield [
+            estimate.channel,
+            symbol_text(symbol) + (f" {component}" if component > 1 else ""),
+            unit.text(parameter.value, 3),
+            interval,
+            unit.sign,
+            parameter.status.replace("_", " "),
+        ]
+
+
+def _reasons(estimates: Any) -> list[str]:
+    """Return why values are in doubt."""
+    reasons = (
+        f"{estimate.channel} {symbol_text(symbol)}: {cut(parameter.reason, 150)}"
+        for estimate in estimates
+        for _, symbol, parameter in estimate.components()
+        if parameter.status == "doubtful" and parameter.reason and symbol not in CURVE
+    )
+    return list(dict.fromkeys(reasons))
+
+
+def _table(estimates: Any, units: System) -> pd.DataFrame:
+    import pandas as pd
+
+    if units not in get_args(System):
+        raise ValueError(f"units is {units!r}, expected 'si' or 'practical'")
+    rows = []
+    for estimate in estimates:
+        sensor, _, recording = estimate.log.partition("/")
+        key = Key(sensor, recording, estimate.channel)
+        for row in parameter_rows(key, estimate, recommended=True):
+            kept = {name: value for name, value in row.items() if name != "recommended"}
+            if units == "practical" and row["parameter"] in SHOWN:
+                unit = page_unit(estimate.quantity, row["parameter"], "practical")
+                for name in ("value", "lower", "upper", "fitted"):
+                    kept[name] = None if row[name] is None else row[name] * unit.per_si
+                kept["unit"] = unit.sign
+            rows.append(kept)
+    return pd.DataFrame(rows)

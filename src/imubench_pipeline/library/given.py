@@ -1,0 +1,273 @@
+"""Samples as users have them, arrays and tables, taken as channels with units.
+
+What stands in an array is in SI unless its units are given: so is all of this library. A table says
+its units, in the names of its columns (``gyro_x [deg/s]``), in its ``attrs`` or beside it; a unit
+is never guessed from the figures.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, TEMPERATURE, quantity_of
+from imubench_pipeline.typing import Array
+from imubench_pipeline.units import SI_UNITS, UnitError, conversion, in_si, naming
+
+Channels = str | Sequence[str]
+Units = Mapping[str, str]
+
+_AXES = {quantity: [f"{quantity}_{axis}" for axis in "xyz"] for quantity in QUANTITIES}
+_NAMED = re.compile(r"^\s*(.*?)\s*[\[(]\s*(.+?)\s*[\])]\s*$")
+_TIMES = ("time", "t", "timestamp")
+_BY_NAME = "the name of the column"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One channel, or the temperature, as it is given."""
+
+    values: Array  # shape (L,); NaN where a sample is missing
+    unit: str
+
+    def in_si(self, name: str) -> Array:
+        """Return the samples in the SI unit of a channel, shape (L,)."""
+        factor, offset = conversion(self.unit, dimension_of(name))
+        return self.values if (factor, offset) == (1.0, 0.0) else factor * self.values + offset
+
+
+def dimension_of(name: str) -> str:
+    """Return the dimension of a channel or of the temperature."""
+    return TEMPERATURE if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
+
+
+def rate_of(rate: float | str | None, data: object) -> float:
+    """Return the sampling rate of samples, Hz; that of a table may stand in its ``attrs``.
+
+    Raises
+    ------
+    ValueError
+        If none is given, or it is no frequency above 0 (`UnitError`: of another dimension).
+    """
+    stated = rate if rate is not None else getattr(data, "attrs", {}).get("rate")
+    if stated is None:
+        raise ValueError(
+            "no rate is given; expected the sampling rate of the samples, such as rate='100 Hz' or "
+            "rate=100.0 (Hz)"
+        )
+    return in_si(stated, "frequency", "rate")
+
+
+def numbers(values: object, name: str) -> Array:
+    """Return samples as double-precision numbers; masked ones are NaN.
+
+    Raises
+    ------
+    ValueError
+        If they are no real numbers.
+    """
+    filled = values.filled(np.nan) if isinstance(values, np.ma.MaskedArray) else values
+    try:
+        array = np.asarray(filled)
+        if array.dtype.kind not in "fiu" and not (array.dtype.kind == "O" and array.size):
+            raise ValueError(f"{name} is of {array.dtype}")
+        return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"{name} is no array of numbers ({error}); expected one such as numpy.loadtxt gives"
+        ) from None
+
+
+def columns_of(
+    data: object, channels: Channels | None = None, units: Units | None = None
+) -> dict[str, Column]:
+    """Return the channels, and the temperature, of an array, a table or a mapping.
+
+    Parameters
+    ----------
+    data : array_like, DataFrame or mapping of str to array_like
+        Shape (L,), (L, 3) or (L, 6), rows are samples; or a column a channel.
+    channels : str or sequence of str, optional
+        What the columns of an array are; ``"gyro"`` and ``"accel"`` are three axes. By default six
+        are gyro_x to accel_z. Of a table or mapping, those to take.
+    units : mapping of str to str, optional
+        By ``gyro``, ``accel``, or channel. By default SI, but that of a table must be stated.
+
+    Raises
+    ------
+    ValueError
+        If the shape, or a name, is none of these, or a channel has no number
+        (`UnitError`: a unit is missing, not known or of another dimension).
+    """
+    _check_units(units)
+    is_table = _is_table(data)
+    if has_columns(data):
+        columns = dict(_named_columns(data, listed(channels), units or {}, stated=is_table))
+    else:
+        columns = dict(_positions(data, listed(channels), units or {}))
+    for name, column in columns.items():
+        with naming(f"{name}: "):
+            conversion(column.unit, dimension_of(name))
+        if name != TEMPERATURE:
+            check_present(column.values, name)
+    return columns
+
+
+def check_present(values: Array, name: str) -> None:
+    """Refuse samples, shape (L,), of which none is a finite number.
+
+    Raises
+    ------
+    ValueError
+        If so.
+    """
+    if not len(values):
+        raise ValueError(f"{name} is empty; expected two samples or more")
+    if not np.isfinite(values).any():
+        raise ValueError(
+            f"{name}: none of the {len(values)} samples is a finite number; expected a channel "
+            "that was recorded: leave it out, or look into what made the array"
+        )
+
+
+def has_columns(data: object) -> bool:
+    """Return whether samples have names: those of a table, or of a mapping."""
+    return _is_table(data) or isinstance(data, Mapping)
+
+
+def _is_table(data: object) -> bool:
+    """Return whether it is a DataFrame of pandas, which is imported by whoever has one."""
+    pandas = sys.modules.get("pandas")
+    return pandas is not None and isinstance(data, pandas.DataFrame)
+
+
+def listed(channels: Channels | None) -> list[str] | None:
+    """Return the names of channels, where ``gyro`` or ``accel`` are three.
+
+    Raises
+    ------
+    ValueError
+        If one is none, or stands twice.
+    """
+    if channels is None:
+        return None
+    asked = [channels] if isinstance(channels, str) else list(channels)
+    names = [name for each in asked for name in _AXES.get(each, [each])]
+    if unknown := [name for name in names if name not in (*CHANNELS, TEMPERATURE)]:
+        raise ValueError(
+            f"no channel {unknown[0]!r}; expected of {', '.join(CHANNELS)}, or gyro or accel for "
+            "three axes"
+        )
+    if len(set(names)) < len(names):
+        raise ValueError(f"channels are {', '.join(names)}; expected each of them once")
+    return names
+
+
+def _check_units(units: Units | None) -> None:
+    known = (*QUANTITIES, *CHANNELS, TEMPERATURE)
+    if units is not None and not isinstance(units, Mapping):
+        raise ValueError(f"units are {units!r}; expected such as {{'gyro': 'deg/s', 'accel': 'g'}}")
+    if unknown := [key for key in units or () if key not in known]:
+        raise ValueError(f"units name {unknown[0]!r}; expected of {', '.join(known)}")
+
+
+def _unit_beside(name: str, units: Units) -> str | None:
+    return units.get(name) or units.get(quantity_of(name))
+
+
+def _positions(data: object, names: list[str] | None, units: Units) -> Iterator[tuple[str, Column]]:
+    """Yield the columns of an array."""
+    array = numbers(data, "the array")
+    if array.ndim not in (1, 2) or not array.size:
+        raise ValueError(
+            f"the array has shape {array.shape}; expected (samples,), (samples, 3) or (samples, 6)"
+        )
+    table = array[:, None] if array.ndim == 1 else array
+    count = table.shape[1]
+    if names is None and count == len(CHANNELS):
+        names = list(CHANNELS)
+    if names is None or len(names) != count:
+        turned = table.shape[0] in (3, 6) and count > len(CHANNELS)
+        if turned:
+            mend = "expected a row for each sample: transpose it, with .T"
+        elif names is None:
+            mend = (
+                "expected six columns, gyro_x to accel_z, or channels= that names them: "
+                "'gyro', 'accel' or such as ['gyro_z']"
+            )
+        else:
+            mend = f"expected a column for each of {', '.join(names)}"
+        raise ValueError(f"the array has shape {array.shape}; {mend}")
+    for place, name in enumerate(names):
+        yield (
+            name,
+            Column(table[:, place], _unit_beside(name, units) or SI_UNITS[dimension_of(name)]),
+        )
+
+
+def _named_columns(
+    data: Any, names: list[str] | None, units: Units, *, stated: bool
+) -> Iterator[tuple[str, Column]]:
+    """Yield the columns of a table or mapping by name; of a table, the units must be ``stated``."""
+    written = {label: _split(label) for label in (data.columns if stated else data)}
+    there = {name: label for label, (name, _) in written.items()}
+    if len(there) < len(written):
+        raise ValueError(f"two columns of {', '.join(map(str, written))} are one channel")
+    passed = (TEMPERATURE, *_TIMES)
+    if names is None:
+        strange = [label for label, (name, _) in written.items() if name not in CHANNELS]
+        strange = [label for label in strange if written[label][0] not in passed]
+        if strange or not set(there) & set(CHANNELS):
+            raise ValueError(
+                f"found {f'the column {strange[0]!r}' if strange else 'no channel'}; expected "
+                f"columns of {', '.join(CHANNELS)}, such as 'gyro_x [deg/s]': rename them, or name "
+                "those to take with channels="
+            )
+        names = [name for name in (*CHANNELS, TEMPERATURE) if name in there]
+    lengths = set()
+    attrs = getattr(data, "attrs", {}).get("units", {}) if stated else {}
+    for name in names:
+        if name not in there:
+            raise ValueError(f"no column {name}; found {', '.join(map(str, written))}")
+        values = numbers(data[there[name]], name)
+        if values.ndim != 1:
+            raise ValueError(f"{name} has shape {values.shape}, expected one dimension")
+        lengths.add(len(values))
+        sources = {
+            _BY_NAME: written[there[name]][1],
+            "units=": _unit_beside(name, units),
+            "attrs['units']": attrs.get(there[name]) or _unit_beside(name, attrs),
+        }
+        unit = _one_unit(name, {source: unit for source, unit in sources.items() if unit})
+        if unit is None and stated:
+            raise UnitError(
+                f"{name}: the table does not say its unit, which is never guessed; expected such "
+                f"as units={{'gyro': 'deg/s', 'accel': 'm/s^2'}}, or columns such as '{name} "
+                f"[{SI_UNITS[dimension_of(name)]}]'"
+            )
+        yield name, Column(values, unit or SI_UNITS[dimension_of(name)])
+    if len(lengths) > 1:
+        raise ValueError(f"the channels have {sorted(lengths)} samples; expected as many of each")
+
+
+def _split(label: object) -> tuple[str, str | None]:
+    """Return the name in a column's label, and the unit where it says one."""
+    match = _NAMED.match(str(label))
+    name, unit = (match[1], match[2]) if match else (str(label).strip(), None)
+    return name.lower(), unit
+
+
+def _one_unit(name: str, units: Mapping[str, str]) -> str | None:
+    """Return the unit that some sources state, which must agree."""
+    factors = {}
+    for source, unit in units.items():
+        with naming(f"{name}: "):
+            factors[conversion(unit, dimension_of(name))] = f"{unit!r} by {source}"
+    if len(factors) > 1:
+        raise UnitError(f"{name} is in {' and in '.join(factors.values())}; expected one unit")
+    return next(iter(units.values()), None)

@@ -1,0 +1,409 @@
+"""Logs as the workflow reads them: files and arrays on a time base, judged, and kept in SI."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from imubench_pipeline.datasheets.plausibility import implausible_of
+from imubench_pipeline.library.given import Channels, Column, Units, dimension_of, listed
+from imubench_pipeline.library.shown import Shown, Summary, cut
+from imubench_pipeline.readers.inspection import inspect
+from imubench_pipeline.readers.inspection.draft import UNKNOWN
+from imubench_pipeline.recordings.drop_zone import name_of, sensor_of
+from imubench_pipeline.recordings.ingest import ingest_as_planned
+from imubench_pipeline.recordings.kept import Quality
+from imubench_pipeline.recordings.recording import ChannelLog, channel_logs, on_grid, was_at_rest
+from imubench_pipeline.report.practical import duration_text, number_text
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import (
+    CHANNELS,
+    TEMPERATURE,
+    LogFormat,
+    RecordingNotes,
+    Sensor,
+    kind_of,
+    merged_log,
+    of_ingest,
+    quantity_of,
+)
+from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
+from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.typing import Array
+from imubench_pipeline.units import SI_UNITS, in_si, quantity_to_si
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SENSORS = Path("config/sensors")
+_NOTES = (".yaml", ".yml")
+_MODEL = {"vendor": "unknown", "model": "unknown"}
+
+
+class Log(Shown):
+    """A recording that was read: its channels in SI on a uniform grid, and what was found of it.
+
+    The samples are kept in a temporary folder, which goes with the object: a log may be longer than
+    memory.
+
+    Attributes
+    ----------
+    sensor, recording : str
+        Names, from which the random streams of an estimate follow, as in the workflow.
+    channels : tuple of str
+        Those that can be analysed, of gyro_x to accel_z.
+    findings : tuple of Finding
+        What is wrong with the log, or worth knowing of it: name, severity, detail, channel and
+        span.
+    bandwidth : float or None
+        Stated cut-off of the sensor's own low-pass, Hz.
+    """
+
+    def __init__(
+        self, folder: Path, quality: Quality, sensor: Sensor | None, bandwidth: float | None
+    ) -> None:
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        self._logs = channel_logs(folder)
+        self._about = quality.recording
+        self.sensor = str(self._about["sensor"])
+        self.recording = str(self._about["recording"])
+        self.bandwidth = bandwidth
+        self.channels = tuple(self._logs)
+        self._at_rest = was_at_rest(folder)
+        rows = [*quality.findings, *implausible_of(quality, sensor)]
+        names = [field.name for field in fields(Finding)]
+        self.findings = tuple(Finding(**{name: row[name] for name in names}) for row in rows)
+
+    @property
+    def name(self) -> str:
+        """Sensor and recording."""
+        return f"{self.sensor}/{self.recording}"
+
+    @property
+    def rates(self) -> dict[str, float]:
+        """Sampling rate of each channel, Hz: as the stamps say it, where there are any."""
+        return {name: log.rate for name, log in self._logs.items()}
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate of all channels, Hz.
+
+        Raises
+        ------
+        ValueError
+            If channels have rates of their own.
+        """
+        if len(set(self.rates.values())) > 1:
+            each = ", ".join(f"{name} {rate:.6g} Hz" for name, rate in self.rates.items())
+            raise ValueError(f"the channels have rates of their own ({each}); expected .rates")
+        return next(iter(self.rates.values()))
+
+    @property
+    def duration(self) -> float:
+        """Length of the longest channel, s, holes counted."""
+        return max(log.grid / log.rate for log in self._logs.values())
+
+    @property
+    def units(self) -> dict[str, str]:
+        """SI unit of each channel."""
+        return {name: SI_UNITS[dimension_of(name)] for name in self.channels}
+
+    def __getitem__(self, channel: str) -> Array:
+        """Return a channel, or ``temperature``, on its grid: SI, shape (L,), NaN where missing."""
+        if channel == TEMPERATURE and self._has_temperature:
+            log = next(log for log in self._logs.values() if log.temperature)
+            return on_grid(log.temperatures(), log.grid)
+        if channel not in self._logs:
+            there = [*self.channels, *([TEMPERATURE] if self._has_temperature else [])]
+            raise KeyError(f"no channel {channel!r} in {self.name}; it has {', '.join(there)}")
+        log = self._logs[channel]
+        return on_grid(log.blocks(), log.grid)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.channels)
+
+    def __len__(self) -> int:
+        return len(self.channels)
+
+    @cached_property
+    def _has_temperature(self) -> bool:
+        return any(log.temperature for log in self._logs.values())
+
+    def chosen(self, channels: Channels | None = None) -> dict[str, ChannelLog]:
+        """Return channels, by default all, as the steps of the workflow take them.
+
+        Raises
+        ------
+        ValueError
+            If the sensor was turned: what it senses of that is no noise; or the log has no such
+            channel.
+        """
+        if not self._at_rest:
+            raise ValueError(
+                f"{self.name}: the notes beside the log say that the sensor was turned "
+                f"({self._about['kind']}); expected a log at rest: noise is told from that alone"
+            )
+        names = listed(channels) or self.channels
+        if missing := [name for name in names if name not in self._logs]:
+            raise ValueError(
+                f"{self.name} has no {missing[0]}; expected of {', '.join(self.channels)}"
+            )
+        return {name: self._logs[name] for name in names}
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a table of all channels, with units in the names of columns and in ``attrs``.
+
+        The index is the time in s from the first sample; missing samples are NaN.
+
+        Raises
+        ------
+        ValueError
+            If channels have clocks of their own.
+        """
+        import pandas as pd
+
+        if len({(log.grid, log.rate) for log in self._logs.values()}) > 1:
+            raise ValueError("the channels have clocks of their own; expected log[channel] of each")
+        names = [*self.channels, *([TEMPERATURE] if self._has_temperature else [])]
+        columns = {f"{name} [{SI_UNITS[dimension_of(name)]}]": self[name] for name in names}
+        length = len(next(iter(columns.values())))
+        table = pd.DataFrame(
+            columns, index=pd.Index(np.arange(length) / self.rate, name="time [s]")
+        )
+        table.attrs = {
+            "sensor": self.sensor,
+            "recording": self.recording,
+            "rate": self.rate,
+            "units": {name: SI_UNITS[dimension_of(name)] for name in names},
+        }
+        return table
+
+    def _summary(self) -> Summary:
+        rows = []
+        for name, log in self._logs.items():
+            rows.append(
+                [
+                    name,
+                    f"{number_text(log.rate, 6)} Hz",
+                    f"{log.grid:,}",
+                    self.units[name],
+                    "yes" if log.holes else "no",
+                ]
+            )
+        serious = [finding for finding in self.findings if finding.severity != "note"]
+        notes = [f"{f.severity}: {f.finding}: {cut(f.detail, 100)}" for f in serious[:_SERIOUS]]
+        if len(self.findings) > len(serious[:_SERIOUS]):
+            notes.append(f"{len(self.findings)} findings in all: .findings")
+        heads = ["channel", "rate", "samples", "unit", "some missing"]
+        title = f"Log {self.name}, {duration_text(self.duration)}"
+        return Summary(title, heads, rows, notes)
+
+
+_SERIOUS = 6
+"""Findings that are shown."""
+
+
+def read_log(
+    path: str | Path,
+    sensor: str | Path | Mapping[str, Any] | Sensor | None = None,
+    *,
+    rate: float | str | None = None,
+    units: Units | None = None,
+    sensors: str | Path = _SENSORS,
+    quality: Mapping[str, Any] | None = None,
+) -> Log:
+    """Read a log of any format as the workflow does: time base, units, knocks, findings.
+
+    Parameters
+    ----------
+    path : str or Path
+        The log file, or the folder or archive of a recording. ``<recording>.yaml`` beside it is
+        its notes.
+    sensor : str, Path or mapping, optional
+        How it is written: a sensor file, the name of one in ``sensors``, or what would stand in
+        it (or under its ``log``). By default this is drafted from the log, as by `imubench
+        inspect`.
+    rate : float or str, optional
+        Of a log without stamps, where it is drafted: Hz, or ``"100 Hz"``.
+    units : mapping of str to str, optional
+        Where it is drafted, what the log does not say: ``{"gyro": "deg/s", "accel": "g"}``, or by
+        channel.
+    sensors : str or Path
+        Folder of the sensor files.
+    quality : mapping, optional
+        Thresholds of the findings, as under ``quality`` of a run's configuration.
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    ValueError
+        If the log cannot be used (`RecordingError`), a setting cannot (`ConfigError`), or a draft
+        has something left to fill in: the text says what, with the draft. The unit of a gyro is
+        never guessed.
+
+    Examples
+    --------
+    >>> import imubench_pipeline as imu
+    >>> log = imu.read_log("run.csv", units={"gyro": "deg/s"})
+    >>> log.channels
+    ('gyro_z', 'accel_z')
+    >>> log["gyro_z"].shape, round(log.rate, 6)
+    ((2000,), 100.0)
+    """
+    source = Path(path)
+    if not source.exists():
+        raise ValueError(f"{source}: no such file; expected the log of an inertial sensor")
+    name = source.name if source.is_dir() else name_of(source.name)
+    declared, sensor_name, own = _sensor_of(source, sensor, Path(sensors), rate, units)
+    notes_file = source.with_name(f"{name}.yaml")
+    notes = RecordingNotes()
+    if notes_file.is_file() and notes_file != own:
+        notes = parse(RecordingNotes, read_yaml(notes_file) or {}, str(notes_file))
+    log = merged_log(declared, notes, str(notes_file))
+    try:
+        notes.check_gyro(log)
+    except ValueError as error:
+        raise ConfigError(f"{notes_file}: {error}") from None
+    bandwidth = quantity_to_si(log.bandwidth, "frequency") if log.bandwidth else None
+    kept, found = _ingested(source, log, notes, (sensor_name, name), quality or {}, guarded=True)
+    return Log(kept, found, declared if sensor is not None else None, bandwidth)
+
+
+def log_of(columns: Mapping[str, Column], rate: float, name: str) -> Log:
+    """Return samples as a log: they are ingested as a file is, so what is wrong of it is found.
+
+    Parameters
+    ----------
+    columns : mapping of str to Column
+        Channels, and perhaps the temperature.
+    rate : float
+        Hz.
+    name : str
+        What the log is called.
+
+    Raises
+    ------
+    RecordingError
+        If no channel can be used.
+    """
+    channels, temperature = {}, None
+    for place, (channel, column) in enumerate(columns.items(), start=1):
+        entry = {"column": place, "unit": column.unit}
+        if channel == TEMPERATURE:
+            temperature = entry
+        else:
+            channels[channel] = entry
+    log = LogFormat.model_validate(
+        {
+            "reader": "numpy",
+            "rate": f"{rate!r} Hz",
+            "channels": channels,
+            "temperature": temperature,
+        }
+    )
+    with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
+        file = Path(folder) / f"{name}.npy"
+        np.save(file, np.column_stack([column.values for column in columns.values()]))
+        kept, found = _ingested(file, log, RecordingNotes(), ("array", name), {}, guarded=False)
+    return Log(kept, found, None, None)
+
+
+def _ingested(
+    source: Path,
+    log: LogFormat,
+    notes: RecordingNotes,
+    names: tuple[str, str],
+    quality: Mapping[str, Any],
+    *,
+    guarded: bool,
+) -> tuple[Path, Quality]:
+    """Return the folder where the samples of a log are kept, and what was found of it."""
+    limits = parse(QualitySettings, quality, "quality")
+    experiments = {"two_position": notes.two_position, "rate_table": notes.rate_table}
+    settings = of_ingest(log, notes, kind_of(experiments)) | {
+        "simulated": False,
+        "quality": limits.model_dump(mode="json"),
+    }
+    folder = Path(tempfile.mkdtemp(prefix="imubench."))
+    try:
+        found = ingest_as_planned(source, json.dumps(settings), *names, folder, guarded=guarded)
+        if found.recording["status"] != "ok":
+            raise RecordingError(str(found.recording["reason"]))
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return folder, found
+
+
+def _sensor_of(
+    source: Path, sensor: Any, folder: Path, rate: float | str | None, units: Units | None
+) -> tuple[Sensor, str, Path | None]:
+    """Return how a log is written, the name of its sensor, and the file that says so."""
+    of_folder = sensor_of(source.absolute().parent)
+    if sensor is None:
+        return _drafted(source, rate, units), of_folder, None
+    if rate is not None or units is not None:
+        raise ValueError(
+            "rate= and units= fill in a draft; expected them in what sensor= states, or no sensor="
+        )
+    if isinstance(sensor, Sensor):
+        return sensor, of_folder, None
+    if isinstance(sensor, Mapping):
+        whole = sensor if "log" in sensor else {"log": sensor}
+        return parse(Sensor, {**_MODEL, **whole}, "sensor"), of_folder, None
+    file = Path(sensor)
+    if file.suffix not in _NOTES:
+        file = folder / f"{sensor}.yaml"
+        if not file.is_file():
+            names = sorted(path.stem for path in folder.glob("*.yaml"))
+            close = get_close_matches(str(sensor), names, n=1)
+            raise ConfigError(
+                f"{file}: no such sensor file; "
+                + (f"did you mean {close[0]!r}? " if close else "")
+                + f"there are: {', '.join(names) or 'none'}; expected one of them, the path of a "
+                "file, or no sensor= to have one drafted"
+            )
+    return read_settings(Sensor, file), file.stem, file
+
+
+def _drafted(source: Path, rate: float | str | None, units: Units | None) -> Sensor:
+    """Return the sensor file that a log tells, with what a user states of it."""
+    inspection = inspect(source)
+    sensor = inspection.draft.sensor()
+    log = sensor["log"]
+    if rate is not None:
+        log["rate"] = f"{in_si(rate, 'frequency', 'rate')!r} Hz"
+    for channel, column in log["channels"].items():
+        stated = (units or {}).get(channel) or (units or {}).get(quantity_of(channel))
+        if stated is not None:
+            column["unit"] = stated
+    if unknown := [key for key in units or () if key not in (*CHANNELS, "gyro", "accel")]:
+        raise ValueError(f"units name {unknown[0]!r}; expected gyro, accel, or a channel")
+    left = [key for key in inspection.draft.unfilled() if _value_of(log, key) == UNKNOWN]
+    if left:
+        raise ValueError(
+            f"{source.name}: the log does not say {', '.join(left)}; expected units= or rate= that "
+            "do, such as units={'gyro': 'deg/s'}, or sensor= with this, where ? is filled in:\n\n"
+            f"{inspection.block}"
+        )
+    return parse(Sensor, sensor, f"the sensor file drafted from {source.name}")
+
+
+def _value_of(log: Any, key: str) -> Any:
+    for part in key.split("."):
+        log = log[part]
+    return log

@@ -1,0 +1,69 @@
+"""What a notebook and a terminal show of a result: a title, a small table, remarks."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+_MOST = 60
+"""Rows that are shown."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What is shown of a result."""
+
+    title: str
+    heads: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    notes: Sequence[str] = ()
+
+    def text(self) -> str:
+        """Return it with columns of equal width."""
+        lines = [self.title]
+        if self.rows:
+            shown = [self.heads, *self.rows[:_MOST]]
+            widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
+            for row in shown:
+                cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+                lines.append(("  " + "  ".join(cells)).rstrip())
+        return "\n".join([*lines, *self._remarks()])
+
+    def html(self) -> str:
+        """Return it as HTML."""
+        parts = [f"<div><strong>{escape(self.title)}</strong>"]
+        if self.rows:
+            parts.append("<table><thead><tr>")
+            parts += [f"<th>{escape(head)}</th>" for head in self.heads]
+            parts.append("</tr></thead><tbody>")
+            for row in self.rows[:_MOST]:
+                cells = "".join(f"<td>{escape(cell)}</td>" for cell in row)
+                parts.append(f"<tr>{cells}</tr>")
+            parts.append("</tbody></table>")
+        parts += [f"<div>{escape(note)}</div>" for note in self._remarks()]
+        return "".join([*parts, "</div>"])
+
+    def _remarks(self) -> list[str]:
+        more = len(self.rows) - _MOST
+        return [*([f"... and {more} rows more: to_pandas()"] if more > 0 else []), *self.notes]
+
+
+class Shown(ABC):
+    """A result that shows itself as its summary."""
+
+    @abstractmethod
+    def _summary(self) -> Summary:
+        """Return what is shown."""
+
+    def __repr__(self) -> str:
+        return self._summary().text()
+
+    def _repr_html_(self) -> str:
+        return self._summary().html()
+
+
+def cut(text: str, most: int = 60) -> str:
+    """Return a text for a cell, shortened."""
+    return text if len(text) <= most else f"{text[: most - 3]}..."

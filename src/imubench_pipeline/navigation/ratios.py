@@ -1,0 +1,155 @@
+"""How many times the noise of one log is that of another, and how sure that is.
+
+Two logs are independent, so a ratio of two parameters has limits that follow from the limits of
+each: on the logarithm, those of a difference (MOVER). The Allan deviation of two models at a tau is
+that of all their parameters together, which are not independent: it is compared over the joint
+draws of both.
+
+References
+----------
+G. Zou and A. Donner, "Construction of confidence limits about effect measures: a general approach",
+Statistics in Medicine 27, 2008 (eq. 2, and 3 for a ratio by logarithms).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.navigation.fusion.equivalence import FusionChannel, number_needed
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.typing import Array
+
+Verdict = Literal["lower", "higher", "not told apart", "not known"]
+
+_TAIL = 0.025
+"""Beyond each 95 % limit."""
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """One over the other."""
+
+    value: float | None
+    """None: one of them has no value."""
+    # 95 % limits; None: there is none, upwards or at all
+    lower: float | None
+    upper: float | None
+    reason: str | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the first is, beside the second: by the interval alone."""
+        if self.upper is not None and self.upper < 1.0:
+            return "lower"
+        if self.lower is not None and self.lower > 1.0:
+            return "higher"
+        limited = self.lower is not None and (self.upper is not None or self.lower > 0.0)
+        return "not told apart" if limited else "not known"
+
+
+def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
+    """Return the ratio of one noise parameter of two logs, both from 0.
+
+    Where one has no value, but limits, the interval is from the lower limit of the first over the
+    upper one of the second to the upper one over the lower one: it is wide.
+    """
+    reason = "; ".join(dict.fromkeys(_doubts(first, second))) or None
+    a, b = first.value, second.value
+    if not a or not b:
+        low = _over(first.lower or 0.0, second.upper)
+        high = _over(first.upper, second.lower)
+        if high is None and low in (None, 0.0):
+            low = None
+        return Ratio(None, low, high, reason)
+    middle = math.log(a / b)
+    below = _hypot(_distance(first.lower, a), _distance(b, second.upper))
+    above = _hypot(_distance(a, first.upper), _distance(second.lower, b))
+    return Ratio(
+        a / b,
+        None if below is None else math.exp(middle - below),
+        None if above is None or math.isinf(above) else math.exp(middle + above),
+        reason,
+    )
+
+
+def _doubts(first: Parameter, second: Parameter) -> list[str]:
+    words = ("the first", first), ("the second", second)
+    return [
+        f"{which} is {parameter.status.replace('_', ' ')}"
+        for which, parameter in words
+        if parameter.status != "ok"
+    ]
+
+
+def _over(numerator: float | None, denominator: float | None) -> float | None:
+    if numerator is None or not denominator:
+        return None
+    return numerator / denominator
+
+
+def _distance(low: float | None, high: float | None) -> float | None:
+    """Return the logarithm of one limit over the other; infinite down to 0, None: not known."""
+    if low is None or high is None:
+        return None
+    return math.log(high / low) if low > 0.0 else math.inf
+
+
+def _hypot(*sides: float | None) -> float | None:
+    return None if None in sides else math.hypot(*(side for side in sides if side is not None))
+
+
+def ratio_of_deviations(
+    first: FusionChannel,
+    second: FusionChannel,
+    tau: float,
+    *,
+    longest: float,
+    draws: int,
+    seed: int,
+) -> Ratio:
+    """Return the ratio of the Allan deviations of two models at a tau.
+
+    Parameters
+    ----------
+    first, second : FusionChannel
+    tau : float
+        s.
+    longest : float
+        Longest tau that a log tells, as a part of it.
+    draws : int
+        Noise models that are drawn of those that each log allows; each pair of them counts.
+    seed : int
+        Each channel has a stream of its own.
+    """
+    told = longest * min(first.duration, second.duration)
+    if tau > told:
+        return Ratio(None, None, None, f"the logs tell tau up to {told:.3g} s alone")
+    if not first.model.terms or not second.model.terms:
+        return Ratio(None, None, None, "one has no noise model")
+    value = math.sqrt(float(number_needed(first.variance(tau), 0.0, second.variance(tau))))
+    own, other = (
+        _variances(
+            channel.drawn(
+                draws, channel_rng(seed, channel.sensor, channel.recording, channel.channel, place)
+            ),
+            tau,
+        )
+        for place, channel in (("first", first), ("second", second))
+    )
+    ratios = np.sqrt(number_needed(own[:, None], 0.0, other[None, :]))
+    lower, upper = np.quantile(ratios, [_TAIL, 1.0 - _TAIL], method="inverted_cdf")
+    unknown = "; ".join(dict.fromkeys([*first.unknown(tau), *second.unknown(tau)])) or None
+    # The draws of what is absent lie above it: the value itself is inside.
+    limits = min(float(lower), value), max(float(upper), value)
+    return Ratio(None if unknown else value, *limits, unknown)
+
+
+def _variances(models: Sequence[NoiseModel], tau: float) -> Array:
+    return np.array([float(model.allan_variance(tau)) for model in models])

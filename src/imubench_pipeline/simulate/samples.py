@@ -1,0 +1,138 @@
+"""Samples of noise models, at a rate and of a length that may have their units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol, overload
+
+import numpy as np
+
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise import simulate as noise
+from imubench_pipeline.typing import Array
+from imubench_pipeline.units import in_si
+
+
+class HasModel(Protocol):
+    """What has a noise model, such as an estimate."""
+
+    @property
+    def model(self) -> NoiseModel:
+        """The noise model."""
+
+
+@overload
+def simulate(
+    model: NoiseModel | HasModel,
+    rate: float | str,
+    samples: int | None = None,
+    rng: np.random.Generator | None = None,
+    *,
+    duration: float | str | None = None,
+    seed: int | None = None,
+) -> Array: ...
+
+
+@overload
+def simulate(
+    model: Mapping[str, NoiseModel] | Mapping[str, HasModel],
+    rate: float | str,
+    samples: int | None = None,
+    rng: np.random.Generator | None = None,
+    *,
+    duration: float | str | None = None,
+    seed: int | None = None,
+) -> dict[str, Array]: ...
+
+
+def simulate(
+    model: NoiseModel | HasModel | Mapping[str, NoiseModel] | Mapping[str, HasModel],
+    rate: float | str,
+    samples: int | None = None,
+    rng: np.random.Generator | None = None,
+    *,
+    duration: float | str | None = None,
+    seed: int | None = None,
+) -> Array | dict[str, Array]:
+    """Return simulated noise.
+
+    Parameters
+    ----------
+    model : NoiseModel, an estimate, or a mapping of channels to either
+        A mapping, such as what `imubench_pipeline.estimate` returns, has a log for each channel.
+    rate : float or str
+        Hz, or with its unit: ``"100 Hz"``.
+    samples : int, optional
+        Length of the log; this, or the duration.
+    rng : numpy.random.Generator, optional
+        This, or a seed; by default other samples each time.
+    duration : float or str, optional
+        s, or with its unit: ``"2 h"``.
+    seed : int, optional
+        The same seed gives the same samples, and each channel of a mapping its own, whichever the
+        others are.
+
+    Returns
+    -------
+    ndarray, shape (samples,), or dict of str to ndarray
+        rad/s or m/s². Stationary processes start in their stationary distribution, the random
+        walk and the ramp at 0, lines at a random phase; flicker noise is a bank of Gauss-Markov
+        processes up to the length of the log. There is no bias and no gravity.
+
+    Raises
+    ------
+    ValueError
+        If rate or length cannot be used, or length or stream are given twice or not at all;
+        `imubench_pipeline.units.UnitError` if a unit is not known, or of another dimension.
+
+    Examples
+    --------
+    >>> import imubench_pipeline as imu
+    >>> gyro = imu.NoiseModel(N=8.7e-5, B=2.4e-5, K=1e-6)  # rad/s/sqrt(Hz), rad/s, rad/s/sqrt(s)
+    >>> imu.simulate(gyro, "100 Hz", duration="10 min", seed=1).shape
+    (60000,)
+    """
+    frequency = in_si(rate, "frequency", "rate")
+    number = _length(samples, duration, frequency)
+    if rng is not None and seed is not None:
+        raise ValueError("rng and seed are both given; expected one of them")
+    if isinstance(model, Mapping):
+        return {
+            name: noise.simulate(_model(each), frequency, number, stream)
+            for (name, each), stream in zip(model.items(), _streams(model, rng, seed), strict=True)
+        }
+    return noise.simulate(_model(model), frequency, number, rng or np.random.default_rng(seed))
+
+
+def _model(source: object) -> NoiseModel:
+    model = source if isinstance(source, NoiseModel) else getattr(source, "model", None)
+    if not isinstance(model, NoiseModel):
+        raise ValueError(
+            f"model is {source!r}, expected a NoiseModel such as NoiseModel(N=1e-4), an estimate, "
+            "or a mapping of channels to these"
+        )
+    return model
+
+
+def _streams(
+    channels: Mapping[str, object], rng: np.random.Generator | None, seed: int | None
+) -> list[np.random.Generator]:
+    if rng is not None:
+        return rng.spawn(len(channels))
+    if seed is None:
+        return np.random.default_rng().spawn(len(channels))
+    return [noise.channel_rng(seed, name) for name in channels]
+
+
+def _length(samples: int | None, duration: float | str | None, rate: float) -> int:
+    if (samples is None) == (duration is None):
+        raise ValueError(
+            "expected either samples (such as 60000) or duration (such as '10 min'): "
+            + ("neither is given" if samples is None else "both are given")
+        )
+    if samples is None:
+        assert duration is not None
+        samples = round(in_si(duration, "time", "duration") * rate)
+    if isinstance(samples, bool) or int(samples) != samples or samples < 1:
+        raise ValueError(f"{samples} samples; expected a whole number from 1")
+    return int(samples)
