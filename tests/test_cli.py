@@ -119,7 +119,7 @@ def test_a_reader_that_goes_away_is_no_fault(tmp_path: Path, command: str) -> No
     ("command", "said"),
     [
         ("exprot", "did you mean export?"),
-        ("q\x1b[31m", "no command 'q\\x1b[31m'. There are: schema,"),
+        ("q\x1b[31m", "no command 'q\\x1b[31m'. There are: analyse,"),
     ],
 )
 def test_a_wrong_command_is_answered_with_the_right_ones(
