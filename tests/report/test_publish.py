@@ -5,7 +5,7 @@ import shlex
 import shutil
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from imubench_pipeline.report import theory
 from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.publish import one_file, publish, published
 from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.start import START
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report.pages import Read, lost_links, read_pages
@@ -301,6 +302,17 @@ def test_findings_stand_on_the_page_of_their_recording(read: dict[str, Read]) ->
     assert "#gyro_y" not in page.links and "#gyro_x" in page.links
     assert "a long gap" not in read["recordings/one/day2.html"].text
     assert "1 warning in 1 recording" in read["index.html"].text
+
+
+def test_a_warning_that_is_shown_on_purpose_says_so(report: Report) -> None:
+    made = report.site
+    (view,) = (view for view in made.views if view.warnings)
+    shown = {view.warnings[0]["finding"]: "A mistake that is often made."}
+    settings = {**made.settings, "on_purpose": {f"{view.sensor}/{view.name}": shown}}
+    told = START.context(replace(made, settings=settings))
+    assert told["warning_count"].endswith("all of simulated logs that are made to show them")
+    assert told["warned"][0]["on_purpose"] == ["A mistake that is often made."]
+    assert START.context(made)["warned"][0]["on_purpose"] == []
 
 
 def test_what_is_taken_out_of_the_noise_stands_on_the_page_of_its_recording(

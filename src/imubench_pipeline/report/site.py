@@ -95,6 +95,11 @@ class Site:
         """The command that made all of it at once, and left no results; None: a run did."""
         return self.settings.get("at_once")
 
+    def on_purpose(self, view: RecordingView) -> Mapping[str, str]:
+        """Return what a simulated recording was made to show, by finding."""
+        shown: Mapping[str, Mapping[str, str]] = self.settings.get("on_purpose", {})
+        return shown.get(f"{view.sensor}/{view.name}", {})
+
     def again(self, view: RecordingView, table: str) -> str:
         """Return the command that makes the results of a recording again, up to a table."""
         return self.at_once or made_again(

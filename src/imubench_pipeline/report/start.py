@@ -36,9 +36,15 @@ def _start(site: Site) -> dict[str, Any]:
         "summary": summary(views),
         "failures": list(_failures(site)),
         "rejected": [view for view in views if view.rejected],
-        "warned": [{"view": view, "findings": _grouped(view.warnings)} for view in warned],
-        "warning_count": f"{counted(sum(len(v.warnings) for v in warned), 'warning')} in "
-        f"{counted(len(warned), 'recording')}",
+        "warned": [
+            {
+                "view": view,
+                "findings": _grouped(view.warnings),
+                "on_purpose": list(dict.fromkeys(site.on_purpose(view).values())),
+            }
+            for view in warned
+        ],
+        "warning_count": _warning_count(site, warned),
         "not_found": list(_without_result(site.turned, "earth_rate")),
         "not_calibrated": list(_without_result(site.calibrated, "calibration")),
         "changed": site.changed_devices(),
@@ -56,6 +62,17 @@ def _start(site: Site) -> dict[str, Any]:
             **together.page,
         },
     }
+
+
+def _warning_count(site: Site, warned: Sequence[RecordingView]) -> str:
+    """Return how many warnings there are, and how many of them nobody expects."""
+    every = [(site.on_purpose(view), row) for view in warned for row in view.warnings]
+    unexpected = sum(row["finding"] not in shown for shown, row in every)
+    text = f"{counted(len(every), 'warning')} in {counted(len(warned), 'recording')}"
+    if unexpected == len(every):
+        return text
+    others = f"all but {unexpected}" if unexpected else "all"
+    return f"{text}, {others} of simulated logs that are made to show them"
 
 
 def _failures(site: Site) -> Iterator[dict[str, Any]]:

@@ -47,7 +47,7 @@ from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 
 _OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
-_PUBLISHED = {"channels": {"__all__": {"published", "figures"}}}
+_PUBLISHED = {"channels": {"__all__": {"published", "figures"}}, "shows": True}
 """Keys of a simulated recording that its samples do not depend on."""
 
 _OF_RANKING = ("price_class", "must")
@@ -378,6 +378,11 @@ class Plan:
                 "sensors": self._described("vendor", "model", "price_class"),
                 "boards": {name: self._board(board) for name, board in self.boards.items()},
                 "requirements": self._requirements(),
+                "on_purpose": {
+                    f"{sensor}/{name}": dict(entry.shows)
+                    for (sensor, name), entry in self._simulated.items()
+                    if entry.shows
+                },
             }
         )
 

@@ -165,6 +165,11 @@ class OfASensor(ImuSettings):
     rate: Frequency
     source: Text = Field(description="where the figures are published")
     channels: dict[Channel, SimulatedChannel] = Field(min_length=1)
+    shows: dict[Text, Text] = Field(
+        default_factory=dict,
+        description="findings that it is to have, each with what it shows by them: on pages they "
+        "are told from those that nobody expects",
+    )
 
     @model_validator(mode="after")
     def _samples_and_units(self) -> Self:
