@@ -1,0 +1,229 @@
+"""Each doubt by itself: at the gain from which it is said, and not below."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.estimators.band import Band
+from imubench_pipeline.estimators.cutoff import Cutoff
+from imubench_pipeline.estimators.doubts import add_doubts, instead_of_walk
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.goodness import Goodness
+from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.spectrum import Spectrum
+from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms, whittle_of
+
+RATE, DURATION, N = 10.0, 4000.0, 1e-2
+FLAT = ideal_spectrum(RATE, DURATION, RATE / 2.0)
+SPECTRUM = replace(FLAT, density=np.full(len(FLAT.density), N**2))
+EVERY = np.ones(len(FLAT.density), dtype=np.bool_)
+NAMES = ("Q", "N", "B", "T_B", "K", "R")
+
+
+def candidate(terms: Terms, bic: float, aic: float, K: float = 1.0, N: float = N) -> Candidate:
+    values = {"Q": 1.0, "N": N, "F": 1.0, "K": K}
+    powers = [values[letter] ** 2 for letter in terms.linear] + [1.0] * terms.gauss_markov
+    times = 100.0 * np.arange(1.0, 1.0 + terms.gauss_markov)
+    maximum = Maximum(terms, np.array(powers), times, 1.0, 0.0)
+    return Candidate(maximum, bic, aic, 1.0, 1.0, Goodness(1.0, 1.0, "explained", ""))
+
+
+def estimate() -> Estimate:
+    parameters = {name: Parameter(N, lower=0.9 * N, upper=1.1 * N) for name in NAMES}
+    return Estimate("likelihood", parameters, curve={"B_curve": Parameter(1.0)})
+
+
+def frame(highest: float = RATE / 2.0, *, cut: bool = False, low_pass: Cutoff | None = None):
+    return Frame([], EVERY, EVERY, Band(highest, "found"), low_pass, cut=cut)
+
+
+def doubted(
+    chosen: Candidate,
+    *others: Candidate,
+    of: Frame | None = None,
+    spectrum: Spectrum = SPECTRUM,
+    papers: Candidate | None = None,
+) -> tuple[Estimate, Estimate]:
+    candidates = [chosen, *others]
+    return add_doubts(estimate(), estimate(), spectrum, of or frame(), candidates, papers or chosen)
+
+
+def statuses(found: Estimate) -> set[str]:
+    return {name for name, one in found.parameters.items() if one.status == "doubtful"}
+
+
+def at(linear: str, processes: int, bic: float, aic: float, **more: float) -> Candidate:
+    ramp = bool(more.pop("ramp", False))
+    return candidate(Terms(linear, processes, ramp), bic, aic, **more)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "other", "expected"),
+    [
+        # AIC that prefers a model without the walk; one with a ramp is another matter.
+        (at("NK", 0, 0.0, 0.0), at("N", 1, 20.0, -2.6), {"K"}),
+        (at("NK", 0, 0.0, 0.0), at("N", 1, 20.0, -2.4), set()),
+        (at("NK", 0, 0.0, 0.0), at("N", 1, 20.0, -2.6, ramp=True), set()),
+        (at("NF", 0, 0.0, 0.0), at("N", 1, 20.0, -3.0), set()),
+        # A ramp that leaves little of it.
+        (at("NK", 0, 0.0, 0.0, K=2.0), at("NK", 0, 20.0, -2.6, K=0.49, ramp=True), {"K"}),
+        (at("NK", 0, 0.0, 0.0, K=2.0), at("NK", 0, 20.0, -2.6, K=0.51, ramp=True), set()),
+        (at("NK", 0, 0.0, 0.0, K=2.0), at("NK", 0, 20.0, -2.4, K=0.49, ramp=True), set()),
+        # One term of bias instability instead of two, and none instead of one.
+        (at("NF", 1, 0.0, 0.0), at("N", 1, 8.8, 20.0), {"B", "T_B"}),
+        (at("NF", 1, 0.0, 0.0), at("N", 1, 9.2, 20.0), set()),
+        (at("NF", 0, 0.0, 0.0), at("NK", 0, 3.8, 20.0), {"B", "T_B"}),
+        (at("NF", 0, 0.0, 0.0), at("NK", 0, 4.2, 20.0), set()),
+        (at("NF", 0, 0.0, 0.0), at("N", 1, 0.5, 20.0), set()),
+        (at("NK", 0, 0.0, 0.0), at("N", 0, 0.5, 20.0), set()),
+        # Other terms of it by AIC, where there is a process and no walk.
+        (at("N", 1, 0.0, 0.0), at("N", 2, 20.0, -4.2), {"B", "T_B"}),
+        (at("N", 1, 0.0, 0.0), at("N", 2, 20.0, -3.8), set()),
+        (at("NK", 1, 0.0, 0.0), at("NK", 2, 20.0, -5.0), set()),
+        (at("NF", 0, 0.0, 0.0), at("NF", 1, 20.0, -5.0), set()),
+        (at("N", 1, 0.0, 0.0), at("NK", 1, 20.0, -5.0), set()),
+        # Quantization noise and a ramp that are hardly needed.
+        (at("QN", 0, 0.0, 0.0), at("N", 0, 7.8, 20.0), {"Q"}),
+        (at("QN", 0, 0.0, 0.0), at("N", 0, 8.2, 20.0), set()),
+        (at("NK", 0, 0.0, 0.0, ramp=True), at("NK", 0, 7.8, 20.0), {"R"}),
+        (at("NK", 0, 0.0, 0.0, ramp=True), at("NK", 0, 8.2, 20.0), set()),
+        (at("QN", 0, 0.0, 0.0), at("NF", 0, 6.0, 20.0), set()),
+    ],
+)
+def test_a_rival_is_named_from_its_gain_on(
+    chosen: Candidate, other: Candidate, expected: set[str]
+) -> None:
+    assert statuses(doubted(chosen, other)[0]) == expected
+
+
+def test_the_papers_model_is_doubted_where_the_data_are_against_it() -> None:
+    chosen = at("NF", 0, 0.0, 0.0)
+    for bic, expected in ((6.2, {"B", "T_B", "K"}), (5.8, set())):
+        papers = at("NK", 1, bic, 20.0)
+        found, of_papers = doubted(chosen, papers, papers=papers)
+        assert statuses(of_papers) == expected
+        assert statuses(found) == set()
+
+
+@pytest.mark.parametrize("status", ["not_identified", "doubtful"])
+def test_the_only_bias_and_that_of_the_curve_are_as_sure(status: str) -> None:
+    known = estimate()
+    unsure = Parameter(1.0, status, "why", 0.5, 2.0)
+    given = replace(known, parameters={**known.parameters, "B": unsure})
+    found, _ = add_doubts(given, known, SPECTRUM, frame(), [at("N", 1, 0.0, 0.0)], at("N", 1, 0, 0))
+    of_curve = found.curve["B_curve"]
+    assert (of_curve.status, of_curve.reason, of_curve.fitted) == (status, "why", 1.0)
+    assert of_curve.value == (1.0 if status == "doubtful" else None)
+    given = replace(given, further=[{"B": Parameter(1.0), "T_B": Parameter(1.0)}])
+    found, _ = add_doubts(given, known, SPECTRUM, frame(), [at("N", 2, 0.0, 0.0)], at("N", 1, 0, 0))
+    assert found.curve["B_curve"].status == "ok"
+
+
+def low_pass(floor: float = 0.0, **more: object) -> Cutoff:
+    ones = np.ones(len(EVERY))
+    return Cutoff(
+        Parameter(2.0), 2, Parameter(N), floor, 30.0, kind="analogue",
+        **{"behind": Behind(ones, ones, ones), **more},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("share", "status"), [(0.04, "doubtful"), (0.02, "ok")])
+def test_white_noise_beside_a_low_pass_may_be_of_the_same_n(share: float, status: str) -> None:
+    of = frame(low_pass=low_pass(N * np.sqrt(share + 0.1), rounded=0.1))
+    found = doubted(at("N", 0, 0.0, 0.0), of=of)[0].parameters["N"]
+    assert found.status == status
+    widened = np.sqrt(1.0 + share) if status == "doubtful" else 1.0
+    assert (found.lower, found.upper) == pytest.approx((0.9 * N, 1.1 * N * widened))
+
+
+def test_a_process_that_may_be_a_filter_leaves_n_between_both() -> None:
+    of = frame(low_pass=low_pass(behind=None, or_process="alike", N_behind=3.0 * N))
+    found = doubted(at("N", 0, 0.0, 0.0), of=of)[0].parameters["N"]
+    assert (found.value, found.status, found.reason) == (None, "not_identified", "alike")
+    assert (found.lower, found.upper) == pytest.approx((0.9 * N, 3.0 * N))
+
+
+def test_a_process_of_a_few_samples_may_be_a_filter_before_all_noise() -> None:
+    of = replace(frame(low_pass=low_pass(behind=None)), shortest=3.0 / RATE)
+    for samples, told in ((12.0, True), (8.0, False)):
+        chosen = at("N", 1, 0.0, 0.0)
+        maximum = replace(chosen.maximum, times=np.array([samples / RATE]))
+        chosen = replace(chosen, maximum=maximum)
+        found = doubted(chosen, of=of)[0].parameters["N"]
+        assert (found.status == "ok") is told
+    # Its density at no frequency is that of white noise: B^2 = 1 makes 2 sigma^2 T_B of it.
+    sigma = np.sqrt(np.log(2.0) / np.pi) / 0.4365
+    before = np.sqrt(N**2 + 2.0 * sigma**2 * 0.8)
+    assert found.upper == pytest.approx(before, rel=0.02)
+    assert found.fitted == pytest.approx(N)
+
+
+def falling(share: float, beyond: float = 1.0, last: float = RATE) -> Spectrum:
+    """White noise that has less of its density from a frequency on."""
+    f = SPECTRUM.frequency
+    return replace(SPECTRUM, density=N**2 * np.where((f > beyond) & (f < last), share, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("share", "status", "lower"),
+    [(0.3, "ok", np.sqrt(0.3)), (0.2, "doubtful", np.sqrt(0.2)), (0.95, "ok", 0.9)],
+)
+def test_beyond_a_cut_n_may_be_the_least_density(share: float, status: str, lower: float) -> None:
+    spectrum = falling(share)
+    of = frame(float(spectrum.upper[spectrum.frequency < 1.0].max()), cut=True)
+    found = doubted(at("N", 0, 0.0, 0.0), of=of, spectrum=spectrum)[0].parameters["N"]
+    assert found.status == status
+    assert found.lower == pytest.approx(lower * N)
+
+
+def test_beyond_a_cut_of_three_bins_nothing_is_said_of_n() -> None:
+    for bins in (3, 4):
+        highest = float(SPECTRUM.lower[-bins])
+        spectrum = falling(0.2, highest)
+        of = frame(highest, cut=True)
+        found = doubted(at("N", 0, 0.0, 0.0), of=of, spectrum=spectrum)[0].parameters["N"]
+        assert found.status == ("doubtful" if bins == 4 else "ok")
+
+
+def test_beyond_a_cut_a_process_would_not_be_seen() -> None:
+    known = estimate()
+    absent = Parameter(None, "absent", "none", 0.0, 1.0)
+    given = replace(known, parameters={**known.parameters, "B": absent})
+    of = frame(1.0, cut=True)
+    found, _ = add_doubts(given, known, SPECTRUM, of, [at("N", 0, 0, 0)], at("N", 0, 0, 0))
+    B = found.parameters["B"]
+    assert (B.status, B.lower, B.upper) == ("not_identified", None, None)
+
+
+@pytest.mark.parametrize(
+    ("share", "last", "told"), [(0.65, RATE, False), (0.75, RATE, True), (0.65, 4.0, True)]
+)
+def test_a_flat_stretch_of_another_level_leaves_n_between_both(
+    share: float, last: float, told: bool
+) -> None:
+    spectrum = falling(share, 1.0, last)
+    of = frame(1.0, low_pass=low_pass())
+    found = doubted(at("N", 0, 0.0, 0.0), of=of, spectrum=spectrum)[0].parameters["N"]
+    assert (found.status == "ok") is told
+    if not told:
+        assert found.lower == pytest.approx(np.sqrt(share) * N)
+
+
+def of_slope(power: float, bins: float = 8.0) -> tuple[str | None, float]:
+    """What is said of a walk that is a drift of this spectrum, as it is expected."""
+    f = SPECTRUM.frequency
+    density = N**2 * (1.0 + (bins / (2.0 * DURATION) / f) ** power)
+    whittle = whittle_of(replace(SPECTRUM, density=density), RATE / 2.0)
+    maximum = whittle.maximum(Terms("NK"))
+    return instead_of_walk(whittle, maximum), maximum.parameter("K")
+
+
+def test_a_walk_is_one_by_its_slope_and_by_what_it_adds_beyond_the_lowest_cosines() -> None:
+    reason, K = of_slope(2.0, 12.0)
+    assert reason is None
+    assert pytest.approx(2.0 * np.pi * 12.0 / (2.0 * DURATION) * N, rel=0.01) == K
+    assert "smooth drift" in (of_slope(4.0, 12.0)[0] or "")
+    assert "beyond the 5 lowest" in (of_slope(2.0, 1.5)[0] or "")
