@@ -72,3 +72,80 @@ def test_the_threshold_of_a_step_counts_the_places_that_noise_tells_apart() -> N
     # Rice: a normal process crosses a level so often; and it begins above it with a chance.
     chance = stats.chi2(1).sf(step.threshold) + apart / np.pi * np.exp(-0.5 * step.threshold)
     assert chance == pytest.approx(FALSE_ALARM["step"], rel=0.1)
+
+
+@pytest.mark.parametrize("kind", ["exponential", "sinusoid", "pulse", "ramp"])
+def test_the_best_of_each_kind_gains_what_least_squares_say(kind: str) -> None:
+    log = static_log(5, hours=0.5)
+    t = times(log)
+    log += {
+        "exponential": 6.0 * SIGMA * np.exp(-t / 200.0),
+        "sinusoid": 3.0 * SIGMA * np.sin(2.0 * np.pi * t / 180.0),
+        "pulse": 40.0 * SIGMA * (np.floor(t / 0.5) == 1234.0),
+        "ramp": 6.0 * SIGMA * t / 1800.0,
+    }[kind]
+    ordinates = Ordinates(means_of([log], len(log), RATE))
+    fit = ordinates.fit([Regressor("step", 0, 2500.0)])
+    (score,) = [x for x in best_scores(ordinates, fit, fit.density) if x.regressor.kind == kind]
+    n, interval = ordinates.sizes[0], ordinates.means.interval
+    scale = np.sqrt(ordinates.weights(fit.density))
+    data = ordinates.coefficient * scale
+
+    def gain(regressor: Regressor) -> float:
+        beside = ordinates.columns(fit.regressors[0]) * scale
+        rows = np.concatenate([beside, ordinates.columns(regressor) * scale])
+        left = [float(np.linalg.lstsq(part.T, data)[1][0]) for part in (beside, rows)]
+        return left[0] - left[1]
+
+    # Of slow courses the lowest ordinates alone are looked at.
+    assert score.gain == pytest.approx(gain(score.regressor), rel=0.02)
+    if kind == "pulse":
+        assert score.regressor.where == 1234.0
+    elif kind == "exponential":
+        assert score.regressor.where * interval == pytest.approx(200.0, rel=0.25)
+        tried = np.geomspace(n / 200, n / 2, 24)
+        assert np.abs(np.log(tried / score.regressor.where)).min() < 1e-9
+        assert score.gain >= 0.98 * max(gain(Regressor("exponential", 0, x)) for x in tried)
+    elif kind == "sinusoid":
+        assert score.regressor.where * n == pytest.approx(10.0)
+        others = [gain(Regressor("sinusoid", 0, 0.25 * k / n)) for k in range(1, 257)]
+        assert score.gain >= 0.98 * max(others)
+
+
+def test_thresholds_count_what_was_tried() -> None:
+    log = static_log(3, hours=0.5)
+    halves = [(0, len(log) // 2), (len(log) // 2, len(log))]
+    for spans, parts in (([(0, len(log))], 1), (halves, 2)):
+        ordinates = Ordinates(means_of([log], len(log), RATE, spans))
+        fit = ordinates.fit([])
+        found = list(best_scores(ordinates, fit, fit.density))
+        assert len(found) == 5 * parts
+        threshold = {score.regressor.kind: score.threshold for score in found}
+        n = ordinates.sizes[0]
+        one, two = stats.chi2(1), stats.chi2(2)
+        assert one.sf(threshold["pulse"]) * n == pytest.approx(0.001 / parts, rel=1e-6)
+        assert one.sf(threshold["ramp"]) == pytest.approx(0.002 / parts, rel=1e-6)
+        # 64 cycles of two places each; time constants of which each may be apart.
+        assert two.sf(threshold["sinusoid"]) * 128 == pytest.approx(0.0015 / parts, rel=0.01)
+        level = threshold["exponential"]
+        crossed = one.sf(level) + 24 / np.pi * np.exp(-0.5 * level)
+        assert min(crossed, 24 * one.sf(level)) == pytest.approx(0.0015 / parts, rel=1e-6)
+        slow = [x.regressor.kind for x in best_scores(ordinates, fit, fit.density, smooth=True)]
+        assert sorted(slow) == sorted(["exponential", "sinusoid", "ramp"] * parts)
+
+
+def test_what_others_explain_wholly_gains_nothing() -> None:
+    log = static_log(3, hours=0.5)
+    ordinates = Ordinates(means_of([log], len(log), RATE))
+    fit = ordinates.fit([Regressor("ramp", 0)])
+    scores = {x.regressor.kind: x for x in best_scores(ordinates, fit, fit.density)}
+    assert scores["ramp"].gain == 0.0
+    # No step is placed at the ends.
+    n = ordinates.sizes[0]
+    for level, where in ((2, 3.0), (n - 2, n - 3.0)):
+        jump = log + 1.0 * (np.arange(len(log)) >= level * ordinates.means.block)
+        far = Ordinates(means_of([jump], len(jump), RATE))
+        (step,) = [
+            x for x in best_scores(far, far.fit([]), fit.density) if x.regressor.kind == "step"
+        ]
+        assert step.regressor.where == where
