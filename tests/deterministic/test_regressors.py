@@ -40,3 +40,19 @@ def test_the_closed_forms_are_the_cosine_transforms(n: int, where: float) -> Non
     ):
         expected = scipy.fft.dct(regressor.means(n), type=2, norm="ortho", axis=1)[:, 1:]
         assert regressor.coefficients(n) == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_step_begins_at_its_place_and_a_pulse_lasts_a_block() -> None:
+    blocks = np.array([6.99, 7.0, 7.99, 8.0])
+    for kind, expected in (
+        ("step", [0, 1, 1, 1]),
+        ("restart", [0, 1, 1, 1]),
+        ("pulse", [0, 1, 1, 0]),
+    ):
+        assert Regressor(kind, 0, 7.0).at(blocks).tolist() == [expected]
+
+
+def test_a_restart_is_a_line_over_its_pause() -> None:
+    # Blocks 5 to 8 are missing, and interpolated between 4 and 9.
+    found = Regressor("restart", 0, 7.0, 4.0).means(12)[0]
+    assert found == pytest.approx([0, 0, 0, 0, 0, 0.2, 0.4, 0.6, 0.8, 1, 1, 1])

@@ -137,6 +137,8 @@ def test_steps_at_pauses_are_judged_by_their_number(log: np.ndarray) -> None:
     one = ordinates.fit([Regressor("step", 0, 702.0), Regressor("restart", 0, 1500.0, 6.0)])
     rest = anew_at_pauses(ordinates, one)
     assert rest is not None and [x.where for x in rest.courses] == [2500.0]
+    gain = 2.0 * (rest.fit.log_likelihood - one.log_likelihood)
+    assert rest.beyond == pytest.approx(gain - stats.chi2(1).isf(0.001))
 
 
 def test_a_rival_is_better_above_and_as_good_a_little_below() -> None:

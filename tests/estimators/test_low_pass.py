@@ -3,7 +3,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.signal import butter, freqz, sosfreqz
 
-from imubench_pipeline.estimators.low_pass import Filter
+from imubench_pipeline.estimators.low_pass import Filter, Kind
 from imubench_pipeline.estimators.spectrum import spectra
 
 RATE = 50.0
@@ -72,3 +72,32 @@ def test_the_ends_of_the_transform_are_what_is_left_in_a_deep_stopband() -> None
     leak = one.leak(part.frequency, part.length, RATE)
     assert (one.white(part.frequency, RATE) < 0.2 * leak).all()
     assert np.average(part.density / leak) == pytest.approx(1.0, abs=0.3)
+
+
+@pytest.mark.parametrize("kind", ["analogue", "bilinear"])
+def test_the_ends_are_those_of_the_variance_of_differences(kind: Kind) -> None:
+    one = Filter(kind, 2, 4.0)
+    length = np.full(len(FREQUENCY), 30.0)
+    variance = (
+        2.0
+        * quad(
+            lambda f: float(one.white(f, RATE)) * (2.0 - 2.0 * np.cos(2.0 * np.pi * f / RATE)),
+            0.0,
+            0.5 * RATE,
+            epsabs=1e-10,
+            limit=200,
+        )[0]
+    )
+    omega = 2.0 * np.pi * FREQUENCY / RATE
+    ends = 4.0 * variance / (30.0 * RATE**2) * np.cos(0.5 * omega) ** 2
+    ends *= (1.0 - one.slow(FREQUENCY, RATE)) ** 2 / (2.0 - 2.0 * np.cos(omega)) ** 2
+    assert one.leak(FREQUENCY, length, RATE) == pytest.approx(ends, rel=1e-4)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 7.5])
+def test_half_the_power_of_a_mean_is_lost_where_it_says(samples: float) -> None:
+    one = Filter("boxcar", 1, 0.442946 * RATE / samples)
+    at = one.half_power(RATE)
+    assert one.white(at, RATE) == pytest.approx(0.5 * one.white(0.0, RATE), rel=1e-6)
+    assert one.white(0.9 * at, RATE) > one.white(at, RATE) > one.white(1.1 * at, RATE)
+    assert Filter("analogue", 1, 3.0).half_power(RATE) == 3.0

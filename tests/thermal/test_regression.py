@@ -169,19 +169,20 @@ def candidate(terms, aic=0.0, share=1.0):
     return Candidate(maximum, aic, aic, share, share, Goodness(1.0, 1.0, "explained", ""))
 
 
-def judged(temperature, s=0.2, gained=30.0, noise=1.0, seed=1, slope=0.0):
+def judged(temperature, s=0.2, gained=30.0, noise=1.0, seed=1, slope=0.0, quadratic=False):
     rng = np.random.default_rng(seed)
     values = s * (temperature - REFERENCE) + slope * TIMES
     log = Log(
         values + noise * N * np.sqrt(RATE) * rng.standard_normal(SAMPLES), path_of(temperature)
     )
     flat = np.full(SAMPLES - 1, 1.0 / N**2)
-    found = log.regressors.at(0.0, flat)
-    left = log.regressors.without(log.spectrum, found, flat)
+    regressors = log.regressors.also(quadratic=quadratic)
+    found = regressors.at(0.0, flat)
+    left = regressors.without(log.spectrum, found, flat)
     whittle = whittle_of(left, RATE / 2.0, 4)
     lags = np.array([0.0])
     verdict = judge(
-        log.regressors, found, whittle, [candidate(Terms("N"))], lags, gained=gained,
+        regressors, found, whittle, [candidate(Terms("N"))], lags, gained=gained,
         rng=np.random.default_rng(2),
     )  # fmt: skip
     return found, verdict, left
@@ -212,6 +213,7 @@ def test_a_temperature_that_is_time_is_told_by_neither():
     _, verdict, _ = judged(RISING)
     assert verdict.sensitivity.status == "not_identified"
     assert "too close to a ramp: time alone would explain 100 %" in verdict.reason
+    assert "too close to a ramp" in judged(RISING, quadratic=True)[1].reason
     # A rise with a bend is told from a ramp, but not where a ramp explains as much.
     bent = 20.0 + 3.0 * (1.0 - np.exp(-TIMES / 6.0))
     assert judged(bent)[1].sensitivity.status == "ok"
