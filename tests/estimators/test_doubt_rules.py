@@ -100,8 +100,8 @@ def test_a_rival_is_named_from_its_gain_on(
 
 
 def test_the_papers_model_is_doubted_where_the_data_are_against_it() -> None:
-    chosen = at("NF", 0, 0.0, 0.0)
-    for bic, expected in ((6.2, {"B", "T_B", "K"}), (5.8, set())):
+    chosen = at("NF", 0, 10.0, 0.0)
+    for bic, expected in ((16.2, {"B", "T_B", "K"}), (15.8, set())):
         papers = at("NK", 1, bic, 20.0)
         found, of_papers = doubted(chosen, papers, papers=papers)
         assert statuses(of_papers) == expected
