@@ -115,20 +115,23 @@ def tests_against(
     """Return the tests that run a line, the quickest first, with their seconds.
 
     Of a file whose tests share what they compute, the others come last. What takes longer than
-    `most` seconds altogether is left out.
+    `most` seconds altogether is left out. Of compiled code nothing sees which lines run: all tests
+    count of a file that imports its module, or that run lines of a module that does.
     """
     lines, imported, compiled = _statement(module, line)
     own = str(module.relative_to(PACKAGE))
     near = {own}
-    if compiled:  # which nothing sees: what calls it
+    if compiled:
         near |= {str(path.relative_to(PACKAGE)) for path in _importers({_dotted(module)})}
     ranked: list[tuple[int, float, str, float]] = []
     for path in files:
         file = seen(path, source)
+        direct = compiled and _imports(path.read_text(), _dotted(module))
         run = {
             name
             for name, (_, rows) in file.tests.items()
-            if (near & set(rows) if imported or compiled else set(lines) & set(rows.get(own, ())))
+            if direct
+            or (near & set(rows) if imported or compiled else set(lines) & set(rows.get(own, ())))
         }
         if imported and own in file.imported and not run:
             run = set(file.tests)

@@ -27,6 +27,13 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("allan/phase.py", "longer = longer_last[i]", "longer = 2.0 * longer_last[i]", KILLED),
         ("allan/phase.py", "            j += 2", "            j += 0", TIMED_OUT),
         ("allan/phase.py", "longer = longer_last[i]", "longer = (longer_last[i])", SURVIVED),
+        # Tests that call a kernel, and run no line of the package that is seen.
+        (
+            "estimators/thermal/path_kernels.py",
+            "x, s = means[n - 1, 0], means[n - 1, 1]",
+            "x, s = means[n - 1, 0], means[n - 2, 1]",
+            KILLED,
+        ),
     ],
 )
 def test_what_is_certain_is_found(
