@@ -17,9 +17,11 @@ from imubench_pipeline.estimators.deterministic.search import (
     lies_at_pause,
     polish,
     restarts,
+    rival_of_walk,
     search,
     with_candidate,
 )
+from imubench_pipeline.estimators.whittle import Terms
 from tests.deterministic.logs import RATE, SIGMA, static_log, times
 
 
@@ -166,3 +168,26 @@ def test_each_regressor_that_is_kept_is_needed_beside_the_others(log: np.ndarray
         lost = 2.0 * (found.fit.log_likelihood - without.log_likelihood)
         assert gain == pytest.approx(lost)
     assert not found.many
+
+
+def test_a_rival_is_judged_over_the_walk_and_its_own_threshold() -> None:
+    log = static_log(1, hours=0.5, walk=0.0)
+    log += 2.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 2400.0 + 0.5)
+    ordinates = of(log)
+    fit = ordinates.fit([])
+    found = rival_of_walk(ordinates, fit)
+    assert found is not None
+    bare = ordinates.fit([], fit.density, Terms("NF", 1))
+    walk = 2.0 * (fit.log_likelihood - bare.log_likelihood)
+    beyond = {}
+    for score, density in find_candidates(ordinates, bare):
+        kind = score.regressor.kind
+        if kind not in ("ramp", "pulse"):
+            gain = with_candidate(ordinates, bare, score, density)[1]
+            factor = 1.0 if kind == "step" else 1.15
+            beyond[gain - walk - factor * score.threshold] = kind
+    best = max(beyond)
+    assert (found.courses[0].kind, found.beyond) == (beyond[best], pytest.approx(best))
+    # Nothing stands against a walk that is not there.
+    none = replace(fit, noise=replace(fit.noise, powers=fit.noise.powers * [1, 1, 0, 1]))
+    assert rival_of_walk(ordinates, none) is None

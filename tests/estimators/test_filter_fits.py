@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from imubench_pipeline.estimators.cutoff import _process_or_filter
 from imubench_pipeline.estimators.filter_fits import (
     FilterFits,
     FilterTrial,
@@ -195,28 +194,3 @@ def test_a_filter_applied_to_the_samples_folds_nothing_into_n() -> None:
     assert (found.below, found.at, found.above) == pytest.approx(
         (folded - 0.1, folded, folded + 0.2), rel=1e-4
     )
-
-
-def test_a_long_correlation_without_white_noise_may_be_a_process_or_a_filter() -> None:
-    flat = ideal_spectrum(RATE, 600.0, RATE / 2.0)
-
-    def told(
-        samples: float, beside: float = 0.0, gained: float = 0.0, stated: float | None = None
-    ) -> tuple[str, float] | None:
-        cutoff = RATE / (2.0 * np.pi * samples)
-        fits = FilterFits(replace(flat, density=4.0 * white(cutoff, flat.frequency)))
-        fits.slow = []
-        first = trial(cutoff)
-        first = replace(first, cost=fits.cost(first))
-        return _process_or_filter(fits, [first], first.cost - beside, gained, stated)
-
-    found = told(20.0)
-    assert found is not None and found[1] == pytest.approx(2.0, rel=1e-3)
-    assert "T_B = 0.2 s" in found[0] and "0.796 Hz" in found[0]
-    # Ten samples and more; as likely as white noise beside a process, or the best by far.
-    assert told(9.9) is None and told(10.1) is not None
-    assert told(20.0, 1.9) is not None and told(20.0, 2.1) is None
-    assert told(20.0, 2.1, gained=6.1) is not None
-    # What its maker states tells it, to a factor of 1.6.
-    for factor, known in ((1.7, False), (1.5, True), (1.0 / 1.5, True), (1.0 / 1.7, False)):
-        assert (told(20.0, stated=0.796 * factor) is None) is known
