@@ -262,3 +262,13 @@ def test_a_ramp_is_followed_through_holes(rng) -> None:
     truth = 1e-2 * np.arange(20_000) / RATE
     log[rng.random(20_000) < 0.1] = np.nan
     assert np.abs(complete(log, model, rng) - truth).max() < 0.1
+
+
+def test_parts_that_touch_have_each_their_own_level(rng) -> None:
+    mean = np.where(np.arange(40) < 20, 0.0, 10.0)
+    means = of_blocks(mean, np.full(40, BLOCK))
+    edge, end = 20 * BLOCK, 40 * BLOCK
+    path = slow_part(means, [(0, edge), (edge, end)], NoiseModel(N=1e-6), RATE, rng)
+    assert (np.diff(path.sample) > 0.0).all()
+    levels = path.at(np.array([0, edge - 1, edge, end - 1]))
+    np.testing.assert_allclose(levels, [0.0, 0.0, 10.0, 10.0], atol=1e-4)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from imubench_pipeline.estimators.deterministic.means import (
     Means,
@@ -170,6 +171,11 @@ def test_missing_blocks_do_not_count(rng) -> None:
     found = steady(power)
     assert found is not None
     assert found.trend == pytest.approx(np.expm1(0.5 * slope), rel=1e-9)
+    # About their mean by their errors.
+    error = stats.sem(power.reshape(16, 200), axis=1, nan_policy="omit") / left
+    level = np.log(left)
+    about = level - np.average(level, weights=error**-2)
+    assert found.chi_squared == pytest.approx(np.sum((about / error) ** 2), rel=1e-9)
 
 
 def test_a_short_or_constant_log_tells_nothing(rng) -> None:

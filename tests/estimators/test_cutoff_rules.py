@@ -12,8 +12,11 @@ from imubench_pipeline.estimators.cutoff import (
 )
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import FilterFits
+from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
-from imubench_pipeline.estimators.whittle import Behind
+from imubench_pipeline.estimators.joint_cutoff import worth_joining
+from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
 from tests.estimators.test_filter_fits import RATE, trial, white
 
 
@@ -66,3 +69,18 @@ def test_a_doubt_leaves_n_between_both() -> None:
             None, "not_identified", "alike", min(2.0, before), max(2.0, before), fitted=2.0
         )
         assert (found.or_process, found.N_behind, found.gained) == ("alike", before, 1.0)
+
+
+def test_models_that_may_be_the_best_get_a_cutoff_of_their_own() -> None:
+    def of(terms: Terms, bic: float, share: float) -> Candidate:
+        maximum = Maximum(terms, np.ones(len(terms.linear)), np.empty(0), 0.0, 0.0)
+        return Candidate(maximum, bic, bic, share, share, Goodness(1.0, 1.0, "explained", ""))
+
+    best, near, likely = (
+        of(Terms("N"), 10.0, 0.9),
+        of(Terms("NK"), 15.9, 0.02),
+        of(Terms("NF"), 17.0, 0.03),
+    )
+    worse, asked = of(Terms("NFK"), 16.1, 0.029), of(Terms("QN"), 90.0, 0.0)
+    found = worth_joining([best, near, worse, likely, asked], Terms("QN"))
+    assert found == [best, near, likely, asked]

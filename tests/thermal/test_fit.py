@@ -136,6 +136,14 @@ def test_sensitivity_lag_and_bias_are_found_and_taken_out():
     assert after < 0.5 * before
 
 
+def half_bic(likelihood, ordinates):
+    """Of the chosen model, the ordinates of the log counted, those that a fit has taken too."""
+    left, density = likelihood.spectrum, likelihood.fitted
+    data = left.density * left.ordinates / ordinates
+    cost = 0.5 * np.sum(ordinates * (np.log(density) + data / density))
+    return cost + 0.5 * likelihood.candidates[0].terms.parameters * math.log(len(density))
+
+
 def test_a_temperature_that_does_nothing_is_left_in():
     rng = np.random.default_rng(4)
     fit = fitted(simulate(NOISE, RATE, SAMPLES, rng), np.round(DAY))
@@ -204,6 +212,11 @@ def test_a_square_is_found_where_there_is_one():
     fit = fitted(log, DAY, longest_lag=0.0)
     assert fit.quadratic.lower < 3e-6 < fit.quadratic.upper
     assert fit.sensitivity.lower < 2e-5 < fit.sensitivity.upper
+    # What it gains is what the likelihood does, less two parameters more.
+    ordinates = fit.plain.spectrum.ordinates
+    gained = half_bic(fit.plain, ordinates) - half_bic(fit.without_temperature, ordinates)
+    told = float(re.search(r"by ([\d.]+)$", fit.reason)[1])
+    assert told == pytest.approx(2.0 * (gained - math.log(len(ordinates))), abs=0.2)
     assert fitted(log, DAY, longest_lag=0.0, quadratic=False).quadratic.status == "absent"
 
 
