@@ -9,6 +9,7 @@ from imubench_pipeline.estimators.cutoff import (
     Cutoff,
     _process_or_filter,
     _without_filter,
+    find_cutoff,
 )
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import FilterFits
@@ -84,3 +85,17 @@ def test_models_that_may_be_the_best_get_a_cutoff_of_their_own() -> None:
     worse, asked = of(Terms("NFK"), 16.1, 0.029), of(Terms("QN"), 90.0, 0.0)
     found = worth_joining([best, near, worse, likely, asked], Terms("QN"))
     assert found == [best, near, likely, asked]
+
+
+@pytest.mark.parametrize(("duration", "told"), [(20.0, False), (30.0, True)])
+def test_a_cutoff_is_told_where_its_limits_are_a_fifth_apart(duration: float, told: bool) -> None:
+    flat = ideal_spectrum(RATE, duration, RATE / 2.0)
+    scatter = np.random.default_rng(3).chisquare(flat.ordinates) / flat.ordinates
+    shape = white(RATE / (2.0 * np.pi), flat.frequency)
+    found = find_cutoff(replace(flat, density=shape * scatter))
+    f = found.frequency
+    assert f.lower is not None and f.upper is not None and f.upper < 2.0 * RATE
+    assert (f.upper > 1.2 * f.lower) is not told
+    assert (f.status, f.value is not None) == (("ok", True) if told else ("not_identified", False))
+    assert found.N.status == f.status
+    assert told or "the log allows cut-offs from" in (f.reason or "")

@@ -158,19 +158,21 @@ def line_of(
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("amplitude", [0.1, 2.0])
-def test_a_line_takes_the_bins_that_it_raises(amplitude: float) -> None:
+@pytest.mark.parametrize(
+    ("place", "amplitude", "wide"), [(20.0, 0.1, 1.2), (20.0, 2.0, 1.2), (0.07, 0.3, 0.03)]
+)
+def test_a_line_takes_the_bins_that_it_raises(place: float, amplitude: float, wide: float) -> None:
     spectrum: Spectrum = spectra([np.random.default_rng(1).standard_normal(20_000)], 20_000, RATE)[
         0
     ]
     density = np.full(len(spectrum.frequency), 1.0 / RATE)
-    for kind, half in (("sinusoid", 0.005), ("band", 0.6)):
-        line = line_of(20.0, amplitude, kind, 1.2)
+    for kind, half in (("sinusoid", 0.005), ("band", 0.5 * wide)):
+        line = line_of(place, amplitude, kind, wide)
         clear = without_lines(spectrum, [line], density)
         # A sinusoid falls as A^2 / (8 pi^2 D (f - f_0)^2): to a part of 0.3 of the error.
         error = 0.3 * density * np.minimum(np.sqrt(2.0 / spectrum.ordinates), 1.0)
         reach = amplitude / np.sqrt(8.0 * np.pi**2 * error * spectrum.length)
         reach = np.maximum(reach, 1.0 / spectrum.length) + half
-        away = np.maximum(spectrum.lower - 20.0, 20.0 - spectrum.upper)
+        away = np.maximum(spectrum.lower - place, place - spectrum.upper)
         np.testing.assert_array_equal(clear, away > reach)
         assert not clear.all() and clear.any()
