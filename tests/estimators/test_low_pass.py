@@ -101,3 +101,13 @@ def test_half_the_power_of_a_mean_is_lost_where_it_says(samples: float) -> None:
     assert one.white(at, RATE) == pytest.approx(0.5 * one.white(0.0, RATE), rel=1e-6)
     assert one.white(0.9 * at, RATE) > one.white(at, RATE) > one.white(1.1 * at, RATE)
     assert Filter("analogue", 1, 3.0).half_power(RATE) == 3.0
+
+
+def test_folds_of_flicker_noise_are_added_from_both_sides() -> None:
+    one = Filter("analogue", 1, 8.0)
+    f = np.array([3.0, 24.0])
+    folds = np.abs(f[:, None] + RATE * np.arange(-3000, 3001))
+    expected = (1.0 / (1.0 + (folds / 20.0) ** 2) / (2 * np.pi * folds)).sum(axis=1)
+    expected *= 2.0 * RATE * np.sin(np.pi * f / RATE)
+    # Beyond the third on either side there is half a per cent.
+    assert one.flicker(f, RATE) == pytest.approx(expected, rel=6.2e-3)

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
+from imubench_pipeline.estimators.thermal.path import TemperaturePath, _Evidence, temperature_path
 from imubench_pipeline.estimators.thermal.path_kernels import cell_moments
-from imubench_pipeline.estimators.thermal.register import KNOTS, readings, step_of
+from imubench_pipeline.estimators.thermal.register import KNOTS, Readings, readings, step_of
 
 SAMPLES = 60_000
 TIME = np.arange(SAMPLES) / SAMPLES
@@ -151,3 +151,60 @@ def test_steps_are_found_through_printed_decimals():
 def test_no_reading_is_refused():
     with pytest.raises(ValueError, match="temperature"):
         path_of(np.full(100, np.nan))
+
+
+def test_the_evidence_of_means_is_that_of_a_wandering_temperature(rng):
+    # Means of ten readings without a register: the marginal normal density of all of them.
+    n, level, spread = 40, 20.0, 4.0
+    mean = (
+        level + np.cumsum(np.cumsum(0.05 * rng.standard_normal(n))) + 0.1 * rng.standard_normal(n)
+    )
+    place = 10 * np.arange(n)
+    whole = (slice(0, n),)
+    read = Readings(
+        place, place + 10, np.full(n, 10), mean, mean - 1.0, mean + 1.0, 0.0, whole, whole
+    )
+    evidence = _Evidence(read, level, spread)
+    t = np.arange(float(n))
+    first, last = np.minimum.outer(t, t), np.maximum.outer(t, t)
+
+    def marginal(q, noise):
+        covariance = (
+            1e3 * spread**2 * (1.0 + np.outer(t, t)) + q * first**2 * (3 * last - first) / 6
+        )
+        # A reading has the noise; ten of them, and what is left where there is none.
+        covariance += (noise**2 / 10.0 + (1e-6 * spread) ** 2) * np.eye(n)
+        off = mean - level
+        return -0.5 * (np.linalg.slogdet(covariance)[1] + off @ np.linalg.solve(covariance, off))
+
+    pairs = [(2.5e-3, 0.3), (1e-2, 0.3), (2.5e-3, 0.6), (1e-3, 0.2)]
+    found = [evidence.part(whole[0], *pair)[2] for pair in pairs]
+    expected = [marginal(*pair) for pair in pairs]
+    np.testing.assert_allclose(np.diff(found), np.diff(expected), atol=1e-4)
+    np.testing.assert_allclose(evidence.steps(whole[0]), 1.0)
+    q, noise, best = evidence.best()
+    # The best of all: within what the search is stopped at.
+    grid = [
+        marginal(a, b) for a in np.geomspace(1e-4, 1e-1, 31) for b in np.geomspace(0.05, 1.5, 31)
+    ]
+    assert marginal(q, noise) > max(grid) - 0.2
+    assert best - found[0] == pytest.approx(marginal(q, noise) - expected[0], abs=1e-3)
+
+
+def test_a_piece_that_stays_in_a_cell_is_between_jumps(rng):
+    n = 12
+    place = 10 * np.arange(n)
+    level = np.where(place < 60, 20.0, 25.0)
+    whole, pieces = (slice(0, n),), (slice(0, 6), slice(6, 12))
+    read = Readings(place, place + 10, np.full(n, 10), level, level, level, 1.0, whole, pieces)
+    evidence = _Evidence(read, 22.0, 5.0)
+    assert [evidence.stays_in_a_cell(piece) for piece in pieces] == [True, True]
+    assert not evidence.stays_in_a_cell(whole[0])
+    other = np.where(place == 30, 21.0, level)
+    moved = Readings(place, place + 10, np.full(n, 10), other, other, other, 1.0, whole, pieces)
+    assert [_Evidence(moved, 22.0, 5.0).stays_in_a_cell(piece) for piece in pieces] == [False, True]
+    # Of ten readings in a cell the path keeps clear of its edges by the greatest of ten normals.
+    greatest = np.median(np.max(rng.standard_normal((20_000, 10)), axis=1))
+    half = evidence._half(pieces[0], 0.1)
+    np.testing.assert_allclose(half, 0.5 - 0.1 * greatest, rtol=0.01)
+    np.testing.assert_allclose(evidence._half(pieces[0], 10.0), 0.05)
