@@ -352,3 +352,60 @@ def test_a_process_alone_that_a_short_log_cannot_tell_has_no_value(method: str) 
         assert found.parameters[name].fitted == truth[name]
     none = fit_errors(curve, everything(curve), NoiseModel(**truth), method, held=["B", "T_B"])
     assert none.names == [] and none.covariance.shape == (0, 0)
+
+
+def test_what_is_doubted_itself_or_not_known_at_all_moves_nothing() -> None:
+    errors = Errors(("N", "B"), np.array([[0.01, 0.3], [0.3, 200.0]]))
+    assert errors.factors("N", ["B"]) == errors.factors("N", [])
+    known = Errors(("N", "B"), np.array([[0.01, -0.02], [-0.02, 0.03]]))
+    assert known.factors("B", ["B"]) == known.factors("B", [])
+
+
+def test_the_lowest_point_is_known_as_its_derivatives_say() -> None:
+    curve = curve_of(SENSOR, SAMPLES)
+    used = everything(curve, 1 / 9)
+    model = NoiseModel(**SENSOR)
+    found = with_limits(estimate_of(SENSOR), curve, used).curve
+    fine = np.geomspace(20.0, 5_000.0, 200_001)
+
+    def lowest(**changed: float) -> np.ndarray:
+        # Of the curve in continuous time.
+        truth = SENSOR | changed
+        variance = NoiseModel(**truth).allan_variance(fine)
+        return np.log([variance.min() ** 0.5, fine[variance.argmin()]])
+
+    errors, step = fit_errors(curve, used, model, "weighted"), 0.01
+    slopes = np.array(
+        [
+            lowest(**{name: SENSOR[name] * np.exp(step)})
+            - lowest(**{name: SENSOR[name] * np.exp(-step)})
+            for name in errors.names
+        ]
+    ) / (2.0 * step)
+    for name, slope in zip(("sigma_min", "tau_min"), slopes.T, strict=True):
+        error = np.sqrt(slope @ errors.covariance @ slope)
+        one = found[name]
+        if error > 0.5:
+            assert one.status == "not_identified"
+            continue
+        assert one.upper is not None and one.lower is not None
+        assert np.log(one.upper / one.lower) == pytest.approx(2.0 * 1.96 * error, rel=0.1), name
+
+
+def test_limits_of_what_is_not_known_are_linear_but_for_a_time() -> None:
+    told = set()
+    for samples in (3_000, 10_000, 30_000):
+        curve = curve_of(SENSOR, samples)
+        used = everything(curve, 1 / 9)
+        errors = fit_errors(curve, used, NoiseModel(**SENSOR), "weighted")
+        found = with_limits(estimate_of(SENSOR), curve, used).parameters
+        for name, value in SENSOR.items():
+            one, error = found[name], errors.of(name)
+            if one.status != "not_identified" or error >= 10.0:
+                continue
+            ends = (0.0, value * (1.0 + 1.96 * error))
+            if name == "T_B":
+                ends = (value * np.exp(-1.96 * error), value * np.exp(1.96 * error))
+            assert (one.lower, one.upper) == pytest.approx(ends)
+            told.add(name)
+    assert {"B", "T_B", "K"} <= told

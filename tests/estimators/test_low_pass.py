@@ -107,7 +107,7 @@ def test_folds_of_flicker_noise_are_added_from_both_sides() -> None:
     one = Filter("analogue", 1, 8.0)
     f = np.array([3.0, 24.0])
     folds = np.abs(f[:, None] + RATE * np.arange(-3000, 3001))
-    expected = (1.0 / (1.0 + (folds / 20.0) ** 2) / (2 * np.pi * folds)).sum(axis=1)
+    expected = (1.0 / (1.0 + (folds / 8.0) ** 2) / (2 * np.pi * folds)).sum(axis=1)
     expected *= 2.0 * RATE * np.sin(np.pi * f / RATE)
     # Beyond the third on either side there is half a per cent.
     assert one.flicker(f, RATE) == pytest.approx(expected, rel=6.2e-3)
