@@ -408,4 +408,4 @@ def test_limits_of_what_is_not_known_are_linear_but_for_a_time() -> None:
                 ends = (value * np.exp(-1.96 * error), value * np.exp(1.96 * error))
             assert (one.lower, one.upper) == pytest.approx(ends)
             told.add(name)
-    assert {"B", "T_B", "K"} <= told
+    assert {"T_B", "K"} <= told

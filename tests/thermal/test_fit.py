@@ -126,6 +126,12 @@ def test_sensitivity_lag_and_bias_are_found_and_taken_out():
     assert fit.sensitivity.value == pytest.approx(s, rel=0.15)
     assert fit.lag.lower < lag < fit.lag.upper
     assert fit.bias.lower < bias < fit.bias.upper
+    # The mean less what temperature adds on average; known as the mean of white noise and a walk.
+    effect = fit.path.at(np.arange(SAMPLES), fit.effect).mean()
+    assert fit.bias.value == pytest.approx(log.mean() - effect, abs=1e-7)
+    known = math.sqrt(NOISE.N**2 / TIME[-1] + NOISE.K**2 * TIME[-1] / 3.0)
+    assert 0.5 < (fit.bias.upper - fit.bias.lower) / 3.92 / known < 2.0
+    assert fit.bias.upper - fit.bias.value == pytest.approx(fit.bias.value - fit.bias.lower)
     plain = fit.plain.estimates[0].parameters["K"]
     left = fit.without_temperature.estimates[0].parameters["K"]
     assert plain.lower > NOISE.K  # temperature passes for a walk
