@@ -6,7 +6,13 @@ import pytest
 import scipy.fft
 from scipy import stats
 
-from imubench_pipeline.estimators.spectrum import SINGLE, LineSpectrum, Spectrum, spectra
+from imubench_pipeline.estimators.spectrum import (
+    SINGLE,
+    LineSpectrum,
+    Spectrum,
+    block_of,
+    spectra,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 
@@ -254,3 +260,25 @@ def test_the_spectrum_for_lines_has_the_level_of_white_noise(rng) -> None:
         error = np.sqrt(1.94 / len(inner) / line.segments)
         assert inner.mean() == pytest.approx(1.0, abs=4.5 * error)
         assert inner.std() == pytest.approx(1 / np.sqrt(line.segments), rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "block"),
+    [
+        ([262_144], 1),
+        ([262_145], 64),  # eight segments of 32,768, and one sample
+        ([280_000], 32),  # of which a sixteenth would be left over
+        ([270_500], 64),  # and here a thirty-third
+        ([271_000], 16),
+        ([150_000, 150_000], 64),
+        ([40_000] * 8, 64),  # a quarter may be left over of many
+        ([15_000] * 20, 8),
+        ([1_000] * 300, 1),
+    ],
+)
+def test_segments_are_as_long_as_they_leave_little_over(lengths: list[int], block: int) -> None:
+    stops = np.cumsum(np.array(lengths) + 10)
+    assert (
+        block_of([(int(stop) - n, int(stop)) for stop, n in zip(stops, lengths, strict=True)])
+        == block
+    )

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.deterministic.courses import (
+    Courses,
     _change_point,
+    _describe,
     _leverage_on_walk,
     _limits,
     _place_steps,
 )
 from imubench_pipeline.estimators.deterministic.means import Means, Part, means_of
-from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
+from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, covariance_of_sizes
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
+from imubench_pipeline.estimators.deterministic.search import Searched
 from tests.deterministic.logs import RATE
 
 
@@ -75,3 +78,72 @@ def test_what_regressors_take_of_the_lowest_ordinates_they_take_of_a_walk() -> N
     leverage = np.array([0.9, 0.3, 1.0, 1.0, 0.0, 0.0, 0.0])
     fit = Fit((), nothing, nothing, None, density, nothing, leverage, 0.0)  # type: ignore[arg-type]
     assert _leverage_on_walk(fit) == pytest.approx(0.6, rel=1e-3)
+
+
+def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
+    n, block = 2000, 10
+    rng = np.random.default_rng(5)
+    kinds = [
+        Regressor("step", 0, 700.25),
+        Regressor("exponential", 0, 150.0),
+        Regressor("sinusoid", 0, 0.005),
+        Regressor("ramp", 0),
+        Regressor("restart", 0, 1200.0, 8.0),
+    ]
+    sizes = np.array([8.0, 30.0, 3.0, 4.0, 1e-4, -6.0])
+    rows = np.concatenate([one.means(n) for one in kinds])
+    values = sizes @ rows + rng.standard_normal(n)
+    ordinates = Ordinates(Means(block, RATE, (Part(500, values, np.ones(n), 0.0),)))
+    fit = ordinates.fit(kinds)
+    searched = Searched(fit, fit, (1.0, 2.0, 3.0, 4.0, 5.0), False)
+    step, warm, drift, restart = _describe(ordinates, searched)
+    interval, start = block / RATE, 500 / RATE
+    covariance = covariance_of_sizes(ordinates, fit)
+    assert [one.gain for one in (step, warm, drift, restart)] == [1.0, 2.0, 3.0, 5.0]
+    assert step.start == step.end == pytest.approx(start + 700.25 * interval)
+    assert restart.start == pytest.approx(start + 1200.0 * interval)
+    assert restart.place_error == pytest.approx(4.0 * interval)
+    assert (warm.start, warm.end) == pytest.approx((start, start + n * interval))
+    assert warm.time == pytest.approx(150.0 * interval)
+    assert drift.time == pytest.approx(interval / 0.005)
+    for one, regressor in ((step, kinds[0]), (warm, kinds[1]), (drift, kinds[2])):
+        low, high = _limits(ordinates, fit, regressor)
+        if one is step:
+            assert one.place_error == pytest.approx(0.5 * (high - low) * interval)
+            assert one.time is None
+        elif one is warm:
+            ends = (low * interval, high * interval)
+            assert (one.time_lower, one.time_upper) == pytest.approx(ends)
+        else:
+            ends = (interval / high, interval / low)
+            assert (one.time_lower, one.time_upper) == pytest.approx(ends)
+    assert (step.size, warm.size, restart.size) == pytest.approx(tuple(fit.sizes[[0, 1, 5]]))
+    assert drift.size == pytest.approx(np.hypot(*fit.sizes[2:4]))
+    # An interval is that of the covariance, and of the place where that was looked for.
+    for one, place in ((warm, 1), (restart, 5)):
+        assert one.size_upper - one.size == pytest.approx(1.96 * covariance[place, place] ** 0.5)
+        assert one.size - one.size_lower == pytest.approx(1.96 * covariance[place, place] ** 0.5)
+    along = fit.sizes[2:4] / drift.size
+    least = 1.96 * np.sqrt(along @ covariance[2:4, 2:4] @ along)
+    spread = []
+    for where in _limits(ordinates, fit, kinds[2]):
+        moved = [replace(x, where=where) if x is kinds[2] else x for x in kinds]
+        spread.append(np.hypot(*ordinates.solved(moved, fit.density)[0][2:4]))
+    half = 0.5 * np.ptp([drift.size, *spread])
+    assert drift.size_upper - drift.size == pytest.approx(np.hypot(least, half))
+    # At samples: of its own part alone, a block's middle after half a block.
+    other = Part(500 + (n + 50) * block, np.zeros(200), np.ones(200), 0.0)
+    means = replace(ordinates.means, parts=(*ordinates.means.parts, other))
+    found = Courses((step, warm, drift, restart), means, searched)
+    at = found.at(0, 25_000)
+    assert not at[:500].any() and not at[other.start :].any()
+    t = (np.arange(500, other.start) + 0.5 - 500) / block
+    expected = fit.sizes[0] * (t >= 700.25) + fit.sizes[1] * np.exp(-t / 150.0)
+    expected += fit.sizes[2:4] @ np.array([np.cos(0.01 * np.pi * t), np.sin(0.01 * np.pi * t)])
+    expected += fit.sizes[5] * (t >= 1200.0)
+    np.testing.assert_allclose(at[500 : other.start], expected, atol=1e-9)
+    np.testing.assert_allclose(found.at(1_234, 9_876), at[1_234:9_876])
+    left = np.concatenate(list(found.less(np.array_split(np.ones(25_000), 9))))
+    np.testing.assert_allclose(left, 1.0 - at)
+    rest = found.without().parts[0].mean
+    np.testing.assert_allclose(rest, values - np.delete(fit.sizes, 4) @ np.delete(rows, 4, axis=0))

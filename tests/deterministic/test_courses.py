@@ -45,6 +45,7 @@ def test_steps_are_found_with_their_sizes_and_places() -> None:
     ):
         assert course.size_lower < size < course.size_upper
         assert course.start == pytest.approx(place, abs=10.0)
+        assert course.place_error is not None and 0.0 < course.place_error < 30.0
     left = np.concatenate(list(found.less([stepped]))) - log
     assert np.std(left) < 0.3 * SIGMA
 

@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.filter_fits import (
     draw_factors,
 )
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
-from imubench_pipeline.estimators.low_pass import Kind
+from imubench_pipeline.estimators.low_pass import Filter, Kind
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -194,3 +194,21 @@ def test_a_filter_applied_to_the_samples_folds_nothing_into_n() -> None:
     assert (found.below, found.at, found.above) == pytest.approx(
         (folded - 0.1, folded, folded + 0.2), rel=1e-4
     )
+
+
+@pytest.mark.parametrize(("order", "cutoff", "duration"), [(3, 55.0, 60.0), (4, 55.0, 20.0)])
+def test_the_limits_are_the_outermost_of_several_hollows(
+    order: int, cutoff: float, duration: float
+) -> None:
+    flat = ideal_spectrum(RATE, duration, RATE / 2.0)
+    density = Filter("analogue", order, cutoff).white(flat.frequency, RATE)
+    fits = FilterFits(replace(flat, density=density))
+    fits.slow = []
+    best = trial(cutoff, "analogue", order)
+    grid = np.geomspace(45.0, 100.0, 120)
+    costs = np.array([fits.cost(replace(best, cutoff=float(one))) for one in grid])
+    inside = costs < fits.cost(best) + 1.92
+    assert np.sum(np.diff(inside.astype(int)) == 1) == 2
+    lower, upper = fits.limits(best)
+    assert lower == pytest.approx(grid[inside].min(), rel=0.007)
+    assert upper == pytest.approx(grid[inside].max(), rel=0.007)

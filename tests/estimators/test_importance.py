@@ -93,3 +93,58 @@ def test_draws_of_a_mixture_have_its_density(rng) -> None:
     grid = np.array(np.meshgrid(x, x, indexing="ij")).reshape(2, -1).T
     mass = mixture.densities(grid).sum(axis=0)
     assert mass[0] / mass.sum() == pytest.approx(0.3, abs=2e-3)
+
+
+def test_a_step_towards_points_is_that_of_expectation_and_maximisation(rng) -> None:
+    points = np.concatenate(
+        [rng.standard_normal((60, 2)), [5.0, 2.0] + 0.5 * rng.standard_normal((140, 2))]
+    )
+    mixture = Mixture(
+        np.array([0.5, 0.3, 0.2]),
+        np.array([[0.5, 0.0], [4.0, 2.0], [90.0, 90.0]]),
+        np.array([np.eye(2), [[1.0, 0.3], [0.3, 0.5]], np.eye(2)]),
+    )
+    found = mixture.fitted(points)
+    # Of six degrees of freedom, which with two dimensions are even.
+    parts = np.column_stack(
+        [
+            weight * stats.multivariate_t(mean, scale, df=6).pdf(points)
+            for weight, mean, scale in zip(
+                mixture.weights, mixture.means, mixture.scales, strict=True
+            )
+        ]
+    )
+    parts /= parts.sum(axis=1, keepdims=True) * len(points)
+    mass = parts.sum(axis=0)
+    # The third has next to nothing, and is left out.
+    assert found.weights == pytest.approx(mass[:2] / mass[:2].sum())
+    for k in range(2):
+        away = points - mixture.means[k]
+        square = np.einsum("ni,ij,nj->n", away, np.linalg.inv(mixture.scales[k]), away)
+        near = parts[:, k] * (6 + 2) / (6 + square)
+        mean = near @ points / near.sum()
+        away = points - mean
+        scale = np.einsum("n,ni,nj->ij", near, away, away) / mass[k]
+        # As few points are too narrow in some direction.
+        scale[np.diag_indices(2)] *= 1.0 + 2 * np.sum(parts[:, k] ** 2) / mass[k] ** 2
+        assert found.means[k] == pytest.approx(mean)
+        assert found.scales[k] == pytest.approx(scale)
+    far = Mixture(np.ones(1), np.array([[500.0, 500.0]]), 1e-6 * np.eye(2)[None])
+    alone = far.fitted(points[:5])
+    assert alone is far
+
+
+def test_the_highest_weights_are_lowered_to_one_that_several_have() -> None:
+    weights = np.array([0.5, 0.2, 0.1, 0.1, 0.1, 0.0])
+    found = Weighted(np.zeros((6, 1)), weights).clipped(2)
+    assert found.weights == pytest.approx(np.array([0.2, 0.2, 0.1, 0.1, 0.1, 0.0]) / 0.7)
+    one = Weighted(np.zeros((3, 1)), np.array([1.0, 0.0, 0.0]))
+    assert one.clipped(2) is one
+
+
+def test_a_part_of_a_mixture_is_another() -> None:
+    first = Mixture(np.ones(1), np.zeros((1, 2)), np.eye(2)[None])
+    other = Mixture(np.array([0.4, 0.6]), np.ones((2, 2)), np.array([np.eye(2)] * 2))
+    found = first.beside(other, 0.25)
+    assert found.weights == pytest.approx([0.75, 0.1, 0.15])
+    assert found.means.tolist() == [[0, 0], [1, 1], [1, 1]]

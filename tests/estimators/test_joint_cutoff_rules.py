@@ -150,3 +150,20 @@ def test_bins_are_ruled_by_the_ends_where_the_filter_leaves_less() -> None:
     assert not _ruled_by_ends(spectrum, fits, best, 4.0 * 200.0 * leak.max())[rules].any()
     loud = replace(spectrum, density=spectrum.density * np.where(rules, 25.0, 1.0))
     assert not _ruled_by_ends(loud, fits, best, 0.0)[-1]
+
+
+def test_the_rounding_of_a_register_stands_behind_the_filter() -> None:
+    flat = ideal_spectrum(RATE, 60.0, RATE / 2.0)
+    scatter = np.random.default_rng(4).chisquare(flat.ordinates) / flat.ordinates
+    resolution = 20.0
+    rounding = resolution**2 / 12.0 / RATE
+    density = 4.0 * white(TRUE, flat.frequency) + rounding
+    found = find_cutoff(replace(flat, density=density * scatter), resolution=resolution)
+    assert (found.kind, found.order) == ("analogue", 1)
+    assert found.frequency.in_model == pytest.approx(TRUE, rel=0.1)
+    N = found.N.in_model
+    assert N is not None and found.N.lower is not None and found.N.upper is not None
+    assert found.N.lower < 2.0 < found.N.upper and N == pytest.approx(2.0, rel=0.1)
+    assert found.floor == pytest.approx(np.sqrt(rounding))
+    assert found.rounded == pytest.approx(rounding / N**2, rel=0.05)
+    assert found.beside == pytest.approx(0.0, abs=1e-2)
