@@ -154,7 +154,7 @@ def test_bins_are_ruled_by_the_ends_where_the_filter_leaves_less() -> None:
 
 def test_the_rounding_of_a_register_stands_behind_the_filter() -> None:
     flat = ideal_spectrum(RATE, 60.0, RATE / 2.0)
-    scatter = np.random.default_rng(4).chisquare(flat.ordinates) / flat.ordinates
+    scatter = np.random.default_rng(6).chisquare(flat.ordinates) / flat.ordinates
     resolution = 20.0
     rounding = resolution**2 / 12.0 / RATE
     density = 4.0 * white(TRUE, flat.frequency) + rounding
