@@ -212,3 +212,16 @@ def test_the_limits_are_the_outermost_of_several_hollows(
     lower, upper = fits.limits(best)
     assert lower == pytest.approx(grid[inside].min(), rel=0.007)
     assert upper == pytest.approx(grid[inside].max(), rel=0.007)
+
+
+def test_a_process_that_explains_all_is_the_only_slow_term(expected: FilterFits) -> None:
+    spectrum, best = expected.whittle.spectrum, trial(CUTOFF)
+    # Of half a second, between those of flicker noise and a walk.
+    place = int(np.argmin(np.abs(np.log(expected.times[2:] / 0.5)))) + 2
+    slow = expected.everything_slow[:, place] / (1.0 + (spectrum.frequency / CUTOFF) ** 2)
+    density = spectrum.density + 3.0 * slow / slow[:8].mean()
+    scatter = np.random.default_rng(7).chisquare(spectrum.ordinates) / spectrum.ordinates
+    for each in (density, density * scatter):
+        fits = FilterFits(replace(spectrum, density=each))
+        fits.choose_slow(best)
+        assert len(fits.slow) == 1 and abs(fits.slow[0] - place) <= 1

@@ -111,6 +111,20 @@ def test_the_chosen_model_is_the_best_with_a_cutoff_of_its_own(profile: Profile)
     assert refine_cutoff(nothing, profile.spectrum, EVERY, []) is nothing
 
 
+@pytest.mark.parametrize(("aic", "counts"), [(5.8, True), (6.0, False)])
+def test_a_model_has_a_part_in_the_interval_from_a_share_of_a_twentieth_on(
+    profile: Profile, aic: float, counts: bool
+) -> None:
+    alone = refine_cutoff(low_pass(14.0), profile.spectrum, EVERY, [candidate(Terms("N"))])
+    # Quantization noise, which stands behind no filter, lets it bend at lower frequencies.
+    both = [candidate(Terms("N")), candidate(Terms("QN"), 20.0, aic)]
+    found = refine_cutoff(low_pass(14.0), profile.spectrum, EVERY, both).frequency
+    assert alone.frequency.lower is not None and found.lower is not None
+    gained = refine_cutoff(low_pass(14.0), profile.spectrum, EVERY, both).models[Terms("QN")]
+    assert gained.gained < 0.05
+    assert (found.lower < 0.99 * alone.frequency.lower) is counts
+
+
 def test_a_filter_is_told_with_n_and_the_limits_of_both(profile: Profile) -> None:
     spectrum = profile.spectrum
     found = find_cutoff(spectrum)

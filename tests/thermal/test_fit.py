@@ -114,6 +114,9 @@ def test_sensitivity_for_known_noise_is_generalised_least_squares():
     # What the fit takes from the log is the freedom of its one parameter.
     left = regressors.without(spectrum, found, weights)
     assert spectrum.ordinates.sum() - left.ordinates.sum() == pytest.approx(1.0, abs=0.01)
+    # A ramp is in all of the ordinates as it was.
+    ramp = left.ramp * left.ordinates
+    assert ramp == pytest.approx(spectrum.ramp * spectrum.ordinates)
 
 
 def test_sensitivity_lag_and_bias_are_found_and_taken_out():

@@ -67,6 +67,18 @@ def test_a_path_jumps_within_a_sample():
     assert np.abs(error).max() < 0.01
 
 
+@pytest.mark.parametrize("step", [0.5, 2.0])
+def test_a_level_between_jumps_is_known_as_its_cell_is_wide(step):
+    levels = step * np.array([40.2, 51.3, 33.9])
+    read = np.round(stepping(np.array([1_000, 2_000]), levels, 3_000) / step) * step
+    path = path_of(read)
+    assert path.step == pytest.approx(step)
+    assert path.deviation == pytest.approx(np.full(len(path.sample), step / np.sqrt(12.0)))
+    off = path.draws - path.value
+    assert np.abs(off).max() <= 0.5 * step and np.ptp(off, axis=1).max() < step
+    assert off.min() < -0.3 * step and off.max() > 0.3 * step
+
+
 @pytest.mark.release
 def test_a_level_of_whole_degrees_may_lie_anywhere_in_its_cell():
     rng = np.random.default_rng(11)

@@ -12,6 +12,7 @@ from imubench_pipeline.estimators.thermal.path_errors import path_errors
 from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.estimators.thermal.regression import Regressors
 from imubench_pipeline.estimators.thermal.uncertainty import (
+    _explained,
     judge,
     lag_parameter,
     mean_error,
@@ -274,3 +275,33 @@ def test_a_walk_has_three_tenths_of_the_models_at_least():
     )
     assert shares([walk, plain])[0][1] == pytest.approx(0.3 * 0.91 / (0.9 + 0.3 * 0.91))
     assert [share for _, share in shares([plain])] == [1.0]
+
+
+def test_what_temperature_follows_is_its_squared_correlation(log):
+    found = log.regressors.at(0.0, WEIGHTS)
+    x, y = dct(means(SWING - REFERENCE)), log.coefficients
+    # In eight ordinates, and more where less than 19 parts of 20 of its power are in them.
+    assert np.sum(x[:8] ** 2) > 0.95 * np.sum(x**2)
+    x, y = x[:8], y[:8]
+    expected = (x @ y) ** 2 / (x @ x) / (y @ y)
+    assert _explained(log.regressors, found) == pytest.approx(expected)
+
+
+def test_lags_are_drawn_by_their_likelihood(log):
+    flat = np.full(SAMPLES - 1, 1.0 / N**2)
+    lags = log.regressors.lags(8.0)
+    found = log.regressors.best(flat, lags)
+    left = log.regressors.without(log.spectrum, found, flat)
+    models = [candidate(Terms("N"))]
+    whittle = whittle_of(left, RATE / 2.0, 4)
+    told = judge(
+        log.regressors, found, whittle, models, lags, gained=30.0, rng=np.random.default_rng(2)
+    ).lag
+    fine = np.linspace(0.0, 4.0, 400)
+    # For the noise that is left.
+    scale = float(np.average(left.density, weights=left.ordinates)) / N**2
+    gains = [log.regressors.at(lag, flat).log_likelihood_gain for lag in fine]
+    mass = np.cumsum(np.exp((np.array(gains) - max(gains)) / scale))
+    low, high = np.interp([0.025, 0.975], mass / mass[-1], fine)
+    assert told.upper - told.lower == pytest.approx(high - low, rel=0.1)
+    assert 0.5 * (told.upper + told.lower) == pytest.approx(0.5 * (high + low), abs=0.1)
