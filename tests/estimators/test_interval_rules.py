@@ -186,6 +186,8 @@ def test_quantiles_of_a_mixture_are_those_of_all_draws_by_weight() -> None:
     assert mixture_quantile([(first, 2.0), (second, 1.0)], 0.5) == pytest.approx(75.0, abs=1.0)
     assert mixture_quantile([(first, 2.0), (second, 1.0)], 0.9) == pytest.approx(340.0, abs=1.0)
     assert mixture_quantile([(first, 1.0), (second, 0.0)], 0.999) <= 100.0
+    few = [(np.array([1.0, 2.0]), 1.0), (np.array([3.0]), 1.0)]
+    assert [mixture_quantile(few, level) for level in (0.2, 0.4, 0.6, 1.0)] == [1.0, 2.0, 3.0, 3.0]
     low, high = mixture_limits([(first, 1.0), (second, 1.0)], [(np.arange(401.0, 500.0), 1.0)])
     assert (low, high) == pytest.approx((5.0, 496.5), abs=1.5)
 

@@ -224,6 +224,15 @@ def test_a_temperature_that_is_time_is_told_by_neither():
     assert "only rises" not in judged(SWING, s=0.01, slope=0.004)[1].reason
 
 
+def test_a_temperature_is_told_from_time_whatever_its_square_is_like():
+    # Odd about the middle of the log: its square, which is even, has nothing of time.
+    middle = TIMES - TIMES.mean()
+    for lean in (0.01, -0.01):
+        odd = 0.1 * middle + 2.0 * np.sin(0.6 * middle) + lean * np.cos(0.2 * middle)
+        _, verdict, _ = judged(REFERENCE + odd, quadratic=True)
+        assert verdict.sensitivity.status == "ok"
+
+
 def test_a_lag_that_is_no_number_has_its_interval_alone():
     draws = np.linspace(0.0, 10.0, 1001)
     assert lag_parameter(3.0, draws, 0.0, True).status == "absent"
