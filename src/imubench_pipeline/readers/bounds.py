@@ -25,6 +25,9 @@ MOST_LOOKED_INTO = 1 << 14
 
 # --------------------------------------------------------------------------------------- text
 
+MOST_LISTED = 1000
+"""Columns of a table, of text or arrays, among which those of the sensor are looked for."""
+
 LONGEST_LINE = 1 << 20
 MOST_LINES_BEFORE, MOST_BYTES_BEFORE = 500_000, 1 << 26
 """Lines and bytes in which the first record is looked for."""
