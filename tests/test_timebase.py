@@ -289,7 +289,7 @@ def test_ten_thousand_segments_are_taken_and_no_more(
     rng: np.random.Generator, jittered: bool
 ) -> None:
     steps = rng.uniform(0.001, 0.02, 50_005) if jittered else np.full(50_005, 0.01)
-    steps[5::5] = -100.0
+    steps[5::10], steps[10::10] = 4000.0, -4000.0
     clock = np.cumsum(steps)
     base, _ = found(clock[:-5])
     assert len(base.segments) == 10_000
