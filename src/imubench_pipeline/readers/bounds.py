@@ -61,9 +61,9 @@ DEEPEST_STRUCTURE, LONGEST_MATLAB_NAME, MOST_SIDES = 16, 256, 32
 
 # --------------------------------------------------------------------------------------- bags
 
-LARGEST_CHUNK, LARGEST_OVERLAP = 1 << 27, 1 << 28
+LARGEST_CHUNK, LARGEST_OVERLAP = 1 << 27, 96 << 20
 """Bytes of a chunk or record as unpacked, and of chunks of one time together, which are unpacked
-to put their messages in order."""
+to put their messages in order: those that hold nothing else take five times as much."""
 
 LARGEST_MESSAGE, LARGEST_BATCH = 1 << 16, 1 << 24
 """Bytes of a message with inertial figures, which are 320 and the name of a frame, and of those
