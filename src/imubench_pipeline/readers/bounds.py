@@ -50,6 +50,11 @@ MOST_CHUNKS = 1 << 17
 LARGEST_ARROW_BATCH = 1 << 28
 """Bytes of a compressed record batch of Feather or Arrow IPC, which is unpacked as a whole."""
 
+LARGEST_PAGES = 1 << 28
+MOST_PAGES, LEAST_IN_PAGE = 1 << 17, 1 << 12
+"""Bytes that the largest pages of all columns of a Parquet file unpack to together; pages of them,
+and bytes that more of them hold on the average at least."""
+
 MOST_OBJECTS, DEEPEST_GROUP = 20_000, 64
 """Objects of an HDF5 file, and groups within each other."""
 
