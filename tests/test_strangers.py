@@ -15,7 +15,8 @@ from imubench_pipeline.readers import log_files
 from imubench_pipeline.recordings.drop_zone import found_logs
 from imubench_pipeline.run.checking import check
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
+from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 from tests.workflow.project import put_log, put_sensor
 
@@ -112,6 +113,27 @@ def test_figures_too_small_for_their_squares_are_those_of_a_dead_channel(tmp_pat
     path.write_text("t,wx\n" + "".join(lines))
     said = {recording: quality for _, recording, quality in check(plan_of(tmp_path))}
     assert "gyro_x never changes" in said["log"].recording["reason"]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("b\x1b[2J", r"holds U\+001B"),
+        ("b\u202e", r"holds U\+202E"),
+        ("b" * 1001, "1001 letters; expected at most 1000"),
+    ],
+)
+def test_a_text_that_cannot_stand_on_a_page_is_refused(
+    tmp_path: Path, text: str, reason: str
+) -> None:
+    sensor = {"vendor": "A", "model": "B", "log": STAMPED}
+    parse(RecordingNotes, {"device": "b" * 1000}, "notes")
+    with pytest.raises(ConfigError, match=f"notes: device: .*{reason}"):
+        parse(RecordingNotes, {"device": text}, "notes")
+    for key in ("vendor", "model", "price_class", "interface"):
+        with pytest.raises(ConfigError, match=f"sensor: {key}: .*{reason}") as caught:
+            parse(Sensor, sensor | {key: text}, "sensor")
+        assert str(caught.value).isprintable() and len(str(caught.value)) < 300
 
 
 @pytest.mark.parametrize("rate", ["1e300 Hz", "1e-300 Hz"])

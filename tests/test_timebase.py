@@ -282,3 +282,17 @@ def test_stamps_that_do_not_advance() -> None:
 def test_no_stamps() -> None:
     base = without_stamps(10, 5.0)
     assert base.uniform and base.segments == ((0, 10),) and base.source == "stated"
+
+
+@pytest.mark.parametrize("jittered", [False, True])
+def test_ten_thousand_segments_are_taken_and_no_more(
+    rng: np.random.Generator, jittered: bool
+) -> None:
+    steps = rng.uniform(0.001, 0.02, 50_005) if jittered else np.full(50_005, 0.01)
+    steps[5::10], steps[10::10] = 4000.0, -4000.0
+    clock = np.cumsum(steps)
+    base, _ = found(clock[:-5])
+    assert len(base.segments) == 10_000
+    assert ("jittered_stamps" in names(base)) == jittered
+    with pytest.raises(RecordingError, match="10001 segments, expected 10000 at most"):
+        found(clock)

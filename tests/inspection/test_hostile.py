@@ -20,6 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.readers.contents import contents
 from imubench_pipeline.readers.inspection import inspect
 from tests.inspection.drafts import (
     NAMED,
@@ -68,6 +69,14 @@ def test_what_is_no_log_is_refused(tmp_path: Path, name: str) -> None:
         path.write_bytes(np.random.default_rng(1).bytes(100_000))
     with pytest.raises(RecordingError):
         inspect(path)
+
+
+def test_a_thousand_columns_are_looked_at_whatever_they_hold(tmp_path: Path) -> None:
+    # Each of dates takes 3 ms, as its pattern is looked for.
+    names = ["wx", "ax", *(f"n{place}" for place in range(8000))]
+    path = saved(tmp_path, ",".join(names) + "\n" + ("1.5,2" + ",3" * 8000 + "\n") * 3)
+    (table,) = contents(path).tables
+    assert len(table.columns) == 1000
 
 
 def test_hostile_texts(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 from datetime import UTC, datetime
 from decimal import Decimal
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 from imubench_pipeline.readers.arrays import file as arrays
+from imubench_pipeline.readers.arrays.parquet_pages import pages
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.array_files import (
     FIRST,
@@ -266,3 +268,25 @@ def test_damaged_files_never_crash(whole: list[Path], damage: Damage) -> None:
     for path in whole:
         data = damage(path.read_bytes())
         survives(path.with_name("damaged"), data, log(EVERY, time=STAMPED))
+
+
+@pytest.mark.parametrize("codec", ["none", "zstd", "snappy"])
+@pytest.mark.parametrize("version", ["1.0", "2.0"])
+def test_all_bytes_of_a_parquet_column_are_in_the_pages_that_are_found(
+    tmp_path: Path, codec: str, version: str
+) -> None:
+    values = np.random.default_rng(1).standard_normal(60_000)
+    table = pa.table(
+        {"few": np.round(values), "many": values, "gaps": pa.array(values, mask=values > 1)}
+    )
+    path = tmp_path / "log.parquet"
+    keys = {"compression": codec, "data_page_version": version, "write_page_checksum": True}
+    saved(path, table, row_group_size=25_000, max_rows_per_page=7000, **keys)
+    metadata = pq.read_metadata(path)
+    with path.open("rb") as file:
+        for group, column in product(range(3), range(3)):
+            about = metadata.row_group(group).column(column)
+            unpacked = list(pages(file, about))
+            headers = about.total_uncompressed_size - sum(unpacked)
+            assert len(unpacked) >= 4 - (group == 2) * 2
+            assert 10 * len(unpacked) < headers < 150 * len(unpacked)

@@ -40,6 +40,9 @@ FILES: dict[str, Callable[[], bytes]] = {
     "20000 columns": lambda: (
         b"wx,ax" + b",n" * 20_000 + b"\n" + (b"1,2" + b",3" * 20_000 + b"\n") * 50
     ),
+    "32769 columns": lambda: (
+        b"wx,ax" + b",n" * 32_767 + b"\n" + (b"1,2" + b",3" * 32_767 + b"\n") * 3
+    ),
     "names twice": lambda: b"wx,wx,ax,ax\n1,2,3,4\n",
     "bytes of chance": lambda: np.random.default_rng(1).bytes(8 * MIB),
     "bytes of chance later": lambda: HEAD + np.random.default_rng(2).bytes(8 * MIB),

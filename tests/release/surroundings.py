@@ -20,7 +20,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import imubench_pipeline
-from tests.release.small import LONGEST, FaultError, Undisturbed, left_over, small_project, visible
+from tests.release.small import (
+    LONGEST,
+    FaultError,
+    Undisturbed,
+    left_over,
+    put_state,
+    small_project,
+    visible,
+)
 from tests.workflow.project import Project
 
 _SAMPLES = 4000
@@ -37,7 +45,7 @@ class Surroundings:
     ----------
     environment : mapping
         Of the run, beside that of this process; None: without this variable. ``{folder}`` is that
-        of the project.
+        of the project, ``{clock}`` the library of another clock.
     before : tuple of str
         Words before its command.
     prepare : callable
@@ -82,8 +90,51 @@ def _given_to_nobody(made: Project) -> None:
         os.chown(path, _NOBODY, _NOBODY, follow_symlinks=False)
 
 
-_NO_CACHES = dict.fromkeys(("NUMBA_CACHE_DIR", "MPLCONFIGDIR"), _NOWHERE)
+def _clock(*offsets: float) -> dict[str, str | None]:
+    """Return the environment of a clock that is ahead by these, s, one after the other."""
+    return {"LD_PRELOAD": "{clock}", "OTHER_CLOCK": " ".join(f"{ahead:.0f}" for ahead in offsets)}
+
+
+def _all_done(made: Project) -> None:
+    if left := made.job_list():
+        raise FaultError(f"left to do: {sorted(left)}")
+
+
+def _run_a_year_ahead(made: Project) -> None:
+    """Leave results of other logs and settings, whose stamps are of the next year."""
+    put_state(made.folder, 1, _SAMPLES)
+    made.environment = _environment(_clock(_YEAR), made)
+    if (done := made.run()).returncode:
+        raise FaultError(f"status {done.returncode}:\n{(done.stdout + done.stderr)[-3000:]}")
+    made.environment = None
+    put_state(made.folder, 0, _SAMPLES)
+
+
+def _environment(changes: Mapping[str, str | None], made: Project) -> dict[str, str]:
+    clock = made.folder.parent / _CLOCK
+    if "{clock}" in changes.values() and not clock.exists():
+        raise FaultError("not tried: there is no compiler of C")
+    places = {"{folder}": str(made.folder), "{clock}": str(clock)}
+    environment = {}
+    for key, value in (os.environ | changes).items():
+        if value is not None:
+            for word, place in places.items():
+                value = value.replace(word, place)
+            environment[key] = value
+    return environment
+
+
+def _build_clock(folder: Path) -> None:
+    """Compile the library of another clock; without a compiler, there is none."""
+    if (compiler := shutil.which("cc") or shutil.which("gcc")) is not None:
+        source = Path(__file__).with_name("other_clock.c")
+        options = ["-O1", "-Wall", "-Werror", "-shared", "-fPIC"]
+        subprocess.run([compiler, *options, "-o", folder / _CLOCK, source, "-ldl"], check=True)
+
+
+_CLOCK = "other_clock.so"
 _YEAR = 365.25 * 86400.0
+_NO_CACHES = dict.fromkeys(("NUMBA_CACHE_DIR", "MPLCONFIGDIR"), _NOWHERE)
 CASES = {
     "caches that cannot be written": Surroundings(_NO_CACHES),
     # Snakemake keeps the sources of workflows there, and begins with making the folder.
@@ -110,8 +161,13 @@ CASES = {
         ("setpriv", f"--reuid={_NOBODY}", f"--regid={_NOBODY}", "--clear-groups"),
         _given_to_nobody,
     ),
-    "a clock that stands in 2031": Surroundings(before=("faketime", "2031-01-01 00:00:00")),
-    "a clock that goes back": Surroundings(before=("faketime", "-f", "+0 x-20")),
+    "a clock that is five years ahead": Surroundings(_clock(5 * _YEAR), check=_all_done),
+    "a clock that jumps every two seconds": Surroundings(
+        _clock(0.0, -3600.0, 86400.0, -_YEAR, 7.0, _YEAR), check=_all_done
+    ),
+    "a clock that has gone back a year since the run before": Surroundings(
+        prepare=_run_a_year_ahead, check=_all_done
+    ),
 }
 
 
@@ -125,12 +181,7 @@ def _tried(name: str, folder: Path, expected: Undisturbed) -> str:
         return f"not tried: {sys.executable} is out of reach there"
     made = small_project(folder, 0, expected.samples)
     around.prepare(made)
-    changed = os.environ | around.environment
-    environment = {
-        key: value.replace("{folder}", str(made.folder))
-        for key, value in changed.items()
-        if value is not None
-    }
+    environment = _environment(around.environment, made)
     begin = time.monotonic()
     done = subprocess.run(
         [*around.before, *made.command()], cwd=made.place, env=environment, capture_output=True,
@@ -161,6 +212,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="imubench.surroundings.") as name:
         folder = Path(name)
         expected = Undisturbed(folder, 1, _SAMPLES)
+        _build_clock(folder)
         for number, case in enumerate(given.cases):
             try:
                 print(f"{case}: {_tried(case, folder / f'case_{number}', expected)}", flush=True)

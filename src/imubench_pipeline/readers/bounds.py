@@ -25,6 +25,9 @@ MOST_LOOKED_INTO = 1 << 14
 
 # --------------------------------------------------------------------------------------- text
 
+MOST_LISTED = 1000
+"""Columns of a table, of text or arrays, among which those of the sensor are looked for."""
+
 LONGEST_LINE = 1 << 20
 MOST_LINES_BEFORE, MOST_BYTES_BEFORE = 500_000, 1 << 26
 """Lines and bytes in which the first record is looked for."""
@@ -47,6 +50,11 @@ MOST_CHUNKS = 1 << 17
 LARGEST_ARROW_BATCH = 1 << 28
 """Bytes of a compressed record batch of Feather or Arrow IPC, which is unpacked as a whole."""
 
+LARGEST_PAGES = 1 << 28
+MOST_PAGES, LEAST_IN_PAGE = 1 << 17, 1 << 12
+"""Bytes that the largest pages of all columns of a Parquet file unpack to together; pages of them,
+and bytes that more of them hold on the average at least."""
+
 MOST_OBJECTS, DEEPEST_GROUP = 20_000, 64
 """Objects of an HDF5 file, and groups within each other."""
 
@@ -58,9 +66,9 @@ DEEPEST_STRUCTURE, LONGEST_MATLAB_NAME, MOST_SIDES = 16, 256, 32
 
 # --------------------------------------------------------------------------------------- bags
 
-LARGEST_CHUNK, LARGEST_OVERLAP = 1 << 27, 1 << 28
+LARGEST_CHUNK, LARGEST_OVERLAP = 1 << 27, 96 << 20
 """Bytes of a chunk or record as unpacked, and of chunks of one time together, which are unpacked
-to put their messages in order."""
+to put their messages in order: those that hold nothing else take five times as much."""
 
 LARGEST_MESSAGE, LARGEST_BATCH = 1 << 16, 1 << 24
 """Bytes of a message with inertial figures, which are 320 and the name of a frame, and of those

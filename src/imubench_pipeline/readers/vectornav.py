@@ -86,6 +86,13 @@ class Row:
     counter: bytes = b""
 
 
+_PIECES = re.compile(rb"[^$]{6,}")
+"""What may be a sentence, from behind its sign: what is shorter than its name is none."""
+
+_MOST_NAMES, _LONGEST_SENTENCE_NAME = 1000, 32
+"""Names of other sentences that are kept, and letters of one."""
+
+
 class Sentences:
     """Sorts the sentences of one kind from all else, and counts."""
 
@@ -110,7 +117,9 @@ class Sentences:
                 self.garbage += bool(line.strip(b"\r\0 \t"))
                 continue
             # A sentence whose line break was lost runs into the next one.
-            for piece in rest.split(b"$"):
+            pieces = _PIECES.findall(rest)
+            self.garbage += rest.count(b"$") + 1 - len(pieces)
+            for piece in pieces:
                 body, _, check = piece.rpartition(b"*")
                 befores.append(before)
                 bodies.append(body or piece)
@@ -124,7 +133,9 @@ class Sentences:
                 self.right += 1
                 rows.append(self._row(before, body))
             elif good:
-                self.others[body.partition(b",")[0].decode("ascii", "replace")] += 1
+                name = _name_of(body)
+                many = len(self.others) >= _MOST_NAMES and name not in self.others
+                self.others["..." if many else name] += 1
             elif body.startswith(self._head) or self._damaged_name(body):
                 self.wrong += 1
                 if not self._stamped:
@@ -135,7 +146,7 @@ class Sentences:
 
     def _damaged_name(self, body: bytes) -> bool:
         """Tell whether this was a sentence of our kind: as many fields, and no known name."""
-        name = body.partition(b",")[0].decode("ascii", "replace")
+        name = _name_of(body)
         other = name in self.others or name in FIELDS
         return not other and body.count(b",") == self._commas
 
@@ -147,6 +158,10 @@ class Sentences:
                 row.counter = appended[1] or b""
                 row.body = row.body[: appended.start()]
         return row
+
+
+def _name_of(body: bytes) -> str:
+    return body[:_LONGEST_SENTENCE_NAME].partition(b",")[0].decode("ascii", "replace")
 
 
 def position_of(kind: str, column: str | int) -> int:

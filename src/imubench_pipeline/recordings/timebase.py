@@ -23,13 +23,16 @@ _SHARED = 0.2
 """Part of the records that repeat a stamp beyond which a stamp belongs to a group of samples."""
 
 _SAME = 1e-5
+"""Relative difference of two intervals at which stamps are put on the same grid points."""
+
 _SHORTEST, _LONGEST = 1e-18, 1e8
 """s; between two samples, also where their unit is taken for another one."""
 
 _MOST_HOLES, _MOST_POINTS = 100, 10_000_000
 """Samples that may be missing for each that is there, and beside them: each takes memory."""
 
-"""Relative difference of two intervals at which stamps are put on the same grid points."""
+_MOST_SEGMENTS = 10_000
+"""Each takes 0.1 ms in a step, however short it is."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,7 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     shared = track.duplicates > _SHARED * track.rows
     if track.off_grid > settings.jitter * track.rows or bursts or shared:
         return _arrival_order(stamps, track, stated, settings)
+    _check_segments(len(track.starts))
     exact = track.mean_interval or interval
     findings = _grid_findings(track, exact)
     rate = 1.0 / exact
@@ -193,6 +197,15 @@ def _grid_findings(track: Track, interval: float) -> list[Finding]:
         detail += "consecutive"
         findings.append(Finding("missing_stamps", "warning", detail, track.unstamped))
     return findings
+
+
+def _check_segments(number: int) -> None:
+    if number > _MOST_SEGMENTS:
+        raise RecordingError(
+            f"the time stamps jump or stop so often that there are {number} segments, expected "
+            f"{_MOST_SEGMENTS} at most: is the right column named, and 'wraps' where they begin "
+            "again at 0? Else cut the log at its pauses"
+        )
 
 
 def _segments(what: str, times: list[float], jumps: list[float]) -> Finding:
@@ -282,6 +295,7 @@ def _arrival_order(
         last = latest[-1]
     if elapsed <= 0:
         raise RecordingError("the time stamps do not advance; is the right column named?")
+    _check_segments(len(starts))
     rate = samples / elapsed
     findings = [_jittered(track, rate, worst, worst_at / rate)]
     findings += _rate_findings(rate, stated, settings)

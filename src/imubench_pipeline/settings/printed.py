@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from imubench_pipeline.settings.conversions import Filter
-from imubench_pipeline.settings.validation import Duration, Frequency, Strict, Text
+from imubench_pipeline.settings.validation import Duration, Frequency, Shown, Strict, Text
 from imubench_pipeline.units import UnitError, dimension_of, quantity_to_si, to_si
 
 Value = float | tuple[float, ...] | dict[str, float]
@@ -65,7 +65,7 @@ class PrintedFigure(Strict):
         description="as printed, ± left out; by axis: {xy: 60, z: 80}; [low, high] of a range; "
         "null: not published"
     )
-    unit: str | None = Field(None, description="as the vendor writes it")
+    unit: Shown | None = Field(None, description="as the vendor writes it")
     kind: Kind = Field(
         "typ", description="choices: what can be selected; derived: computed from another figure"
     )
@@ -86,8 +86,10 @@ class PrintedFigure(Strict):
         description="grade, range or mode of the sensor that alone has this figure; which of "
         "them the logged ones have, 'options' of the datasheet says",
     )
-    condition: str | None = Field(None, description="temperature, supply and the like, as printed")
-    evidence: str | None = Field(None, description="where the figure or its sidedness is from")
+    condition: Shown | None = Field(
+        None, description="temperature, supply and the like, as printed"
+    )
+    evidence: Shown | None = Field(None, description="where the figure or its sidedness is from")
     source: Literal["primary", "secondary"] | None = Field(
         None, description="null: that of the datasheet"
     )
@@ -257,7 +259,7 @@ _LARGEST_ACCELERATION_NOISE = 1.0
 class Datasheet(Strict):
     """What a vendor prints of a sensor."""
 
-    document: str | None = None
+    document: Shown | None = None
     revision: Text | None = Field(None, description="of the document, with its date")
     source: Literal["primary", "secondary"] | None = Field(
         None,

@@ -17,6 +17,7 @@ from imubench_pipeline.settings.validation import (
     Between,
     ConfigError,
     Frequency,
+    Shown,
     Strict,
     Text,
     of_size,
@@ -243,9 +244,9 @@ def _check_unit(unit: str, dimension: str, key: str) -> None:
 class Sensor(Strict):
     """One IMU model: its logs, what it needs of a vehicle, and its datasheet."""
 
-    vendor: str
-    model: str
-    price_class: str | None = None
+    vendor: Shown
+    model: Shown
+    price_class: Shown | None = None
     price: Text | None = Field(None, description="with its currency and number, such as 12 EUR")
     mass: Annotated[Text, of_size("mass")] | None = Field(
         None, examples=["15 g"], description="null: not known"

@@ -105,7 +105,22 @@ def _between(ends: tuple[str, str]) -> tuple[str, str]:
 
 
 FractionOfLog = Annotated[float, BeforeValidator(_fraction, json_schema_input_type=float | str)]
-Text = Annotated[str, BeforeValidator(as_text)]
+_LONGEST_TEXT = 1000
+_UNSEEN = re.compile("[\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\x7f-\\x9f\\u2028-\\u202e\\u2066-\\u2069]")
+"""What moves a cursor, ends a line or turns the direction of what follows."""
+
+
+def _shown(text: str) -> str:
+    if len(text) > _LONGEST_TEXT:
+        raise ValueError(f"{len(text)} letters; expected at most {_LONGEST_TEXT}")
+    if unseen := _UNSEEN.search(text):
+        raise ValueError(f"holds U+{ord(unseen[0]):04X}; expected what can be seen")
+    return text
+
+
+Shown = Annotated[str, AfterValidator(_shown)]
+"""A text that stands in tables and on pages."""
+Text = Annotated[Shown, BeforeValidator(as_text)]
 Frequency = Annotated[
     Text, checked("frequency", "a frequency above zero"), Field(examples=["100 Hz"])
 ]

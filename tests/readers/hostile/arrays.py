@@ -6,10 +6,12 @@ import os
 import struct
 import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 
 from tests.readers.hostile.attack import FIRST, MIB, Attack, file
 
@@ -98,6 +100,24 @@ def batch(folder: Path, rows: int, said: int | None = None) -> Path:
     return path
 
 
+def parquet(*groups: int, rows_of_page: int = 1 << 30) -> Callable[[Path], Path]:
+    """Return what writes zeros, in row groups of so many, each of one page."""
+
+    def write(folder: Path) -> Path:
+        path = folder / "log.parquet"
+        schema = pa.schema([("wx", pa.float64())])
+        with pq.ParquetWriter(
+            path, schema, compression="zstd", use_dictionary=False, write_statistics=False,
+            data_page_size=(1 << 31) - 1, max_rows_per_page=rows_of_page,
+            write_batch_size=min(rows_of_page, max(groups)),
+        ) as out:  # fmt: skip
+            for rows in groups:
+                out.write_table(pa.table({"wx": np.zeros(rows)}), row_group_size=rows)
+        return path
+
+    return write
+
+
 CORRUPT = "corrupt data, or cut short"
 ARRAYS = {
     "a header of 800 MB": Attack(
@@ -129,6 +149,14 @@ ARRAYS = {
         lambda folder: batch(folder, 1_000_000, 8192),
         "a compressed record batch unpacks to 8589934592 bytes",
         channels=FIRST,
+    ),
+    "a page of 256 MiB after a short one": Attack(
+        parquet(1000, 256 << 17),
+        "pages unpack to 268435465 bytes together; expected at most 268435456",
+        channels=FIRST,
+    ),
+    "131073 pages": Attack(
+        parquet((1 << 17) + 1, rows_of_page=1), "more than 131072 pages", channels=FIRST
     ),
     "a batch of 256 MiB": Attack(
         lambda folder: batch(folder, 32 * MIB), "^read: 33554432$", "^listed: ", FIRST

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import bz2
+import os
 import sqlite3
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import lz4.frame
@@ -123,11 +124,14 @@ def mcap(*records: bytes, summary: bytes = b"") -> bytes:
     return data + summary + mcap_record(2, struct.pack("<QQI", start, 0, 0)) + MAGIC
 
 
-def overlapping(size: int) -> bytes:
-    """Return a bag whose index has three chunks of one time."""
-    one = struct.pack("<QQQQ", 0, 1, 0, 100) + struct.pack("<IHQ", 10, 1, 100)
-    one += struct.pack("<Q", 100) + mcap_text(b"zstd") + struct.pack("<QQ", 10, size)
-    return mcap(summary=SCHEMA + mcap_channel() + mcap_record(8, one) * 3)
+def indexed(size: int, times: Sequence[int]) -> bytes:
+    """Return a bag whose index has one chunk of so many bytes again and again, at these times."""
+    index = b""
+    for time in times:
+        one = struct.pack("<QQQQ", time, time + 1, 0, 100) + struct.pack("<IHQ", 10, 1, 100)
+        one += struct.pack("<Q", 100) + mcap_text(b"zstd") + struct.pack("<QQ", 10, size)
+        index += mcap_record(8, one)
+    return mcap(summary=SCHEMA + mcap_channel() + index)
 
 
 def packed_zeros(count: int) -> bytes:
@@ -158,14 +162,20 @@ rosbag2_bagfile_information:
 """
 
 
-def folder_of(mode: str, data: Callable[[], bytes], more: str = "") -> Callable[[Path], Path]:
+def folder_of(
+    mode: str, data: Callable[[], bytes], more: str = "", names: int = 1, pipe: bool = False
+) -> Callable[[Path], Path]:
     """Return what writes the folder of a bag whose file or messages are packed."""
 
     def write(folder: Path) -> Path:
         path, name = folder / "log", "a.mcap" + ".zstd" * (mode == "file")
         path.mkdir()
         (path / name).write_bytes(data())
-        (path / "metadata.yaml").write_text(METADATA.format(name=name, mode=mode) + more)
+        if pipe:
+            os.mkfifo(path / ".pipe")
+            name = ".pipe"
+        text = METADATA.format(name=", ".join([name] * names), mode=mode)
+        (path / "metadata.yaml").write_text(text + more)
         return path
 
     return write
@@ -224,8 +234,13 @@ BAGS = {
         IMU,
     ),
     "MCAP chunks of one time": Attack(
-        file("a.mcap", lambda: overlapping(100 * MIB)),
-        "chunks of one time have 314572800 bytes",
+        file("a.mcap", lambda: indexed(33 * MIB, [0, 0, 0])),
+        "chunks of one time have 103809024 bytes",
+        channels=IMU,
+    ),
+    "an MCAP index of one chunk for all times": Attack(
+        file("a.mcap", lambda: indexed(7 * MIB, range(0, 3000, 2))),
+        "its chunks expand to more than 800 times its size",
         channels=IMU,
     ),
     "10001 channels": Attack(
@@ -241,6 +256,25 @@ BAGS = {
         NOT_READ,
         EMPTY,
         IMU,
+    ),
+    "a file that is named a hundred times": Attack(
+        folder_of("message", mcap, names=100), "names a file twice", channels=IMU
+    ),
+    "a pipe for a file": Attack(
+        folder_of("message", mcap, pipe=True), "'.pipe' is no file", channels=IMU
+    ),
+    "a connection whose number has 1 MB": Attack(
+        file("a.bag", lambda: bag(record({b"op": b"\2", b"conn": b"\xff" * MIB}, b""))),
+        "damaged at byte 90 .unpack requires",
+        channels=IMU,
+    ),
+    "a compression whose name has 1 MB": Attack(
+        file(
+            "a.bag",
+            lambda: bag(record({b"op": b"\5", b"compression": b"x" * MIB, b"size": bytes(4)}, b"")),
+        ),
+        r"is compressed with 'x+\.\.\.x+'; expected bz2",
+        channels=IMU,
     ),
     "metadata of 2 MB": Attack(
         folder_of("message", mcap, "#" * 2 * MIB), "metadata.yaml has", channels=IMU

@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
+from imubench_pipeline.readers.arrays.parquet_pages import check_pages
 from imubench_pipeline.readers.arrays.table import Column, Table, UnusableError
 from imubench_pipeline.readers.bounds import LARGEST_ARROW_BATCH
 
@@ -38,7 +39,7 @@ class ArrowFile(ArrayFile):
             file = pq.ParquetFile(
                 self.path, memory_map=True, pre_buffer=False, page_checksum_verification=True
             )
-            return [_ParquetTable(stack.enter_context(file))]
+            return [_ParquetTable(self.path, stack.enter_context(file))]
         if begin.startswith((_FILE, _STREAM)):
             check_batches(self.path, begin == _FILE)
             source = stack.enter_context(pa.memory_map(str(self.path)))
@@ -102,12 +103,13 @@ class _ArrowTable(Table):
 
 
 class _ParquetTable(_ArrowTable):
-    def __init__(self, file: pq.ParquetFile) -> None:
+    def __init__(self, path: Path, file: pq.ParquetFile) -> None:
         super().__init__(file.schema_arrow)
-        self._file = file
+        self._path, self._file = path, file
         self.rows = file.metadata.num_rows
 
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
+        check_pages(self._path, self._file.metadata, names)
         yield from self._file.iter_batches(rows, columns=names, use_threads=False)
 
 

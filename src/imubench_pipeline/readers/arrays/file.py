@@ -34,6 +34,7 @@ from imubench_pipeline.readers.bounds import (
     LARGEST_RATIO,
     LARGEST_RECORD,
     MOST_ARRAYS,
+    MOST_LISTED,
     UNSUSPICIOUS,
 )
 from imubench_pipeline.readers.file_format import (
@@ -406,7 +407,7 @@ def _listed(names: Iterable[str]) -> str:
 
 # ----------------------------------------------------------------------- what a log holds
 
-_MOST_TABLES, _MOST_COLUMNS = 1000, 1000
+_MOST_TABLES = 1000
 _MOST_BYTES = 1 << 24
 _RATES = frozenset(
     ("fs", "rate", "sr", "samplerate", "samplingrate", "samplefreq", "samplingfreq", "freq",
@@ -466,7 +467,7 @@ def _together(described: Sequence[LogTable]) -> list[LogTable]:
 def _described(path: Path, file_format: FileFormat, table: Table) -> LogTable:
     if table.fault is not None:
         return LogTable(file_format, table.name, fault=table.fault)
-    described = [table.column(place) for place in range(min(table.width, _MOST_COLUMNS))]
+    described = [table.column(place) for place in range(min(table.width, MOST_LISTED))]
     usable = [n for n, column in enumerate(described) if column.kind in NUMBERS + DATES]
     try:
         with explained(path):

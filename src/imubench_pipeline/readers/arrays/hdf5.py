@@ -245,6 +245,7 @@ _NAMES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 _LONGEST_WAIT = 3.0
 _LONGEST = 40
 _LONGEST_STORED = 1 << 12
+_MEMORY = 1 << 29
 
 
 def stated_unit(data: h5py.Dataset) -> str | None:
@@ -272,11 +273,12 @@ def _texts_of_variable_length(path: str, *_: int) -> dict[str, str]:
     """Return the units of a file by data set; none where they cannot be read.
 
     The library does not come back from every damaged text of variable length: a process of its own
-    reads these, and is ended where it does not answer.
+    reads these, and is ended where it does not answer. It has to unpack a text to tell its length,
+    so it reads no further where one is no unit.
     """
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _READING, path, str(_LONGEST_STORED), *_NAMES],
+            [sys.executable, "-c", _READING, path, str(_LONGEST_STORED), str(_MEMORY), *_NAMES],
             capture_output=True,
             timeout=_LONGEST_WAIT,
             check=True,
@@ -288,18 +290,20 @@ def _texts_of_variable_length(path: str, *_: int) -> dict[str, str]:
 
 
 _READING = """
-import json, sys
+import json, resource, sys
 import h5py
 
+resource.setrlimit(resource.RLIMIT_DATA, (int(sys.argv[3]),) * 2)
 units = {}
 
 def visit(name, item):
     if isinstance(item, h5py.Dataset):
-        for key in sys.argv[3:]:
+        for key in sys.argv[4:]:
             if key in item.attrs:
                 text = item.attrs[key]
-                text = text if isinstance(text, str) else text.decode()
-                units["/" + name] = text[: int(sys.argv[2])]
+                if len(text) > int(sys.argv[2]):
+                    return "no unit"
+                units["/" + name] = text if isinstance(text, str) else text.decode()
 
 with h5py.File(sys.argv[1], "r") as file:
     file.visititems(visit)

@@ -9,7 +9,7 @@ hold the column. Time columns, with ``unit: ns``: ``header.stamp``, what the dri
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
@@ -28,6 +28,7 @@ from imubench_pipeline.readers.file_format import ROWS, FileFormat, LogColumn, L
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder
 from imubench_pipeline.readers.stamps import Clock, date_of
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 # ---------------------------------------------------------------------------------- messages
@@ -129,6 +130,7 @@ def _whole_numbers(table: NDArray[np.uint8], kind: str) -> NDArray[np.uint32]:
 # -------------------------------------------------------------------------------------- bags
 
 _BATCH = 1 << 14
+_SHOWN = 10
 _SQLITE = b"SQLite format 3"
 STAMP, LOG_TIME = "header.stamp", "log_time"
 """The columns of time."""
@@ -247,7 +249,7 @@ class RosbagFile(LogFile):
         stated = {source.variable for source in self.sources.values() if source.variable}
         if len(stated) > 1:
             raise RecordingError(
-                f"{self.path.name}: columns of the topics {', '.join(sorted(stated))} cannot be "
+                f"{self.path.name}: columns of the topics {_listed(sorted(stated))} cannot be "
                 "read together, for each topic has a clock of its own; expected one topic a file"
             )
         able = {
@@ -257,7 +259,7 @@ class RosbagFile(LogFile):
             and all(source.column in LAYOUTS[kind].columns for source in self.sources.values())
         }
         wanted = ", ".join(str(source.column) for source in self.sources.values())
-        present = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items())[:30])
+        present = _listed(f"{topic} ({kind})" for topic, kind in sorted(topics.items()))
         if stated:
             (name,) = stated
             chosen = [topic for topic in able if topic.strip("/") == name.strip("/")]
@@ -267,7 +269,7 @@ class RosbagFile(LogFile):
             return chosen[0], able[chosen[0]]
         if chosen:
             raise RecordingError(
-                f"{self.path.name}: several topics hold {wanted}: {', '.join(chosen)}; name one "
+                f"{self.path.name}: several topics hold {wanted}: {_listed(chosen)}; name one "
                 "with 'variable:' at each column in the sensor file"
             )
         cut = " (the bag is cut short, or was not closed)" if source.unclosed else ""
@@ -305,6 +307,12 @@ class RosbagFile(LogFile):
                 "them with sqlite3 and 'pragma wal_checkpoint'",
                 1,
             )
+
+
+def _listed(names: Iterable[str]) -> str:
+    """Return the first of some names, each a line at most."""
+    every = list(names)
+    return ", ".join(cut(name, str) for name in every[:_SHOWN]) + ", ..." * (len(every) > _SHOWN)
 
 
 @contextmanager

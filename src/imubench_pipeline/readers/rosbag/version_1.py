@@ -21,6 +21,7 @@ from imubench_pipeline.readers.bounds import (
     MOST_TOPICS,
     UNSUSPICIOUS,
 )
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 _MAGIC = b"#ROSBAG V2.0\n"
@@ -39,7 +40,7 @@ class Bag:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._connections: dict[bytes, tuple[str, str]] = {}
+        self._connections: dict[int, tuple[str, str]] = {}
         self._left = 0
         self.unclosed = False
 
@@ -138,8 +139,8 @@ class Bag:
             data = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
         elif compression != "none":
             raise RecordingError(
-                f"{self._path.name}: a chunk is compressed with {compression!r}; expected bz2 or "
-                "lz4; write the bag anew with 'rosbag compress'"
+                f"{self._path.name}: a chunk is compressed with {cut(compression)}; expected "
+                "bz2 or lz4; write the bag anew with 'rosbag compress'"
             )
         if len(data) != size:
             raise ValueError(f"a chunk is not as long as the {size} bytes that it says")
@@ -152,7 +153,7 @@ class Bag:
         self, header: dict[bytes, bytes], data: bytes, topic: str
     ) -> Iterator[tuple[int, bytes]]:
         if header[b"op"] == _MESSAGE:
-            if self._connections[header[b"conn"]][0] == topic:
+            if self._connections[_number_of(header)][0] == topic:
                 seconds, nanoseconds = _TIME.unpack(header[b"time"])
                 yield seconds * 10**9 + nanoseconds, data if len(data) <= LARGEST_MESSAGE else b""
         elif header[b"op"] == _CONNECTION:
@@ -166,7 +167,13 @@ class Bag:
         if len(self._connections) >= MOST_TOPICS:
             raise ValueError(f"more than {MOST_TOPICS} connections, expected those of a vehicle")
         # The name that ROS 2 has for the same type.
-        self._connections[header[b"conn"]] = topic, kind.replace("/", "/msg/", 1)
+        self._connections[_number_of(header)] = topic, kind.replace("/", "/msg/", 1)
+
+
+def _number_of(header: dict[bytes, bytes]) -> int:
+    """Return the number of the connection that a record is of."""
+    (number,) = _U4.unpack(header[b"conn"])
+    return int(number)
 
 
 class _CutShortError(Exception):

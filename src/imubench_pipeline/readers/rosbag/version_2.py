@@ -23,11 +23,14 @@ from imubench_pipeline.readers.bounds import (
     LARGEST_MESSAGE,
     LARGEST_METADATA,
     LARGEST_OVERLAP,
+    LARGEST_RATIO,
     LONGEST_TOPIC,
     MOST_TOPICS,
+    UNSUSPICIOUS,
 )
 from imubench_pipeline.readers.compressed import open_bytes
 from imubench_pipeline.readers.decompression import unpacked_zstd
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 _TABLES = ("messages", "topics", "message_definitions", "schema", "metadata")
@@ -75,9 +78,12 @@ class Bag2:
             raise ValueError(f"more than {MOST_TOPICS} topics, expected those of a vehicle")
         if any(len(str(c.topic) + str(c.msgtype)) > LONGEST_TOPIC for c in self._connections):
             raise ValueError(f"a topic or type of more than {LONGEST_TOPIC} letters")
-        for storage in _storages(reader):
+        storages = _storages(reader)
+        if len({storage.path for storage in storages}) < len(storages):
+            raise ValueError("metadata.yaml names a file twice, expected each once")
+        for storage in storages:
             if isinstance(storage, McapReader):
-                _check_overlap(storage)
+                _check_index(storage)
 
     def topics(self) -> dict[str, str]:
         """Return the topics, and the type of message of each."""
@@ -120,8 +126,15 @@ def _storages(reader: _Reader) -> list[Any]:
     return list(storage.storages) if isinstance(storage, DirectoryReader) else [storage]
 
 
-def _check_overlap(storage: McapReader) -> None:
-    """Raise if chunks of one time are larger than may be in memory together."""
+def _check_index(storage: McapReader) -> None:
+    """Raise if the chunks expand too far, or those of one time may not be in memory together.
+
+    The index may name one chunk again and again.
+    """
+    size_of_file = Path(str(storage.path)).stat().st_size
+    expanded = sum(chunk.uncompressed_size for chunk in storage.chunks)
+    if expanded > max(UNSUSPICIOUS, LARGEST_RATIO * size_of_file):
+        raise ValueError(f"its chunks expand to more than {LARGEST_RATIO} times its size")
     open_until: list[tuple[int, int]] = []
     size = 0
     for chunk in sorted(storage.chunks, key=lambda chunk: chunk.message_start_time):
@@ -138,8 +151,14 @@ def _check_overlap(storage: McapReader) -> None:
 def check_folder(path: Path) -> None:
     """Raise if what describes a bag is too long to be that, or a packed file expands too far.
 
-    ``path``: the folder of a ROS 2 bag.
+    ``path``: the folder of a ROS 2 bag, of whose files no one may be a device or a named pipe.
     """
+    for file in sorted(path.iterdir()):
+        if not file.is_file() and not file.is_dir():
+            raise RecordingError(
+                f"{path.name}: {cut(file.name)} is no file; expected those of a ROS 2 bag: copy "
+                "the bag again"
+            )
     size = (path / "metadata.yaml").stat().st_size
     if size > LARGEST_METADATA:
         raise RecordingError(

@@ -12,6 +12,7 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import Batch, LogFile
+from imubench_pipeline.readers.bounds import MOST_LISTED
 from imubench_pipeline.readers.file_format import (
     FIRST,
     NOTHING_STATED,
@@ -281,7 +282,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     named = layout.names != [str(number) for number in range(1, len(layout.names) + 1)]
     columns = tuple(
         _column(layout, place, [row[place] for row in rows], named, units.get(place))
-        for place in range(len(layout.names))
+        for place in range(min(len(layout.names), MOST_LISTED))
     )
     names = "with names" if named else "without names"
     return [
