@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 import os
 
 # A worker of pytest-xdist has one processor: the threads of the linear algebra would wait for each
@@ -7,6 +8,9 @@ import os
 os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "NUMBA")}
 # Some hundred processes are started: each would compile its imports, for 3 s.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Modules and tests are millions of objects, which live as long as the worker: to look for garbage
+# among them takes half of the time of their collection, and half a second each time after it.
+gc.disable()
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -32,6 +36,11 @@ SHARED = PROJECT.parent / "shared"
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: place(item.nodeid))
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()  # garbage is looked for among what the tests leave
+    gc.enable()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:

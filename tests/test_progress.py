@@ -31,7 +31,7 @@ onerror:
 SCRIPT = """
 import os, time
 from pathlib import Path
-time.sleep(0.6)
+time.sleep(float(os.environ.get("PAUSE", "0")))
 if snakemake.wildcards.recording == "bad" and "FAIL" in os.environ:
     raise ValueError("upside down\\nturn it over")
 Path(snakemake.output[0]).touch()
@@ -86,7 +86,7 @@ def seen(text: str) -> str:
 
 
 def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
-    written, left = in_terminal(folder)
+    written, left = in_terminal(folder, PAUSE="0.6")
     assert re.search(r"first steps: ingest (a|b|bad) 0:00", written)
     assert re.search(r"1 of 4 steps, about \d+ s left: ingest (a|b|bad) 0:00", written)
     assert "steps, about" not in left and "rule ingest:" not in left
@@ -107,7 +107,7 @@ def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
 def test_who_asks_for_more_or_less_gets_what_snakemake_says(
     folder: Path, flags: tuple[str, ...]
 ) -> None:
-    written, left = in_terminal(folder, *flags)
+    written, left = in_terminal(folder, *flags, PAUSE="0.6")
     assert "of 4 steps, about" not in written and "first steps" not in written
     assert ("rule ingest:" in left) == (flags == ("--verbose",))
 
