@@ -8,11 +8,8 @@ import os
 os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "NUMBA")}
 # Some hundred processes are started: each would compile its imports, for 3 s.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-# Modules and tests are millions of objects, which live as long as the worker: to look for garbage
-# among them takes half of the time of their collection, and half a second each time after it.
-gc.disable()
 
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +35,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: place(item.nodeid))
 
 
-def pytest_collection_finish() -> None:
-    gc.freeze()  # garbage is looked for among what the tests leave
-    gc.enable()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Collect without looking for garbage, and never look for it in what was collected.
+
+    Modules and tests are millions of objects, which live as long as the worker: to look through
+    them takes half of the time of their collection, and half a second each time after it.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:

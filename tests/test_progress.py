@@ -51,7 +51,7 @@ def in_terminal(folder: Path, *flags: str, **variables: str) -> tuple[str, str]:
     process = subprocess.Popen(
         [sys.executable, "-m", "snakemake", "-c1", "--keep-going", *flags],
         cwd=folder, stdin=inner, stdout=inner, stderr=inner,
-        env={**os.environ, "TERM": "xterm", "COLUMNS": "100", **variables},
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "100", "PAUSE": "0.6", **variables},
     )  # fmt: skip
     os.close(inner)
     written = b""
@@ -86,7 +86,7 @@ def seen(text: str) -> str:
 
 
 def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
-    written, left = in_terminal(folder, PAUSE="0.6")
+    written, left = in_terminal(folder)
     assert re.search(r"first steps: ingest (a|b|bad) 0:00", written)
     assert re.search(r"1 of 4 steps, about \d+ s left: ingest (a|b|bad) 0:00", written)
     assert "steps, about" not in left and "rule ingest:" not in left
@@ -107,7 +107,7 @@ def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
 def test_who_asks_for_more_or_less_gets_what_snakemake_says(
     folder: Path, flags: tuple[str, ...]
 ) -> None:
-    written, left = in_terminal(folder, *flags, PAUSE="0.6")
+    written, left = in_terminal(folder, *flags)
     assert "of 4 steps, about" not in written and "first steps" not in written
     assert ("rule ingest:" in left) == (flags == ("--verbose",))
 

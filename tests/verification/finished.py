@@ -44,8 +44,6 @@ class Finished:
 def finished(folder: Path) -> Finished:
     """Make a project of three recordings, one of them simulated, and run it once."""
     made = small_project(folder / "project", 1, SAMPLES)
-    # The step that draws is to be among those of which one core and two leave the same.
-    made.settings[-1] = 'estimate={"methods": ["likelihood", "weighted"]}'
     jobs, site = folder / "jobs", folder / "site"
     jobs.mkdir()
     site.mkdir()
