@@ -32,7 +32,7 @@ onerror:
 SCRIPT = """
 import os, time
 from pathlib import Path
-time.sleep(0.6)
+time.sleep(float(os.environ.get("PAUSE", "0")))
 if snakemake.wildcards.recording == "bad" and "FAIL" in os.environ:
     raise ValueError("upside down\\nturn it over")
 Path(snakemake.output[0]).touch()
@@ -52,7 +52,7 @@ def in_terminal(folder: Path, *flags: str, **variables: str) -> tuple[str, str]:
     process = subprocess.Popen(
         [sys.executable, "-m", "snakemake", "-c1", "--logger", "imubench", "--keep-going", *flags],
         cwd=folder, stdin=inner, stdout=inner, stderr=inner,
-        env={**os.environ, "TERM": "xterm", "COLUMNS": "100", **variables},
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "100", "PAUSE": "0.6", **variables},
     )  # fmt: skip
     os.close(inner)
     written = b""

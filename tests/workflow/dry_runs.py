@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import gc
 import importlib
 import json
 import os
@@ -52,6 +53,7 @@ def _serve() -> None:
     cli, *_ = (importlib.import_module(name) for name in IMPORTED)
     for step in (PROJECT / "src/imubench_pipeline/steps").glob("[!_]*.py"):
         source_digest(f"steps.{step.stem}")  # what a module uses is found once, and not by each run
+    gc.freeze()
     for line in sys.stdin:
         asked = json.loads(line)
         with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:

@@ -10,6 +10,7 @@ from imubench_pipeline.report.publish import one_file, publish
 from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader, Scheme
+from tests.report.browser.visit import Seen, visit
 
 
 @pytest.fixture(scope="package")
@@ -60,6 +61,11 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Report:
     site, rows = made.bench(results)
     publish(site, results / "report")
     return Report(results / "report", rows)
+
+
+@pytest.fixture(scope="package")
+def seen(window: Reader, bench: Report) -> Seen:
+    return visit(window, bench)
 
 
 @pytest.fixture(scope="package")

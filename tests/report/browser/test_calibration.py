@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.report.publish import publish
+from tests.report.browser.accessibility import UNFOLD, faults
 from tests.report.browser.reader import TOO_WIDE, Open, Reader, axis_title, traces
-from tests.report.browser.test_accessibility import faults
 from tests.report.tables import joined, site
 from tests.report.test_calibration import some
 
@@ -32,7 +32,7 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Rows, Rows]:
 def test_nothing_is_too_wide_or_hinders_a_reader(path: str, read: Open, rows: Any) -> None:
     reader: Reader = read(rows[0], path)
     reader.draw_all()
-    reader.page.evaluate("document.querySelectorAll('details').forEach(one => (one.open = true))")
+    reader.page.evaluate(UNFOLD)
     assert faults(reader.page) == []
     assert reader.page.evaluate(TOO_WIDE) == []
     narrow: Reader = read(rows[0], path, width=400)

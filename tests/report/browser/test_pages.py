@@ -3,12 +3,8 @@
 import posixpath
 import re
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
-
-import pytest
 
 from imubench_pipeline.report.payload import FOREST
 from imubench_pipeline.report.publish import publish
@@ -17,40 +13,8 @@ from imubench_pipeline.report.view import recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report.browser import made
 from tests.report.browser.made import Report
-from tests.report.browser.reader import TOO_WIDE, Open, Reader
-
-LOOK = f"""() => ({{
-  wide: ({TOO_WIDE})(),
-  title: document.title,
-  heads: [...document.querySelectorAll("h1")].map((head) => head.textContent),
-  ids: [...document.querySelectorAll("[id]")].map((one) => one.id),
-  links: [...document.querySelectorAll("a[href], link[href], [src]")]
-    .map((one) => one.getAttribute("href") ?? one.getAttribute("src")),
-  text: document.querySelector("main").innerText,
-  empty: [...document.querySelectorAll("figure[data-kind] .canvas")]
-    .filter((one) => !one.querySelector("svg.main-svg") || !one.data?.length)
-    .map((one) => one.getAttribute("aria-label")),
-}})"""
-
-
-@dataclass
-class Seen:
-    """What a reader found who opened every page and looked at every figure."""
-
-    pages: dict[str, dict[str, Any]]
-    figures: dict[str, int]
-    complaints: list[str]
-
-
-@pytest.fixture(scope="module")
-def seen(window: Reader, bench: Report) -> Seen:
-    window.begin(bench.folder, 1280, 900, "light")
-    pages, figures = {}, {}
-    for path in bench.pages:
-        window.open(path)
-        figures[path] = window.draw_all()
-        pages[path] = window.page.evaluate(LOOK)
-    return Seen(pages, figures, window.end())
+from tests.report.browser.reader import Open
+from tests.report.browser.visit import Seen
 
 
 def test_no_page_complains_or_asks_for_anything_else(seen: Seen) -> None:

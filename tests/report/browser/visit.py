@@ -1,0 +1,51 @@
+"""A visit of every page of a report, from which several tests know what a reader finds."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from tests.report.browser.accessibility import hindrances
+from tests.report.browser.made import Report
+from tests.report.browser.reader import TOO_WIDE, Reader
+
+KINDS = ("index", "recordings.html", "datasheets", "theory", "sensors/alpha", "devices/",
+         "recordings/alpha/night 1")  # fmt: skip
+"""One page of each kind; accessibility is looked at there, as it takes longer than to draw."""
+
+LOOK = f"""() => ({{
+  wide: ({TOO_WIDE})(),
+  title: document.title,
+  heads: [...document.querySelectorAll("h1")].map((head) => head.textContent),
+  ids: [...document.querySelectorAll("[id]")].map((one) => one.id),
+  links: [...document.querySelectorAll("a[href], link[href], [src]")]
+    .map((one) => one.getAttribute("href") ?? one.getAttribute("src")),
+  text: document.querySelector("main").innerText,
+  empty: [...document.querySelectorAll("figure[data-kind] .canvas")]
+    .filter((one) => !one.querySelector("svg.main-svg") || !one.data?.length)
+    .map((one) => one.getAttribute("aria-label")),
+}})"""
+
+
+@dataclass
+class Seen:
+    """What a reader found who opened every page and looked at every figure."""
+
+    pages: dict[str, dict[str, Any]]
+    figures: dict[str, int]
+    hindrances: dict[str, list[str]]
+    complaints: list[str]
+
+
+def visit(window: Reader, report: Report) -> Seen:
+    pages, figures, hinder = {}, {}, {}
+    kinds = {report.page(kind) for kind in KINDS}
+    window.begin(report.folder, 1280, 900, "light")
+    for path in report.pages:
+        if hinder:
+            window.page.goto("about:blank")  # or the figures of the page before would turn light
+            window.page.emulate_media(color_scheme="light")
+        window.open(path)
+        figures[path] = window.draw_all()
+        pages[path] = window.page.evaluate(LOOK)
+        if path in kinds:
+            hinder[path] = hindrances(window.page)
+    return Seen(pages, figures, hinder, window.end())
