@@ -18,7 +18,10 @@ from pydantic import BaseModel
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
+from imubench_pipeline.run import completion_command as completion
 from imubench_pipeline.run import formats_command as formats
+from imubench_pipeline.run import init_command as init
+from imubench_pipeline.run import run_command as run
 from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
@@ -44,8 +47,8 @@ _CLOSED_PIPE = 141
 """Exit status that shells give a command whose reader has gone."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
+def command_parser() -> argparse.ArgumentParser:
+    """Return what reads the commands and their options."""
     parser = argparse.ArgumentParser(prog="imubench", description="Inertial sensor benchmark.")
     parser.add_argument(
         "--version", action="version", version=f"imubench {version('imubench_pipeline')}"
@@ -53,12 +56,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, command in _COMMANDS.items():
         command.add_arguments(commands.add_parser(name, help=command.help))
-    first = next(iter(sys.argv[1:] if arguments is None else arguments), "-")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    parser = command_parser()
+    own = list(sys.argv[1:] if arguments is None else arguments)
+    first = next(iter(own), "-")
+    flags = []
+    if first in _PASS_ON and "--" in own:
+        end = own.index("--")
+        own, flags = own[:end], own[end + 1 :]
     if first not in _COMMANDS and not first.startswith("-"):
         close = get_close_matches(first, _COMMANDS, n=1)
         meant = f", did you mean {close[0]}?" if close else "."
         parser.error(f"no command {first!r}{meant} There are: {', '.join(_COMMANDS)}")
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(own, argparse.Namespace(flags=flags))
     try:
         status = _COMMANDS[options.command].run(options)
         sys.stdout.flush()
@@ -253,6 +267,15 @@ def _inspect(options: argparse.Namespace) -> int:
     return 0 if inspected.complete else 1
 
 
+def _completion(options: argparse.Namespace) -> int:
+    print(completion.script(command_parser(), options.shell))
+    return 0
+
+
+_PASS_ON = {"run", "nightly"}
+"""Commands of which all that stands after ``--`` is for Snakemake."""
+
+
 class _Command(NamedTuple):
     help: str
     add_arguments: Callable[[argparse.ArgumentParser], None]
@@ -262,6 +285,12 @@ class _Command(NamedTuple):
 _COMMANDS = {
     "analyse": _Command(
         "estimate the noise parameters of logs, at once", analysis.add_arguments, analysis.run
+    ),
+    "init": _Command("make a folder of logs", init.add_arguments, init.run),
+    "run": _Command(
+        "analyse the logs of a folder, as snakemake does in a checkout",
+        run.add_arguments,
+        run.run,
     ),
     "schema": _Command(
         "write the JSON Schema of a configuration file, for editors", _add_schema, _schema
@@ -302,5 +331,8 @@ _COMMANDS = {
         "say whether all results are as runs left them",
         verification.add_arguments,
         verification.run,
+    ),
+    "completion": _Command(
+        "print what a shell needs to complete all this", completion.add_arguments, _completion
     ),
 }
