@@ -28,7 +28,8 @@ BEGUN = time.time()
 
 HERE = workflow.current_basedir
 
-if workflow.modifier.path_modifier.modifies_prefixes:
+path_modifier = workflow.modifier.path_modifier
+if path_modifier.modifies_prefixes or path_modifier.replace_prefix("x") != "x":
     raise WorkflowError(
         "module: found prefix or replace_prefix; expected the folder of the results in its "
         "config, as results: <folder>"

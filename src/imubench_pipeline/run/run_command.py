@@ -5,13 +5,10 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 from imubench_pipeline.run.project import snakefile_of
 from imubench_pipeline.settings.validation import ConfigError
-
-_DRY = {"-n", "--dry-run", "--dryrun"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,15 +38,8 @@ def run(options: argparse.Namespace) -> int:
     except (ConfigError, OSError) as error:
         print(f"imubench run: {error}", file=sys.stderr)
         return 2
-    quiet = _unsaid(options.flags, terminal=sys.stderr.isatty())
     command = [sys.executable, "-P", "-m", "snakemake", "--snakefile", str(snakefile)]
-    command += ["--quiet", *quiet, "--cores", options.cores, *options.flags]
+    command += ["--cores", options.cores, *options.flags]
     sys.stdout.flush()
     os.execv(sys.executable, command)
 
-
-def _unsaid(flags: Sequence[str], *, terminal: bool) -> list[str]:
-    """Return what Snakemake need not say: a terminal has one line, others read the summary."""
-    if _DRY.intersection(flags):
-        return ["host", "rules"]
-    return ["host"] if terminal else ["host", "rules", "progress"]

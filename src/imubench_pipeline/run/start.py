@@ -10,9 +10,9 @@ def main() -> int:
     """Run the command that is given; return its exit status."""
     if os.name != "posix":
         print(
-            f"imubench: found the platform {sys.platform}; expected Linux, as it forks processes and "
-            "locks files; to mend: on Windows, install and run it in WSL, which `wsl --install` "
-            "sets up",
+            f"imubench: found the platform {sys.platform}; expected Linux, as it forks processes "
+            "and locks files; to mend: on Windows, install and run it in WSL, which `wsl "
+            "--install` sets up",
             file=sys.stderr,
         )
         return 2
