@@ -14,7 +14,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'Print a script for the shell. Now: eval "$(imubench completion bash)"; always: put that '
         "line into ~/.bashrc, for zsh the script as _imubench into a folder of $fpath."
     )
-    parser.epilog = "Exit status: 0."
     parser.add_argument("shell", choices=shtab.SUPPORTED_SHELLS, help="which shell")
 
 

@@ -18,7 +18,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Make a folder of logs: config/config.yaml with all settings, an example of a sensor file, "
         "and a README that says how to go on. Nothing that is there is written over."
     )
-    parser.epilog = "Exit status: 0 the folder is made; 2 it has one of the files already."
     parser.add_argument("folder", type=Path, help="where to make it; made if it is not there")
     parser.add_argument(
         "--demonstration",

@@ -19,14 +19,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "after -- goes to snakemake: targets, and flags such as -n or --config allan='{...}'; "
         "paths in them are taken from the folder."
     )
-    parser.epilog = (
-        "Exit status: that of snakemake, 0 fine, 1 something failed or was left out; 2 the folder "
-        "is none of logs."
-    )
     parser.add_argument(
         "folder", type=Path, nargs="?", default=Path(), help="of logs; default: this one"
     )
-    parser.add_argument("-c", "--cores", default="all", metavar="N", help="default: all")
+    parser.add_argument(
+        "-c", "--cores", default="all", metavar="N", help="cores for snakemake; default: all"
+    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -19,3 +19,7 @@ def main() -> int:
     from imubench_pipeline.run.cli import main as run
 
     return run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -8,15 +8,9 @@ from pathlib import Path
 
 from imubench_pipeline.units import UnitError, quantity_to_si
 
-_EPILOG = (
-    "Exit status: 0 fine; 1 a log was rejected, a warning is new or a device has changed since the "
-    "last run; 2 failed, for one recording at least, or another run goes on."
-)
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command is given."""
-    parser.epilog = _EPILOG
     parser.usage = "%(prog)s [options] [folder] [-- FLAG ...]"
     parser.description = "What stands after -- goes to snakemake, such as --workflow-profile DIR."
     parser.add_argument(
