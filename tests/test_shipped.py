@@ -12,6 +12,7 @@ import pytest
 from imubench_pipeline.run.cli import COMMANDS, main
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.project import snakefile_of
+from imubench_pipeline.run.verification.results import Results
 from imubench_pipeline.settings.config import Run, read_run
 from imubench_pipeline.settings.shipped import folders, project
 from imubench_pipeline.settings.validation import ConfigError
@@ -74,6 +75,17 @@ def test_a_folder_has_the_workflow_of_the_package_unless_it_has_its_own(lab: Pat
     assert snakefile_of(lab) == lab / "workflow/Snakefile"
     with pytest.raises(ConfigError, match=r"found no config/config.yaml and no Snakefile"):
         snakefile_of(lab / "logs")
+
+
+def test_what_makes_results_again_is_a_command_of_the_folder(
+    lab: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert Results(Path("results")).run_again == "imubench run"
+    (lab / "results/report").mkdir(parents=True)
+    (lab / "results/report/settings.json").write_text('{"given": ["logs=/data"]}')
+    assert Results(Path("results")).run_again == "imubench run -- --config logs=/data"
+    monkeypatch.chdir(PROJECT)
+    assert Results(lab / "results").run_again == "snakemake -c2 --config logs=/data"
 
 
 def test_each_exit_status_stands_in_one_place() -> None:

@@ -277,6 +277,22 @@ def test_what_another_workflow_finds_damaged_is_made_again(ways: Ways) -> None:
     assert "imu_allan" in again.stdout and "imu_ingest" not in again.stdout
 
 
+def test_two_modules_with_results_of_their_own_do_not_mind_each_other(ways: Ways) -> None:
+    place = with_logs(ways.folder / "twice", ways.logs)
+    modules = (
+        f'module {name}:\n    snakefile: "{PROJECT}/Snakefile"\n'
+        f'    config: {{"results": "{name}"}}\nuse rule * from {name} as {name}_*\n'
+        for name in ("a", "b")
+    )
+    asked = "rule all:\n    default_target: True\n    input: rules.a_all.input, rules.b_all.input\n"
+    (place / "Snakefile").write_text("".join(modules) + asked)
+    shutil.copytree(ways.checkout / "results", place / "b")
+    done = dry_run(place, ["-c1", "--quiet", "host"])
+    assert done.returncode == 0, done.stdout
+    assert all(f"rule {name}_report" in done.stdout for name in ("a", "b"))
+    assert "rule a_ingest" in done.stdout and "rule b_ingest" not in done.stdout
+
+
 def test_a_prefix_of_paths_is_refused_with_what_does_that(ways: Ways) -> None:
     snakefile = json.dumps(str(PROJECT / "Snakefile")) + '\n    prefix: "elsewhere"'
     place = using(ways.folder / "prefix", ways, snakefile, "rules.imu_all.input")

@@ -7,6 +7,13 @@ from pathlib import Path
 from imubench_pipeline.settings.shipped import project
 from imubench_pipeline.settings.validation import ConfigError
 
+_OWN = ("Snakefile", "workflow/Snakefile")
+
+
+def has_snakefile(folder: Path) -> bool:
+    """Return whether a folder has a workflow of its own, which `snakemake` finds there."""
+    return any((folder / own).is_file() for own in _OWN)
+
 
 def snakefile_of(folder: Path) -> Path:
     """Return the Snakefile of a folder: its own, or, of a folder of logs, that of this package.
@@ -16,7 +23,7 @@ def snakefile_of(folder: Path) -> Path:
     ConfigError
         If the folder is neither.
     """
-    for own in ("Snakefile", "workflow/Snakefile"):
+    for own in _OWN:
         if (folder / own).is_file():
             return (folder / own).absolute()
     shipped = project() / "Snakefile"
