@@ -77,6 +77,15 @@ def test_a_folder_has_the_workflow_of_the_package_unless_it_has_its_own(lab: Pat
         snakefile_of(lab / "logs")
 
 
+def test_a_run_ends_as_snakemake_does_and_says_why(lab: Path) -> None:
+    command = [sys.executable, "-m", "imubench_pipeline.run.start", "run", ".", "--"]
+    wrong = [*command, "--config", "sensors=nosuch"]
+    done = subprocess.run(wrong, cwd=lab, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "nosuch: no such folder; expected one YAML file a sensor" in done.stderr
+    assert len(done.stderr.splitlines()) < 10 and not done.stdout
+
+
 def test_what_makes_results_again_is_a_command_of_the_folder(
     lab: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
