@@ -40,4 +40,3 @@ def run(options: argparse.Namespace) -> int:
     command += ["--cores", options.cores, *options.flags]
     sys.stdout.flush()
     os.execv(sys.executable, command)
-
