@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel
 
@@ -48,7 +49,7 @@ from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 
 _OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
-_PUBLISHED = {"channels": {"__all__": {"published", "figures"}}, "shows": True}
+_PUBLISHED: dict[str, Any] = {"channels": {"__all__": {"published", "figures"}}, "shows": True}
 """Keys of a simulated recording that its samples do not depend on."""
 
 _OF_RANKING = ("price_class", "must")
