@@ -1,7 +1,8 @@
 """From static logs of inertial sensors to a cross-IMU report: `snakemake -c2`."""
 
+if Path("config/config.yaml").exists():  # every setting has a default
 
-configfile: "config/config.yaml"
+    configfile: "config/config.yaml"
 
 
 include: "workflow/rules/common.smk"  # the plan of the run, and what the rules share
@@ -20,10 +21,7 @@ rule all:
         rules.figures.output,
         rules.exports.output,
         made_again,
-
-
-localrules:
-    all,
+    localrule: True
 
 
 onstart:

@@ -10,6 +10,7 @@ FIRST = (
     "tests/workflow/test_workflow.py",  # runs of one project, each upon those before
     "tests/workflow/test_nightly.py",  # so are these
     "tests/workflow/test_failures.py",  # waits for a step that takes too long
+    "tests/workflow/test_deployed.py",  # three runs of one log, and a wheel
     "tests/workflow/test_earth_rate.py",  # a run, and lists of jobs
     "tests/verification",  # a folder: one finished project, of which every file is spoilt once
     "tests/test_corpus.py",  # logs of every format, together and one by one

@@ -20,7 +20,9 @@ FEW = {"estimate": {"methods": ["likelihood"]}}
 def laid_out(folder: Path, *logs: Path, sensor: Path | None = None, **stated: str) -> dict:
     project = folder / "project"
     project.mkdir()
-    return lay_out(logs, sensor, Stated(**stated), folder / "catalogue", project)
+    catalogue = folder / "catalogue"
+    catalogue.mkdir(exist_ok=True)
+    return lay_out(logs, sensor, Stated(**stated), [catalogue], project)
 
 
 def log(path: Path) -> Path:

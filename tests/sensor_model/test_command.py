@@ -249,7 +249,7 @@ def test_notes_of_another_log_are_kept_while_it_is_there(tmp_path: Path, capsys)
         ({"axes": {}}, "axes"),
         ({"misalignment": {"gyro": [[1, 0, 0]]}}, "three rows"),
         ({"misalignment": {"mag": [[1, 0, 0]] * 3}}, "expected gyro or accel"),
-        ({"sensor": "nosuch"}, "nosuch.yaml: no such file"),
+        ({"sensor": "nosuch"}, "nosuch.yaml: no such sensor file"),
     ],
 )
 def test_a_wrong_file_of_models_names_the_key(change: dict, said: str, tmp_path, capsys) -> None:

@@ -23,11 +23,9 @@ from tests.workflow.test_workflow import put_log, put_sensor
 pytestmark = pytest.mark.workflow
 
 ENTRY = """
-import argparse, sys
-from imubench_pipeline.run.nightly import command
-parser = argparse.ArgumentParser()
-command.add_arguments(parser)
-sys.exit(command.run(parser.parse_args()))
+import sys
+from imubench_pipeline.run.cli import main
+sys.exit(main(["nightly", *sys.argv[1:]]))
 """
 SETTINGS = ["sensors=sensors", "simulated=false", "requirements=false",
             'estimate={"methods": ["weighted"]}']  # fmt: skip

@@ -26,6 +26,15 @@ atexit.register(gc.freeze)
 # somebody takes, at the end if nothing was done to it since the beginning.
 BEGUN = time.time()
 
+HERE = workflow.current_basedir
+
+path_modifier = workflow.modifier.path_modifier
+if path_modifier.modifies_prefixes or path_modifier.replace_prefix("x") != "x":
+    raise WorkflowError(
+        "module: found prefix or replace_prefix; expected the folder of the results in its "
+        "config, as results: <folder>"
+    )
+
 try:
     plan = Plan(config)
 except ConfigError as error:
@@ -109,27 +118,32 @@ def tried(step):
     return lambda w: plan.attempt(step, w.sensor, w.get("recording"))
 
 
+def own_rules():
+    """The rules of this workflow by their names here; one that uses them may name them otherwise."""
+    known = {name: proxy.rule for name, proxy in rules._rules.items()}
+    return {name: rule for name, rule in known.items() if rule.basedir == HERE}
+
+
 def jobs():
     """The first output and the settings of every job of this run, by the place of its seal."""
     found = {}
-    for rule in workflow.rules:
-        if not rule.norun:
-            for of in jobs_of(rule):
-                wildcards = Wildcards(fromdict=of)
-                params = {
-                    name: value(wildcards) if callable(value) else value
-                    for name, value in rule.params.items()
-                    if name != "attempt"
-                }
-                found[place_of(rule.name, *of.values())] = (
-                    str(rule.output[0].apply_wildcards(of)),
-                    settings_digest(params),
-                )
+    for step, rule in own_rules().items():
+        for of in jobs_of(step, rule):
+            wildcards = Wildcards(fromdict=of)
+            params = {
+                name: value(wildcards) if callable(value) else value
+                for name, value in rule.params.items()
+                if name != "attempt"
+            }
+            found[place_of(step, *of.values())] = (
+                str(rule.output[0].apply_wildcards(of)),
+                settings_digest(params),
+            )
     return found
 
 
-def jobs_of(rule):
-    """The sensor and recording of each job of a rule."""
+def jobs_of(step, rule):
+    """The sensor and recording of each job of a step, by its rule."""
     if "recording" not in rule.wildcard_names:
         return [{"sensor": name} for name in FOLDERS] if rule.wildcard_names else [{}]
     chosen = {
@@ -137,7 +151,7 @@ def jobs_of(rule):
         "earth_rotation": plan.turned,
         "calibration": plan.calibrated,
     }
-    recordings = chosen.get(rule.name, plan.recordings)
+    recordings = chosen.get(step, plan.recordings)
     return [{"sensor": sensor, "recording": name} for sensor, name in recordings]
 
 

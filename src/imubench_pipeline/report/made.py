@@ -22,7 +22,8 @@ _LIBRARIES = (
 
 _RUN = (
     "snakemake -c2",
-    "makes everything, and afterwards only what new logs or changed settings ask for",
+    "makes everything, and afterwards only what new logs or changed settings ask for; "
+    "in a folder that imubench init has made it is imubench run, with further flags after --",
 )
 _COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
     ("show", {}, "prints the comparison in the terminal"),

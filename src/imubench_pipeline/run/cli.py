@@ -18,7 +18,10 @@ from pydantic import BaseModel
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
+from imubench_pipeline.run import completion_command as completion
 from imubench_pipeline.run import formats_command as formats
+from imubench_pipeline.run import init_command as init
+from imubench_pipeline.run import run_command as run
 from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
@@ -44,23 +47,37 @@ _CLOSED_PIPE = 141
 """Exit status that shells give a command whose reader has gone."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
+def command_parser() -> argparse.ArgumentParser:
+    """Return what reads the commands and their options."""
     parser = argparse.ArgumentParser(prog="imubench", description="Inertial sensor benchmark.")
     parser.add_argument(
         "--version", action="version", version=f"imubench {version('imubench_pipeline')}"
     )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name, command in _COMMANDS.items():
-        command.add_arguments(commands.add_parser(name, help=command.help))
-    first = next(iter(sys.argv[1:] if arguments is None else arguments), "-")
-    if first not in _COMMANDS and not first.startswith("-"):
-        close = get_close_matches(first, _COMMANDS, n=1)
+    for name, command in COMMANDS.items():
+        of_it = commands.add_parser(name, help=command.help)
+        command.add_arguments(of_it)
+        said = (f"{status} {meaning}" for status, meaning in enumerate(command.statuses) if meaning)
+        of_it.epilog = f"Exit status: {'; '.join(said)}."
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    parser = command_parser()
+    own = list(sys.argv[1:] if arguments is None else arguments)
+    first = next(iter(own), "-")
+    flags = []
+    if first in _PASS_ON and "--" in own:
+        end = own.index("--")
+        own, flags = own[:end], own[end + 1 :]
+    if first not in COMMANDS and not first.startswith("-"):
+        close = get_close_matches(first, COMMANDS, n=1)
         meant = f", did you mean {close[0]}?" if close else "."
-        parser.error(f"no command {first!r}{meant} There are: {', '.join(_COMMANDS)}")
-    options = parser.parse_args(arguments)
+        parser.error(f"no command {first!r}{meant} There are: {', '.join(COMMANDS)}")
+    options = parser.parse_args(own, argparse.Namespace(flags=flags))
     try:
-        status = _COMMANDS[options.command].run(options)
+        status = COMMANDS[options.command].run(options)
         sys.stdout.flush()
         return status
     except BrokenPipeError:
@@ -75,7 +92,6 @@ def _add_schema(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Exit status: 0 all good, 1 warnings or rejected logs, 2 wrong settings."
     parser.add_argument("logs", type=Path, help="folder that holds <sensor>/<recording>")
     parser.add_argument("--sensors", type=Path, help="folder of the sensor files")
     parser.add_argument(
@@ -84,10 +100,6 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_inspect(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Exit status: 0 the sensor file is complete, 1 something is left to fill in, "
-        "2 the log cannot be read."
-    )
     parser.add_argument("log", type=Path, help="log file, or folder or archive of a recording")
     parser.add_argument(
         "--block", action="store_true", help="print the sensor file alone, and no listing"
@@ -253,54 +265,137 @@ def _inspect(options: argparse.Namespace) -> int:
     return 0 if inspected.complete else 1
 
 
-class _Command(NamedTuple):
+def _completion(options: argparse.Namespace) -> int:
+    print(completion.script(command_parser(), options.shell))
+    return 0
+
+
+_PASS_ON = {"run", "nightly"}
+"""Commands of which all that stands after ``--`` is for Snakemake."""
+
+
+class Command(NamedTuple):
+    """A command.
+
+    ``statuses``: what its exit statuses mean, from 0; an empty text is one that it never has.
+    """
+
     help: str
     add_arguments: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace], int]
+    statuses: tuple[str, ...]
 
 
-_COMMANDS = {
-    "analyse": _Command(
-        "estimate the noise parameters of logs, at once", analysis.add_arguments, analysis.run
+_NO_RESULTS = "what was asked for is not there, or cannot be used"
+
+COMMANDS = {
+    "analyse": Command(
+        "estimate the noise parameters of logs, at once",
+        analysis.add_arguments,
+        analysis.run,
+        (
+            "analysed",
+            "a log was rejected, or a step failed",
+            "a log or the sensor file is not there, or does not say what is needed",
+        ),
     ),
-    "schema": _Command(
-        "write the JSON Schema of a configuration file, for editors", _add_schema, _schema
+    "init": Command(
+        "make a folder of logs",
+        init.add_arguments,
+        init.run,
+        ("made", "", "it has one of the files already, or cannot be written"),
     ),
-    "check": _Command("say what is wrong with logs, without analysing them", _add_check, _check),
-    "inspect": _Command(
-        "show what a log holds, and draft a sensor file for it", _add_inspect, _inspect
+    "run": Command(
+        "analyse the logs of a folder, as snakemake does in a checkout",
+        run.add_arguments,
+        run.run,
+        (
+            "done, as snakemake says it",
+            "a step failed, a recording was left out, or a setting is wrong, likewise",
+            "the folder is none of logs, or snakemake does not know a flag",
+        ),
     ),
-    "formats": _Command(
-        "list the logs that are read, and the exports", lambda _: None, formats.run
+    "schema": Command(
+        "write the JSON Schema of a configuration file, for editors",
+        _add_schema,
+        _schema,
+        ("written",),
     ),
-    "export": _Command("write what a filter or simulator loads", _add_export, _export),
-    "show": _Command(
-        "show the comparison of the sensors in the terminal", show.add_arguments, show.run
+    "check": Command(
+        "say what is wrong with logs, without analysing them",
+        _add_check,
+        _check,
+        ("all good", "warnings, or rejected logs", "a setting is wrong, or there are no logs"),
     ),
-    "shortlist": _Command(
+    "inspect": Command(
+        "show what a log holds, and draft a sensor file for it",
+        _add_inspect,
+        _inspect,
+        (
+            "the sensor file is complete",
+            "something is left to fill in",
+            "the log cannot be read, or the sensor file is there already",
+        ),
+    ),
+    "formats": Command(
+        "list the logs that are read, and the exports", lambda _: None, formats.run, ("listed",)
+    ),
+    "export": Command(
+        "write what a filter or simulator loads",
+        _add_export,
+        _export,
+        ("written", "", "the program cannot hold it, or " + _NO_RESULTS),
+    ),
+    "show": Command(
+        "show the comparison of the sensors in the terminal",
+        show.add_arguments,
+        show.run,
+        ("shown", "", _NO_RESULTS),
+    ),
+    "shortlist": Command(
         "say by datasheets alone which sensors are worth logging",
         shortlist.add_arguments,
         shortlist.run,
+        ("said", "", _NO_RESULTS),
     ),
-    "report": _Command(
-        "write the report again, elsewhere or in one file", report.add_arguments, report.run
+    "report": Command(
+        "write the report again, elsewhere or in one file",
+        report.add_arguments,
+        report.run,
+        ("written", "", _NO_RESULTS),
     ),
-    "figures": _Command(
-        "draw the figures of channels for print", figures.add_arguments, figures.run
+    "figures": Command(
+        "draw the figures of channels for print",
+        figures.add_arguments,
+        figures.run,
+        ("drawn", "", _NO_RESULTS),
     ),
-    "simulate": _Command(
+    "simulate": Command(
         "write a simulated log of a sensor, to test filters on",
         simulation.add_arguments,
         simulation.run,
+        ("written", "", _NO_RESULTS),
     ),
-    "nightly": _Command(
+    "nightly": Command(
         "run on the logs that are complete, and say what is new: for timers",
         nightly.add_arguments,
         nightly.run,
+        (
+            "fine",
+            "a log was rejected, a warning is new or a device has changed since the last run",
+            "failed, for one recording at least, or another run goes on",
+        ),
     ),
-    "verify": _Command(
+    "verify": Command(
         "say whether all results are as runs left them",
         verification.add_arguments,
         verification.run,
+        ("all is as it was left", "something is not", "there are no results"),
+    ),
+    "completion": Command(
+        "print what a shell needs to complete all this",
+        completion.add_arguments,
+        _completion,
+        ("printed",),
     ),
 }

@@ -34,6 +34,7 @@ from imubench_pipeline.settings.sensor import (
     of_ingest,
     read_sensor_files,
 )
+from imubench_pipeline.settings.shipped import folders, own_folder
 from imubench_pipeline.settings.simulated_recordings import (
     Board,
     SimulatedRecording,
@@ -77,7 +78,7 @@ class Plan:
     def __init__(self, config: Mapping[str, object]) -> None:
         self.run: Run = read_run(config)
         self.faults = Faults(self.run.results)
-        declared = read_sensor_files(self.run.sensors)
+        declared = read_sensor_files(folders(self.run.sensors, "sensors"))
         self.sensors: dict[str, Sensor] = {}
         self.unusable: dict[str, str] = {}
         """Why a sensor file is of no use, by sensor: all logs of that sensor are rejected."""
@@ -86,8 +87,10 @@ class Plan:
                 self.unusable[name] = str(sensor)
             else:
                 self.sensors[name] = sensor
-        self.requirements: dict[str, Requirement] = read_requirements(self.run.requirements)
-        simulated = read_simulated(self.run.simulated, declared)
+        self.requirements: dict[str, Requirement] = read_requirements(
+            self.run.requirements and folders(self.run.requirements, "requirements")
+        )
+        simulated = read_simulated(self.run.to_simulate, declared)
         self.boards: dict[str, Board] = simulated.boards
         self._simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
@@ -115,7 +118,7 @@ class Plan:
 
     def _found_logs(self) -> list[Recording]:
         if not self.run.logs.is_dir():
-            if self.run.simulated is None:
+            if self.run.to_simulate is None:
                 raise ConfigError(
                     f"logs: found {str(self.run.logs)!r}, which is no folder; expected the folder "
                     "that holds <sensor>/<recording>"
@@ -274,7 +277,7 @@ class Plan:
         if recording.sensor in self.unusable:
             raise ConfigError(self.unusable[recording.sensor])
         if recording.sensor not in self.sensors:
-            expected = self.run.sensors / f"{recording.sensor}.yaml"
+            expected = own_folder(self.run.sensors) / f"{recording.sensor}.yaml"
             raise ConfigError(
                 f"no sensor file {expected} for the logs in {self.run.logs / recording.sensor}; "
                 "write one, or move the logs to the folder of their sensor"

@@ -15,14 +15,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sensors",
         type=Path,
-        default=Path("config/sensors"),
-        help="folder of the sensor files; default: config/sensors",
+        help="folder of the sensor files; default: the catalogue of the package and config/sensors",
     )
     parser.add_argument(
         "--requirements",
         type=Path,
-        default=Path("config/requirements"),
-        help="folder of the requirements; default: config/requirements",
+        help="folder of the requirements; default: those of the package and config/requirements",
     )
     parser.add_argument(
         "--results",
@@ -38,8 +36,10 @@ def run(options: argparse.Namespace) -> int:
 
     from imubench_pipeline.report.shortlist import cells, notes
     from imubench_pipeline.report.terminal_table import fitting
+    from imubench_pipeline.settings.config import Run
     from imubench_pipeline.settings.requirements import Requirement, read_requirements
     from imubench_pipeline.settings.sensor import read_sensors
+    from imubench_pipeline.settings.shipped import folders
     from imubench_pipeline.settings.validation import ConfigError
     from imubench_pipeline.settings.yaml_files import read_settings
     from imubench_pipeline.steps.shortlist import NEEDED, rows_of_run
@@ -50,12 +50,14 @@ def run(options: argparse.Namespace) -> int:
         if path.suffix in (".yaml", ".yml"):
             name, asked = path.stem, read_settings(Requirement, path)
         else:
-            requirements = read_requirements(options.requirements)
+            requirements = read_requirements(
+                folders(options.requirements or Run().requirements or (), "requirements")
+            )
             if options.requirement not in requirements:
                 names = ", ".join(requirements) or "none"
                 raise ConfigError(f"no requirement {options.requirement!r}; there are: {names}")
             name, asked = options.requirement, requirements[options.requirement]
-        sensors = read_sensors(options.sensors)
+        sensors = read_sensors(folders(options.sensors or Run().sensors, "sensors"))
         tables = {}
         if options.results is not None:
             folder = tables_folder(options.results)

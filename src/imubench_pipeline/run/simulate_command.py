@@ -12,8 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from imubench_pipeline.settings.shipped import folders
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
+from imubench_pipeline.settings.yaml_files import files_in, read_settings, read_yaml
 from imubench_pipeline.units import UnitError, naming, quantity_to_si
 
 if TYPE_CHECKING:
@@ -56,7 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--recording", help="of --results; default: the longest of the sensor")
     parser.add_argument(
-        "--sensors", type=Path, default=Path("config/sensors"), help="folder of the sensor files"
+        "--sensors",
+        type=Path,
+        help="folder of the sensor files; default: the catalogue of the package and config/sensors",
     )
     parser.add_argument("--channels", help="comma between them; default: all of the sensor")
 
@@ -158,9 +161,24 @@ def _metadata(
     }
 
 
+def _declared(name: str, stated: Path | None) -> Any:
+    """Return the sensor file of this name."""
+    from imubench_pipeline.settings.config import Run
+    from imubench_pipeline.settings.sensor import Sensor
+
+    places = folders(stated or Run().sensors, "sensors")
+    files = files_in(places, "sensor")
+    if name not in files:
+        raise ConfigError(
+            f"{places[-1] / name}.yaml: no such sensor file; there are: "
+            f"{', '.join(files) or 'none'}; or name a file of models"
+        )
+    return read_settings(Sensor, files[name])
+
+
 def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
     """Return the model, and the sensor file where there is one."""
-    from imubench_pipeline.settings.sensor import CHANNELS, Sensor
+    from imubench_pipeline.settings.sensor import CHANNELS
     from imubench_pipeline.simulate import sources
     from imubench_pipeline.simulate.from_datasheet import from_datasheet
     from imubench_pipeline.simulate.from_estimates import with_estimates
@@ -174,17 +192,9 @@ def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
         if options.results:
             raise ConfigError("--results are for a sensor by name; the file of models has its own")
         origin = sources.from_file(path)
-        own = origin.sensor and options.sensors / f"{origin.sensor}.yaml"
-        sensor = read_settings(Sensor, own) if own else None
+        sensor = _declared(origin.sensor, options.sensors) if origin.sensor else None
     else:
-        file = options.sensors / f"{options.sensor}.yaml"
-        if not file.is_file():
-            names = sorted(path.stem for path in options.sensors.glob("*.yaml"))
-            raise ConfigError(
-                f"{file}: no such sensor file; there are: {', '.join(names) or 'none'}; or name a "
-                "file of models"
-            )
-        sensor = read_settings(Sensor, file)
+        sensor = _declared(options.sensor, options.sensors)
         try:
             origin = from_datasheet(options.sensor, sensor, options.seed)
         except ConfigError:

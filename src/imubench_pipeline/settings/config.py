@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, field_validator
 from imubench_pipeline.settings.known_rates import AccelerationFromZero, RateFromZero
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.requirements import Axis, Latitude, Time
+from imubench_pipeline.settings.shipped import CATALOGUE
 from imubench_pipeline.settings.two_position import TimeFromZero
 from imubench_pipeline.settings.validation import (
     ConfigError,
@@ -25,7 +26,11 @@ from imubench_pipeline.settings.validation import (
 )
 from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
 
+_SIMULATED = Path("config/simulated.yaml")
 _OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
+
+
+Folders = Path | Annotated[tuple[Path, ...], Field(min_length=1)]
 
 
 class AllanSettings(Strict):
@@ -236,14 +241,22 @@ class Run(Strict):
 
     logs: Path = Field(Path("logs"), description="the drop zone: logs/<sensor>/<recording>")
     results: Path = Field(Path("results"), description="where a run leaves its results")
-    sensors: Path = Field(Path("config/sensors"), description="folder of the sensor files")
+    sensors: Folders = Field(
+        (CATALOGUE, Path("config/sensors")),
+        description="folder of the sensor files, or several: what is in a later one counts; "
+        "catalogue: those that come with the package",
+    )
     simulated: Annotated[
         Path | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
-    ] = Field(Path("config/simulated.yaml"), description="simulated recordings; false: none")
-    requirements: Annotated[
-        Path | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
     ] = Field(
-        Path("config/requirements"), description="what applications need, a file each; false: none"
+        _SIMULATED, description="simulated recordings; false, or no such file by default: none"
+    )
+    requirements: Annotated[
+        Folders | None,
+        BeforeValidator(_path_or_none, json_schema_input_type=str | list[str] | bool | None),
+    ] = Field(
+        (CATALOGUE, Path("config/requirements")),
+        description="folders of what applications need, a file each, as of sensors; false: none",
     )
     held_back: tuple[HeldBack, ...] = Field(
         (), description="recordings whose logs are not read; results that are there stay"
@@ -260,6 +273,12 @@ class Run(Strict):
     earth_rate: EarthRateSettings = EarthRateSettings()
     limits: LimitSettings = LimitSettings()
     report: ReportSettings = ReportSettings()
+
+    @property
+    def to_simulate(self) -> Path | None:
+        """The list of simulated recordings; a folder of logs need not have that of a checkout."""
+        by_default = self.simulated == _SIMULATED and not _SIMULATED.exists()
+        return None if by_default else self.simulated
 
 
 def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --config") -> Run:

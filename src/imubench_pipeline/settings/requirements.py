@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from statistics import NormalDist
 from typing import Annotated, Literal
@@ -192,12 +192,12 @@ class Requirement(Strict):
         return any(word.lower() in (price_class or "").lower() for word in self.price_class)
 
 
-def read_requirements(folder: Path | None) -> dict[str, Requirement]:
-    """Read every requirement of a folder, by the name of its file; none without a folder.
+def read_requirements(folders: Path | Iterable[Path] | None) -> dict[str, Requirement]:
+    """Read every requirement of folders, by the name of its file; none without a folder.
 
     Raises `ConfigError`.
     """
-    return {} if folder is None else usable(read_folder(Requirement, folder, "requirement"))
+    return {} if folders is None else usable(read_folder(Requirement, folders, "requirement"))
 
 
 def requirements_of(sections: Mapping[str, object]) -> dict[str, Requirement]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -345,20 +345,20 @@ def kind_of(notes: object) -> Kind:
     return "static"
 
 
-def read_sensors(folder: Path) -> dict[str, Sensor]:
-    """Read every sensor file of a folder, by name; raises `ConfigError`."""
-    return usable(read_sensor_files(folder))
+def read_sensors(folders: Path | Iterable[Path]) -> dict[str, Sensor]:
+    """Read every sensor file of one or several folders, by name; raises `ConfigError`."""
+    return usable(read_sensor_files(folders))
 
 
-def read_sensor_files(folder: Path) -> dict[str, Sensor | ConfigError]:
-    """Read every sensor file of a folder, by name; why, of those that are of no use.
+def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | ConfigError]:
+    """Read every sensor file of one or several folders; why, of those that are of no use.
 
     Raises
     ------
     ConfigError
         If there is no folder.
     """
-    return read_folder(Sensor, folder, "sensor")
+    return read_folder(Sensor, folders, "sensor")
 
 
 def sensors_of(catalogue: str) -> dict[str, Sensor]:

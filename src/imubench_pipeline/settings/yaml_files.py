@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -112,17 +112,29 @@ def read_settings(model: type[_Model], path: Path) -> _Model:
     return parse(model, read_yaml(path), str(path))
 
 
-def read_folder(model: type[_Model], folder: Path, each: str) -> dict[str, _Model | ConfigError]:
+def read_folder(
+    model: type[_Model], folders: Path | Iterable[Path], each: str
+) -> dict[str, _Model | ConfigError]:
     """Read every ``.yaml`` file of a folder, by name; of one that is of no use return why.
+
+    Of several folders, a file takes the place of one of its name in a folder before.
 
     Raises
     ------
     ConfigError
         If there is no folder.
     """
-    if not folder.is_dir():
-        raise ConfigError(f"{folder}: no such folder; expected one YAML file a {each}")
-    return {path.stem: _read(model, path) for path in sorted(folder.glob("*.yaml"))}
+    return {name: _read(model, path) for name, path in files_in(folders, each).items()}
+
+
+def files_in(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
+    """Return the ``.yaml`` files that `read_folder` reads, by name; raises `ConfigError`."""
+    files: dict[str, Path] = {}
+    for folder in [folders] if isinstance(folders, Path) else folders:
+        if not folder.is_dir():
+            raise ConfigError(f"{folder}: no such folder; expected one YAML file a {each}")
+        files |= {path.stem: path for path in folder.glob("*.yaml")}
+    return dict(sorted(files.items(), key=lambda file: file[1].name))
 
 
 def _read(model: type[_Model], path: Path) -> _Model | ConfigError:

@@ -102,8 +102,9 @@ class Bag:
             except (ValueError, KeyError, struct.error, OSError, EOFError, RuntimeError) as error:
                 if isinstance(error, RecordingError):
                     raise
+                why = str(error) or type(error).__name__
                 raise RecordingError(
-                    f"{self._path.name}: damaged at byte {at} ({error or type(error).__name__}); "
+                    f"{self._path.name}: damaged at byte {at} ({why}); "
                     "expected a record of a ROS 1 bag; copy it again, or try 'rosbag reindex' and "
                     "'rosbag fix'"
                 ) from None

@@ -251,11 +251,12 @@ class TextTime:
     ``position`` is that of the stamps, and ``expected`` what a stamp is, for messages.
     """
 
+    _text: TextStamps | None = None
+
     def __init__(self, file: LogFile, layout: TextLayout) -> None:
         assert file.log.time is not None  # made where there are stamps
         source = file.log.time
         self._source = source
-        self._text: TextStamps | None = None
         positions = [layout.position(column, "time") for column in time_columns(source)]
         self.position = positions[-1]
         stamps = [row[self.position] for row in layout.rows if self.position < len(row)]

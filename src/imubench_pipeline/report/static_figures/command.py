@@ -39,9 +39,7 @@ class SelectionError(ValueError):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.description = (
-        "Write figures for print. Exit status: 0 written, 2 what was asked for is not there."
-    )
+    parser.description = "Write figures for print."
     parser.add_argument("results", type=Path, help="folder of the results of a run")
     parser.add_argument("--sensor", help="only this sensor; default: all")
     parser.add_argument("--recording", help="only this recording; default: all")

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 _DESCRIPTION = (
     "Read static logs, say what is wrong with them, and estimate the noise parameters of each "
-    "axis, as a run of the workflow does. Exit status: 0 analysed, 1 a log was rejected or a step "
-    "failed, 2 a log or the sensor file is not there, or does not say what is needed."
+    "axis, as a run of the workflow does."
 )
 
 
@@ -36,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sensor",
         type=Path,
         metavar="FILE",
-        help="sensor file, or a name in config/sensors; default: what the log says itself",
+        help="sensor file, or a name in config/sensors or the catalogue; default: as the log says",
     )
     parser.add_argument("--rate", metavar="FREQUENCY", help="of a log without stamps, as '100 Hz'")
     parser.add_argument("--gyro-unit", metavar="UNIT", help="where the log does not say it")
@@ -73,15 +72,15 @@ def run(arguments: argparse.Namespace) -> int:
     from imubench_pipeline.run.analysis.chain import analysed
     from imubench_pipeline.run.analysis.project import Stated, lay_out
     from imubench_pipeline.run.plan import Plan
-    from imubench_pipeline.settings.config import read_config
+    from imubench_pipeline.settings.config import Run, read_config
+    from imubench_pipeline.settings.shipped import folders
     from imubench_pipeline.settings.validation import ConfigError
 
     with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
         try:
             stated = Stated(arguments.rate, arguments.gyro_unit, arguments.accel_unit)
-            paths = lay_out(
-                arguments.logs, arguments.sensor, stated, Path("config/sensors"), Path(folder)
-            )
+            catalogue = folders(Run().sensors, "sensors")
+            paths = lay_out(arguments.logs, arguments.sensor, stated, catalogue, Path(folder))
             plan = Plan(read_config(arguments.config) | paths)
         except ConfigError as error:
             print(f"imubench analyse: {error}", file=sys.stderr)

@@ -14,7 +14,7 @@ from imubench_pipeline.readers.inspection.draft import UNKNOWN
 from imubench_pipeline.recordings.drop_zone import name_of, sensor_of
 from imubench_pipeline.settings.sensor import Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.settings.yaml_files import read_settings
+from imubench_pipeline.settings.yaml_files import files_in, read_settings
 from imubench_pipeline.tables import write_json
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -46,7 +46,7 @@ def lay_out(
     logs: Sequence[Path],
     sensor: Path | None,
     stated: Stated,
-    catalogue: Path,
+    catalogue: Sequence[Path],
     folder: Path,
 ) -> dict[str, str | None]:
     """Make a project of logs: a drop zone of links, and the sensor files for them.
@@ -60,8 +60,8 @@ def lay_out(
         says itself, as `imubench inspect` drafts it.
     stated : Stated
         Fills in what a draft leaves open.
-    catalogue : Path
-        A folder of sensor files, for names.
+    catalogue : sequence of Path
+        Folders of sensor files, for names.
     folder : Path
         Where the project is made; it is there.
 
@@ -112,13 +112,14 @@ def lay_out(
     }
 
 
-def _sensor_file(sensor: Path, catalogue: Path) -> Path:
+def _sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
     """Return the file of a sensor that is given by its path, or by its name in the catalogue."""
     if not sensor.is_file():
-        named = catalogue / f"{sensor.name}.yaml"
-        if len(sensor.parts) > 1 or not named.is_file():
+        named = files_in(catalogue, "sensor").get(str(sensor))
+        if named is None:
+            places = " or ".join(map(str, catalogue))
             raise ConfigError(
-                f"{sensor}: no such sensor file, and none of that name in {catalogue}; expected "
+                f"{sensor}: no such sensor file, and none of that name in {places}; expected "
                 "one, such as imubench inspect LOG --output FILE drafts"
             )
         sensor = named

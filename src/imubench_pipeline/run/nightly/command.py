@@ -8,18 +8,15 @@ from pathlib import Path
 
 from imubench_pipeline.units import UnitError, quantity_to_si
 
-_EPILOG = (
-    "Exit status: 0 fine; 1 a log was rejected, a warning is new or a device has changed since the "
-    "last run; 2 failed, for one recording at least, or another run goes on."
-)
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command is given."""
-    parser.epilog = _EPILOG
+    parser.usage = "%(prog)s [options] [folder] [-- FLAG ...]"
+    parser.description = "What stands after -- goes to snakemake, such as --workflow-profile DIR."
     parser.add_argument(
-        "--project", type=Path, default=Path(), help="folder of the Snakefile; default: this one"
+        "folder", type=Path, nargs="?", help="of logs, or a checkout; default: this one"
     )
+    parser.add_argument("--project", type=Path, metavar="DIR", help="the folder, as an option")
     parser.add_argument(
         "-c", "--cores", default="all", metavar="N", help="cores for Snakemake; default: all"
     )
@@ -43,9 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quiet", action="store_true", help="print the summary only if the exit status is not 0"
     )
-    parser.add_argument(
-        "flags", nargs="*", metavar="-- FLAG", help="further flags of snakemake, after --"
-    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -59,7 +53,10 @@ def run(options: argparse.Namespace) -> int:
     from imubench_pipeline.settings.validation import ConfigError
 
     try:
-        night = Night(options.project, options.config, options.flags)
+        if options.folder and options.project:
+            raise ConfigError("found a folder and --project; expected one of the two")
+        folder = options.folder or options.project or Path()
+        night = Night(folder, options.config, options.flags)
         summary = night.run(options.cores, options.settle, options.wait)
     except KeyboardInterrupt:
         print("stopped by a signal before Snakemake began", file=sys.stderr)

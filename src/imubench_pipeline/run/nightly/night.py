@@ -20,6 +20,7 @@ from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakem
 from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, settled
 from imubench_pipeline.run.nightly.state import State, StateError, load_tables, read_state, state_of
 from imubench_pipeline.run.nightly.summary import Skipped, Summary, compared, in_words
+from imubench_pipeline.run.project import snakefile_of
 from imubench_pipeline.settings.config import Run, read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import write_content, write_json
@@ -41,7 +42,7 @@ class Night:
     Parameters
     ----------
     project : Path
-        Folder of the Snakefile.
+        Folder of logs, or a checkout.
     config : sequence of str
         Settings ``key=value`` beyond its file, as Snakemake takes them.
     flags : sequence of str
@@ -50,13 +51,12 @@ class Night:
     Raises
     ------
     ConfigError
-        If there is no Snakefile, or the settings cannot be read.
+        If the folder is none of the two, or the settings cannot be read.
     """
 
     def __init__(self, project: Path, config: Sequence[str], flags: Sequence[str] = ()) -> None:
         self.project = project.absolute()
-        if not (self.project / "Snakefile").is_file():
-            raise ConfigError(f"{project}: no Snakefile; expected --project with the folder of it")
+        self._snakefile = snakefile_of(self.project)
         if own := set(flags) & _OWN_FLAGS:
             raise ConfigError(f"{', '.join(own)}: expected --config of imubench nightly instead")
         run = _settings(self.project / "config/config.yaml", config)
@@ -149,7 +149,8 @@ class Night:
 
     def _snakemake(self, cores: str, skips: Sequence[Skip], lock: Lock) -> list[str]:
         """Run Snakemake; return why it failed, if it did."""
-        arguments = [f"-c{cores}", "--rerun-incomplete", *self._flags, *self._held_back(skips)]
+        arguments = ["--snakefile", str(self._snakefile), f"-c{cores}", "--rerun-incomplete"]
+        arguments += [*self._flags, *self._held_back(skips)]
         status = run_snakemake(arguments, self.project, self._log, lock)
         if status == 0:
             return []

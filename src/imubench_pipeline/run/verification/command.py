@@ -19,9 +19,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Read all that runs have left, and hold it against the digests that they left, too. Each "
         "line says what is wrong with a file, and the command that has it made again."
     )
-    parser.epilog = (
-        "Exit status: 0 all is as it was left; 1 something is not; 2 there are no results."
-    )
     parser.add_argument("results", type=Path, help="folder of the results of runs")
 
 

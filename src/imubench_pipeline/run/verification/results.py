@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
 from imubench_pipeline.run.nightly.recovery import temporary
+from imubench_pipeline.run.project import has_snakefile
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.digests import read_sealed_json
 from imubench_pipeline.tables.findings import RecordingError
@@ -95,7 +96,10 @@ class Results:
             config = [str(entry) for entry in settings["given"]]
         except (OSError, ValueError, KeyError, TypeError):
             pass  # it is told that this file is damaged
-        return shlex.join(["snakemake", "-c2", *(["--config", *config] if config else [])])
+        flags = ["--config", *config] if config else []
+        own = has_snakefile(Path()) or not Path("config/config.yaml").is_file()
+        called = ["snakemake", "-c2"] if own else ["imubench", "run", *(["--"] if flags else [])]
+        return shlex.join([*called, *flags])
 
     def faults(self) -> Iterator[Fault]:
         """Yield what is not as it was left, each file once."""

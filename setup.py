@@ -1,0 +1,47 @@
+"""Puts workflow, configuration and catalogue into a wheel; all else is in pyproject.toml."""
+
+from pathlib import Path
+
+from setuptools import setup
+from setuptools.command.build_py import build_py
+
+SHIPPED = ("Snakefile", "workflow/**/*", "config/**/*", "profiles/**/*")
+
+
+class WithProject(build_py):
+    """Copies the files of a checkout to where `settings.shipped` looks for them in a wheel."""
+
+    def run(self) -> None:
+        """Copy the package, and the files."""
+        super().run()
+        for source, target in self._shipped().items():
+            self.mkpath(str(Path(target).parent))
+            self.copy_file(source, target, preserve_mode=False)
+
+    def get_source_files(self) -> list[str]:
+        """Return what a source distribution needs."""
+        return [*super().get_source_files(), *self._shipped()]
+
+    def get_outputs(self, include_bytecode: bool = True) -> list[str]:
+        """Return what is built."""
+        return [*super().get_outputs(include_bytecode), *self._shipped().values()]
+
+    def get_output_mapping(self) -> dict[str, str]:
+        """Return which file is built of which."""
+        shipped = {target: source for source, target in self._shipped().items()}
+        return {**super().get_output_mapping(), **shipped}
+
+    def _shipped(self) -> dict[str, str]:
+        """Return the files and their places in the wheel; in an editable install they stay."""
+        if self.editable_mode:
+            return {}
+        place = Path(self.build_lib, "imubench_pipeline/project")
+        files = (path for pattern in SHIPPED for path in sorted(Path().glob(pattern)))
+        return {
+            str(path): str(place / path)
+            for path in files
+            if path.is_file() and "__pycache__" not in path.parts
+        }
+
+
+setup(cmdclass={"build_py": WithProject})

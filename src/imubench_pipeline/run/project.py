@@ -1,0 +1,40 @@
+"""Which workflow runs in a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imubench_pipeline.settings.shipped import project
+from imubench_pipeline.settings.validation import ConfigError
+
+_OWN = ("Snakefile", "workflow/Snakefile")
+
+
+def has_snakefile(folder: Path) -> bool:
+    """Return whether a folder has a workflow of its own, which `snakemake` finds there."""
+    return any((folder / own).is_file() for own in _OWN)
+
+
+def snakefile_of(folder: Path) -> Path:
+    """Return the Snakefile of a folder: its own, or, of a folder of logs, that of this package.
+
+    Raises
+    ------
+    ConfigError
+        If the folder is neither.
+    """
+    for own in _OWN:
+        if (folder / own).is_file():
+            return (folder / own).absolute()
+    shipped = project() / "Snakefile"
+    if not (folder / "config/config.yaml").is_file():
+        raise ConfigError(
+            f"{folder}: found no config/config.yaml and no Snakefile; expected a folder of logs, "
+            f"which imubench init {folder} makes, or a checkout"
+        )
+    if not shipped.is_file():
+        raise ConfigError(
+            f"{shipped}: no such file; expected the workflow in the installed package: install it "
+            "again, from a wheel or a checkout"
+        )
+    return shipped

@@ -1,0 +1,43 @@
+"""What comes with the package beside its code: the workflow, and a catalogue of its configuration.
+
+In a checkout that is the checkout itself; a wheel holds the same files in the package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+CATALOGUE = Path("catalogue")
+"""Stands in a configuration for the folder of such files that comes with the package."""
+
+Folders = Path | Sequence[Path]
+
+
+def project() -> Path:
+    """Return the folder that holds the Snakefile, workflow/, config/ and profiles/."""
+    inside = Path(__file__).parents[1] / "project"
+    return inside if inside.is_dir() else Path(__file__).parents[3]
+
+
+def folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[Path]:
+    """Return the folders that a configuration names, each once; what is in a later one counts.
+
+    That of a project, ``config/<kind>``, need not be there beside another one.
+    """
+    named = [stated] if isinstance(stated, Path) else stated
+    found: dict[Path, Path] = {}
+    for folder in named:
+        place = project() / "config" / kind if folder == CATALOGUE else folder
+        found.pop(place.resolve(), None)
+        found[place.resolve()] = place
+    places = list(found.values())
+    needed = [place for place in places if place != Path("config", kind) or place.is_dir()]
+    return needed or places
+
+
+def own_folder(stated: Folders) -> Path:
+    """Return the folder to put a file into that is missing: the last that is not the package's."""
+    named = [stated] if isinstance(stated, Path) else stated
+    return next((folder for folder in reversed(named) if folder != CATALOGUE), named[-1])

@@ -1,0 +1,153 @@
+"""What comes with the package, and what a folder of logs puts on top of it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from imubench_pipeline.run.cli import COMMANDS, main
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.run.project import snakefile_of
+from imubench_pipeline.run.verification.results import Results
+from imubench_pipeline.settings.config import Run, read_run
+from imubench_pipeline.settings.shipped import folders, project
+from imubench_pipeline.settings.validation import ConfigError
+from tests.conftest import PROJECT
+from tests.workflow.project import put_sensor
+
+
+@pytest.fixture
+def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "."]) == 0
+    return tmp_path
+
+
+def test_in_a_checkout_the_catalogue_is_its_own_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(PROJECT)
+    assert project() == PROJECT
+    assert folders(Run().sensors, "sensors") == [Path("config/sensors")]
+    assert len(Plan({}).sensors) == len(list(Path("config/sensors").glob("*.yaml")))
+
+
+def test_files_of_a_folder_of_logs_come_on_top_of_the_catalogue(lab: Path) -> None:
+    shipped = {path.stem for path in (PROJECT / "config/sensors").glob("*.yaml")}
+    put_sensor(lab / "config/sensors/mine.yaml")
+    put_sensor(lab / "config/sensors/mti_7.yaml")
+    sensors = Plan({}).sensors
+    assert sensors.keys() == shipped | {"mine"} and list(sensors) == sorted(sensors)
+    assert sensors["mti_7"].vendor == "V" and sensors["bno055"].vendor != "V"
+    assert Plan({}).requirements.keys() == {
+        path.stem for path in (PROJECT / "config/requirements").glob("*.yaml")
+    }
+
+
+def test_a_folder_that_is_stated_stands_alone_and_must_be_there(lab: Path) -> None:
+    put_sensor(lab / "config/sensors/mine.yaml")
+    assert Plan({"sensors": "config/sensors"}).sensors.keys() == {"mine"}
+    for stated in ("nosuch", ["catalogue", "nosuch"]):
+        with pytest.raises(ConfigError, match="nosuch: no such folder; expected one YAML file"):
+            Plan({"sensors": stated})
+    with pytest.raises(ConfigError, match="sensors"):
+        read_run({"sensors": []})
+
+
+def test_a_log_without_a_sensor_file_is_told_the_folder_for_one(lab: Path) -> None:
+    (lab / "logs/nosuch").mkdir()
+    (lab / "logs/nosuch/run.csv").write_text("gx\n1\n")
+    assert "no sensor file config/sensors/nosuch.yaml" in Plan({}).ingest_settings("nosuch", "run")
+
+
+def test_a_folder_without_logs_says_what_it_expects(lab: Path) -> None:
+    (lab / "logs").rmdir()
+    with pytest.raises(ConfigError, match=r"logs: found 'logs', which is no folder"):
+        Plan({})
+
+
+def test_a_folder_has_the_workflow_of_the_package_unless_it_has_its_own(lab: Path) -> None:
+    assert snakefile_of(lab) == PROJECT / "Snakefile"
+    (lab / "workflow").mkdir()
+    (lab / "workflow/Snakefile").touch()
+    assert snakefile_of(lab) == lab / "workflow/Snakefile"
+    with pytest.raises(ConfigError, match=r"found no config/config.yaml and no Snakefile"):
+        snakefile_of(lab / "logs")
+
+
+def test_a_run_ends_as_snakemake_does_and_says_why(lab: Path) -> None:
+    command = [sys.executable, "-m", "imubench_pipeline.run.start", "run", ".", "--"]
+    wrong = [*command, "--config", "sensors=nosuch"]
+    done = subprocess.run(wrong, cwd=lab, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "nosuch: no such folder; expected one YAML file a sensor" in done.stderr
+    assert len(done.stderr.splitlines()) < 10 and not done.stdout
+
+
+def test_what_makes_results_again_is_a_command_of_the_folder(
+    lab: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert Results(Path("results")).run_again == "imubench run"
+    (lab / "results/report").mkdir(parents=True)
+    (lab / "results/report/settings.json").write_text('{"given": ["logs=/data"]}')
+    assert Results(Path("results")).run_again == "imubench run -- --config logs=/data"
+    monkeypatch.chdir(PROJECT)
+    assert Results(lab / "results").run_again == "snakemake -c2 --config logs=/data"
+
+
+def test_each_exit_status_stands_in_one_place() -> None:
+    rows = {
+        cells[1].strip(" `"): tuple(cell.strip() for cell in cells[2:-1])
+        for line in (PROJECT / "docs/commands.md").read_text().splitlines()
+        if line.startswith("| `") and len(cells := line.split("|")) == 6
+    }
+    assert rows == {name: (*of.statuses, "", "")[:3] for name, of in COMMANDS.items()}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_command_says_its_exit_statuses(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main([name, "--help"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"Exit status: 0 {COMMANDS[name].statuses[0]}" in said
+
+
+@pytest.mark.parametrize(
+    ("typed", "expected"),
+    [
+        ("in", {"init", "inspect"}),
+        ("nightly --se", {"--settle"}),
+        ("show --units p", {"practical"}),
+        ("run mylogs", {"mylogs/"}),
+    ],
+)
+def test_a_shell_completes(typed: str, expected: set[str], tmp_path: Path) -> None:
+    (tmp_path / "mylogs").mkdir()
+    script = (
+        f'source <("{sys.executable}" -m imubench_pipeline.run.start completion bash); '
+        f"COMP_WORDS=(imubench {typed}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); "
+        '_shtab_imubench; printf "%s\\n" "${COMPREPLY[@]}"'
+    )
+    done = subprocess.run(
+        ["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert {line.rstrip("/") for line in done.stdout.split()} == {e.rstrip("/") for e in expected}
+
+
+def test_where_there_is_no_posix_it_says_so_at_once() -> None:
+    # What is POSIX's alone cannot be imported there.
+    script = (
+        "import os, sys; os.name = 'nt'; sys.platform = 'win32'; "
+        "sys.modules |= dict.fromkeys(['fcntl', 'resource', 'termios', 'pwd', 'grp']); "
+        "from imubench_pipeline.run.start import main; sys.exit(main())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", script],
+        env=os.environ | {"PYTHONPATH": str(PROJECT / "src")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2 and "expected Linux" in done.stderr and "WSL" in done.stderr
