@@ -46,7 +46,9 @@ Say = Callable[[str], None]
 _OF_INGEST = {"quality": "quality.json"} | {
     name: f"{name}.parquet" for name in ("envelope", "histogram")
 }
-_OF_ESTIMATE = tuple(field.name for field in fields(Estimation) if field.name != "paths")
+_OF_ESTIMATE = tuple(
+    field.name for field in fields(Estimation) if field.name not in ("estimates", "paths")
+)
 _OF_COMPARISON = ("datasheet", "datasheet_curve", "error_budget", "backtest")
 _BEFORE_RECONSTRUCTION = ("allan", "parameters", "allan_compensated")
 _OF_RECONSTRUCTION = ("reconstruction", "scores")
