@@ -11,6 +11,7 @@ import pyarrow as pa
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.experiments.papers.registry import rows_without_a_run
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.navigation.pooled import pooled_rows
@@ -251,7 +252,9 @@ def coverage_rows(*sensors: str) -> Rows:
     }  # fmt: skip
 
 
-def joined(*several: Rows, requirements: Mapping[str, Any] | None = None) -> Tables:
+def joined(
+    *several: Rows, requirements: Mapping[str, Any] | None = None, papers: bool = False
+) -> Tables:
     """The tables of a run: the rows of its recordings, and what it makes of them together."""
     rows = {name: [row for one in several for row in one.get(name, [])] for name in TABLES}
     made = {name: build(name, own) for name, own in rows.items()}
@@ -270,6 +273,7 @@ def joined(*several: Rows, requirements: Mapping[str, Any] | None = None) -> Tab
         "ranking": build("ranking", ranked(judged, basis)),
         "next_steps": build("next_steps", next_step_rows(judged, basis)),
         "fusion": build("fusion", fusion_rows(made, FUSION)),
+        "published": build("published", rows_without_a_run() if papers else ()),
     }
 
 

@@ -247,7 +247,7 @@ def _channels(view: RecordingView) -> list[ChannelView]:
         if row["channel"] in channels:
             true = channels[row["channel"]].true_components.setdefault(row["parameter"], [])
             true.append(row)
-    for row in view.rows("published"):
+    for row in view.rows("published_figures"):
         if row["channel"] in channels:
             channels[row["channel"]].published.append(row)
     for name, channel in channels.items():

@@ -27,6 +27,7 @@ from imubench_pipeline.tables.of_navigation import (
     REPEATABILITY,
     SHORTLIST,
 )
+from imubench_pipeline.tables.of_papers import PUBLISHED
 
 _FITTED = number("fitted", "as in unit", "what the model has where that is not value; no estimate")
 _DOUBTED = text("doubts", "of the recording; empty: none", required=False)
@@ -319,7 +320,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "ranking": RANKING,
     "next_steps": NEXT_STEPS,
     "shortlist": SHORTLIST,
-    "published": (
+    "published": PUBLISHED,
+    "published_figures": (
         *KEYS,
         text("place", "table of the source"),
         text("figure", "its name there"),
@@ -393,7 +395,7 @@ BY_RECORDING = (
     "low_pass",
     "deterministic",
     "simulated_truth",
-    "published",
+    "published_figures",
     "error_budget",
     "backtest",
     *TURNED,
