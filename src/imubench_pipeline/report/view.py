@@ -29,6 +29,7 @@ METHOD_NAMES = {
     "curve": "read from the curve",
     "paper": "fit, weights as printed",
     "weighted": "fit, right weights",
+    "authors": "read by the authors",
 }
 QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}
 

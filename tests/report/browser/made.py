@@ -229,7 +229,7 @@ def channel_rows(log: Log, channel: str) -> Rows:
             )
         ],
         "scores": [
-            key | {"method": one.method, "rms": 1e-6, "rms_log10": 0.01 * n, "inside_band": 0.97}
+            key | SCORES | {"method": one.method, "rms_log10": 0.01 * n}
             for n, one in enumerate(every, start=1)
         ],
         "datasheet": [
