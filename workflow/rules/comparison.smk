@@ -151,7 +151,7 @@ rule papers:
             )
         },
     output:
-        **as_files("published"),
+        **as_files("published", "accuracy"),
     log:
         LOGS + "/papers.log",
     group:

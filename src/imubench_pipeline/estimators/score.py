@@ -1,8 +1,9 @@
 """How well a model repeats the measured curve: its own curve, and logs simulated from it.
 
-One simulated log is one draw. Where few clusters are averaged its curve may be anywhere, so that the
-difference of one draw ranks no method (000 Table 3 does that). Scored are the curve of the model,
-and the distribution over many draws, each tau with a weight by how sure the measured curve is there.
+One simulated log is one draw. Where few clusters are averaged its curve may be anywhere, so that
+the difference of one draw ranks no method (000 Table 3 does that). Scored are the curve of the
+model, and the distribution over many draws, each tau with a weight by how sure the measured curve
+is there.
 """
 
 from __future__ import annotations

@@ -295,7 +295,7 @@ class Plan:
         )
 
     def _read_by_authors(self, sensor: str, name: str) -> dict[str, object]:
-        """Return what a source reads from its own curve, in SI, where one that is simulated does."""
+        """Return what the source of a simulated recording reads from its own curve, in SI."""
         if (sensor, name) not in self._simulated:
             return {}
         channels = self._simulated[sensor, name].channels.items()

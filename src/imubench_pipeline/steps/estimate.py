@@ -19,7 +19,13 @@ from imubench_pipeline.estimators.agreement import disagreements, doubt_contradi
 from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_courses
 from imubench_pipeline.estimators.deterministic.verdict import deterministic_rows, verdict_of
-from imubench_pipeline.estimators.estimate import PARAMETERS, SI_UNITS, Estimate, Parameter, not_shown
+from imubench_pipeline.estimators.estimate import (
+    PARAMETERS,
+    SI_UNITS,
+    Estimate,
+    Parameter,
+    not_shown,
+)
 from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
@@ -370,7 +376,5 @@ def estimation(
 def _of_authors(read: Mapping[str, float]) -> Estimate:
     """Return what the authors of a simulated recording read from the curve of their own log."""
     unread = Parameter(None, "not_shown", "the source does not print it")
-    parameters = {
-        name: Parameter(read[name]) if name in read else unread for name in PARAMETERS
-    }
+    parameters = {name: Parameter(read[name]) if name in read else unread for name in PARAMETERS}
     return Estimate("authors", parameters)

@@ -1,8 +1,8 @@
-"""The table of what the papers print, line by line, beside what is found here."""
+"""The tables of what the papers print, line by line, and of how far their methods reach."""
 
 from __future__ import annotations
 
-from imubench_pipeline.tables.columns import number, text
+from imubench_pipeline.tables.columns import count, number, text
 
 PUBLISHED = (
     text("paper", "its authors"),
@@ -25,3 +25,17 @@ PUBLISHED = (
     text("check", "test or benchmark that stands behind the line"),
 )
 """Every number is SI."""
+
+ACCURACY = (
+    text("method", "estimation method; likelihood_gm with the papers' model alone"),
+    text("parameter", "N, B, T_B or K"),
+    count("logs", "simulated", required=True),
+    count("given", "of them that the method gives a value for", required=True),
+    number("rmse", "-", "root mean square error of these values over the truth"),
+    number("bias", "-", "their mean error over the truth"),
+    number("bound", "-", "Cramér-Rao bound of the standard deviation over the truth", True),
+    number("ratio", "-", "rmse over bound"),
+    number("ratio_lower", "-", "lower 95 % limit of it, as logs are few"),
+    number("ratio_upper", "-", "upper 95 % limit of it"),
+)
+"""How far the methods are from the bound, on simulated logs of one channel."""

@@ -27,7 +27,7 @@ from imubench_pipeline.tables.of_navigation import (
     REPEATABILITY,
     SHORTLIST,
 )
-from imubench_pipeline.tables.of_papers import PUBLISHED
+from imubench_pipeline.tables.of_papers import ACCURACY, PUBLISHED
 
 _FITTED = number("fitted", "as in unit", "what the model has where that is not value; no estimate")
 _DOUBTED = text("doubts", "of the recording; empty: none", required=False)
@@ -341,6 +341,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "next_steps": NEXT_STEPS,
     "shortlist": SHORTLIST,
     "published": PUBLISHED,
+    "accuracy": ACCURACY,
     "published_figures": (
         *KEYS,
         text("place", "table of the source"),

@@ -41,6 +41,7 @@ from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.ranking import ranking_rows
+from tests.report.tables import SCORES
 
 Rows = dict[str, list[Mapping[str, Any]]]
 

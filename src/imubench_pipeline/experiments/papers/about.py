@@ -26,6 +26,17 @@ VERDICTS: dict[Verdict, str] = {
 }
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """A curve that stands for figures of a paper."""
+
+    figures: str  # of the paper
+    sensor: str
+    recording: str
+    channel: str
+    methods: str  # whose curves are drawn, beside that of the log
+
+
 @dataclass(frozen=True, kw_only=True)
 class About:
     """A paper."""
@@ -37,6 +48,7 @@ class About:
     logs: tuple[tuple[str, str], ...]
     # sentences: what is assumed, whose input comes back, what is typed by hand
     declared: tuple[str, ...]
+    drawn: tuple[Drawn, ...] = ()
 
 
 MAIA = About(
@@ -51,6 +63,15 @@ MAIA = About(
         "finds what was put in, and nothing of the sensors.",
         "Tables 1, 3 and 4 are typed from the paper; the curves of its figures are not in its "
         "text, so that figures are compared by the curves of the printed parameters.",
+    ),
+    drawn=tuple(
+        Drawn(figures, sensor, "sim_published", channel, "authors paper")
+        for figures, sensor, channel in (
+            ("Figure 2", "c102_f9r", "accel_x"),
+            ("Figures 3 and 8", "mti_7", "accel_x"),
+            ("Figure 4", "c102_f9r", "gyro_x"),
+            ("Figures 5 and 9", "mti_7", "gyro_x"),
+        )
     ),
 )
 

@@ -22,6 +22,11 @@ class Found:
     reason: str | None = None  # in place of the claim's
 
 
+def number(value: float, words: str = "") -> Callable[[Evidence], Found]:
+    """Return what finds a number that hangs on no run."""
+    return lambda _: Found(value=value, words=words)
+
+
 def nothing(reason: str) -> Found:
     """Return what is found where there is nothing to be had."""
     return Found(verdict="not to be had", reason=reason)
