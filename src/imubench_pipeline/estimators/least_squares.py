@@ -56,7 +56,7 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
     - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, the variance of the Allan variance;
     - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 as 000 eq. 25 prints it, whose dimension is
       not that of the cost: the bottom of the curve counts less, which on these tau hardly hurts
-      (`benchmarks/papers.py`). For the papers' figures.
+      (`tests/papers/test_panel.py`). For the papers' figures.
 
     Parameters
     ----------
