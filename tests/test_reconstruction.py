@@ -43,7 +43,7 @@ def test_it_depends_on_the_seed_and_the_channel_only(rng, tmp_path: Path) -> Non
 
     def scores(key: Key, seed: int) -> object:
         settings = ReconstructionSettings(seed=seed)
-        return reconstruct(key, estimate(MODEL), curve, 10.0, settings, tmp_path).score_row["rms"]
+        return reconstruct(key, estimate(MODEL), curve, 10.0, settings, tmp_path).score_row["drawn"]
 
     assert scores(KEY, 1) == scores(KEY, 1)
     assert scores(KEY, 1) != scores(KEY, 2)

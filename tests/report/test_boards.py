@@ -89,7 +89,7 @@ def of_board(sensor: str, *figures: dict[str, Any], board: str = "pair", **given
     recording = f"sim_{board}"
     rows = deepcopy(recording_rows(sensor, recording, simulated=True, **given))
     names = {"sensor": sensor, "recording": recording, "channel": "gyro_x"}
-    rows["published"] = [names | one for one in figures]
+    rows["published_figures"] = [names | one for one in figures]
     return rows
 
 
@@ -317,7 +317,7 @@ def test_the_page_is_written_again_only_if_its_recordings_or_words_change() -> N
     key = BOARDS.page(made(*some())).key
     assert BOARDS.page(made(*some())).key == key
     changed = some()
-    changed[0]["published"][0]["reason"] = "another"
+    changed[0]["published_figures"][0]["reason"] = "another"
     assert BOARDS.page(made(*changed)).key != key
     longer = some()
     longer[3]["recordings"][0]["duration"] = 9000.0  # a measured one
@@ -331,7 +331,7 @@ def test_the_page_is_written_again_only_if_its_recordings_or_words_change() -> N
 
 def line(**changes: Any) -> dict[str, Any]:
     names = {"sensor": "imu", "recording": "sim_pair", "channel": "gyro_x"}
-    (found,) = published_lines(build("published", [names | PRINTED | changes]).to_pylist())
+    (found,) = published_lines(build("published_figures", [names | PRINTED | changes]).to_pylist())
     return found
 
 

@@ -15,9 +15,12 @@ import numpy as np
 import pytest
 import yaml
 from scipy.optimize import minimize_scalar
+from scipy.stats import t as student
 
+from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.datasheets import coverage
 from imubench_pipeline.datasheets import deltas as datasheet
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators import estimate, lines
 from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.navigation import pooled
@@ -28,6 +31,7 @@ from imubench_pipeline.navigation.suitability import conditions
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
+from imubench_pipeline.report.theory import words_of_reading
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import findings
 from imubench_pipeline.units import from_si, to_si
@@ -53,7 +57,7 @@ def theory() -> str:
         lstrip_blocks=True,
     )
     page = environment.get_template("theory.html.jinja")
-    return page.render(figure="figures/theory.svg", terms=glossary())
+    return page.render(figure="figures/theory.svg", terms=glossary(), reading="")
 
 
 class Page(HTMLParser):
@@ -368,7 +372,9 @@ def test_a_page_may_name_another_base() -> None:
         )
     )
     made = environment.get_template("theory.html.jinja")
-    assert made.render(base="other", figure="f", terms=glossary()).startswith("<p>other</p>")
+    assert made.render(base="other", figure="f", terms=glossary(), reading="").startswith(
+        "<p>other</p>"
+    )
 
 
 # ------------------------------------------------------ its figures are those of the library
@@ -535,6 +541,70 @@ def test_the_conversions(
     assert shown in text()
     converted = from_si(to_si(value, unit, dimension), other, dimension)
     assert converted == pytest.approx(expected, rel=2e-3)
+
+
+def _error_at_a_ninth(exponent: int) -> float:
+    n = 4000
+    return 1.0 / math.sqrt(2.0 * equivalent_degrees(exponent, n, 9 * n - 2 * n + 1))
+
+
+_FOLDED = math.pi * 0.64 / math.tanh(math.pi * 0.64)
+"""Density at 0 Hz of white noise behind 64 Hz, sampled at 100 Hz: the sum of its folds."""
+
+
+@pytest.mark.parametrize(
+    ("shown", "expected", "close"),
+    [
+        ("standard error of 21 to 27 %", [_error_at_a_ninth(0), _error_at_a_ninth(-2)], 0.006),
+        ("half the log, of 71 %", [math.sqrt(0.5)], 0.005),
+        ("75 to 170 TB here", [1.9 * 3600 / 89.5, 1.8 * 3600 / 38.3], 0.02),
+        ("9.2 times as good", [1 / (0.1 + 0.9 / 100)], 0.005),
+        ("t = 12.7), of five it is moderate (2.8)",
+         [float(student.ppf(0.975, 1)), float(student.ppf(0.975, 4))], 0.01),
+        ("5°/1.96 = 2.55°", [float(student.ppf(0.975, 1e9)), 5 / 1.96], 0.003),
+        ("0.0016 °/s, 38 % of the rate",
+         [0.0122 / math.sqrt(60), 0.0122 / math.sqrt(60) / math.degrees(EARTH_RATE)], 0.02),
+        ("1 % of the Earth's rate stands for 0.57°", [0.01, math.degrees(0.01)], 0.006),
+        ("1.44 N for 64 Hz at 100 Hz", [math.sqrt(_FOLDED)], 0.003),
+        ("frequency 0.37/τ", [1.1656 / math.pi], 0.005),
+        ("√10 = 3.2 times better", [math.sqrt(10)], 0.02),
+        ("0.1 decades are 26 %", [0.1, 10**0.1 - 1], 0.01),
+    ],
+)  # fmt: skip
+def test_the_other_figures(shown: str, expected: list[float], close: float) -> None:
+    assert shown in text()
+    numbers = [float(number) for number in re.findall(r"\d+\.?\d*", shown)]
+    for value in expected:
+        assert any(
+            value == pytest.approx(number, rel=close)
+            or 100 * value == pytest.approx(number, rel=close)
+            for number in numbers
+        ), (value, numbers)
+
+
+def test_where_the_transfer_of_a_tau_is_highest() -> None:
+    found = minimize_scalar(lambda x: -(math.sin(x) ** 4) / x**2, bounds=(0.5, 2.0))
+    assert found.x == pytest.approx(1.1656, abs=1e-3)
+
+
+def test_a_flat_earth_overstates_by_up_to_a_tenth() -> None:
+    # Schuler feedback: a velocity of a constant error is sin(x)/x of what it would be without.
+    x = math.sqrt(9.81 / 6.371e6) * 600.0
+    assert 0.05 < 1.0 - math.sin(x) / x < 0.11
+    assert "overstates errors by up to a tenth" in text()
+
+
+def test_what_is_said_of_reading_the_curve_is_of_the_run() -> None:
+    assert "Reading the curve is the weakest." in text()
+    row = {"method": "curve", "logs": 100, "bias": -0.29}
+    rows = [
+        row | {"parameter": name, "given": given, "rmse": 0.3, "bound": 0.04}
+        for name, given in (("N", 100), ("B", 17), ("T_B", 17), ("K", 0))
+    ]
+    assert words_of_reading(rows) == (
+        "In 100 simulated logs of 10 h it finds B in 17, 29 % too small, and K in none: "
+    )
+    assert words_of_reading([]) == ""
 
 
 def test_the_glossarys_own_figures() -> None:

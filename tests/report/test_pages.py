@@ -43,7 +43,8 @@ def whole() -> Site:
         recording_rows("asked", "day1", requirements=asked),
         rejected_rows("turned", "day1", kind="two_position"),
     ]
-    return site(joined(*rows, requirements=asked), requirements=asked, boards={"pair": BOARD})
+    tables = joined(*rows, requirements=asked, papers=True)
+    return site(tables, requirements=asked, boards={"pair": BOARD})
 
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.file)

@@ -126,3 +126,39 @@ rule catalogue:
         code=plan.code("catalogue"),
     script:
         "../scripts/catalogue.py"
+
+
+rule papers:
+    input:
+        **{
+            name: table(name)
+            for name in (
+                "recordings",
+                "allan",
+                "parameters",
+                "models",
+                "reconstruction",
+                "scores",
+                "datasheet",
+                "error_budget",
+                "temperature",
+                "published_figures",
+                "simulated_truth",
+                "earth_rate",
+                "earth_rate_published",
+                "alignment",
+                "fusion",
+            )
+        },
+    output:
+        **as_files("published", "accuracy"),
+    log:
+        LOGS + "/papers.log",
+    group:
+        "comparison"
+    resources:
+        **cost(OfMany(memory=350, memory_of_each=0.3, time=10, time_of_each=0.01)),
+    params:
+        code=plan.code("papers"),
+    script:
+        "../scripts/papers.py"

@@ -35,7 +35,7 @@ OUTLOOK = tables_of(rules.outlook)
 OF_SENSOR = sorted(
     {*PARTS} - {"estimate_findings"}
     | {"recordings", "findings", "doubts", "failures", "drift", "pooled"}
-    | {"simulated_truth", "published"}
+    | {"simulated_truth", "published_figures"}
 )
 
 

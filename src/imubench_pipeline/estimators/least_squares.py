@@ -55,7 +55,8 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
 
     - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, the variance of the Allan variance;
     - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 as 000 eq. 25 prints it, whose dimension is
-      not that of the cost: the bottom of the curve hardly counts. For the papers' figures.
+      not that of the cost: the bottom of the curve counts less, which on these tau hardly hurts
+      (`tests/papers/test_panel.py`). For the papers' figures.
 
     Parameters
     ----------
@@ -80,6 +81,21 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
     ValueError
         If the method is not known.
     """
+    return with_limits(*_solved(curve, method, longest))
+
+
+def solve(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 9) -> Estimate:
+    """Fit N, B, T_B and K as `fit` does, without limits, which take most of its time.
+
+    Parameters, errors raised and statuses are those of `fit`, but for ``not_identified``.
+    """
+    return _solved(curve, method, longest)[0]
+
+
+def _solved(
+    curve: AllanCurve, method: Method, longest: float
+) -> tuple[Estimate, AllanCurve, NDArray[np.bool_]]:
+    """Return the estimate without limits, the curve, and the tau that it is of."""
     used = curve.cluster_size <= longest * curve.samples
     if used.sum() < _FEWEST_POINTS:
         raise UnfitCurveError(
@@ -99,7 +115,7 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
             reason=f"from tau = {curve.tau[first]:.3g} s: at shorter tau the curve is bent, as by "
             "the sensor's own filter",
         )
-    return with_limits(Estimate(method, parameters), curve, used)
+    return Estimate(method, parameters), curve, used
 
 
 def _first_unbent(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> int:
@@ -202,6 +218,12 @@ class _Search:
         self.longest = self._tau[-1] / PEAK_TAU
         self.shortest = min(CORRELATION_TIMES.samples * self._interval, self.longest / 2.0)
 
+    def _shapes(self, times: Array) -> Array:
+        """Return the shape of the process at each tau, a row each T_B."""
+        if self._sampled:
+            return np.array([self._shape(T_B) for T_B in times])
+        return np.asarray(gauss_markov_shape(self._tau, times[:, None]))
+
     def _shape(self, T_B: float) -> Array:
         if self._sampled:
             return sampled_gauss_markov_shape(self._n, self._interval, T_B)
@@ -209,7 +231,9 @@ class _Search:
 
     def densities(self, T_B: float | None) -> tuple[Array, float]:
         """Return S_N, S_B, S_K that fit best at a T_B, and the root of the cost."""
-        shape = self._shape(T_B) if T_B is not None else np.zeros_like(self._tau)
+        return self._solved(self._shape(T_B) if T_B is not None else np.zeros_like(self._tau))
+
+    def _solved(self, shape: Array) -> tuple[Array, float]:
         columns = np.column_stack([self._white, shape, self._walk]) * self._root_weight[:, None]
         size = np.linalg.norm(columns, axis=0)
         size[size == 0] = 1.0
@@ -219,7 +243,7 @@ class _Search:
     def estimate(self) -> Estimate:
         """Return the estimate at the best T_B."""
         scan = np.geomspace(self.shortest, self.longest, _SCAN)
-        costs = [self.densities(T_B)[1] for T_B in scan]
+        costs = [self._solved(shape)[1] for shape in self._shapes(scan)]
         best = int(np.argmin(costs))
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN - 1)]
         minimum = minimize_scalar(

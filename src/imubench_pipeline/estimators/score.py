@@ -1,4 +1,10 @@
-"""How well a reconstruction repeats the measured curve."""
+"""How well a model repeats the measured curve: its own curve, and logs simulated from it.
+
+One simulated log is one draw. Where few clusters are averaged its curve may be anywhere, so that
+the difference of one draw ranks no method (000 Table 3 does that). Scored are the curve of the
+model, and the distribution over many draws, each tau with a weight by how sure the measured curve
+is there.
+"""
 
 from __future__ import annotations
 
@@ -8,41 +14,120 @@ import numpy as np
 
 from imubench_pipeline.typing import Array
 
+_SUREST = 0.02
+"""Relative error below which a tau counts no more than others: figures are printed with two digits,
+and what counts by its error alone counts at the shortest tau alone."""
+
 
 @dataclass(frozen=True)
 class Scores:
-    """Scores of one reconstruction.
+    """Scores of one model; those of draws are the median of single ones and its 90 % range.
 
     Attributes
     ----------
     rms : float
-        RMS over tau of the difference of the Allan deviations, rad/s or m/s² (000, Table 3).
+        Weighted RMS over tau of the model's Allan deviation less the measured one, rad/s or m/s².
     rms_log10 : float
-        RMS over tau of the difference of their log10, decades.
+        The same of the difference of log10, decades.
+    drawn, drawn_lower, drawn_upper : float
+        ``rms`` of single draws.
+    drawn_log10, drawn_log10_lower, drawn_log10_upper : float
+        ``rms_log10`` of single draws.
+    whole, whole_lower, whole_upper : float
+        RMS of single draws with equal weights up to the longest tau, as in 000 Table 3.
     inside_band : float
-        Share of the measured curve inside the band of the ensemble.
+        Share of the measured curve inside the 95 % band of the draws.
     """
 
     rms: float
     rms_log10: float
+    drawn: float
+    drawn_lower: float
+    drawn_upper: float
+    drawn_log10: float
+    drawn_log10_lower: float
+    drawn_log10_upper: float
+    whole: float
+    whole_lower: float
+    whole_upper: float
     inside_band: float
 
 
-def score(measured: Array, reconstructed: Array, lower: Array, upper: Array) -> Scores:
-    """Compare Allan deviations on the same tau, all of shape (m,), in rad/s or m/s².
+def weights(error: Array) -> Array:
+    """Return the weight of each tau, of sum 1.
+
+    Parameters
+    ----------
+    error : ndarray, shape (m,)
+        Relative standard error of the measured Allan deviation.
+    """
+    weight = 1.0 / (error**2 + _SUREST**2)
+    return np.asarray(weight / weight.sum())
+
+
+def rms(one: Array, other: Array, weight: Array | None = None) -> Array:
+    """Return the RMS over the last axis of the difference of two curves, or of many and one.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (..., m)
+        Allan deviations, or their logarithms.
+    weight : ndarray, shape (m,), optional
+        Of sum 1; equal where it is not given.
+    """
+    return np.asarray(np.sqrt(np.average((one - other) ** 2, axis=-1, weights=weight)))
+
+
+def beats(one: Array, other: Array) -> float:
+    """Return the chance that a draw of the first kind has the lower RMS of two.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (k,), (l,)
+        RMS of single draws of each kind.
+    """
+    place = np.searchsorted(np.sort(other), one, side="right")
+    return float(1.0 - np.mean(place) / other.size)
+
+
+def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
+    """Score a model against a measured curve.
+
+    Parameters
+    ----------
+    measured : ndarray, shape (m,)
+        Allan deviation, rad/s or m/s².
+    error : ndarray, shape (m,)
+        Its relative standard error.
+    model : ndarray, shape (m,)
+        Allan deviation of the model.
+    draws : ndarray, shape (k, m)
+        Allan deviations of simulated logs.
 
     Raises
     ------
     ValueError
         If the shapes differ.
     """
-    if not measured.shape == reconstructed.shape == lower.shape == upper.shape:
+    if not measured.shape == error.shape == model.shape == draws.shape[1:]:
         raise ValueError(
-            f"shapes differ: measured {measured.shape}, reconstructed {reconstructed.shape}, "
-            f"band {lower.shape} and {upper.shape}"
+            f"shapes differ: measured {measured.shape}, error {error.shape}, model {model.shape}, "
+            f"draws {draws.shape}"
         )
+    weight = weights(error)
+    lower, upper = np.quantile(draws, [0.025, 0.975], axis=0)
+    logarithm = np.log10(measured)
     return Scores(
-        rms=float(np.sqrt(np.mean((reconstructed - measured) ** 2))),
-        rms_log10=float(np.sqrt(np.mean(np.log10(reconstructed / measured) ** 2))),
+        float(rms(model, measured, weight)),
+        float(rms(np.log10(model), logarithm, weight)),
+        *_spread(rms(draws, measured, weight)),
+        *_spread(rms(np.log10(draws), logarithm, weight)),
+        *_spread(rms(draws, measured)),
         inside_band=float(np.mean((measured >= lower) & (measured <= upper))),
     )
+
+
+def _spread(values: Array) -> tuple[float, float, float]:
+    """Return the median, and the ends of the 90 % range."""
+    lower, median, upper = np.quantile(values, [0.05, 0.5, 0.95])
+    return float(median), float(lower), float(upper)

@@ -93,7 +93,7 @@ def _channel(site: Site, channel: ChannelView, figures: Mapping[str, str | None]
 
 
 def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of what a source prints of a channel, of ``published``."""
+    """Yield the lines of what a source prints of a channel, of rows of ``published_figures``."""
     for row in rows:
         quantity = row["channel"].split("_")[0]
         ours = row["datasheet"] if row["of"] == "datasheet" else row["value"]

@@ -9,6 +9,7 @@ from imubench_pipeline.report import (
     earth_rate,
     fusion,
     made,
+    papers,
     rate_table,
     recording,
     shortlist,
@@ -27,6 +28,7 @@ ENTRIES: Sequence[Entry] = (
     fusion.FUSION,
     boards.BOARDS,
     earth_rate.EARTH_RATE_PAGE,
+    papers.PAPERS_PAGE,
     theory.THEORY,
     made.MADE,
 )

@@ -42,6 +42,7 @@ _METHODS = {
     "curve": Appearance("#D55E00", "#F08A3C", "dash", "triangle-up"),
     "paper": Appearance("#B3508C", "#DB8FBC", "dashdot", "triangle-down"),
     "weighted": Appearance("#0072B2", "#4DA3D9", "dot", "cross"),
+    "authors": Appearance("#7A4B3A", "#C69A88", "longdash", "circle"),
 }
 
 

@@ -29,6 +29,7 @@ METHOD_NAMES = {
     "curve": "read from the curve",
     "paper": "fit, weights as printed",
     "weighted": "fit, right weights",
+    "authors": "read by the authors",
 }
 QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}
 
@@ -247,7 +248,7 @@ def _channels(view: RecordingView) -> list[ChannelView]:
         if row["channel"] in channels:
             true = channels[row["channel"]].true_components.setdefault(row["parameter"], [])
             true.append(row)
-    for row in view.rows("published"):
+    for row in view.rows("published_figures"):
         if row["channel"] in channels:
             channels[row["channel"]].published.append(row)
     for name, channel in channels.items():

@@ -16,6 +16,7 @@ from typing import NamedTuple
 from pydantic import BaseModel
 
 from imubench_pipeline.report import command as report
+from imubench_pipeline.report import papers_command as papers
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import completion_command as completion
@@ -351,6 +352,12 @@ COMMANDS = {
         show.add_arguments,
         show.run,
         ("shown", "", _NO_RESULTS),
+    ),
+    "papers": Command(
+        "print what the papers say, line by line, beside what is found",
+        papers.add_arguments,
+        papers.run,
+        ("printed", "", _NO_RESULTS),
     ),
     "shortlist": Command(
         "say by datasheets alone which sensors are worth logging",

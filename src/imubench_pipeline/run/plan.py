@@ -49,7 +49,8 @@ from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 
 _OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
-_PUBLISHED: dict[str, Any] = {"channels": {"__all__": {"published", "figures"}}, "shows": True}
+_OF_THE_SOURCE = {"published", "figures", "read"}
+_PUBLISHED: dict[str, Any] = {"channels": {"__all__": _OF_THE_SOURCE}, "shows": True}
 """Keys of a simulated recording that its samples do not depend on."""
 
 _OF_RANKING = ("price_class", "must")
@@ -288,7 +289,18 @@ class Plan:
     def estimate_settings(self, sensor: str, name: str) -> str:
         """Return what the estimates of a recording depend on."""
         settings = self.run.estimate.model_dump(mode="json")
-        return _text({"estimate": settings, "bandwidth": self.bandwidth(sensor, name)})
+        return _text(
+            {"estimate": settings, "bandwidth": self.bandwidth(sensor, name)}
+            | self._read_by_authors(sensor, name)
+        )
+
+    def _read_by_authors(self, sensor: str, name: str) -> dict[str, object]:
+        """Return what the source of a simulated recording reads from its own curve, in SI."""
+        if (sensor, name) not in self._simulated:
+            return {}
+        channels = self._simulated[sensor, name].channels.items()
+        read = {str(key): axis.read.si(key) for key, axis in channels if axis.read is not None}
+        return {"authors": read} if read else {}
 
     def bandwidth(self, sensor: str, name: str) -> float | None:
         """Return the stated cut-off of the sensor's own filter, Hz."""

@@ -135,16 +135,35 @@ class PublishedFigure(Strict):
         return quantity_to_si(self.means, dimensions.get(self.parameter, QUANTITIES[quantity]))
 
 
+class ReadByAuthors(Strict):
+    """What a source reads from the curve of its own log, which was not published."""
+
+    N: Text | None = Field(None, description="white noise density, two-sided")
+    B: Text | None = Field(None, description="bias instability: the floor of the curve / 0.664")
+    T_B: Text | None = Field(None, description="correlation time")
+    K: Text | None = Field(None, description="rate or acceleration random walk")
+
+    def si(self, channel: str) -> dict[str, float]:
+        """Return the figures that there are, in SI."""
+        return AxisSettings(**self.model_dump()).si(channel)
+
+
 class SimulatedChannel(AxisSettings):
     """The truth of one simulated channel, with units as published."""
 
     assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
     published: tuple[PublishedFigure, ...] = ()
+    read: ReadByAuthors | None = Field(
+        None, description="what the source reads from its own curve: method `authors`"
+    )
     figures: Text | None = Field(None, description="figures of the source that show this channel")
 
     def check(self, channel: str) -> None:
         """Raise UnitError if a unit has another dimension than its figure."""
         super().check(channel)
+        if self.read is not None:
+            with naming("read."):
+                self.read.si(channel)
         for number, figure in enumerate(self.published):
             with naming(f"published.{number}.means: "):
                 figure.si(quantity_of(channel))

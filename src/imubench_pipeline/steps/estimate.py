@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,13 @@ from imubench_pipeline.estimators.agreement import disagreements, doubt_contradi
 from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_courses
 from imubench_pipeline.estimators.deterministic.verdict import deterministic_rows, verdict_of
-from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, not_shown
+from imubench_pipeline.estimators.estimate import (
+    PARAMETERS,
+    SI_UNITS,
+    Estimate,
+    Parameter,
+    not_shown,
+)
 from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
@@ -362,4 +368,13 @@ def estimation(
         key = Key(sensor, recording, channel)
         how = EstimateSettings.model_validate(sections["estimate"])
         estimate_channel(key, log, measured[channel], how, sections["bandwidth"], into)
+        if read := sections.get("authors", {}).get(channel):
+            into.parameters += parameter_rows(key, _of_authors(read), recommended=False)
     return into
+
+
+def _of_authors(read: Mapping[str, float]) -> Estimate:
+    """Return what the authors of a simulated recording read from the curve of their own log."""
+    unread = Parameter(None, "not_shown", "the source does not print it")
+    parameters = {name: Parameter(read[name]) if name in read else unread for name in PARAMETERS}
+    return Estimate("authors", parameters)

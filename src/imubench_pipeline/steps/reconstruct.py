@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.estimators.rows import estimates
-from imubench_pipeline.estimators.score import score
+from imubench_pipeline.estimators.rows import estimates, recommended_estimates
+from imubench_pipeline.estimators.score import beats, rms, score
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import (
     channel_rng,
@@ -36,6 +36,8 @@ class Reconstruction:
 
     curve_rows: list[Mapping[str, Any]]
     score_row: Mapping[str, Any]
+    differences: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """RMS of each member with equal weights, as 000 Table 3 has it of one."""
 
 
 def reconstruct(
@@ -74,9 +76,12 @@ def reconstruct(
         ensemble(model, rate, samples, sizes, settings.band_members, stream("band"))
     )
     lower, median, upper = np.quantile(deviations, [0.025, 0.5, 0.975], axis=0)
-    scores = score(measured.deviation, reconstructed, lower, upper)
+    of_model = np.sqrt(model.allan_variance(measured.tau, rate))
+    error = 1.0 / np.sqrt(2.0 * measured.edf)
+    scores = score(measured.deviation, error, of_model, deviations)
     rows = _rows(names, measured.tau, median, lower, upper, reconstructed)
-    return Reconstruction(list(rows), names | asdict(scores))
+    differences = rms(deviations, measured.deviation)
+    return Reconstruction(list(rows), names | asdict(scores), differences)
 
 
 def _rows(
@@ -104,13 +109,23 @@ def write_reconstruction(
     about = Quality.read(quality)
     measured = curves(allan, about)
     left = compensated_curves(compensated, measured)
-    results = []
+    best = recommended_estimates(parameters)
+    curve_rows: list[Mapping[str, Any]] = []
+    score_rows: list[Mapping[str, Any]] = []
     for channel, by_method in estimates(parameters).items():
         key = Key(about.recording["sensor"], about.recording["recording"], channel)
         rate = about.channels[channel]["rate"]
+        results = {}
         for estimate in by_method:
             series = quality.parent / "series" / f"{channel}.{estimate.method}.parquet"
             curve = (left if estimate.method == "compensated" else measured)[channel]
-            results.append(reconstruct(key, estimate, curve, rate, settings, series))
-    write("reconstruction", [row for result in results for row in result.curve_rows], outputs[0])
-    write("scores", [result.score_row for result in results], outputs[1])
+            results[estimate.method] = reconstruct(key, estimate, curve, rate, settings, series)
+        recommended = results[best[channel].method].differences
+        for method, result in results.items():
+            # Of the log without what temperature adds the curve is another.
+            same = method != "compensated" and result.differences.size and recommended.size
+            chance = beats(result.differences, recommended) if same else None
+            score_rows.append({**result.score_row, "beats": chance})
+            curve_rows += result.curve_rows
+    write("reconstruction", curve_rows, outputs[0])
+    write("scores", score_rows, outputs[1])

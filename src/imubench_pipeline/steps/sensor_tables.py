@@ -25,7 +25,7 @@ from imubench_pipeline.recordings.fitness import (
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.copies import recorded_twice
 from imubench_pipeline.settings.sensor import sensors_of
-from imubench_pipeline.steps.published import published_rows, truth_rows
+from imubench_pipeline.steps.published_figures import published_rows, truth_rows
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures, without
 from imubench_pipeline.tables.keys import divided
@@ -89,7 +89,7 @@ def joined_tables(
         joined[name] = build(name, with_doubts(joined[name].to_pylist(), about))
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
-    joined["published"] = build("published", published_rows(truths, truth, joined))
+    joined["published_figures"] = build("published_figures", published_rows(truths, truth, joined))
     return with_failures(joined, failures)
 
 

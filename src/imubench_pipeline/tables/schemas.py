@@ -27,6 +27,7 @@ from imubench_pipeline.tables.of_navigation import (
     REPEATABILITY,
     SHORTLIST,
 )
+from imubench_pipeline.tables.of_papers import ACCURACY, PUBLISHED
 
 _FITTED = number("fitted", "as in unit", "what the model has where that is not value; no estimate")
 _DOUBTED = text("doubts", "of the recording; empty: none", required=False)
@@ -233,8 +234,28 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "scores": (
         *KEYS,
         _METHOD,
-        number("rms", _SI, "RMS over tau of reconstructed minus measured Allan deviation"),
-        number("rms_log10", "decades", "RMS over tau of the difference of log10"),
+        number(
+            "rms",
+            _SI,
+            "RMS over tau of the model's less the measured Allan deviation; each tau counts by how "
+            "sure the measured one is",
+        ),
+        number("rms_log10", "decades", "the same of the difference of log10"),
+        number("drawn", _SI, "rms of one simulated log in the model's place: median of many"),
+        number("drawn_lower", _SI, "lower end of the range of 90 % of them"),
+        number("drawn_upper", _SI, "upper end"),
+        number("drawn_log10", "decades", "rms_log10 of one simulated log: median of many"),
+        number("drawn_log10_lower", "decades", "lower end of the range of 90 % of them"),
+        number("drawn_log10_upper", "decades", "upper end"),
+        number("whole", _SI, "RMS of one simulated log, every tau alike: median of many"),
+        number("whole_lower", _SI, "lower end of the range of 90 % of them"),
+        number("whole_upper", _SI, "upper end"),
+        number(
+            "beats",
+            "-",
+            "chance that a log simulated of it has a lower whole than one of the recommended "
+            "method: 0.5 for the same model",
+        ),
         number("inside_band", "-", "share of the measured curve inside the 95 % band"),
         text("reason", "why there is no score", required=False),
     ),
@@ -319,7 +340,9 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "ranking": RANKING,
     "next_steps": NEXT_STEPS,
     "shortlist": SHORTLIST,
-    "published": (
+    "published": PUBLISHED,
+    "accuracy": ACCURACY,
+    "published_figures": (
         *KEYS,
         text("place", "table of the source"),
         text("figure", "its name there"),
@@ -393,7 +416,7 @@ BY_RECORDING = (
     "low_pass",
     "deterministic",
     "simulated_truth",
-    "published",
+    "published_figures",
     "error_budget",
     "backtest",
     *TURNED,

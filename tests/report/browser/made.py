@@ -41,6 +41,7 @@ from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.ranking import ranking_rows
+from tests.report.tables import SCORES
 
 Rows = dict[str, list[Mapping[str, Any]]]
 
@@ -229,7 +230,7 @@ def channel_rows(log: Log, channel: str) -> Rows:
             )
         ],
         "scores": [
-            key | {"method": one.method, "rms": 1e-6, "rms_log10": 0.01 * n, "inside_band": 0.97}
+            key | SCORES | {"method": one.method, "rms_log10": 0.01 * n}
             for n, one in enumerate(every, start=1)
         ],
         "datasheet": [

@@ -214,8 +214,10 @@ def bias_instability(density: float, T_B: float) -> float:
     return math.sqrt(density * T_B * math.pi * PEAK**2 / (2.0 * math.log(2.0)))
 
 
-def gauss_markov_shape(tau: Array, T_B: float) -> Array:
+def gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
     """Return the Allan variance of a Gauss-Markov process over S_B, s (000 eq. 26, Farrell 63).
+
+    Tau and T_B may be arrays that broadcast.
 
     (T_B^2/tau) (1 - (T_B/(2 tau)) (3 - 4 e^(-tau/T_B) + e^(-2 tau/T_B)))
     """

@@ -32,7 +32,7 @@ _DATASHEET = {
 def published_rows(
     truths: str, truth: Iterable[Row], tables: Mapping[str, pa.Table]
 ) -> Iterator[Row]:
-    """Yield the rows of the table ``published``.
+    """Yield the rows of the table ``published_figures``.
 
     `truths`: the simulated recordings, as the plan wrote them; `truth`: the table
     ``simulated_truth``; `tables`: ``parameters``, ``fixed_bias``, ``temperature`` and

@@ -13,7 +13,7 @@ from imubench_pipeline.datasheets.measured import sensitivity
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.steps.published import published_rows, truth_rows
+from imubench_pipeline.steps.published_figures import published_rows, truth_rows
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.keys import Key
 
@@ -138,7 +138,7 @@ def rows(given: Mapping[str, pa.Table], said: str | None = None) -> list[dict[st
     """The rows of the table, as it is written."""
     said = said or truths()
     made = published_rows(said, list(truth_rows(said)), given)
-    found: list[dict[str, Any]] = build("published", made).to_pylist()
+    found: list[dict[str, Any]] = build("published_figures", made).to_pylist()
     return found
 
 

@@ -1,0 +1,1 @@
+"""What the papers behind this project print, line by line, beside what is found here."""

@@ -1,0 +1,98 @@
+"""The papers, and the words of their lines: what shows the table ``published`` needs these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Basis = Literal["come back", "simulated", "computed", "checked"]
+"""What ours rests on; `BASES` says it in words."""
+
+BASES: dict[Basis, str] = {
+    "come back": "the log is simulated from this very figure: it comes back, which says that the "
+    "estimate works, and nothing of the sensor",
+    "simulated": "found in logs that are simulated from other figures of the paper",
+    "computed": "follows from printed figures alone, without a log",
+    "checked": "an equation, held against independent truth",
+}
+
+Verdict = Literal["agrees", "differs", "misprint", "not to be had"]
+
+VERDICTS: dict[Verdict, str] = {
+    "agrees": "within the tolerance of the line, or inside the interval of what is found",
+    "differs": "what is found is another number, or says another thing, for the reason beside it",
+    "misprint": "as printed it cannot be right, and what is meant is known",
+    "not to be had": "it takes the authors' own logs, or a run with the demonstration",
+}
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A curve that stands for figures of a paper."""
+
+    figures: str  # of the paper
+    sensor: str
+    recording: str
+    channel: str
+    methods: str  # whose curves are drawn, beside that of the log
+
+
+@dataclass(frozen=True, kw_only=True)
+class About:
+    """A paper."""
+
+    key: str  # "maia"
+    name: str  # "Maia et al."
+    title: str  # what it is of
+    # sensor and recording of the logs that stand for its own; a run that has none leaves it out
+    logs: tuple[tuple[str, str], ...]
+    # sentences: what is assumed, whose input comes back, what is typed by hand
+    declared: tuple[str, ...]
+    drawn: tuple[Drawn, ...] = ()
+
+
+MAIA = About(
+    key="maia",
+    name="Maia et al.",
+    title="the Allan variance of an MTi-7 and a C102-F9R",
+    logs=(("mti_7", "sim_published"), ("c102_f9r", "sim_published")),
+    declared=(
+        "The length of the logs is not printed: 10 h are assumed, the least that the paper "
+        "recommends.",
+        "The logs are simulated from Table 2, so the ratios to Table 2 say how well an estimate "
+        "finds what was put in, and nothing of the sensors.",
+        "Tables 1, 3 and 4 are typed from the paper; the curves of its figures are not in its "
+        "text, so that figures are compared by the curves of the printed parameters.",
+    ),
+    drawn=tuple(
+        Drawn(figures, sensor, "sim_published", channel, "authors paper")
+        for figures, sensor, channel in (
+            ("Figure 2", "c102_f9r", "accel_x"),
+            ("Figures 3 and 8", "mti_7", "accel_x"),
+            ("Figure 4", "c102_f9r", "gyro_x"),
+            ("Figures 5 and 9", "mti_7", "gyro_x"),
+        )
+    ),
+)
+
+SILVA = About(
+    key="silva",
+    name="Silva et al.",
+    title="a SiRRS01-03, and the Earth’s rotation",
+    logs=(
+        ("sirrs01_03", "sim_published"),
+        *(("sirrs01_03", f"sim_run_{number}") for number in (1, 2, 3, 4)),
+    ),
+    declared=(),
+)
+
+ENGERS = About(
+    key="engers",
+    name="Engers",
+    title="three MEMS gyros on one board",
+    logs=tuple((sensor, "sim_engers") for sensor in ("scc2130", "mpu9250", "bno055")),
+    declared=(),
+)
+
+PAPERS = (MAIA, SILVA, ENGERS)
+"""In the order in which they are shown."""

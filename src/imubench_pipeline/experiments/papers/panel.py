@@ -1,0 +1,89 @@
+"""Whether the methods differ: their errors on simulated logs of one channel, against the bound.
+
+The channel is the gyro of the MTi-7 by Table 2 of Maia et al., its logs of 10 h at a tenth of its
+rate: N, B, T_B and K are the same, and so is what a log tells of B, T_B and K.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+import numpy as np
+
+from imubench_pipeline.allan import allan_variance
+from imubench_pipeline.estimators import curve as reading
+from imubench_pipeline.estimators import least_squares
+from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate
+from imubench_pipeline.estimators.identifiability import bounds_of
+from imubench_pipeline.estimators.model_choice import PAPERS
+from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.whittle import whittle_of
+from imubench_pipeline.experiments.papers.maia_printed import DURATION, MTI_GYRO
+from imubench_pipeline.noise.simulate import channel_rng, simulate
+from imubench_pipeline.typing import Row
+
+LOGS = 100
+"""Enough to tell ratios of 1.1 and 1.5; more, and whole rates: `benchmarks/accuracy.py`."""
+
+_RATE = MTI_GYRO.rate / 10.0
+_FITS: tuple[Literal["paper", "weighted"], ...] = ("paper", "weighted")
+
+Values = Mapping[str, float | None]
+
+
+def panel_rows(logs: int = LOGS) -> Iterator[Row]:
+    """Yield the rows of the table ``accuracy``.
+
+    The likelihood is that of the papers' model, up to half of the sampling rate.
+    """
+    model = MTI_GYRO.table_2
+    bounds = bounds_of(model, _RATE, DURATION, _RATE / 2.0)
+    found: dict[str, list[Values]] = {}
+    for number in range(logs):
+        for method, values in _estimates(number).items():
+            found.setdefault(method, []).append(values)
+    for method, of_logs in found.items():
+        for name in PARAMETERS:
+            truth = float(getattr(model, name))
+            given = [value for values in of_logs if (value := values[name]) is not None]
+            errors = np.array(given) / truth - 1.0
+            rmse = math.sqrt(float(np.mean(errors**2))) if given else None
+            # The root mean square of n normal errors is known to 1 / sqrt(2 n).
+            spread = 1.96 / math.sqrt(2.0 * len(given)) if given else 0.0
+            ratio = None if rmse is None else rmse / bounds[name]
+            yield {
+                "method": method,
+                "parameter": name,
+                "logs": logs,
+                "given": len(given),
+                "rmse": rmse,
+                "bias": float(np.mean(errors)) if given else None,
+                "bound": bounds[name],
+                "ratio": ratio,
+                "ratio_lower": None if ratio is None else ratio * (1.0 - spread),
+                "ratio_upper": None if ratio is None else ratio * (1.0 + spread),
+            }
+
+
+def _estimates(number: int) -> dict[str, Values]:
+    """Return what each method finds in a log; None where it gives no value."""
+    samples = round(DURATION * _RATE)
+    rng = channel_rng(1, MTI_GYRO.sensor, MTI_GYRO.channel, f"panel {number}")
+    log = simulate(MTI_GYRO.table_2, _RATE, samples, rng)
+    curve = allan_variance(log, _RATE, overlap="octave")
+    estimates = [reading.read(curve), *(least_squares.solve(curve, method=m) for m in _FITS)]
+    spectrum, _ = spectra([log], samples, _RATE)
+    best = whittle_of(spectrum, _RATE / 2.0).maximum(PAPERS)
+    powers = [best.parameter("N"), float(best.biases[0]), float(best.times[0]), best.parameter("K")]
+    return {estimate.method: _values(estimate) for estimate in estimates} | {
+        "likelihood_gm": {
+            name: value if value > 0.0 else None
+            for name, value in zip(PARAMETERS, powers, strict=True)
+        }
+    }
+
+
+def _values(estimate: Estimate) -> Values:
+    return {name: estimate.parameters[name].value for name in PARAMETERS}

@@ -1,0 +1,151 @@
+"""The page of the papers, line by line: what is printed, what is found, and why they differ."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from imubench_pipeline.experiments.papers.about import BASES, PAPERS, VERDICTS, About, Drawn
+from imubench_pipeline.report.payload import Arrays, channel_payload, looks
+from imubench_pipeline.report.practical import limit_digits, number_text
+from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.report.view import ChannelView, RecordingView
+from imubench_pipeline.typing import Row
+
+
+def _context(site: Site) -> dict[str, Any]:
+    there = _pages(site)
+    rows = site.rows("published")
+    arrays = Arrays()
+    drawn = _drawn(site)
+    payloads = [channel_payload(channel, view.row["rate"], arrays) for _, view, channel in drawn]
+    used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
+    return {
+        "bases": BASES,
+        "verdicts": VERDICTS,
+        "panel": _panel(site.rows("accuracy")),
+        "papers": [
+            _paper(paper, own, there)
+            | {"figures": [figure for figure in drawn if figure[0] in paper.drawn]}
+            for paper in PAPERS
+            if (own := [row for row in rows if row["paper"] == paper.name])
+        ],
+        "page": {"looks": looks(used), "channels": payloads, "arrays": arrays.texts},
+    }
+
+
+def _views(site: Site) -> list[RecordingView]:
+    """Return the recordings whose curves are drawn."""
+    names = dict.fromkeys((one.sensor, one.recording) for paper in PAPERS for one in paper.drawn)
+    views = {view.full_name: view for view in site.views if view.simulated and not view.left_out}
+    return [views[name] for name in names if name in views]
+
+
+PAPERS_PAGE = Entry(
+    file="papers.html",
+    title="Papers",
+    context=_context,
+    tables=("published", "accuracy"),
+    views=_views,
+    exists=lambda site: bool(site.rows("published")),
+)
+"""The page of every table, figure and equation of the papers of which the run has logs."""
+
+
+def _drawn(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
+    """Return the curves that stand for figures, those that there are."""
+    channels = {
+        (*view.full_name, channel.channel): (view, channel)
+        for view in _views(site)
+        for channel in view.channels()
+    }
+    return [
+        (one, *channels[key])
+        for paper in PAPERS
+        for one in paper.drawn
+        if (key := (one.sensor, one.recording, one.channel)) in channels
+    ]
+
+
+def _panel(rows: Sequence[Row]) -> dict[str, Any]:
+    """Return how far each method is from the bound: a line a method, a cell a parameter."""
+    symbols = list(dict.fromkeys(row["parameter"] for row in rows))
+    by = {(row["method"], row["parameter"]): row for row in rows}
+    return {
+        "logs": rows[0]["logs"] if rows else 0,
+        "symbols": symbols,
+        "bounds": [
+            _percent(next(r["bound"] for r in rows if r["parameter"] == symbol))
+            for symbol in symbols
+        ],
+        "lines": [
+            {"method": method, "cells": [_cell(by[method, symbol]) for symbol in symbols]}
+            for method in dict.fromkeys(row["method"] for row in rows)
+        ],
+    }
+
+
+def _cell(row: Row) -> dict[str, str]:
+    if row["rmse"] is None:
+        return {"error": "no value", "ratio": ""}
+    low, high = (number_text(row[f"ratio_{end}"], 2) for end in ("lower", "upper"))
+    given = "" if row["given"] == row["logs"] else f", in {row['given']} logs"
+    return {
+        "error": f"{_percent(row['rmse'])}{given}",
+        "ratio": f"{number_text(row['ratio'], 3)} ({low} to {high})",
+    }
+
+
+def _percent(value: float) -> str:
+    return f"{number_text(100.0 * value, 3)} %"
+
+
+def _pages(site: Site) -> set[str]:
+    """Return the pages that a line may lead to."""
+    of_recordings = {view.page for view in site.views if not view.left_out}
+    return of_recordings | {file for file, _ in site.navigation}
+
+
+def _paper(paper: About, rows: Sequence[Row], there: set[str]) -> dict[str, Any]:
+    kinds = dict.fromkeys(row["place"].split()[0] for row in rows)
+    verdicts = Counter(row["verdict"] for row in rows)
+    return {
+        "about": paper,
+        "lines": [
+            {
+                **row,
+                "kind": row["place"].split()[0],
+                "page": row["page"] if (row["page"] or "").split("#")[0] in there else None,
+                **cells(row),
+            }
+            for row in rows
+        ],
+        "counts": [(verdicts[verdict], verdict) for verdict in VERDICTS if verdicts[verdict]],
+        "filters": {
+            "kind": list(kinds),
+            "verdict": list(dict.fromkeys(row["verdict"] for row in rows)),
+            "basis": list(dict.fromkeys(row["basis"] for row in rows)),
+        },
+    }
+
+
+def cells(row: Row) -> dict[str, str]:
+    """Return what is found and the ratio of a row of ``published``, as texts.
+
+    What is found is in the unit of the paper, so that it can be held beside what is printed.
+    """
+    found = ""
+    if row["found"] is not None:
+        digits = limit_digits(row["lower"], row["upper"], 3)
+        shown = (row[name] for name in ("found", "lower", "upper"))
+        value, lower, upper = (
+            None if x is None else number_text(x / row["scale"], digits) for x in shown
+        )
+        unit = "" if row["printed_unit"] == "-" else f" {row['printed_unit']}"
+        found = f"{value}{unit}"
+        if lower is not None and upper is not None:
+            found += f" ({lower} to {upper})"
+    words = "; ".join(filter(None, (found, row["found_words"])))
+    ratio = "–" if row["ratio"] is None else number_text(row["ratio"], 3)
+    return {"found_text": words or "–", "ratio_text": ratio}

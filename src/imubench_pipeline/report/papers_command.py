@@ -1,0 +1,111 @@
+"""`imubench papers`: what the papers print beside what is found, in the terminal."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imubench_pipeline.typing import Row
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+_KEYS = ("maia", "silva", "engers")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command to its parser."""
+    parser.add_argument(
+        "results",
+        type=Path,
+        nargs="?",
+        help="folder of the results of a run; default: what follows from printed figures alone",
+    )
+    parser.add_argument("--paper", choices=_KEYS, help="this one alone")
+    parser.add_argument("--place", help='such as "Table 3"; default: all')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the lines; return the exit status."""
+    # Only what computes or draws loads this: the other commands answer at once.
+    from imubench_pipeline.experiments.papers.about import PAPERS
+    from imubench_pipeline.report.show import show
+    from imubench_pipeline.tables import tables_folder
+
+    if arguments.results is None:
+        from imubench_pipeline.experiments.papers.registry import rows_without_a_run
+
+        rows = list(rows_without_a_run())
+        expected = "without the results of a run: what needs no log"
+    else:
+        from imubench_pipeline.tables import read
+
+        path = tables_folder(arguments.results) / "published.parquet"
+        if not path.is_file():
+            print(
+                f"{path}: is not there; expected the folder of the results of a finished run, such "
+                "as results: `snakemake -c2` makes it",
+                file=sys.stderr,
+            )
+            return 2
+        try:
+            rows = read("published", [path]).to_pylist()
+        except (OSError, ValueError) as error:
+            print(error, file=sys.stderr)
+            return 2
+        expected = f"{path}: the run simulates the logs of no paper"
+    wanted = [paper for paper in PAPERS if arguments.paper in (None, paper.key)]
+    names = {paper.name for paper in wanted}
+    places = list(dict.fromkeys(row["place"] for row in rows if row["paper"] in names))
+    if arguments.place is not None and arguments.place not in places:
+        shown = ", ".join(places) or expected
+        print(f"no place {arguments.place!r}; there are: {shown}", file=sys.stderr)
+        return 2
+
+    def shown_parts(width: int) -> Iterator[RenderableType]:
+        for paper in wanted:
+            own = [
+                row
+                for row in rows
+                if row["paper"] == paper.name and arguments.place in (None, row["place"])
+            ]
+            if own:
+                yield from _parts(f"{paper.name}: {paper.title}", own, width)
+
+    if not rows:
+        print(expected)
+    show(shown_parts)
+    return 0
+
+
+def _parts(title: str, rows: Sequence[Row], width: int) -> Iterator[RenderableType]:
+    """Yield the table of a paper, and why lines differ."""
+    from rich.text import Text
+
+    from imubench_pipeline.report.papers import cells
+    from imubench_pipeline.report.terminal_table import fitting
+
+    reasons = list(dict.fromkeys(row["reason"] for row in rows if row["reason"]))
+    lines: list[list[str | Text]] = []
+    for row in rows:
+        shown = cells(row)
+        note = f" [{reasons.index(row['reason']) + 1}]" if row["reason"] else ""
+        lines.append(
+            [
+                row["place"],
+                row["quantity"],
+                row["printed_as"],
+                shown["found_text"],
+                shown["ratio_text"],
+                row["verdict"] + note,
+            ]
+        )
+    heads = ["Place", "Quantity", "Printed", "Found", "Ratio", "Verdict"]
+    yield fitting(title, heads, lines, width, names=1)
+    yield Text()
+    for number, reason in enumerate(reasons, start=1):
+        yield Text(f"  [{number}] {reason}")
+    yield Text()

@@ -1,0 +1,241 @@
+"""The lines of Maia et al. against truth of another source than their own code."""
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import allantools
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from imubench_pipeline.experiments.papers import maia
+from imubench_pipeline.experiments.papers.claims import rows_of
+from imubench_pipeline.experiments.papers.evidence import Evidence
+from imubench_pipeline.experiments.papers.maia_equations import (
+    as_printed,
+    by_integral,
+    spread_over_weight,
+)
+from imubench_pipeline.experiments.papers.maia_printed import (
+    CHANNELS,
+    MTI_GYRO,
+    TABLE_4,
+    lottery,
+    lowest_point,
+    sizes,
+)
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.settings.sensor import read_sensors
+from imubench_pipeline.settings.simulated_recordings import read_simulated
+from tests.conftest import PROJECT
+
+GYRO = MTI_GYRO.table_2
+PRINTED = {
+    # N, B, K and T_B of Tables 1 and 2, digit by digit, and Table 3
+    "MTi-7 accelerometer": ("9.5 3.6 1.5 84.6", "9.6 3.4 1.7 38.3", 3.9e-4, 1.0e-4),
+    "MTi-7 gyro": ("8.5 5.7 1.0 223.5", "8.4 6.7 8.2 89.5", 4.2e-5, 8.6e-6),
+    "C102-F9R accelerometer": ("1.1 7.2 1.5 18.5", "1.1 7.2 2.0 148.9", 4.2e-4, 1.2e-4),
+    "C102-F9R gyro": ("5.8 3.0 1.3 29", "5.7 3.4 8.7 68.3", 1.8e-3, 5.0e-4),
+}
+
+
+@pytest.fixture(scope="module")
+def lines() -> dict[str, list[dict[str, Any]]]:
+    by_place: dict[str, list[dict[str, Any]]] = {}
+    for row in rows_of(maia.PAPER, Evidence()):
+        by_place.setdefault(row["place"], []).append(dict(row))
+    return by_place
+
+
+def test_every_table_figure_and_equation_has_a_line(lines: dict[str, Any]) -> None:
+    expected = {f"Table {n}" for n in range(1, 5)} | {f"Figure {n}" for n in range(1, 10)}
+    assert lines.keys() == expected | {f"Equation {n}" for n in range(1, 28)}
+
+
+def test_the_tables_are_typed_as_printed() -> None:
+    for channel in CHANNELS:
+        first, second, *table_3 = PRINTED[channel.name]
+        for model, digits in ((channel.table_1, first), (channel.table_2, second)):
+            shown = [f"{value:.1e}".split("e")[0] for value in (model.N, model.B, model.K)]
+            assert " ".join([*shown, f"{model.T_B:g}"]) == digits
+        assert list(channel.table_3) == table_3
+
+
+def test_the_demonstration_simulates_table_2_and_has_table_1_beside_it() -> None:
+    run = read_simulated(
+        PROJECT / "config/simulated.yaml", read_sensors(PROJECT / "config/sensors")
+    )
+    entries = {(entry.sensor, entry.recording): entry for entry in run.recordings}
+    for channel in CHANNELS:
+        entry = entries[channel.sensor, "sim_published"]
+        axis = entry.channels[channel.channel]  # type: ignore[index]
+        assert axis.read is not None
+        for model, figures in (
+            (channel.table_2, axis.si(channel.channel)),
+            (channel.table_1, axis.read.si(channel.channel)),
+        ):
+            for name, value in figures.items():
+                assert value == pytest.approx(getattr(model, name), rel=1e-9), name
+        assert entry.rate == f"{channel.rate:g} Hz"
+
+
+def test_what_differs_has_its_reason_and_what_agrees_none(lines: dict[str, Any]) -> None:
+    for row in (row for rows in lines.values() for row in rows):
+        assert (row["reason"] is None) == (row["verdict"] == "agrees"), row
+
+
+def test_reading_the_curve_of_table_2(lines: dict[str, Any]) -> None:
+    tau = np.geomspace(1, 18_000, 100_000)
+    for channel in CHANNELS:
+        N, B, K, T_B = (row for row in lines["Table 1"] if channel.name in row["quantity"][:40]
+                        and "read from" in row["quantity"])  # fmt: skip
+        adev = np.sqrt(channel.table_2.allan_variance(tau))
+        assert B["found"] == pytest.approx(adev.min() / 0.6643, rel=1e-3)
+        assert T_B["found"] == pytest.approx(tau[adev.argmin()] / 1.8926, rel=2e-3)
+        assert N["found"] == pytest.approx(adev[0], rel=1e-6)
+        assert K["found"] == pytest.approx(
+            np.interp(4000, tau, adev) * math.sqrt(3 / 4000), rel=1e-4
+        )
+
+
+def test_the_numbers_of_table_1_do_not_fit_equation_26() -> None:
+    taus = {channel.name: lowest_point(channel.table_1)[0] for channel in CHANNELS}
+    assert taus["MTi-7 gyro"] == pytest.approx(27.3, abs=0.1)
+    for channel in CHANNELS:
+        T_B = channel.table_1.T_B
+        assert T_B is not None
+        assert not 0.5 < taus[channel.name] / (1.89 * T_B) < 2.0
+        # By the integral of the density the curve is lower there than at 1.89 T_B.
+        here, there = (
+            by_integral(channel.table_1, tau) for tau in (taus[channel.name], 1.89 * T_B)
+        )
+        assert here < there
+
+
+def test_table_3_lies_in_the_spread_of_single_draws(lines: dict[str, Any]) -> None:
+    inside = {row["quantity"]: row["verdict"] == "agrees" for row in lines["Table 3"]
+              if row["quantity"].startswith("RMS of one")}  # fmt: skip
+    assert len(inside) == 8
+    outside = [name for name, agrees in inside.items() if not agrees]
+    assert outside == ["RMS of one reconstruction, MTi-7 gyro, state space"]
+    for channel in CHANNELS:
+        spread = lottery(channel)
+        assert 0.2 < spread.beats < 0.6  # never the 0 that one draw each seems to show
+        assert spread.slow > 0.95
+        for low, high in (spread.state_space[::2], spread.optimised[::2]):
+            assert high / low > 3.0
+
+
+def test_single_draws_spread_as_full_length_logs_do() -> None:
+    """Against logs sample by sample, of a tenth of the length, and another Allan variance."""
+    channel, rng = MTI_GYRO, np.random.default_rng(3)
+    taus = sizes(channel)[::12] / channel.rate
+    model = NoiseModel(N=GYRO.N, B=GYRO.B, T_B=GYRO.T_B, K=GYRO.K)
+    curves = [
+        allantools.oadev(simulate(model, 1.0, 36_000, rng), rate=1.0, data_type="freq",
+                         taus=taus[taus > 300])[1]
+        for _ in range(40)
+    ]  # fmt: skip
+    rms = [np.sqrt(np.mean((one - other) ** 2)) for one, other in pairwise(curves)]
+    low, middle, high = lottery(channel).optimised
+    assert low < np.median(rms) / 1.7 < high  # of tau > 300 s alone, a third of the grid
+    assert middle / 2 < np.median(rms) / 1.7 < middle * 2
+
+
+def test_table_4(lines: dict[str, Any]) -> None:
+    # By a pocket calculator: 120 ug/sqrt(Hz), 0.007 deg/s/sqrt(Hz), 0.03 mg and 10 deg/h.
+    vendor = {
+        "accel_x": (120e-6 * 9.80665, 30e-6 * 9.80665),
+        "gyro_x": (math.radians(0.007), math.radians(10.0 / 3600.0)),
+    }
+    for place, symbol in enumerate("NB"):
+        for channel, figures in vendor.items():
+            assert TABLE_4[symbol][channel] == pytest.approx(figures[place], rel=0.03)
+    shown = {row["quantity"]: row for row in lines["Table 4"]}
+    gyro = shown["N of the MTi-7 gyro, optimised over manufacturer"]
+    assert gyro["printed"] == pytest.approx(0.70)
+    assert gyro["found"] == pytest.approx(8.4e-5 / (math.radians(0.007) / math.sqrt(2)))
+    floor = shown["B of the MTi-7 gyro, optimised over manufacturer"]
+    assert floor["printed"] == pytest.approx(6.7 / 4.8)
+    tau = np.geomspace(1, 1e4, 3000)
+    lowest = min(math.sqrt(by_integral(GYRO, t)) for t in tau[:: 3000 // 40])
+    assert floor["found"] == pytest.approx(lowest / math.radians(10 / 3600), rel=0.05)
+    on_1_s, line = lines["Figure 9"]
+    assert on_1_s["found"] == pytest.approx(12.0e-5 / 8.42e-5, rel=1e-3)
+    assert line["printed"] == pytest.approx(0.664 * 4.8e-5, rel=1e-3)
+
+
+def test_figures_6_and_7(lines: dict[str, Any]) -> None:
+    (accel,), (gyro,) = lines["Figure 6"], lines["Figure 7"]
+    # The walks alone are 106 times apart, the white noise 68.
+    assert 68 < gyro["found"] < 8.7e-5 / 8.2e-7
+    assert 1.1 / 0.96 < accel["found"] < 7.2 / 3.4 * 1.1
+
+
+def test_lines_and_floor(lines: dict[str, Any]) -> None:
+    assert lines["Figure 1"][0]["found_words"] == "-0.5, +0, +0.5"
+    for model, tau, expected in (
+        (NoiseModel(N=2.0), 1.0, 2.0),
+        (NoiseModel(K=2.0), 3.0, 2.0),
+        (NoiseModel(B=2.0), 7.0, 0.6643 * 2.0),
+    ):
+        assert math.sqrt(by_integral(model, tau)) == pytest.approx(expected, rel=2e-3)
+    floor, place = (row["found"] for row in lines["Equation 13"])
+    assert floor == pytest.approx(math.sqrt(2 * math.log(2) / math.pi))
+    process = NoiseModel(B=1.0, T_B=10.0)
+    around = [by_integral(process, 10.0 * place * factor) for factor in (0.9, 1.0, 1.1)]
+    assert max(around) == around[1]
+    assert math.sqrt(around[1]) == pytest.approx(floor, rel=1e-3)
+
+
+def test_densities(lines: dict[str, Any]) -> None:
+    B, T_B = GYRO.B, GYRO.T_B
+    S_B = 2 * B**2 * math.log(2) / (math.pi * 0.4365**2 * T_B)
+    assert lines["Equation 8"][0]["found"] == pytest.approx(S_B, rel=3e-4)
+    f, corner = 1e-3, 1 / (2 * math.pi * T_B)
+    process = S_B / (2 * math.pi * f) ** 2 * (f / corner) ** 2 / (1 + (f / corner) ** 2)
+    expected = GYRO.N**2 + process + GYRO.K**2 / (2 * math.pi * f) ** 2
+    assert float(GYRO.psd(f)) == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_discrete_model(lines: dict[str, Any]) -> None:
+    """Van Loan's matrix exponential of the continuous model, equations 14 to 17."""
+    T, T_B = 0.01, GYRO.T_B
+    A = np.diag([-1 / T_B, 0.0])
+    S_B = 2 * GYRO.B**2 * math.log(2) / (math.pi * 0.4365**2 * T_B)
+    S = np.diag([S_B, GYRO.K**2])
+    block = expm(np.block([[-A, S], [np.zeros((2, 2)), A.T]]) * T)
+    phi = block[2:, 2:].T
+    space = GYRO.state_space(100.0)
+    assert space.transition == pytest.approx(phi, rel=1e-9)
+    assert np.diag(space.process_noise) == pytest.approx(np.diag(phi @ block[:2, 2:]), rel=3e-4)
+    assert space.output.tolist() == [1.0, 1.0]
+    assert space.measurement_noise == pytest.approx(GYRO.N**2 / T)
+    (step,) = lines["Equation 22"]
+    assert step["found"] == pytest.approx(1 - T / T_B, abs=1e-6)
+    assert lines["Equation 10"][0]["found"] == 7.0
+
+
+def test_the_weight_of_equation_25() -> None:
+    """The standard deviation of the Allan variance over that of many logs, of a tenth the rate."""
+    rng = np.random.default_rng(4)
+    logs = [simulate(GYRO, 1.0, 36_000, rng) for _ in range(200)]
+    variances = [
+        allantools.oadev(log, rate=1.0, data_type="freq", taus=[100.0])[1][0] ** 2 for log in logs
+    ]
+    relative = float(np.std(variances) / np.mean(variances))
+    meant, printed = spread_over_weight()
+    weighed = 2 * math.sqrt(100.0 / (2 * 36_000.0))
+    assert relative / weighed == pytest.approx(meant, rel=0.15)
+    assert 0.7 < meant < 1.4  # the weight meant takes about what is there
+    assert printed < 1e-3  # in rad/s; in degrees it would be 57 times that
+
+
+def test_the_sign_of_equation_26(lines: dict[str, Any]) -> None:
+    for tau in (1.0, 30.0, 300.0, 3000.0):
+        assert float(GYRO.allan_variance(tau)) == pytest.approx(by_integral(GYRO, tau), rel=1e-6)
+    assert as_printed(GYRO, 100.0) > 10 * by_integral(GYRO, 100.0)
+    for number in (26, 27):
+        assert lines[f"Equation {number}"][0]["verdict"] == "misprint"
