@@ -1,4 +1,5 @@
 import json
+import os
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -15,6 +16,7 @@ from imubench_pipeline.tables import (
     write_content,
     write_json,
 )
+from imubench_pipeline.tables.digests import read_sealed_json
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 SCORE = {"sensor": "s", "recording": "r", "channel": "gyro_x", "method": "curve", "rms": 1.0}
@@ -113,3 +115,12 @@ def test_a_folder_appears_with_all_that_is_in_it(tmp_path: Path) -> None:
         write_content("a", inside / "a.txt")
         raise RuntimeError
     assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_a_pipe_for_a_file_is_damaged(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.parquet")
+    with pytest.raises(TableError, match=r"a.parquet: is damaged \(it is no file\)"):
+        read("parameters", [tmp_path / "a.parquet"])
+    os.mkfifo(tmp_path / "a.json")
+    with pytest.raises(ValueError, match="digest"):
+        read_sealed_json(tmp_path / "a.json")
