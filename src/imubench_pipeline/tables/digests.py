@@ -45,7 +45,10 @@ def read_sealed_json(path: Path) -> dict[str, Any]:
     rest = text[: seal.start()] + _END if seal else text
     if seal is None or seal[0] != _last_line(rest):
         raise ValueError(f"{path}: its digest is another one")
-    data: dict[str, Any] = json.loads(rest)
+    try:
+        data: dict[str, Any] = json.loads(rest)
+    except RecursionError:
+        raise ValueError(f"{path}: is deeper than what is written") from None
     return data
 
 
