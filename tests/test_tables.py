@@ -1,4 +1,6 @@
+import hashlib
 import json
+import os
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -15,6 +17,7 @@ from imubench_pipeline.tables import (
     write_content,
     write_json,
 )
+from imubench_pipeline.tables.digests import read_sealed_json
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 SCORE = {"sensor": "s", "recording": "r", "channel": "gyro_x", "method": "curve", "rms": 1.0}
@@ -113,3 +116,20 @@ def test_a_folder_appears_with_all_that_is_in_it(tmp_path: Path) -> None:
         write_content("a", inside / "a.txt")
         raise RuntimeError
     assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_sealed_json_deeper_than_python_reads_is_refused(tmp_path: Path) -> None:
+    text = '{\n "a": ' + "[" * 100_000 + "]" * 100_000
+    digest = hashlib.sha256(f"{text}\n}}".encode()).hexdigest()
+    (tmp_path / "a.json").write_text(f'{text},\n "digest": "{digest}"\n}}\n')
+    with pytest.raises(ValueError, match="is deeper than what is written"):
+        read_sealed_json(tmp_path / "a.json")
+
+
+def test_a_pipe_for_a_file_is_damaged(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.parquet")
+    with pytest.raises(TableError, match=r"a.parquet: is damaged \(it is no file\)"):
+        read("parameters", [tmp_path / "a.parquet"])
+    os.mkfifo(tmp_path / "a.json")
+    with pytest.raises(ValueError, match="digest"):
+        read_sealed_json(tmp_path / "a.json")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from imubench_pipeline.run.sealing import settings_digest, unsound
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
-from imubench_pipeline.tables.seals import SealedFile, places, read_seal, seal_file
+from imubench_pipeline.tables.seals import Seal, SealedFile, SealError, places, read_seal, seal_file
 from tests.verification.finished import Finished
 
 pytestmark = pytest.mark.workflow
@@ -100,6 +102,31 @@ def test_what_was_made_of_another_file_is_made_again(results: Path) -> None:
     }  # fmt: skip
     write_sealed_json(data, seal)
     assert list(unsound(results, settings)) == [JOINED]
+
+
+FILE = {"size": 1, "sha256": "0", "changed": 0}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"inputs": ["a"]},
+        {"form": {}},
+        {"outputs": {"a": FILE | {"size": "1"}}},
+        {"outputs": {"a": FILE | {"changed": None}}},
+        {"outputs": {"../../a": FILE}},
+        {"inputs": {"/etc/passwd": "0"}},
+    ],
+)
+def test_a_seal_of_other_types_or_of_what_lies_elsewhere_is_none(
+    tmp_path: Path, change: dict[str, Any]
+) -> None:
+    seal = Seal("allan", "form", {"b": "0"}, {"a": SealedFile(**FILE)})
+    seal.write(tmp_path)
+    assert read_seal(tmp_path, "allan") == seal
+    write_sealed_json(asdict(seal) | change, tmp_path / seal_file("allan"))
+    with pytest.raises(SealError, match="is not as it was written"):
+        read_seal(tmp_path, "allan")
 
 
 def test_how_often_a_step_was_tried_is_no_setting() -> None:

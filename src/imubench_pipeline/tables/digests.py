@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,13 +39,22 @@ def read_sealed_json(path: Path) -> dict[str, Any]:
         If it is not, letter for letter, as it was written.
     """
     # All letters count, and not only what they mean.
-    text = path.read_bytes().decode()
+    with open(path, "rb", opener=_without_waiting) as file:
+        text = file.read().decode()
     seal = _LAST_LINE.search(text)
     rest = text[: seal.start()] + _END if seal else text
     if seal is None or seal[0] != _last_line(rest):
         raise ValueError(f"{path}: its digest is another one")
-    data: dict[str, Any] = json.loads(rest)
+    try:
+        data: dict[str, Any] = json.loads(rest)
+    except RecursionError:
+        raise ValueError(f"{path}: is deeper than what is written") from None
     return data
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe that nobody writes to is empty."""
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def digest_of(path: Path) -> str:

@@ -11,7 +11,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from imubench_pipeline.tables.digests import digest_of, read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
@@ -181,6 +181,7 @@ def read_seal(results: Path, place: str) -> Seal:
         data = read_sealed_json(path)
         outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}
         seal = Seal(**{**data, "outputs": outputs})
+        _check(seal)
     except FileNotFoundError:
         raise
     except OSError as error:
@@ -190,6 +191,20 @@ def read_seal(results: Path, place: str) -> Seal:
     if seal.place != place:
         raise SealError(f"is that of {seal.place}")
     return seal
+
+
+def _check(seal: Seal) -> None:
+    """Raise `ValueError` unless all in a seal is of its type, and names what is in the results."""
+    texts = [seal.place, seal.form, seal.settings, *seal.inputs.values()]
+    texts += [file.sha256 for file in seal.outputs.values()]
+    numbers = [n for file in seal.outputs.values() for n in (file.size, file.changed)]
+    names = [PurePosixPath(name) for name in (*seal.inputs, *seal.outputs)]
+    if (
+        not all(isinstance(text, str) for text in texts)
+        or not all(type(number) is int for number in numbers)
+        or any(name.is_absolute() or ".." in name.parts for name in names)
+    ):
+        raise ValueError("no seal")
 
 
 def places(results: Path) -> list[str]:

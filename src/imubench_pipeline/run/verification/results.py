@@ -253,6 +253,9 @@ class Results:
         }
         for name in sorted(set(TABLES) - set(OF_ONE_RECORDING)):
             place = f"tables/{name}.parquet"
+            left = self.seals["tables"].outputs.get(place)
+            if left is None or left.fault(self.folder / place, whole=False):
+                continue  # it is told
             try:
                 if not {"sensor", "recording"} <= set(pq.read_schema(self.folder / place).names):
                     continue
