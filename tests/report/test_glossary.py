@@ -3,7 +3,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import cache, lru_cache
 from html import unescape
 from html.parser import HTMLParser
 from itertools import pairwise
@@ -186,7 +186,7 @@ def values_of(name: str, inside: ast.FunctionDef, tree: ast.Module) -> set[str]:
     arguments = [argument.arg for argument in inside.args.args if argument.arg != "self"]
     if name in arguments:
         place = arguments.index(name)
-        for module in [tree] if list(calls(tree, inside.name)) else trees():  # else in a subclass
+        for module in [tree] if calls(tree, inside.name) else trees():  # else in a subclass
             for caller, call in calls(module, inside.name):
                 if len(call.args) > place:  # else a method of another class
                     found |= texts(call.args[place], caller, module)
@@ -205,15 +205,22 @@ def trees() -> dict[ast.Module, str]:
     return {ast.parse(path.read_text()): path.stem for path in sorted(SOURCE.rglob("*.py"))}
 
 
-def calls(tree: ast.Module, name: str) -> Iterator[tuple[ast.FunctionDef, ast.Call]]:
-    """Yield the calls of a function, each with the function that it stands in."""
+def calls(tree: ast.Module, name: str) -> list[tuple[ast.FunctionDef, ast.Call]]:
+    """Return the calls of a function, each with the function that it stands in."""
+    return calls_in(tree).get(name, [])
+
+
+@cache
+def calls_in(tree: ast.Module) -> dict[str, list[tuple[ast.FunctionDef, ast.Call]]]:
+    found: dict[str, list[tuple[ast.FunctionDef, ast.Call]]] = {}
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef):
             for node in ast.walk(function):
                 if isinstance(node, ast.Call):
                     called = getattr(node.func, "attr", getattr(node.func, "id", None))
-                    if called == name:
-                        yield function, node
+                    if called is not None:
+                        found.setdefault(called, []).append((function, node))
+    return found
 
 
 @lru_cache(maxsize=1)
