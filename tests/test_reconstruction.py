@@ -1,3 +1,4 @@
+import json
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,10 +10,15 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.recording import read_metadata
-from imubench_pipeline.settings.config import ReconstructionSettings
-from imubench_pipeline.steps.reconstruct import reconstruct
-from imubench_pipeline.tables import build
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
+from imubench_pipeline.steps.allan import curves
+from imubench_pipeline.steps.estimate import estimation
+from imubench_pipeline.steps.reconstruct import reconstruct, write_reconstruction
+from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables import read as read_table
 from imubench_pipeline.tables.keys import Key
 
 MODEL = NoiseModel(N=1e-3, B=2e-3, T_B=10.0, K=1e-4)
@@ -78,3 +84,41 @@ def test_the_square_root_of_the_mean_of_members(rng, tmp_path: Path) -> None:
 
     expected = 1.0 / np.sqrt(curve.tau[-3])
     assert at_long_tau(200) == pytest.approx(expected, rel=0.15)
+
+
+def test_what_authors_read_is_reconstructed_and_scored_beside_the_methods(rng, tmp_path) -> None:
+    (tmp_path / "logs/s").mkdir(parents=True)
+    (tmp_path / "sensors").mkdir()
+    log = simulate(NoiseModel(N=1e-3), 10.0, 5000, rng)
+    np.savetxt(tmp_path / "logs/s/r.csv", log, header="gx", comments="")
+    (tmp_path / "sensors/s.yaml").write_text(
+        "{vendor: V, model: S, log: {rate: 10 Hz, channels: {gyro_x: {column: gx, unit: rad/s}}}}"
+    )
+    plan = Plan(
+        {"logs": str(tmp_path / "logs"), "sensors": str(tmp_path / "sensors"), "simulated": None,
+         "results": str(tmp_path), "requirements": None, "estimate": {"methods": ["curve"]}}
+    )  # fmt: skip
+    folder, names = tmp_path / "kept", ("s", "r")
+    folder.mkdir()
+    settings = plan.ingest_settings(*names)
+    ingest_as_planned(plan.recordings[names].path, settings, *names, folder).write(
+        folder / "quality.json"
+    )
+    write("allan", curves(folder, *names, AllanSettings()), folder / "curve.parquet")
+    # Twice the noise that the log has, and no B: what the source does not print is no value.
+    asked = json.loads(plan.estimate_settings(*names)) | {"authors": {"gyro_x": {"N": 2e-3}}}
+    into = estimation(folder / "quality.json", folder / "curve.parquet", *names, json.dumps(asked))
+    read = {row["parameter"]: row for row in into.parameters if row["method"] == "authors"}
+    assert read["N"]["value"] == 2e-3 and read["B"]["status"] == "not_shown"
+    assert not any(row["recommended"] for row in read.values())
+    for table in ("allan", "parameters", "allan_compensated"):
+        write(table, getattr(into, table), folder / f"{table}.parquet")
+    inputs = [folder / name for name in ("quality.json", "allan.parquet", "parameters.parquet",
+                                         "allan_compensated.parquet")]  # fmt: skip
+    outputs = [folder / "reconstruction.parquet", folder / "scores.parquet"]
+    write_reconstruction(inputs, outputs, ReconstructionSettings())
+    scores = {row["method"]: row for row in read_table("scores", outputs[1:]).to_pylist()}
+    assert scores["authors"]["rms_log10"] == pytest.approx(np.log10(2.0), abs=0.02)
+    assert scores["curve"]["rms_log10"] < 0.05
+    assert scores["authors"]["beats"] < 0.01
+    assert scores["curve"]["beats"] == pytest.approx(0.5, abs=0.01)

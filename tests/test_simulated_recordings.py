@@ -1,4 +1,5 @@
 import json
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -167,6 +168,10 @@ def test_a_published_figure_is_taken_to_si_in_the_dimension_of_its_parameter(
         (
             with_channel(published=[PUBLISHED | {"parameter": "sensitivity"}]),
             "channels.gyro_x.published.0.means: 'deg/s' is no unit",
+        ),
+        (
+            with_channel(read={"N": "0.6 deg/sqrt(h)", "K": "1 deg/s"}),
+            "channels.gyro_x.read.K: 'deg/s' is no unit",
         ),
         (with_channel(N="1 deg/s"), "channels.gyro_x.N: 'deg/s' is no unit of gyro density"),
         (
@@ -521,10 +526,14 @@ def test_what_is_said_of_a_published_figure_does_not_simulate_again(tmp_path: Pa
     before = plan_of(tmp_path, BOARD)
     figures = dict(OF_S["channels"]["gyro_x"])
     reworded = [PUBLISHED | {"printed": "0.41 °/s", "means": "0.61 deg/s", "why": "because"}]
-    said = figures | {"published": reworded, "figures": "curve: 3"}
+    read = {"N": "0.6 deg/sqrt(h)", "B": "36 deg/h"}
+    said = figures | {"published": reworded, "figures": "curve: 3", "read": read}
     after = plan_of(tmp_path, BOARD | {"sensors": [OF_S | {"channels": {"gyro_x": said}}, OF_T]})
     assert settings_of_both(after) == settings_of_both(before)
-    # The tables and the report show it.
+    # The tables and the report show it, and what the source read is a method of the estimates.
+    (found,) = json.loads(after.estimate_settings("s", "sim_pair"))["authors"].values()
+    assert found == pytest.approx({"N": math.radians(0.6) / 60.0, "B": math.radians(0.01)})
+    assert "authors" not in json.loads(before.estimate_settings("s", "sim_pair"))
     assert after.truths("s") != before.truths("s")
     assert after.report_settings() != before.report_settings()
     noisier = OF_S | {"channels": {"gyro_x": figures | {"N": "0.7 deg/sqrt(h)"}}}

@@ -55,7 +55,7 @@ def test_printed_and_found_stand_side_by_side_in_the_unit_of_the_paper(
     (line,) = page.naming("Equation 26", "tr")
     assert "misprint" in line.text and "–" in line.text
     assert "nowhere.html" not in page.source, "a page that there is none of"
-    assert "Of 2 lines 1 differs, 1 misprint." in page.text
+    assert "Of 2 lines 1 differs, 1 is a misprint." in page.text
     assert "10 h are assumed" in page.text
 
 

@@ -6,7 +6,14 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from imubench_pipeline.experiments.papers.about import BASES, PAPERS, VERDICTS, About, Drawn
+from imubench_pipeline.experiments.papers.about import (
+    BASES,
+    PAPERS,
+    VERDICTS,
+    About,
+    Drawn,
+    Verdict,
+)
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.practical import limit_digits, number_text
 from imubench_pipeline.report.site import Entry, Site
@@ -107,23 +114,33 @@ def _pages(site: Site) -> set[str]:
     return of_recordings | {file for file, _ in site.navigation}
 
 
+_COUNTED: dict[Verdict, tuple[str, str]] = {
+    "agrees": ("agrees", "agree"),
+    "differs": ("differs", "differ"),
+    "misprint": ("is a misprint", "are misprints"),
+    "not to be had": ("is not to be had", "are not to be had"),
+}
+
+
 def _paper(paper: About, rows: Sequence[Row], there: set[str]) -> dict[str, Any]:
-    kinds = dict.fromkeys(row["place"].split()[0] for row in rows)
     verdicts = Counter(row["verdict"] for row in rows)
     return {
         "about": paper,
         "lines": [
             {
                 **row,
-                "kind": row["place"].split()[0],
                 "page": row["page"] if (row["page"] or "").split("#")[0] in there else None,
                 **cells(row),
             }
             for row in rows
         ],
-        "counts": [(verdicts[verdict], verdict) for verdict in VERDICTS if verdicts[verdict]],
+        "counts": [
+            f"{verdicts[verdict]} {words[verdicts[verdict] > 1]}"
+            for verdict, words in _COUNTED.items()
+            if verdicts[verdict]
+        ],
         "filters": {
-            "kind": list(kinds),
+            "place": list(dict.fromkeys(row["place"] for row in rows)),
             "verdict": list(dict.fromkeys(row["verdict"] for row in rows)),
             "basis": list(dict.fromkeys(row["basis"] for row in rows)),
         },

@@ -50,12 +50,24 @@ def _units(channel: Channel) -> dict[str, str]:
     return SI_UNITS[quantity_of(channel.channel)]
 
 
+def _shown(unit: str) -> str:
+    """Return a unit with its signs."""
+    return unit.replace("sqrt(", "√").replace(")", "").replace("^2", "²")
+
+
+def _power(value: float, digits: int) -> str:
+    """Return a number of some digits, such as 8.4·10⁻⁵."""
+    text = f"{value:.{digits}g}"
+    if "e" not in text and value >= 1e-2:
+        return text
+    mantissa, power = f"{value:.{digits - 1}e}".split("e")
+    return f"{mantissa}·10{str(int(power)).translate(_DIGITS)}"
+
+
 def _written(value: float, unit: str) -> str:
-    """Return a number as the paper writes it, such as 8,4·10⁻⁵ rad/s/sqrt(Hz)."""
-    if value >= 1.0:
-        return f"{value:g} {unit}".replace(".", ",")
-    digits, power = f"{value:.1e}".split("e")
-    return f"{digits.replace('.', ',')}·10{str(int(power)).translate(_DIGITS)} {unit}"
+    """Return a number as the paper writes it, such as 8,4·10⁻⁵ rad/s/√Hz."""
+    number = f"{value:g}" if value >= 1.0 else _power(value, 2)
+    return f"{number} {_shown(unit)}".replace(".", ",")
 
 
 def _value(model: NoiseModel, symbol: str) -> float:
@@ -66,7 +78,7 @@ def _words_of(row: Row | None, what: str) -> str:
     if row is None:
         return ""
     value = row["value"]
-    told = str(row["status"]).replace("_", " ") if value is None else f"{value:.3g}"
+    told = str(row["status"]).replace("_", " ") if value is None else _power(float(value), 3)
     return f"{what}: {told}"
 
 
@@ -394,7 +406,8 @@ def _place(claim: Claim) -> tuple[int, int]:
 
 @cache
 def _claims() -> tuple[Claim, ...]:
-    return tuple(sorted((claim for part in _PARTS for claim in part()), key=_place))
+    claims = sorted((claim for part in _PARTS for claim in part()), key=_place)
+    return tuple(replace(claim, printed_unit=_shown(claim.unit)) for claim in claims)
 
 
 PAPER = Paper(about=MAIA, claims=lambda _: _claims())
