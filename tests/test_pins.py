@@ -35,7 +35,7 @@ def project() -> dict:
 
 
 def test_there_is_a_file_for_each_use() -> None:
-    assert [path.stem for path in FILES] == ["dev", "run", "test"]
+    assert [path.stem for path in FILES] == ["dev", "docs", "run", "test"]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

@@ -97,15 +97,6 @@ def test_what_makes_results_again_is_a_command_of_the_folder(
     assert Results(lab / "results").run_again == "snakemake -c2 --config logs=/data"
 
 
-def test_each_exit_status_stands_in_one_place() -> None:
-    rows = {
-        cells[1].strip(" `"): tuple(cell.strip() for cell in cells[2:-1])
-        for line in (PROJECT / "docs/commands.md").read_text().splitlines()
-        if line.startswith("| `") and len(cells := line.split("|")) == 6
-    }
-    assert rows == {name: (*of.statuses, "", "")[:3] for name, of in COMMANDS.items()}
-
-
 @pytest.mark.parametrize("name", COMMANDS)
 def test_each_command_says_its_exit_statuses(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):

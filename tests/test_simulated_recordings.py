@@ -246,7 +246,7 @@ def test_a_recording_that_is_simulated_twice_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_board_is_run_as_its_page_of_the_manual_says(tmp_path: Path) -> None:
-    manual = (PROJECT / "docs/boards.md").read_text(encoding="utf-8")
+    manual = (PROJECT / "docs/how-to/boards.md").read_text(encoding="utf-8")
     listed = re.search(r"^boards: .*", manual, re.MULTILINE)
     named = re.search(r"named (sim_\w+)$", listed[0]) if listed else None
     assert listed and named and "--config simulated=my_simulated.yaml" in manual
@@ -258,7 +258,7 @@ def test_a_board_is_run_as_its_page_of_the_manual_says(tmp_path: Path) -> None:
 
 
 def test_the_manual_has_the_defaults_of_a_day_cycle() -> None:
-    manual = (PROJECT / "docs/simulator.md").read_text(encoding="utf-8")
+    manual = (PROJECT / "docs/how-to/simulator.md").read_text(encoding="utf-8")
     period, highest = (DayCycleForm.model_fields[name].default for name in ("period", "highest"))
     assert f"period is {period} and highest, the time of the highest value, {highest}" in manual
 

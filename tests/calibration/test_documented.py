@@ -8,7 +8,7 @@ from tests.conftest import PROJECT
 
 
 def test_the_example_of_the_documentation_finds_what_it_simulates():
-    text = (PROJECT / "docs/calibration.md").read_text(encoding="utf-8")
+    text = (PROJECT / "docs/how-to/calibration.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     names = {}
     with contextlib.redirect_stdout(io.StringIO()):

@@ -11,7 +11,7 @@ from tests.workflow.rules import costs
 
 MB = 1_000_000
 
-# MB and s that the steps took (docs/cluster.md): millions of samples, channels.
+# MB and s that the steps took (docs/how-to/cluster.md): millions of samples, channels.
 MEASURED = {
     (8.64, 6): {
         "simulate": (217, 9),

@@ -1,8 +1,8 @@
 """Memory and time that a job asks for on a cluster, from the size of the log.
 
 The costs that the rules state are what steps took of logs of up to 60 million samples
-(docs/cluster.md); here a margin is added. A job has one core whatever its log: no step computes
-with more. A run on one computer is held to the limits alone, far above what steps take.
+(docs/how-to/cluster.md); here a margin is added. A job has one core whatever its log: no step
+computes with more. A run on one computer is held to the limits alone, far above what steps take.
 """
 
 from __future__ import annotations

@@ -1,0 +1,91 @@
+"""The reference of tables, findings, statuses, formats, targets and noise terms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from extensions.markdown import cell, code, table
+from imubench_pipeline.noise.terms import TERMS
+from imubench_pipeline.report.glossary import Term, glossary
+from imubench_pipeline.run.formats_command import Line, export_targets, log_formats
+from imubench_pipeline.tables.schemas import TABLES
+
+
+def tables() -> str:
+    """Return the columns of every table."""
+    return "\n".join(
+        f"(table-{name})=\n## {name}\n\n"
+        + table(
+            ("column", "type", "unit", "meaning"),
+            (
+                (
+                    code(column.name),
+                    f"{column.type}{'' if column.required else ' or null'}",
+                    cell(column.unit),
+                    cell(column.meaning),
+                )
+                for column in columns
+            ),
+        )
+        for name, columns in TABLES.items()
+    )
+
+
+def findings() -> str:
+    """Return what is found in logs, and what to do about it."""
+    rows = (
+        (code(term.key), cell(term.short), cell(term.action))
+        for term in glossary().values()
+        if term.action
+    )
+    return table(("finding", "what it says", "what to do"), rows)
+
+
+_STATUSES = ("ok", "doubtful", "not_shown", "at_bound", "not_identified", "absent")
+
+
+def statuses() -> str:
+    """Return what the status of an estimated figure says."""
+    terms = glossary()
+    return table(("status", "what it says"), ((code(s), cell(terms[s].short)) for s in _STATUSES))
+
+
+def terms_of_the_report() -> str:
+    """Return every word of the report, by the section that it stands in."""
+    sections: dict[str, list[Term]] = {}
+    for term in glossary().values():
+        if not term.action:
+            sections.setdefault(term.section, []).append(term)
+    return "\n".join(
+        f"## {section.replace('-', ' ').capitalize()}\n\n"
+        + table(("term", "meaning"), ((cell(term.name), cell(term.short)) for term in found))
+        for section, found in sections.items()
+    )
+
+
+def formats() -> str:
+    """Return the logs that are read."""
+    return _of_lines(log_formats())
+
+
+def targets() -> str:
+    """Return the programs that files are written for."""
+    return _of_lines(export_targets())
+
+
+def _of_lines(lines: Iterable[Line]) -> str:
+    heads, *rows = lines
+    return table(heads, ((code(first), *map(cell, rest)) for first, *rest in rows))
+
+
+def noise_terms() -> str:
+    """Return every kind of noise term with its parameters."""
+    rows = (
+        (
+            code(kind.symbol),
+            cell((kind.__doc__ or "").split("\n")[0]),
+            ", ".join(code(parameter.symbol) for parameter in kind.parameters),
+        )
+        for kind in TERMS
+    )
+    return table(("in the name of a model", "what", "parameters"), rows)

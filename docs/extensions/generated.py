@@ -1,0 +1,42 @@
+"""Puts what the code declares where a page has a line `%generated <name>`, when pages are made."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from sphinx.application import Sphinx
+
+from extensions import commands, declared, models
+
+PARTS: dict[str, Callable[[], str]] = {
+    "configuration": models.configuration,
+    "sensor-file": models.sensor_file,
+    "notes": models.notes,
+    "requirement": models.requirement,
+    "simulated": models.simulated,
+    "tables": declared.tables,
+    "statuses": declared.statuses,
+    "findings": declared.findings,
+    "glossary": declared.terms_of_the_report,
+    "formats": declared.formats,
+    "targets": declared.targets,
+    "noise-terms": declared.noise_terms,
+    "commands": commands.commands,
+    "exit-statuses": commands.exit_statuses,
+}
+"""Markdown of each part, made when a page that names it is read."""
+
+_LINE = re.compile(r"^%generated ([\w-]+)$", re.MULTILINE)
+
+
+def _fill(app: Sphinx, docname: str, content: list[str]) -> None:
+    content[0] = _LINE.sub(lambda line: PARTS[line[1]](), content[0])
+    if names := _LINE.findall(content[0]):
+        raise ValueError(f"{docname}: {names} stand within generated text")
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Fill pages when they are read."""
+    app.connect("source-read", _fill)
+    return {"parallel_read_safe": True}

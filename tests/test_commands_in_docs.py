@@ -1,0 +1,340 @@
+"""Every command of the README and of `docs/` is run here, or says what runs it instead."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from imubench_pipeline.run.cli import main
+from tests.conftest import PROJECT
+
+PAGES = [
+    *(
+        PROJECT / name
+        for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "config/README.md")
+    ),
+    *sorted(path for path in (PROJECT / "docs").rglob("*.md") if "_build" not in path.parts),
+]
+_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_COMMENT = re.compile(r"(^|\s+)#( .*)?$")
+
+INSTALLS = "installs from an index: .ci/run"
+HOURS = "minutes to hours: by hand before a release; its flags are tried by -m release"
+ELSEWHERE = {
+    "git clone <this repository> && cd imubench_pipeline": "needs a place where it is kept",
+    "python3 -m venv .venv && .venv/bin/pip install -r requirements/dev.txt": INSTALLS,
+    ".venv/bin/pip install --no-deps --no-build-isolation -e .": INSTALLS,
+    "python3 -m venv .venv && .venv/bin/pip install -r requirements/run.txt && .venv/bin/pip "
+    "install --no-deps --no-build-isolation -e . && .venv/bin/snakemake -c2": INSTALLS,
+    "python3 -m venv .venv-test && .venv-test/bin/pip install -r requirements/test.txt && "
+    ".venv-test/bin/pip install --no-deps --no-build-isolation -e . && .venv-test/bin/python -m "
+    "pytest -n 2": INSTALLS,
+    ".venv-test/bin/pip install -r requirements/docs.txt && .venv-test/bin/sphinx-build -W -q docs "
+    "docs/_build/html": INSTALLS,
+    ".venv/bin/pip install -r requirements/docs.txt && .venv/bin/sphinx-build -W -q docs "
+    "docs/_build/html": INSTALLS,
+    "python3 -m venv .venv && .venv/bin/pip install -r requirements/run.txt && .venv/bin/pip "
+    "install --no-deps --no-build-isolation -e .": INSTALLS,
+    ".venv/bin/ruff check . && .venv/bin/ruff format .": "of the whole project: .ci/run",
+    ".venv/bin/snakefmt Snakefile workflow": "of the whole project: .ci/run",
+    ".venv/bin/mypy": "of the whole project: .ci/run",
+    ".venv/bin/python -m pytest -n 2": "these tests themselves: .ci/run",
+    "cyclonedx-py environment --output-reproducible --of JSON -o sbom.json .venv": "an "
+    "environment of its own, before a release",
+    "pip-audit --disable-pip --require-hashes -r requirements/run.txt": "asks a service",
+    "python3 -m venv .venv && .venv/bin/pip install -c constraints.txt -e '.[cluster]'": INSTALLS,
+    ".venv/bin/snakemake --workflow-profile profiles/slurm --config logs=/data/logs "
+    "results=/data/results": "needs Slurm: tests/slurm",
+    ".venv/bin/imubench nightly -- --workflow-profile profiles/slurm": "needs Slurm: tests/slurm",
+    "pip wheel --no-deps -w dist . && pip install dist/imubench_pipeline-*.whl": "installs from an "
+    "index: tests/workflow/test_deployed.py builds it",
+    'eval "$(imubench completion bash)"': "of a shell that is typed into: tests/test_shipped.py",
+    "imubench completion zsh > ~/.zfunc/_imubench": "of a shell that is typed into: "
+    "tests/test_shipped.py",
+    "snakemake -c2 --snakefile <checkout>/workflow/Snakefile": "tests/workflow/test_deployed.py",
+    "docker build -f container/Dockerfile -t imubench .": "needs Docker; nothing runs it here",
+    "docker run --rm -v /srv/imubench:/data -v imubench:/opt/imubench/.snakemake imubench "
+    "snakemake -c4 --config logs=/data/logs sensors=/data/sensors results=/data/results "
+    "simulated=false": "needs Docker; nothing runs it here",
+    "rclone sync lab:logs /scratch/logs": "needs a store; nothing runs it here",
+    "rclone sync lab:imubench /scratch/imubench": "needs a store; nothing runs it here",
+    "rclone sync /scratch/imubench lab:imubench": "needs a store; nothing runs it here",
+    "rsync -a logger:/data/ /data/logs/mti_7/": "needs another machine; nothing runs it here",
+    "systemctl daemon-reload && systemctl enable --now imubench.timer": "needs root and systemd; "
+    "nothing runs it here",
+    "systemctl start imubench.service; journalctl -u imubench.service": "needs root and systemd; "
+    "nothing runs it here",
+    ".venv-test/bin/python -m tests.release.mutants": "needs what `release` installs: "
+    "tests/release/test_mutants.py",
+    "snakemake -c2 --config simulated=my_simulated.yaml results=my_results": "10 h of two sensors: "
+    "tests/test_simulated_recordings.py reads the page",
+}
+"""Commands that are not run here, as the pages have them, with the reason and what runs them."""
+
+COSTLY = (
+    ".venv/bin/imubench init lab",
+    ".venv/bin/imubench run lab",
+    "imubench init station/",
+    "imubench run station/",
+    "imubench nightly station/",
+    ".venv/bin/imubench figures ",
+    ".venv/bin/imubench nightly ",
+    ".venv/bin/snakemake -c2 --config ",
+    "snakemake -c16 ",
+    "imubench simulate bno055 --hours 10 ",
+    "imubench simulate mti_7 --hours 10 ",
+    "#!/bin/sh",
+    "for batch in ",
+)
+"""How those begin that take more than a few seconds, and are run before a release."""
+
+ANALYSE = ".venv/bin/snakemake -c2"
+"""What all others find done."""
+
+FLAGGED = ("#!/bin/sh", ".venv/bin/imubench inspect bench.csv")
+"""How those begin that end with 1: something is to be said, or left to fill in."""
+
+STANDS_FOR = {"/srv/imubench": ".", "/data/": "data/", "/scratch/": "scratch/"}
+"""Places of a reader, and those in the folder of the test."""
+
+
+def commands_of(block: str) -> Iterator[str]:
+    """The commands of a block, each in one line and without its comment; a script is one."""
+    if block.startswith("#!") or re.search(r"^done$", block, re.MULTILINE):
+        yield block.strip()
+        return
+    for line in re.sub(r" *\\\n *", " ", block).splitlines():
+        if command := _COMMENT.sub("", line).strip():
+            yield command
+
+
+def listed() -> dict[str, str]:
+    """Every command, and the page that has it first."""
+    found: dict[str, str] = {}
+    for page in PAGES:
+        for language, block in _BLOCK.findall(page.read_text(encoding="utf-8")):
+            if language == "sh":
+                for command in commands_of(block):
+                    found.setdefault(command, page.relative_to(PROJECT).as_posix())
+    return found
+
+
+TUTORIAL = "docs/tutorial/index.md"
+
+
+def of_tutorial() -> list[str]:
+    """The commands of the tutorial, of which each needs those before it."""
+    blocks = _BLOCK.findall((PROJECT / TUTORIAL).read_text(encoding="utf-8"))
+    return [one for language, block in blocks if language == "sh" for one in commands_of(block)]
+
+
+COMMANDS = listed()
+BENCHMARK = re.compile(r"(\w+=\w+ )?\.venv-test/bin/python (-m )?(benchmarks/\w+\.py|[\w.]+)( .*)?")
+RUN = [
+    pytest.param(command, marks=pytest.mark.release if command.startswith(COSTLY) else ())
+    for command in COMMANDS
+    if command not in {*ELSEWHERE, *of_tutorial(), ANALYSE} and not BENCHMARK.fullmatch(command)
+]
+
+
+def put_log(path: Path, names: list[str], separator: str, *, samples: int = 6000) -> None:
+    rng = np.random.default_rng(1)
+    gyro, accel = rng.normal(0.0, 8e-4, samples), rng.normal(9.81, 1e-2, samples)
+    columns = [np.arange(samples) / 100.0, gyro, accel][-len(names) :]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savetxt(
+        path,
+        np.column_stack(columns),
+        "%.7f",
+        delimiter=separator,
+        header=separator.join(names),
+        comments="",
+    )
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A checkout with one short log, which was analysed by the README's command."""
+    folder = tmp_path_factory.mktemp("lab")
+    for name in ("Snakefile", "profiles", "workflow", "docs"):
+        (folder / name).symlink_to(PROJECT / name)
+    shutil.copytree(PROJECT / "config", folder / "config")
+    (folder / ".venv").symlink_to(sys.prefix)
+    config = folder / "config/config.yaml"
+    settings = yaml.safe_load(config.read_text())
+    settings["estimate"]["methods"] = ["likelihood"]
+    settings["simulated"] = False
+    config.write_text(yaml.safe_dump(settings))
+    sensor = folder / "config/sensors/mti_7.yaml"
+    sensor.write_text(re.sub(r"    (gyro|accel)_[xy]: .*\n", "", sensor.read_text()))
+    put_log(folder / "logs/mti_7/bench.txt", ["Gyr_Z", "Acc_Z"], "\t")
+    shutil.copytree(folder / "logs", folder / "data/logs")
+    shutil.copytree(folder / "logs", folder / "data/batches/batch_07")
+    shutil.copytree(folder / "logs", folder / "scratch/logs")
+    shutil.copytree(folder / "config/sensors", folder / "data/sensors")
+    run(ANALYSE, folder)
+    (folder / "results/nightly").mkdir()
+    units = ["t [s]", "gz [deg/s]", "az [m/s^2]"]
+    for name in ("logs/mine/run.csv", "run.csv", "other.csv"):
+        put_log(folder / name, units, ",", samples=2000)
+    with zipfile.ZipFile(folder / "run.zip", "w") as archive:
+        archive.write(folder / "logs/mine/run.csv", "run.csv")
+    shutil.copy(folder / "logs/mti_7/bench.txt", folder / "run_7.csv")
+    (folder / "bin").mkdir()
+    (folder / "bin/mail").write_text("#!/bin/sh\ncat > mailed\n")  # a mailer that keeps it
+    (folder / "bin/mail").chmod(0o755)
+    (folder / "profile.csv").write_text("time [s],temperature [degC]\n0,20\n36000,30\n")
+    for name, begin in {
+        "my_model.yaml": "sensor: bno055",
+        "turn.yaml": "temperature: {form",
+    }.items():
+        (folder / name).write_text(block_of("docs/how-to/simulator.md", begin))
+    return folder
+
+
+def block_of(page: str, begin: str) -> str:
+    """A block of a page by how it begins, as a reader copies it."""
+    blocks = _BLOCK.findall((PROJECT / page).read_text(encoding="utf-8"))
+    (found,) = (block for _, block in blocks if block.startswith(begin))
+    return found
+
+
+def run(command: str, folder: Path) -> None:
+    """Run a command as the page has it; those of `imubench` here, where it is imported."""
+    said = io.StringIO()
+    for place, other in STANDS_FOR.items():
+        command = command.replace(place, other if other == "." else f"{folder}/{other}")
+    words = shlex.split(command, comments=False) if command.count("\n") == 0 else []
+    of_shell = set(words) & {"&&", ";", "|", ">", "run"}  # `imubench run` becomes Snakemake
+    if words[:1] in ([".venv/bin/imubench"], ["imubench"]) and not of_shell:
+        out, err = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
+        with contextlib.chdir(folder), out, err:
+            returned = main(words[1:])
+    else:
+        own = (str(Path(sys.executable).parent), str(folder / "bin"), os.environ["PATH"])
+        done = subprocess.run(
+            ["/bin/sh", "-c", command],
+            cwd=folder,
+            env=os.environ | {"PATH": os.pathsep.join(own)},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=600,
+        )
+        returned = done.returncode
+        said.write(done.stdout + done.stderr)
+    assert returned == int(command.startswith(FLAGGED)), (
+        f"{command}: exit status {returned}\n{said.getvalue()}"
+    )
+
+
+@pytest.mark.parametrize("command", RUN)
+def test_it_runs(command: str, lab: Path) -> None:
+    run(command, lab)
+
+
+def test_what_it_runs_on_was_analysed(lab: Path) -> None:
+    assert ANALYSE in COMMANDS
+    assert (lab / "results/report/sensors/mti_7.html").is_file()
+
+
+def test_what_is_not_run_is_still_there() -> None:
+    assert ELSEWHERE.keys() <= COMMANDS.keys()
+    assert all(any(command.startswith(begin) for command in COMMANDS) for begin in COSTLY)
+
+
+@pytest.mark.parametrize("reason", sorted(set(ELSEWHERE.values())))
+def test_what_runs_it_instead_is_there(reason: str) -> None:
+    where = reason.partition(": ")[2].split(" ")[0]
+    assert not where or "/" not in where or (PROJECT / where).exists(), reason
+
+
+@pytest.mark.release
+def test_the_tutorial_from_first_to_last(lab: Path) -> None:
+    for command in of_tutorial():
+        run(command, lab)
+    assert "accelerometer_noise_density" in (lab / "safe.yaml").read_text()
+
+
+def benchmarks() -> dict[str, str]:
+    found = {}
+    for command in COMMANDS:
+        if (told := BENCHMARK.fullmatch(command)) and command not in ELSEWHERE:
+            found[told[3]] = told[4] or ""
+    return found
+
+
+def test_every_benchmark_has_its_command() -> None:
+    stated = {name for name in benchmarks() if name.startswith("benchmarks/")}
+    helpers = {"bands", "resident", "silent_cases", "simulators", "workflow_steps"}
+    there = {f"benchmarks/{path.name}" for path in (PROJECT / "benchmarks").glob("*.py")}
+    assert stated == there - {f"benchmarks/{name}.py" for name in helpers}
+
+
+@pytest.mark.release
+@pytest.mark.parametrize(("name", "flags"), benchmarks().items())
+def test_a_benchmark_takes_the_flags_of_its_command(name: str, flags: str) -> None:
+    if name == "benchmarks/peers.py":
+        flags = ""
+    else:
+        flags += " --help"
+    what = name if name.endswith(".py") else f"-m {name}"
+    done = subprocess.run(
+        [sys.executable, *shlex.split(f"{what}{flags}")],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+NO_PROGRAMS = {
+    "docs/extending.md": "parts of modules that were not kept",
+    "config/README.md": "a Snakefile: tests/workflow/test_deployed.py",
+    "docs/how-to/calibration.md": "tests/calibration/test_documented.py",
+    "docs/how-to/scaling.md": "reads the results of several batches",
+}
+"""Pages with Python that is not run here, and why."""
+
+
+def programs() -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for page in PAGES:
+        blocks = _BLOCK.findall(page.read_text(encoding="utf-8"))
+        if parts := [block for language, block in blocks if language == "python"]:
+            found[page.relative_to(PROJECT).as_posix()] = parts
+    return found
+
+
+@pytest.mark.parametrize("page", sorted(programs().keys() - NO_PROGRAMS.keys()))
+def test_python_of_a_page_runs(page: str, lab: Path, rng: np.random.Generator) -> None:
+    logs = rng.normal(0.0, 2e-3, (2, 20_000))
+    names = {"rng": rng, "cheap_log": logs[0], "better_log": logs[1]}
+    with contextlib.chdir(lab), contextlib.redirect_stdout(io.StringIO()):
+        for part in programs()[page]:
+            exec(compile(part, page, "exec"), names)
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", "SECURITY.md"])
+def test_links_lead_somewhere(page: str) -> None:
+    links = re.findall(r"\]\((?!https?:)([^)#]+)", (PROJECT / page).read_text(encoding="utf-8"))
+    assert links and not [link for link in links if not (PROJECT / link).exists()]
+
+
+def test_the_readme_is_short() -> None:
+    assert len((PROJECT / "README.md").read_text(encoding="utf-8").splitlines()) < 120
