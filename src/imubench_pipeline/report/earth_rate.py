@@ -143,5 +143,5 @@ def _gain(lines: Sequence[Row]) -> str:
     text = " to ".join(dict.fromkeys(number_text(gain, 2) for gain in (min(gains), max(gains))))
     return (
         f"A filter that does not know the rate has a σ that is {text} % less than that of "
-        " the mean over pairs in these runs: that is all that it improves."
+        "the mean over pairs in these runs: that is all that it improves."
     )
