@@ -83,7 +83,16 @@ SILVA = About(
         ("sirrs01_03", "sim_published"),
         *(("sirrs01_03", f"sim_run_{number}") for number in (1, 2, 3, 4)),
     ),
-    declared=(),
+    declared=(
+        "The latitude is not printed, nor how long a turn takes, nor the bias: −23.3° (Londrina, "
+        "where the authors work), 2 s of each 30 s and 0.05 °/s are assumed.",
+        "The log at rest was a week long; here 48 h are simulated.",
+        "All logs are simulated from the four numbers of section 5.1: what is found of N, B, K and "
+        "T_B is the input come back. The estimates of section 6 are typed from the paper, and held "
+        "against what the noise of those four numbers allows.",
+        "The curves of the figures are not in the text: figures are compared by what is said of "
+        "them.",
+    ),
 )
 
 ENGERS = About(
