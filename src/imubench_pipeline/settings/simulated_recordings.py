@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from imubench_pipeline.settings.known_rates import Angle, AtRest, OnRateTable
 from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.settings.printed import Kind as FigureKind
 from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
 from imubench_pipeline.settings.sensor import (
     EXPERIMENTS,
@@ -122,6 +123,7 @@ class PublishedFigure(Strict):
     figure: Text = Field(description="its name there")
     printed: Text = Field(description="with its unit, as printed")
     of: Literal["log", "datasheet"] = Field("log", description="what it says something of")
+    kind: FigureKind | None = Field(None, description="of a datasheet: max, typ ...; left out: any")
     parameter: Literal["N", "B", "bias", "sensitivity"]
     means: Text = Field(description="the same as that parameter: N two-sided, B the floor / 0.664")
     why: Text | None = Field(None, description="why it differs from what an estimate gives")

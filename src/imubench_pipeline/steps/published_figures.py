@@ -51,7 +51,9 @@ def published_rows(
             for figure in settings.published:
                 key = (entry.sensor, entry.recording, str(channel), figure.parameter)
                 estimate = _as_shown(best.get(key, {}))
-                sheet = printed.get(key, [])
+                sheet = [
+                    value for kind, value in printed.get(key, []) if figure.kind in (None, kind)
+                ]
                 shown = true.get((*key[:3], f"{figure.parameter} in the log"), true.get(key, {}))
                 yield {
                     "sensor": entry.sensor,
@@ -119,14 +121,16 @@ def _slowest(rows: Iterable[Row]) -> dict[_Place, Row]:
     return {_place(row): row for row in sorted(with_value, key=slowness)}
 
 
-def _printed(rows: Iterable[Row]) -> dict[_Place, list[float]]:
-    """Return the figures of the datasheet, in the conventions of the parameters."""
-    figures: dict[_Place, list[float]] = {}
+def _printed(rows: Iterable[Row]) -> dict[_Place, list[tuple[str | None, float]]]:
+    """Return kind and value of the figures of the datasheet, in the parameters' conventions."""
+    figures: dict[_Place, list[tuple[str | None, float]]] = {}
     for row in rows:
         convention = _DATASHEET.get(row["statistic"]) or _DATASHEET.get(row["quantity"])
         if convention is not None and row["comparable"] is not None:
             parameter, factor = convention
-            figures.setdefault(_place(row, parameter), []).append(row["comparable"] * factor)
+            figures.setdefault(_place(row, parameter), []).append(
+                (row["kind"], row["comparable"] * factor)
+            )
     return figures
 
 

@@ -100,7 +100,15 @@ ENGERS = About(
     name="Engers",
     title="three MEMS gyros on one board",
     logs=tuple((sensor, "sim_engers") for sensor in ("scc2130", "mpu9250", "bno055")),
-    declared=(),
+    declared=(
+        "He published no log: all are simulated from his Tables 2 to 7, so the ratios to these are "
+        "the simulator’s own input come back. T_B, K, the temperature and the noise of the BNO055 "
+        "that he could not simulate are assumed; so are the sensitivities, as in datasheets.",
+        "The tables are typed from the text, in which the figures are not: figures are compared by "
+        "what is said of them, and by their counterparts here.",
+        "Before the fit is what the curve of the simulated log reads; after it, the estimate. He "
+        "turned gains by hand until the curves looked alike.",
+    ),
 )
 
 PAPERS = (MAIA, SILVA, ENGERS)
