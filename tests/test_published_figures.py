@@ -206,6 +206,26 @@ def test_a_figure_of_the_datasheet_is_called_so() -> None:
     assert found["datasheet_upper"] == pytest.approx(found["means"])
 
 
+def test_a_printed_maximum_stands_beside_the_maximum_of_the_sheet() -> None:
+    offset = [
+        {"value": 1, "unit": "deg/s", "kind": "typ"},
+        {"value": 3, "unit": "deg/s", "kind": "max"},
+    ]
+    given = tables(estimate("likelihood", (31.0, 90.0)), sheet=SHEET | {"offset": offset})
+    found = {}
+    for kind in (None, "typ", "max"):
+        stated = {} if kind is None else {"kind": kind}
+        figure = printed_as("bias", "3 deg/s", of="datasheet", **stated)
+        (row,) = rows(given, truths({"gyro_x": CHANNEL | {"published": [figure]}}))
+        upper = row["datasheet_upper"]
+        found[kind] = (row["datasheet"] / DEGREE, upper and upper / DEGREE)
+    assert found == {
+        None: (pytest.approx(1.0), pytest.approx(3.0)),
+        "typ": (pytest.approx(1.0), None),
+        "max": (pytest.approx(3.0), None),
+    }
+
+
 def test_nothing_printed_is_no_datasheet() -> None:
     found = rows(tables(estimate("likelihood", (31.0, 90.0)), WARM, sheet={}))
     assert len(found) == len(FIGURES)

@@ -150,6 +150,7 @@ rule papers:
                 "fusion",
             )
         },
+        of_models=of_each(plan.on_boards, "samples_of_models"),
     output:
         **as_files("published", "accuracy"),
     log:

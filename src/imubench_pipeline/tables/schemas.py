@@ -142,6 +142,16 @@ TABLES: dict[str, tuple[Column, ...]] = {
         number("mean", "SI", "mean of the samples"),
         count("samples", "samples present", required=True),
     ),
+    "samples_of_models": (
+        *KEYS,
+        text("of", "log; before: of the model that the curve reads; after: of the estimate"),
+        text("what", "deviation of all samples; stretch: each sample; envelope: over time"),
+        number("start", "s", "from the first sample", required=True),
+        number("end", "s", "its end", required=True),
+        number("low", "SI", "of an envelope: least sample"),
+        number("high", "SI", "largest sample"),
+        number("mean", "SI", "mean of the samples, the sample, or the deviation"),
+    ),
     "histogram": (
         *KEYS,
         number("lower", "SI", "lower edge of the bin", required=True),
@@ -385,7 +395,7 @@ PARTS_OF = {"curve": "allan", "estimate_findings": "findings"}
 SAMPLES = ("envelope", "histogram")
 """The tables of the samples themselves, for the pages of the recordings."""
 
-OF_ONE_RECORDING = (*SAMPLES, "draws")
+OF_ONE_RECORDING = (*SAMPLES, "samples_of_models", "draws")
 """The tables that are kept with each recording and not joined."""
 
 TURNED = tuple(EARTH_RATE_TABLES)

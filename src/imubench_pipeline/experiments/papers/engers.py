@@ -413,17 +413,17 @@ def _deviations(sensor: str) -> Callable[[Evidence], Found]:
         by = {(row["channel"], row["of"]): row["mean"] for row in rows}
         ratios = {
             of: [value / by[channel, "log"] for (channel, own), value in by.items() if own == of]
-            for of in ("curve", "likelihood")
+            for of in ("before", "after")
         }
         if not all(ratios.values()):
             return nothing(_NO_LOG)
         words = "; ".join(
-            f"deviation of the samples {'before' if of == 'curve' else 'after'} the fit "
+            f"deviation of the samples {of} the fit "
             + ", ".join(f"{ratio:.3g}" for ratio in ratios[of])
             + " times the log’s"
             for of in ratios
         )
-        alike = all(abs(ratio - 1.0) < 0.05 for ratio in ratios["likelihood"])
+        alike = all(abs(ratio - 1.0) < 0.05 for ratio in ratios["after"])
         return Found(words=words, verdict="agrees" if alike else "differs")
 
     return found
