@@ -208,14 +208,37 @@ class OfASensor(ImuSettings):
         return round(quantity_to_si(self.duration, "time") * rate)
 
 
+class Specimens(Strict):
+    """Several of one sensor on a board, fused to one log."""
+
+    number: int = Field(ge=2, le=1000)
+    spread: float = Field(
+        0.0, ge=0, le=1, description="standard deviation of the logarithm of N, B and K of each"
+    )
+
+
 class SimulatedRecording(OfASensor, Surroundings):
     """A recording that is made before the run, from known figures."""
 
     recording: str = Field(pattern=_NAMES, description="starts with sim_")
     seed: int
+    specimens: Specimens | None = Field(None, description="fused to this log; left out: one sensor")
     two_position: SimulatedTurns | None = None
     rate_table: SimulatedTable | None = None
     pointing: SimulatedRest | None = None
+
+    @model_validator(mode="after")
+    def _of_specimens(self) -> Self:
+        if self.specimens is None:
+            return self
+        for name, axis in self.channels.items():
+            other = [key for key in ("R", "Q", "further", "sinusoids") if getattr(axis, key)]
+            if axis.N is None or other:
+                found = f"{other[0]} in it" if other else "no N in it"
+                raise ValueError(
+                    f"specimens: channels.{name} has {found}; expected N, and B and K at most"
+                )
+        return self
 
     @model_validator(mode="after")
     def _one_experiment(self) -> Self:

@@ -14,7 +14,8 @@ from imubench_pipeline.estimators.estimate import SI_UNITS
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.simulate.models import figures_of
+from imubench_pipeline.simulate.models import figures_of, imu_model
+from imubench_pipeline.steps.specimens import fused_model, specimens_of, weights_of
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
@@ -140,15 +141,32 @@ def truth_rows(truths: str) -> Iterator[Row]:
         recording = SimulatedRecording.model_validate(entry)
         rate = quantity_to_si(recording.rate, "frequency")
         for channel, truth in recording.channels.items():
+            factors = _of_fused(recording, str(channel))
             for figure in figures_of(truth, channel, rate):
+                factor = factors.get(figure.name.removesuffix(" in the log"), 1.0)
                 yield {
                     "sensor": recording.sensor,
                     "recording": recording.recording,
                     "channel": channel,
                     "parameter": figure.name,
                     "component": figure.component,
-                    "value": figure.value,
+                    "value": figure.value * factor,
                     "unit": figure.unit,
                     "assumed": bool({figure.setting, figure.name} & set(truth.assumed)),
                     "source": recording.source,
                 }
+
+
+def _of_fused(recording: SimulatedRecording, channel: str) -> dict[str, float]:
+    """Return by what the noise of a specimen is multiplied where several are fused."""
+    if recording.specimens is None:
+        return {}
+    models = [model.axes[channel].noise for model in specimens_of(recording)]
+    of_kind = imu_model(recording.channels, recording).axes[channel].noise
+    _, weights = weights_of(models, quantity_to_si(recording.rate, "frequency"))
+    fused = fused_model(models, weights)
+    return {
+        name: getattr(fused, name) / getattr(of_kind, name)
+        for name in ("N", "B", "K")
+        if getattr(of_kind, name)
+    }

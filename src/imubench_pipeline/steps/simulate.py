@@ -26,6 +26,7 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import simulate_imu
 from imubench_pipeline.simulate.models import imu_model
 from imubench_pipeline.simulate.profiles import Profile, profiles_of
+from imubench_pipeline.steps.specimens import fused_blocks
 from imubench_pipeline.tables import making
 from imubench_pipeline.units import quantity_to_si
 
@@ -70,9 +71,12 @@ def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, ND
         name = f"{recording.sensor}/{recording.recording}"
         raise ConfigError(f"{name}: channels.{error}") from error
     motion, temperature = profiles_of(recording, Path())
+    motion = dict(motion)
     gyro = recording.experimental
     if gyro is not None:
         motion = motion | {gyro: _sensed(recording, rate)}
+    if recording.specimens is not None:
+        return fused_blocks(recording, motion, temperature)
     return simulate_imu(
         model,
         rate,
