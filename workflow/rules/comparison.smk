@@ -98,7 +98,7 @@ rule fusion:
         temperature=table("temperature"),
         draws=every("draws.parquet"),
     output:
-        **as_files("fusion"),
+        **as_files("fusion", "grades"),
     log:
         LOGS + "/fusion.log",
     group:
@@ -107,6 +107,7 @@ rule fusion:
         **cost(OfMany(memory=300, memory_of_each=0.2, time=6, time_of_each=0.01)),
     params:
         settings=plan.settings("fusion"),
+        catalogue=plan.catalogue("price_class"),
         code=plan.code("fusion"),
     script:
         "../scripts/fusion.py"

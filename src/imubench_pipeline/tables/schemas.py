@@ -21,6 +21,7 @@ from imubench_pipeline.tables.of_fitness import DOUBTS, JUDGED
 from imubench_pipeline.tables.of_navigation import (
     BACKTEST,
     FUSION,
+    GRADES,
     IN_USE,
     NEXT_STEPS,
     RANKING,
@@ -383,6 +384,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "deterministic": DETERMINISTIC,
     "draws": DRAWS,
     "fusion": FUSION,
+    "grades": GRADES,
     **EARTH_RATE_TABLES,
     **CALIBRATION_TABLES,
     "alignment": ALIGNMENT,
