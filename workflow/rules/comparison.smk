@@ -148,6 +148,8 @@ rule papers:
                 "earth_rate",
                 "earth_rate_published",
                 "alignment",
+                "calibration",
+                "grades",
                 "fusion",
             )
         },

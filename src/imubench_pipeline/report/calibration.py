@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from imubench_pipeline.report import positions
 from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
@@ -188,10 +189,13 @@ def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
 
 def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
     """Return the lines of the page that has all calibrated recordings, by kind of run."""
-    by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": []}
+    by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
     for view in site.calibrated:
         rows = view.rows("calibration")
         if not rows:
+            continue
+        if rows[0]["run"] == "positions":
+            by_run["positions"].append({"view": view, "lines": list(positions.lines(rows))})
             continue
         by_run[rows[0]["run"]].append(
             {

@@ -237,11 +237,11 @@ class Plan:
 
     @cached_property
     def calibrated(self) -> list[tuple[str, str]]:
-        """Sensor and name of the recordings on a rate table, or with a direction that is stated."""
+        """Sensor and name of the recordings on a rate table, in positions, or that point known."""
         return [key for key in self.recordings if self._calibrates(*key)]
 
     def _calibrates(self, sensor: str, name: str) -> bool:
-        if self.kind(sensor, name) == "rate_table":
+        if self.kind(sensor, name) in ("rate_table", "positions"):
             return True
         recording = self.recordings[sensor, name]
         if recording.simulated:

@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from imubench_pipeline.settings.known_rates import Angle, AtRest, OnRateTable
 from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.settings.positions import InPositions
 from imubench_pipeline.settings.printed import Kind as FigureKind
 from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
 from imubench_pipeline.settings.sensor import (
@@ -94,6 +95,20 @@ class SimulatedTable(OnRateTable):
     def declared(self) -> OnRateTable:
         """What would stand beside such a log."""
         return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
+
+
+class SimulatedPositions(InPositions):
+    """A triad that is turned by the clock, and senses gravity and the Earth's rate."""
+
+    roll: Angle = Field("0 deg", description="true one, in the first position")
+    pitch: Angle = Field("0 deg", description="likewise")
+    heading: Angle = Field("0 deg", description="likewise, from north towards east")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @property
+    def declared(self) -> InPositions:
+        """What would stand beside such a log."""
+        return InPositions(**{name: getattr(self, name) for name in InPositions.model_fields})
 
 
 class SimulatedRest(AtRest):
@@ -225,6 +240,7 @@ class SimulatedRecording(OfASensor, Surroundings):
     specimens: Specimens | None = Field(None, description="fused to this log; left out: one sensor")
     two_position: SimulatedTurns | None = None
     rate_table: SimulatedTable | None = None
+    positions: SimulatedPositions | None = None
     pointing: SimulatedRest | None = None
 
     @model_validator(mode="after")
@@ -250,8 +266,11 @@ class SimulatedRecording(OfASensor, Surroundings):
                 gyro = self.experimental
             except ValueError as error:
                 raise ValueError(f"{key}.{error}") from error
-            if gyro in self.motion:
-                raise ValueError(f"motion.{gyro}: {key} says how it moves; expected one of the two")
+            if gyro in self.motion or (key == "positions" and self.motion):
+                raise ValueError(
+                    f"motion.{gyro or min(self.motion)}: {key} says how it moves; expected one of "
+                    "the two"
+                )
         return self
 
     @property
@@ -272,6 +291,9 @@ class SimulatedRecording(OfASensor, Surroundings):
             return self.two_position.turned(channels)
         if self.rate_table is not None:
             return self.rate_table.gyro(channels, column=False)
+        if self.positions is not None:
+            self.positions.check(channels)
+            return None
         return None if self.pointing is None else self.pointing.gyro(channels)
 
     @property

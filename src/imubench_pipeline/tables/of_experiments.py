@@ -111,7 +111,7 @@ _CALIBRATED = (SENSOR, RECORDING, text("channel", "the gyro that was calibrated"
 CALIBRATION_TABLES: dict[str, tuple[Column, ...]] = {
     "calibration": (
         *_CALIBRATED,
-        text("run", "rate_table, or at_rest with a direction that is stated"),
+        text("run", "rate_table; at_rest with a direction that is stated; positions of a triad"),
         *figure(
             "bias at the first sample used; present_bias: at the end; scale_factor (indicated over "
             "true rate), quadratic, asymmetry (of the scale factors of both senses, over their "

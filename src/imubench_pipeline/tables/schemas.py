@@ -42,7 +42,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         SENSOR,
         text("device", "specimen of the sensor; by default the recording's name"),
         RECORDING,
-        text("kind", "static, two_position or rate_table"),
+        text("kind", "static, two_position, rate_table or positions"),
         text("started", "date and time of the first sample, where known", required=False),
         flag("power_cycled", "without power before it; null: not known", required=False),
         flag("simulated", "made from known parameters, not measured"),

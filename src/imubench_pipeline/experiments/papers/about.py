@@ -82,6 +82,7 @@ SILVA = About(
     logs=(
         ("sirrs01_03", "sim_published"),
         *(("sirrs01_03", f"sim_run_{number}") for number in (1, 2, 3, 4)),
+        ("sirrs01_03_triad", "sim_aligned"),
     ),
     declared=(
         "The latitude is not printed, nor how long a turn takes, nor the bias: −23.3° (Londrina, "

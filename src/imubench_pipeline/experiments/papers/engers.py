@@ -429,9 +429,34 @@ def _deviations(sensor: str) -> Callable[[Evidence], Found]:
     return found
 
 
+def _reached(run: Evidence) -> Found:
+    """Return how many SCC2130 reach the tactical class, and what 25 of them, fused, leave."""
+    words = []
+    for sensor, name in (("scc2130", "one SCC2130"), ("scc2130_x25", "25 fused")):
+        rows = [row for row in run.rows("grades", sensor=sensor, quantity="gyro") if row["n"]]
+        numbers = [
+            f"{row['n']:.2g} for the {'N' if row['statistic'] == 'N' else 'floor'} of "
+            f"{row['grade']}{' ' + row['option'] if row['option'] else ''}"
+            for row in rows
+        ]
+        if numbers:
+            words.append(f"{name}: {', '.join(numbers)}")
+    if not words:
+        return nothing("it takes the simulated logs of both")
+    return Found(words="; ".join(words), verdict="agrees")
+
+
+def _aim() -> Iterator[Claim]:
+    yield Claim(
+        place="Section 1.0.1.1", quantity="several cheap gyros in place of a better one: how many",
+        printed="left for later", found=_reached, basis="simulated", page="fusion.html#grades",
+        check="tests/test_specimens.py",
+    )  # fmt: skip
+
+
 @cache
 def _claims() -> tuple[Claim, ...]:
-    return (*_datasheets(), *_of_axes(), *_equations(), *_figures())
+    return (*_datasheets(), *_of_axes(), *_equations(), *_figures(), *_aim())
 
 
 PAPER = Paper(about=ENGERS, claims=lambda _: _claims())
