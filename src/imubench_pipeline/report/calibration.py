@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.report import positions
 from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
@@ -195,7 +194,7 @@ def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
         if not rows:
             continue
         if rows[0]["run"] == "positions":
-            by_run["positions"].append({"view": view, "lines": list(positions.lines(rows))})
+            by_run["positions"].append({"view": view, "lines": list(attitude_lines(rows))})
             continue
         by_run[rows[0]["run"]].append(
             {
@@ -206,3 +205,26 @@ def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
             }
         )
     return by_run
+
+
+def attitude_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield roll, pitch and heading in degrees, of rows of ``calibration`` of one recording."""
+    for row in rows:
+        value, lower, upper, truth = (
+            None if row[name] is None else math.degrees(row[name])
+            for name in ("value", "lower", "upper", "truth")
+        )
+        digits = limit_digits(lower, upper, 3)
+        off = None
+        if value is not None and truth is not None:
+            off = math.remainder(value - truth, 360.0) / math.degrees(row["sigma"])
+        yield {
+            "words": row["parameter"],
+            "value": "–" if value is None else f"{number_text(value, digits)}°",
+            "limits": ""
+            if lower is None or upper is None
+            else f"{number_text(lower, digits)}° to {number_text(upper, digits)}°",
+            "truth": "–" if truth is None else f"{number_text(truth, digits)}°",
+            "off": "–" if off is None else f"{number_text(off, 2)} σ",
+            "why": sentence(row["reason"] or ""),
+        }
