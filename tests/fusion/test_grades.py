@@ -24,7 +24,9 @@ def channel(
     noise = n * 60.0 * HOUR
     own = {"N": Parameter(noise, lower=0.9 * noise, upper=1.1 * noise)}
     lowest = (
-        Parameter(None, "not_identified", "too short") if floor is None else Parameter(floor * HOUR)
+        Parameter(None, "not_identified", "too short", 0.0, 0.6 * HOUR)
+        if floor is None
+        else Parameter(floor * HOUR)
     )
     estimate = Estimate("likelihood", own, curve={"sigma_min": lowest})
     names = {"recording": "r", "channel": f"gyro_{axis}", "simulated": False, "duration": 1e4}
@@ -57,6 +59,7 @@ def test_what_is_not_printed_or_not_identified_has_no_number() -> None:
     assert all(row["n"] is None and row["reason"] for row in found.values())
     row = rows_of(channel(0.27, None))["", "sigma_min"]
     assert row["n"] is None and row["reason"] == "too short" and row["printed"] > 0
+    assert row["n_upper"] == pytest.approx((0.6 / 0.3) ** 2)  # by the upper limit
 
 
 def test_the_middle_axis_answers_and_a_measured_log_before_a_simulated() -> None:

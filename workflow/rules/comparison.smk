@@ -136,6 +136,7 @@ rule papers:
             for name in (
                 "recordings",
                 "allan",
+                "allan_compensated",
                 "parameters",
                 "models",
                 "reconstruction",

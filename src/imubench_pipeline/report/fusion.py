@@ -120,9 +120,12 @@ def grade_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
 
 
 def _number_limits(row: Row) -> str:
-    if row["n_lower"] is None or row["n_upper"] is None:
+    if row["n_upper"] is None:
         return ""
-    lower, upper = _whole(row["n_lower"]), _whole(row["n_upper"])
+    upper = _whole(row["n_upper"])
+    if row["n"] is None or row["n_lower"] is None:
+        return f"at most {upper}"
+    lower = _whole(row["n_lower"])
     return lower if lower == upper else f"{lower} to {upper}"
 
 

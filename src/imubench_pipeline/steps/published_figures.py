@@ -36,14 +36,15 @@ def published_rows(
     """Yield the rows of the table ``published_figures``.
 
     `truths`: the simulated recordings, as the plan wrote them; `truth`: the table
-    ``simulated_truth``; `tables`: ``parameters``, ``fixed_bias``, ``temperature`` and
-    ``datasheet`` of the same sensor.
+    ``simulated_truth``; `tables`: ``recordings``, ``allan``, ``parameters``, ``fixed_bias``,
+    ``temperature`` and ``datasheet`` of the same sensor.
     """
     entries = [SimulatedRecording.model_validate(entry) for entry in json.loads(truths)]
     if not any(settings.published for entry in entries for settings in entry.channels.values()):
         return
     true = _slowest(truth)
     curve, best = _estimates(tables)
+    curve = _lowest_points(tables) | curve
     printed = _printed(tables["datasheet"].to_pylist())
     for entry in entries:
         for channel, settings in entry.channels.items():
@@ -94,7 +95,7 @@ def _estimates(tables: Mapping[str, pa.Table]) -> tuple[dict[_Place, Any], dict[
     curve: dict[_Place, Any] = {}
     parameters = tables["parameters"].to_pylist()
     for row in parameters:
-        if row["method"] == "curve" and row["component"] == 1:
+        if row["method"] == "curve" and row["component"] == 1 and row["value"] is not None:
             curve[_place(row)] = row["value"]
     best = _slowest(row for row in parameters if row["recommended"])
     for row in tables["fixed_bias"].to_pylist():
@@ -103,6 +104,25 @@ def _estimates(tables: Mapping[str, pa.Table]) -> tuple[dict[_Place, Any], dict[
         if row["parameter"] in ("bias", "sensitivity"):
             best[_place(row)] = row
     return curve, best
+
+
+_LONGEST = 1.0 / 9.0
+"""Part of a log up to which its curve is read."""
+
+
+def _lowest_points(tables: Mapping[str, pa.Table]) -> dict[_Place, Any]:
+    """Return B by the lowest point of each curve, as a source reads it that shows no minimum."""
+    durations = {
+        (row["sensor"], row["recording"]): row["duration"]
+        for row in tables["recordings"].to_pylist()
+    }
+    lowest: dict[_Place, float] = {}
+    for row in tables["allan"].to_pylist():
+        duration = durations.get((row["sensor"], row["recording"]))
+        if duration is not None and row["tau"] <= _LONGEST * duration:
+            place = _place(row, "B")
+            lowest[place] = min(lowest.get(place, math.inf), row["adev"] / FLOOR)
+    return lowest
 
 
 def _slowest(rows: Iterable[Row]) -> dict[_Place, Row]:

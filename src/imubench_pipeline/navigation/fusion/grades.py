@@ -100,8 +100,6 @@ def _compared(own: Parameter, printed: Comparable) -> dict[str, Any]:
     }
     if printed.value is None:
         return row | {"reason": printed.obstacle or printed.reason}
-    if own.value is None:
-        return row | {"reason": own.reason or own.status}
 
     def needed(value: float | None) -> float | None:
         return (
@@ -109,6 +107,7 @@ def _compared(own: Parameter, printed: Comparable) -> dict[str, Any]:
         )
 
     return row | {
+        "reason": None if own.value is not None else own.reason or own.status,
         "n": needed(own.value),
         "n_lower": needed(own.lower),
         "n_upper": needed(own.upper),
