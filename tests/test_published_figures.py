@@ -110,7 +110,7 @@ def tables(
     ]
     # A curve that falls to 3e-6 rad/s at a ninth of the hour, and further where it is not read.
     falling = [
-        NAMES | {"tau": tau, "adev": adev, "cluster_size": 1}
+        NAMES | {"tau": tau, "adev": adev, "cluster_size": 1, "edf_source": "none"}
         for tau, adev in ((10.0, 3e-5), (100.0, 1e-5), (360.0, 3e-6), (1000.0, 1e-6))
     ]
     told = NAMES | {"status": "ok", "duration": 3600.0, "device": "a", "kind": "static"}
