@@ -276,7 +276,7 @@ def filtered() -> Iterator[Claim]:
             quantity=f"run {run}: time after which the cumulative mean stays at the true rate",
             printed="about 10³ samples, 30 to 60 s", value=1000.0 / PAPER_RATE, unit="s",
             found=_settled(run), basis="simulated", page=f"{page_of(run)}#estimates",
-            check=f"{_GIVEN}::test_a_mean_has_settled_after_its_last_time_outside",
+            check="benchmarks/earth_rate.py",
             reason="within a tenth of it; the mean has the white noise of all samples so far, "
             "whether the filter is given the rate or not",
         )  # fmt: skip
