@@ -26,7 +26,7 @@ from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.experiments.earth_rate.bound import block_length, cramer_rao
 from imubench_pipeline.experiments.earth_rate.experiment import Experiment
 from imubench_pipeline.experiments.earth_rate.kalman import Filtered, RateFilter
-from imubench_pipeline.experiments.earth_rate.known_rate import track
+from imubench_pipeline.experiments.earth_rate.known_rate import STARTS, mean_sigma, settled, track
 from imubench_pipeline.experiments.earth_rate.pairs import by_pairs, by_triples
 from imubench_pipeline.experiments.earth_rate.prediction import Outlook
 from imubench_pipeline.experiments.earth_rate.simulation import (
@@ -340,9 +340,43 @@ def circular() -> None:
     log = simulate_log(
         model, design, earth_rate=EARTH_RATE, transient=0.0, rng=np.random.default_rng(1)
     )
-    for given in (0.0, 1.0, 2.0, -1.0):
-        mean = track(log, design, PAPER_MODEL, given * EARTH_RATE).mean / EARTH_RATE
-        print(f"  given {given:+.0f}: finds {mean[-1]:+.3f}; {mean[1000]:+.3f} after 1,000 samples")
+    for unit, start in STARTS.items():
+        for given in (0.0, 1.0, 2.0, -1.0):
+            mean = track(log, design, PAPER_MODEL, given * EARTH_RATE, start).mean / EARTH_RATE
+            print(
+                f"  P_0 in {unit}, given {given:+.0f}: finds {mean[-1]:+.3f}; {mean[999]:+.3f} "
+                "after 1,000 samples"
+            )
+
+
+def settling(runs: int = 100) -> None:
+    """Print when the mean of that filter stays near what it was given, over simulated runs."""
+    print(
+        f"\nThe same, given the true rate, {runs} simulated runs: data after which the mean stays "
+        "within a tenth of it (quartiles, s; inf: not by the end), and its sigma in deg/h"
+    )
+    model = SensorModel(noise=PAPER_MODEL, bias=BIAS)
+    for run in ("2", "3", "4", "1"):
+        design = paper_run(PAPER_MINUTES[run])
+        rng = np.random.default_rng(int(run))
+        logs = [
+            simulate_log(model, design, earth_rate=EARTH_RATE, transient=0.0, rng=rng)
+            for _ in range(runs)
+        ]
+        for unit, start in STARTS.items():
+            times = [
+                settled(
+                    track(log, design, PAPER_MODEL, EARTH_RATE, start).mean, PAPER_RATE, EARTH_RATE
+                )
+                for log in logs
+            ]
+            quartiles = np.quantile(times, [0.25, 0.5, 0.75], method="inverted_cdf")
+            sigma = mean_sigma(PAPER_MODEL, PAPER_RATE, 1000, start, BIAS)[-1]
+            print(
+                f"  run {run}, P_0 in {unit:8s}: {', '.join(f'{t:.0f}' for t in quartiles)}; "
+                f"within 60 s in {sum(t <= 60.0 for t in times)}; after 1,000 samples "
+                f"{math.degrees(sigma) * 3600:.2f} deg/h"
+            )
 
 
 def main() -> int:
@@ -358,6 +392,7 @@ def main() -> int:
     published()
     outlook()
     circular()
+    settling()
     print(f"\n{sum(fulfilled)} of {len(fulfilled)} fulfilled")
     return int(not all(fulfilled))
 

@@ -108,7 +108,16 @@ def tables(
         NAMES | {"method": "mean"} | asdict(delta)
         for delta in bias_deltas(datasheet, "gyro_x", {"gyro_x": bias}, 0.1, warm)
     ]
+    # A curve that falls to 3e-6 rad/s at a ninth of the hour, and further where it is not read.
+    falling = [
+        NAMES | {"tau": tau, "adev": adev, "cluster_size": 1, "edf_source": "none"}
+        for tau, adev in ((10.0, 3e-5), (100.0, 1e-5), (360.0, 3e-6), (1000.0, 1e-6))
+    ]
+    told = NAMES | {"status": "ok", "duration": 3600.0, "device": "a", "kind": "static"}
+    del told["channel"]
     rows: dict[str, list[Row]] = {
+        "allan": falling,
+        "recordings": [told | {"simulated": True}],
         "parameters": [
             *parameter_rows(KEY, curve, recommended=False),
             *parameter_rows(KEY, best, recommended=True),
@@ -206,6 +215,35 @@ def test_a_figure_of_the_datasheet_is_called_so() -> None:
     assert found["datasheet_upper"] == pytest.approx(found["means"])
 
 
+def test_a_printed_maximum_stands_beside_the_maximum_of_the_sheet() -> None:
+    offset = [
+        {"value": 1, "unit": "deg/s", "kind": "typ"},
+        {"value": 3, "unit": "deg/s", "kind": "max"},
+    ]
+    given = tables(estimate("likelihood", (31.0, 90.0)), sheet=SHEET | {"offset": offset})
+    found = {}
+    for kind in (None, "typ", "max"):
+        stated = {} if kind is None else {"kind": kind}
+        figure = printed_as("bias", "3 deg/s", of="datasheet", **stated)
+        (row,) = rows(given, truths({"gyro_x": CHANNEL | {"published": [figure]}}))
+        upper = row["datasheet_upper"]
+        found[kind] = (row["datasheet"] / DEGREE, upper and upper / DEGREE)
+    assert found == {
+        None: (pytest.approx(1.0), pytest.approx(3.0)),
+        "typ": (pytest.approx(1.0), None),
+        "max": (pytest.approx(3.0), None),
+    }
+
+
+def test_a_curve_without_a_minimum_has_its_lowest_point_for_the_b_before_the_fit() -> None:
+    given = tables(estimate("likelihood", (31.0, 90.0)))
+    parameters = given["parameters"].to_pylist()
+    without = [row for row in parameters if (row["method"], row["parameter"]) != ("curve", "B")]
+    assert len(without) < len(parameters)
+    found = by_parameter(rows(given | {"parameters": build("parameters", without)}))["B"]
+    assert found["curve"] == pytest.approx(3e-6 / math.sqrt(2 * math.log(2) / math.pi))
+
+
 def test_nothing_printed_is_no_datasheet() -> None:
     found = rows(tables(estimate("likelihood", (31.0, 90.0)), WARM, sheet={}))
     assert len(found) == len(FIGURES)
@@ -272,7 +310,15 @@ def test_a_recording_of_which_nothing_is_published_has_no_rows() -> None:
 
 def test_a_rejected_recording_has_what_is_printed_and_its_truth() -> None:
     empty = {
-        name: build(name, []) for name in ("parameters", "fixed_bias", "temperature", "datasheet")
+        name: build(name, [])
+        for name in (
+            "recordings",
+            "allan",
+            "parameters",
+            "fixed_bias",
+            "temperature",
+            "datasheet",
+        )
     }
     found = rows(empty)
     assert len(found) == len(FIGURES)

@@ -47,6 +47,9 @@ def test_a_temperature_that_is_followed_is_said_with_what_is_left() -> None:
     assert said == [
         "The bias follows the temperature by 90 °/h/K. Without it the Allan deviation is lower: "
         "2 times at τ = 100 s, 2 times at τ = 300 s, 2 times at τ = 1000 s.",
+        "Ranking, datasheet and budgets take the log as it comes, with what temperature does to "
+        "it: so it is in use, and so are the logs of sensors without readings. Method compensated "
+        "has the noise that is left, of which a datasheet of constant temperature speaks.",
         "T₀, the mean temperature, is 22.5 °C.",
         "The sensor's own low-pass cuts off at 64 Hz, of first order.",
     ]

@@ -150,6 +150,7 @@ def jobs_of(step, rule):
         "simulate": [key for key, found in plan.recordings.items() if found.simulated],
         "earth_rotation": plan.turned,
         "calibration": plan.calibrated,
+        "samples_of_models": plan.on_boards,
     }
     recordings = chosen.get(step, plan.recordings)
     return [{"sensor": sensor, "recording": name} for sensor, name in recordings]

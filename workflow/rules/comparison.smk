@@ -98,7 +98,7 @@ rule fusion:
         temperature=table("temperature"),
         draws=every("draws.parquet"),
     output:
-        **as_files("fusion"),
+        **as_files("fusion", "grades"),
     log:
         LOGS + "/fusion.log",
     group:
@@ -107,6 +107,7 @@ rule fusion:
         **cost(OfMany(memory=300, memory_of_each=0.2, time=6, time_of_each=0.01)),
     params:
         settings=plan.settings("fusion"),
+        catalogue=plan.catalogue("price_class"),
         code=plan.code("fusion"),
     script:
         "../scripts/fusion.py"
@@ -135,6 +136,7 @@ rule papers:
             for name in (
                 "recordings",
                 "allan",
+                "allan_compensated",
                 "parameters",
                 "models",
                 "reconstruction",
@@ -147,9 +149,12 @@ rule papers:
                 "earth_rate",
                 "earth_rate_published",
                 "alignment",
+                "calibration",
+                "grades",
                 "fusion",
             )
         },
+        of_models=of_each(plan.on_boards, "samples_of_models"),
     output:
         **as_files("published", "accuracy"),
     log:

@@ -132,6 +132,32 @@ rule reconstruct:
         "../scripts/reconstruct.py"
 
 
+# Of recordings of boards alone, whose source compares samples by eye.
+rule samples_of_models:
+    input:
+        quality=KEPT + "/quality.json",
+        parameters=KEPT + "/parameters.parquet",
+        low_pass=KEPT + "/low_pass.parquet",
+        temperature=KEPT + "/temperature.parquet",
+        fixed_bias=KEPT + "/fixed_bias.parquet",
+    output:
+        samples_of_models=KEPT + "/samples_of_models.parquet",
+    log:
+        LOGS + "/recordings/{sensor}/{recording}/samples_of_models.log",
+    group:
+        "recording"
+    resources:
+        **cost(
+            OfRecording(memory=400, memory_of_samples=20, time=4, time_of_values=0.1)
+        ),
+    params:
+        settings=plan.settings("reconstruction"),
+        code=plan.code("samples_of_models"),
+        attempt=tried("samples_of_models"),
+    script:
+        "../scripts/samples_of_models.py"
+
+
 rule datasheet:
     input:
         quality=KEPT + "/quality.json",

@@ -6,6 +6,7 @@ rule report:
         tables=[table(name) for name in TABLES if name not in OF_ONE_RECORDING],
         quality=every("quality.json"),
         samples=[file for name in SAMPLES for file in every(f"{name}.parquet")],
+        of_models=of_each(plan.on_boards, "samples_of_models"),
     output:
         page=report(RESULTS + "/report/index.html", category="Comparison"),
     log:

@@ -9,5 +9,9 @@ if __name__ == "__main__":
         snakemake.input,
         [Path(path) for path in snakemake.input.draws],
         snakemake.params.settings,
-        [Path(path) for path in snakemake.output],
+        snakemake.params.catalogue,
+        {
+            name: [path for path in map(Path, snakemake.output) if path.stem == name]
+            for name in ("fusion", "grades")
+        },
     )

@@ -53,7 +53,7 @@ _BEYOND = 0.8
 _SAME = 0.01
 """Part of the mean gap between levels within which two are one, written in two ways."""
 
-_LOW, _HIGH, _TOTAL, _PRESENT = range(4)
+_LOW, _HIGH, TOTAL, PRESENT = range(4)
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,12 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
         buckets = BUCKETS if was_at_rest(folder) else BUCKETS_OF_TURNS
     for log in (*logs.values(), *_temperature(folder)):
         names = asdict(Key(sensor, recording, log.channel))
-        edges = _bucket_edges(log.grid, buckets)
+        edges = bucket_edges(log.grid, buckets)
         figures, drawn = _follow(log, edges)
         if len(drawn) == 0:
             continue
         times = edges / log.rate + read_metadata(log.path).get("begins", 0.0)
-        result.envelope.extend(names | row for row in _envelope(times, figures))
+        result.envelope.extend(names | row for row in envelope_rows(times, figures))
         if log.channel != TEMPERATURE:
             low, high = float(figures[:, _LOW].min()), float(figures[:, _HIGH].max())
             result.histogram.extend(names | row for row in _bins(log, bin_edges(drawn, low, high)))
@@ -103,20 +103,25 @@ def _temperature(folder: Path) -> Iterator[ChannelLog]:
             yield ChannelLog(path, TEMPERATURE, about["rate"], about["grid"], (), holes=True)
 
 
-def _bucket_edges(grid: int, buckets: int) -> NDArray[np.int64]:
+def bucket_edges(grid: int, buckets: int) -> NDArray[np.int64]:
     """Return the points that begin the buckets of a grid, and one past the last."""
     number = min(buckets, grid)
     return np.array([grid * i // number for i in range(number + 1)], dtype=np.int64)
 
 
+def no_figures(edges: NDArray[np.int64]) -> Array:
+    """Return least, largest, sum and number of no samples in each bucket, shape (b, 4)."""
+    return np.tile([np.inf, -np.inf, 0.0, 0.0], (len(edges) - 1, 1))
+
+
 def _follow(log: ChannelLog, edges: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return the figures of each bucket, shape (b, 4), and samples drawn from all of them."""
     stride = max(1.0, pq.read_metadata(log.path).num_rows / _DRAWN)
-    figures = np.tile([np.inf, -np.inf, 0.0, 0.0], (len(edges) - 1, 1))
+    figures = no_figures(edges)
     drawn = []
     reached = 0
     for values in log.blocks():
-        _gather(values, reached, edges, figures)
+        gather(values, reached, edges, figures)
         reached += len(values)
         drawn.append(_drawn(values[~np.isnan(values)] if log.holes else values, stride))
     return figures, np.concatenate(drawn)
@@ -130,8 +135,11 @@ def _drawn(values: Array, stride: float) -> Array:
     return values[at[at < len(values)].astype(np.int64)]
 
 
-def _envelope(times: Array, figures: Array) -> Iterator[Row]:
-    """Yield the rows of the table ``envelope``, without the names."""
+def envelope_rows(times: Array, figures: Array) -> Iterator[Row]:
+    """Yield the rows of the table ``envelope``, without the names.
+
+    The times of the edges, s, have the shape (b + 1,), the figures (b, 4) as in `no_figures`.
+    """
     spans = zip(times[:-1].tolist(), times[1:].tolist(), figures.tolist(), strict=True)
     for start, end, (low, high, total, present) in spans:
         row = {"start": start, "end": end, "samples": int(present)}
@@ -224,8 +232,11 @@ def _lattice(ordered: Array) -> tuple[float, float] | None:
 
 
 @njit(cache=True, nogil=True)
-def _gather(values: Array, reached: int, edges: NDArray[np.int64], figures: Array) -> None:
-    """Take consecutive grid points from ``reached`` on into their buckets; NaN is missing."""
+def gather(values: Array, reached: int, edges: NDArray[np.int64], figures: Array) -> None:
+    """Take consecutive grid points from ``reached`` on into their buckets; NaN is missing.
+
+    The values have the shape (n,), the edges of b buckets (b + 1,), the figures (b, 4).
+    """
     bucket = np.searchsorted(edges, reached, side="right") - 1
     begin = 0
     while begin < values.size:

@@ -12,6 +12,9 @@ from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.typing import Row
 
+_ALIKE = 0.05
+"""Relative difference up to which found and printed are one figure."""
+
 _UNIT = {"bias": "signal"}
 """Unit of the page of a parameter, where it has another name."""
 
@@ -97,9 +100,11 @@ def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
     for row in rows:
         quantity = row["channel"].split("_")[0]
         ours = row["datasheet"] if row["of"] == "datasheet" else row["value"]
+        ratio = ours / row["means"] if ours and row["means"] else None
         yield {
             **row,
             "unit": f"{quantity}.{_UNIT.get(row['parameter'], row['parameter'])}",
             "digits": limit_digits(row["lower"], row["upper"], 4),
-            "ratio": number_text(ours / row["means"], 3) if ours and row["means"] else "–",
+            "ratio": "–" if ratio is None else number_text(ratio, 3),
+            "differs": ratio is not None and abs(ratio - 1.0) > _ALIKE,
         }

@@ -188,10 +188,13 @@ def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
 
 def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
     """Return the lines of the page that has all calibrated recordings, by kind of run."""
-    by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": []}
+    by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
     for view in site.calibrated:
         rows = view.rows("calibration")
         if not rows:
+            continue
+        if rows[0]["run"] == "positions":
+            by_run["positions"].append({"view": view, "lines": list(attitude_lines(rows))})
             continue
         by_run[rows[0]["run"]].append(
             {
@@ -202,3 +205,26 @@ def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
             }
         )
     return by_run
+
+
+def attitude_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield roll, pitch and heading in degrees, of rows of ``calibration`` of one recording."""
+    for row in rows:
+        value, lower, upper, truth = (
+            None if row[name] is None else math.degrees(row[name])
+            for name in ("value", "lower", "upper", "truth")
+        )
+        digits = limit_digits(lower, upper, 3)
+        off = None
+        if value is not None and truth is not None:
+            off = math.remainder(value - truth, 360.0) / math.degrees(row["sigma"])
+        yield {
+            "words": row["parameter"],
+            "value": "–" if value is None else f"{number_text(value, digits)}°",
+            "limits": ""
+            if lower is None or upper is None
+            else f"{number_text(lower, digits)}° to {number_text(upper, digits)}°",
+            "truth": "–" if truth is None else f"{number_text(truth, digits)}°",
+            "off": "–" if off is None else f"{number_text(off, 2)} σ",
+            "why": sentence(row["reason"] or ""),
+        }

@@ -27,13 +27,14 @@ def _context(site: Site) -> dict[str, Any]:
     }
     return {
         "lines": lines,
+        "grades": list(grade_lines(site.rows("grades"))),
         "filters": filters,
         "shared": shared_words(site.settings["settings"]["fusion"]["common"]),
         "price_classes": price_classes,
     }
 
 
-FUSION = Entry(file="fusion.html", title="Fusion", context=_context, tables=("fusion",))
+FUSION = Entry(file="fusion.html", title="Fusion", context=_context, tables=("fusion", "grades"))
 """The page that says how many of one sensor equal one of another."""
 
 
@@ -80,6 +81,52 @@ def equal_numbers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             "limits": _limits(row),
             "common": _common(row),
         }
+
+
+def grade_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table of how many reach a class: a sensor and an option each.
+
+    What is not printed of the class is said once of all sensors.
+    """
+    groups: dict[tuple[str, ...], dict[str, Row]] = {}
+    for row in rows:
+        key = (row["quantity"], row["sensor"], row["grade"], row["option"] or "")
+        # A density of which the side is not printed is there twice: the first reading is shown.
+        groups.setdefault(key, {}).setdefault(row["statistic"], row)
+    for (quantity, sensor, grade, option), by in groups.items():
+        if not any(row["printed"] for row in by.values()):
+            continue
+        yield {
+            "quantity": QUANTITY_NAMES[quantity],
+            "sensor": sensor,
+            "simulated": any(row["simulated"] for row in by.values()),
+            "grade": grade,
+            "option": option,
+            "symbol": quantity,
+            "cells": [
+                {
+                    "name": name,
+                    "value": row["value"] if row else None,
+                    "printed": row["printed"] if row else None,
+                    "n": row["n"] if row else None,
+                    "number": "–" if row is None or row["n"] is None else _whole(row["n"]),
+                    "limits": "" if row is None else _number_limits(row),
+                    "reason": (row["reason"] or "") if row else "",
+                }
+                for name in ("N", "sigma_min")
+                for row in (by.get(name),)
+            ],
+        }
+
+
+def _number_limits(row: Row) -> str:
+    if row["n_upper"] is None:
+        return ""
+    upper = _whole(row["n_upper"])
+    if row["n"] is None or row["n_lower"] is None:
+        return f"at most {upper}"
+    lower = _whole(row["n_lower"])
+    return lower if lower == upper else f"{lower} to {upper}"
 
 
 def _common(row: Row) -> str:

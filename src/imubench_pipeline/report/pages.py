@@ -10,6 +10,7 @@ from imubench_pipeline.report import (
     fusion,
     made,
     papers,
+    positions,
     rate_table,
     recording,
     shortlist,
@@ -38,6 +39,7 @@ _STATIC = ("recording.html.jinja", recording.context)
 _OF_KIND: Mapping[str, tuple[str, recording.Context]] = {
     "two_position": ("turned.html.jinja", turned.context),
     "rate_table": ("rate_table.html.jinja", rate_table.context),
+    "positions": ("positions.html.jinja", positions.context),
 }
 """Template and context of the page of a recording that is not static, by its kind."""
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import log_paths, read_metadata
-from imubench_pipeline.report import thermal
+from imubench_pipeline.report import compared_samples, thermal
 from imubench_pipeline.report.backtest import backtest_lines
 from imubench_pipeline.report.calibration import at_rest
 from imubench_pipeline.report.datasheets import curve_distances, delta_rows
@@ -51,7 +51,8 @@ def page_of(site: Site, view: RecordingView, template: str, context: Context) ->
 
 def recording_key(site: Site, view: RecordingView, folder: Path) -> str:
     """Return the digest of what the page of a recording shows; ``folder`` is the recording's."""
-    samples = [folder / f"{table}.parquet" for table in ("envelope", "histogram")]
+    shown = ("envelope", "histogram", "samples_of_models")
+    samples = [folder / f"{table}.parquet" for table in shown]
     own = [path.read_bytes() for path in samples if path.is_file()]
     published = [row for row in site.rows("coverage") if row["sensor"] == view.sensor]
     look = site.looks.get(view.sensor)
@@ -59,7 +60,7 @@ def recording_key(site: Site, view: RecordingView, folder: Path) -> str:
 
 
 def rows_of_samples(folder: Path, table: str) -> list[Row]:
-    """Return the rows of ``envelope`` or ``histogram`` in the folder of a recording, if any."""
+    """Return the rows of a table of samples in the folder of a recording, if any."""
     path = folder / f"{table}.parquet"
     return list(read(table, [path]).to_pylist()) if path.is_file() else []
 
@@ -76,6 +77,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         for i, row in enumerate(sorted(view.findings, key=lambda r: order[r["severity"]]), start=1)
     ]
     samples = samples_payload(envelope, histogram, arrays)
+    of_models = rows_of_samples(folder, "samples_of_models")
     budgets = list(budget_tables(view.budget, {view.full_name: view.simulated}, site.system))
     return {
         **about_of(site, view, channels, folder),
@@ -83,7 +85,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "findings": numbered,
         "serious": [row for row in numbered if row["severity"] != "note"],
         "notes": [row for row in numbered if row["severity"] == "note"],
-        "channels": [_channel(site, view, channel, samples) for channel in channels],
+        "channels": [_channel(site, view, channel, samples, of_models) for channel in channels],
         "has_temperature": "temperature" in samples["envelope"],
         "at_rest": at_rest(view, site.system),
         "budget": budgets[0] if budgets else None,
@@ -104,6 +106,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
                 channel_payload(channel, view.row["rate"], arrays) for channel in channels
             ],
             "samples": samples,
+            "of_models": compared_samples.payload(of_models, arrays),
             "findings": [
                 {name: row[name] for name in ("number", "finding", "channel", "start", "end")}
                 for row in numbered
@@ -144,7 +147,11 @@ def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
 
 
 def _channel(
-    site: Site, view: RecordingView, channel: ChannelView, samples: Mapping[str, Any]
+    site: Site,
+    view: RecordingView,
+    channel: ChannelView,
+    samples: Mapping[str, Any],
+    of_models: Sequence[Row],
 ) -> dict[str, Any]:
     symbols, lines = methods_table(channel, view.row["duration"], site.system)
     used = next(line for line in lines if line["recommended"])
@@ -163,6 +170,7 @@ def _channel(
         "lines": lines,
         "has_spectrum": bool(channel.spectrum),
         "has_samples": channel.channel in samples["envelope"],
+        "of_models": compared_samples.words(of_models, channel.channel),
         "model": _model_words(channel),
         "models": [
             {

@@ -129,12 +129,12 @@ class Site:
 
     @cached_property
     def calibrated(self) -> list[RecordingView]:
-        """The recordings on a rate table, or at rest with a direction that is stated."""
+        """The recordings on a rate table, in positions, or at rest with a direction."""
         named = self._named_in("calibration")
         return [
             view
             for view in self.views
-            if view.row["kind"] == "rate_table" or view.full_name in named
+            if view.row["kind"] in ("rate_table", "positions") or view.full_name in named
         ]
 
     @cached_property

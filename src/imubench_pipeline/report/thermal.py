@@ -25,6 +25,11 @@ _SWITCHED = {"sensitivity": "sensitivity", "quadratic": "quadratic", "bias": "si
 
 _FIXED = {"lag": "s", "cutoff": "Hz"}
 _AT = np.array([100.0, 300.0, 1_000.0, 3_000.0, 10_000.0, 30_000.0])
+_AS_IT_COMES = (
+    "Ranking, datasheet and budgets take the log as it comes, with what temperature does to it: "
+    "so it is in use, and so are the logs of sensors without readings. Method compensated has the "
+    "noise that is left, of which a datasheet of constant temperature speaks."
+)
 _SEEN = 1.05
 """How many times lower an Allan deviation must be to be worth a word."""
 
@@ -71,6 +76,7 @@ def answer(channel: ChannelView, system: System) -> list[str]:
                 f"The bias follows the temperature by {unit.text(sensitivity['value'], 3)} "
                 f"{unit.sign}.{_falls(channel)}"
             )
+            lines.append(_AS_IT_COMES)
         else:
             lines.append(f"Temperature is not taken out: {sensitivity['reason']}.")
         lines.append(f"T₀, the mean temperature, is {number_text(temperature['T_0']['value'])} °C.")

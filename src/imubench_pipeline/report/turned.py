@@ -28,6 +28,7 @@ METHOD_TERMS = {
     "filter": "rate_filter",
     "smoother": "rate_smoother",
     "known_rate": "known_rate",
+    "known_rate_radians": "known_rate",
 }
 """Term of the glossary of each method."""
 
@@ -36,7 +37,8 @@ METHOD_WORDS = {
     "triples": "A-B-A differences",
     "filter": "filter, rate unknown",
     "smoother": "smoother, rate unknown",
-    "known_rate": "bias tracking with known rate",
+    "known_rate": "bias tracking with known rate, P₀ in (°/s)²",
+    "known_rate_radians": "bias tracking with known rate, P₀ in (rad/s)²",
 }
 ESTIMATES = ("filter", "pairs", "triples")
 """The methods that find the rate, the one to use first; the smoother's is that of the filter."""
@@ -60,6 +62,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "doubts": [sentence(row["doubts"]) for row in turning if row["what"] == "doubt"],
         "findings": view.findings,
         "lines": [line(row) for row in rows],
+        "given": given_words(rows),
         "noise": noise_words(rows),
         "has_range": any(row["sigma_lower"] is not None for row in rows),
         "latitude": latitude_text(rows) if rows else "",
@@ -120,6 +123,31 @@ def answer(rows: Sequence[Row], system: System) -> str:
             "up, or another noise than at rest."
         )
     return text + (f" {sentence(best['reason'])}" if best["reason"] else "")
+
+
+def given_words(rows: Sequence[Row]) -> str:
+    """Return from when on the filter that is given the rate stays near it, in a sentence.
+
+    Of rows of ``earth_rate``, of one recording or of several; empty where none was given.
+    """
+    given = [row for row in rows if row["part"] == "whole" and row["status"] == "given"]
+    parts = []
+    for method, unit in (("known_rate", "(°/s)²"), ("known_rate_radians", "(rad/s)²")):
+        times = [row["settled"] for row in given if row["method"] == method]
+        reached = sorted(time for time in times if time is not None)
+        if not times:
+            continue
+        ends = [duration_text(time) for time in dict.fromkeys(reached[:1] + reached[-1:])]
+        text = f"after {' to '.join(ends)} of data" if ends else "not by the end"
+        if ends and len(reached) < len(times):
+            text += f", in {len(times) - len(reached)} of {len(times)} not by the end"
+        parts.append(f"{text} with P₀ in {unit}")
+    if not parts:
+        return ""
+    return (
+        f"Within a tenth of the rate that it is given it stays {'; '.join(parts)}: till then its "
+        "mean has the noise of all that came, and has it whatever the filter is given."
+    )
 
 
 _FAR = 4.0

@@ -158,7 +158,7 @@ class RecordingView:
     @property
     def static(self) -> bool:
         """Whether it could be used, and its sensor was at rest all the time."""
-        return not self.left_out and self.row["kind"] not in ("two_position", "rate_table")
+        return not self.left_out and self.row["kind"] == "static"
 
     @property
     def key(self) -> str:

@@ -214,6 +214,15 @@ class Plan:
         """Sensor and name of the recordings of gyros that were turned."""
         return [key for key in self.recordings if self.kind(*key) == "two_position"]
 
+    @property
+    def on_boards(self) -> list[tuple[str, str]]:
+        """Sensor and name of the simulated recordings of boards."""
+        return [
+            (sensor.sensor, f"sim_{name}")
+            for name, board in self.boards.items()
+            for sensor in board.sensors
+        ]
+
     def static_of(self, sensor: str) -> list[str]:
         """Return the static recordings of a sensor."""
         return self._at_rest.get(sensor, [])
@@ -228,11 +237,11 @@ class Plan:
 
     @cached_property
     def calibrated(self) -> list[tuple[str, str]]:
-        """Sensor and name of the recordings on a rate table, or with a direction that is stated."""
+        """Sensor and name of the recordings on a rate table, in positions, or that point known."""
         return [key for key in self.recordings if self._calibrates(*key)]
 
     def _calibrates(self, sensor: str, name: str) -> bool:
-        if self.kind(sensor, name) == "rate_table":
+        if self.kind(sensor, name) in ("rate_table", "positions"):
             return True
         recording = self.recordings[sensor, name]
         if recording.simulated:

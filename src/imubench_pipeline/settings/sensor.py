@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
+from imubench_pipeline.settings.positions import InPositions
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import (
@@ -41,10 +42,10 @@ POSITION = "position"
 TABLE_RATE = "table_rate"
 """Name of the column with the rate of the table that a sensor stands on."""
 
-Kind = Literal["static", "two_position", "rate_table"]
+Kind = Literal["static", "two_position", "rate_table", "positions"]
 """What was done with a sensor during a recording."""
 
-EXPERIMENTS = ("two_position", "rate_table", "pointing")
+EXPERIMENTS = ("two_position", "rate_table", "positions", "pointing")
 """Keys of the notes that the ingest does not depend on; a recording has one at most."""
 
 Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
@@ -298,6 +299,10 @@ class RecordingNotes(Strict):
         None,
         description="a gyro on a rate table, for scale factor and bias; null: it was on none",
     )
+    positions: InPositions | None = Field(
+        None,
+        description="a triad that stood in several positions, to find its attitude; null: in one",
+    )
     pointing: AtRest | None = Field(
         None,
         description="where the axis of a gyro at rest points, for its bias without what the Earth "
@@ -329,6 +334,8 @@ class RecordingNotes(Strict):
                     self.two_position.turned(channels)
                 if key == "rate_table" and self.rate_table is not None:
                     self.rate_table.gyro(channels, column=log.table_rate is not None)
+                if key == "positions" and self.positions is not None:
+                    self.positions.check(channels)
                 if key == "pointing" and self.pointing is not None:
                     self.pointing.gyro(channels)
             except ValueError as error:
@@ -342,6 +349,8 @@ def kind_of(notes: object) -> Kind:
             return "two_position"
         if notes.get("rate_table") is not None:
             return "rate_table"
+        if notes.get("positions") is not None:
+            return "positions"
     return "static"
 
 

@@ -15,6 +15,8 @@ from pydantic import Field, model_validator
 
 from imubench_pipeline.settings.known_rates import Angle, AtRest, OnRateTable
 from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.settings.positions import InPositions
+from imubench_pipeline.settings.printed import Kind as FigureKind
 from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
 from imubench_pipeline.settings.sensor import (
     EXPERIMENTS,
@@ -95,6 +97,20 @@ class SimulatedTable(OnRateTable):
         return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
 
 
+class SimulatedPositions(InPositions):
+    """A triad that is turned by the clock, and senses gravity and the Earth's rate."""
+
+    roll: Angle = Field("0 deg", description="true one, in the first position")
+    pitch: Angle = Field("0 deg", description="likewise")
+    heading: Angle = Field("0 deg", description="likewise, from north towards east")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @property
+    def declared(self) -> InPositions:
+        """What would stand beside such a log."""
+        return InPositions(**{name: getattr(self, name) for name in InPositions.model_fields})
+
+
 class SimulatedRest(AtRest):
     """A gyro at rest that senses its part of the Earth's rate."""
 
@@ -122,6 +138,7 @@ class PublishedFigure(Strict):
     figure: Text = Field(description="its name there")
     printed: Text = Field(description="with its unit, as printed")
     of: Literal["log", "datasheet"] = Field("log", description="what it says something of")
+    kind: FigureKind | None = Field(None, description="of a datasheet: max, typ ...; left out: any")
     parameter: Literal["N", "B", "bias", "sensitivity"]
     means: Text = Field(description="the same as that parameter: N two-sided, B the floor / 0.664")
     why: Text | None = Field(None, description="why it differs from what an estimate gives")
@@ -206,14 +223,38 @@ class OfASensor(ImuSettings):
         return round(quantity_to_si(self.duration, "time") * rate)
 
 
+class Specimens(Strict):
+    """Several of one sensor on a board, fused to one log."""
+
+    number: int = Field(ge=2, le=1000)
+    spread: float = Field(
+        0.0, ge=0, le=1, description="standard deviation of the logarithm of N, B and K of each"
+    )
+
+
 class SimulatedRecording(OfASensor, Surroundings):
     """A recording that is made before the run, from known figures."""
 
     recording: str = Field(pattern=_NAMES, description="starts with sim_")
     seed: int
+    specimens: Specimens | None = Field(None, description="fused to this log; left out: one sensor")
     two_position: SimulatedTurns | None = None
     rate_table: SimulatedTable | None = None
+    positions: SimulatedPositions | None = None
     pointing: SimulatedRest | None = None
+
+    @model_validator(mode="after")
+    def _of_specimens(self) -> Self:
+        if self.specimens is None:
+            return self
+        for name, axis in self.channels.items():
+            other = [key for key in ("R", "Q", "further", "sinusoids") if getattr(axis, key)]
+            if axis.N is None or other:
+                found = f"{other[0]} in it" if other else "no N in it"
+                raise ValueError(
+                    f"specimens: channels.{name} has {found}; expected N, and B and K at most"
+                )
+        return self
 
     @model_validator(mode="after")
     def _one_experiment(self) -> Self:
@@ -225,8 +266,11 @@ class SimulatedRecording(OfASensor, Surroundings):
                 gyro = self.experimental
             except ValueError as error:
                 raise ValueError(f"{key}.{error}") from error
-            if gyro in self.motion:
-                raise ValueError(f"motion.{gyro}: {key} says how it moves; expected one of the two")
+            if gyro in self.motion or (key == "positions" and self.motion):
+                raise ValueError(
+                    f"motion.{gyro or min(self.motion)}: {key} says how it moves; expected one of "
+                    "the two"
+                )
         return self
 
     @property
@@ -247,6 +291,9 @@ class SimulatedRecording(OfASensor, Surroundings):
             return self.two_position.turned(channels)
         if self.rate_table is not None:
             return self.rate_table.gyro(channels, column=False)
+        if self.positions is not None:
+            self.positions.check(channels)
+            return None
         return None if self.pointing is None else self.pointing.gyro(channels)
 
     @property

@@ -22,6 +22,7 @@ from imubench_pipeline.recordings.kept import kept_logs
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.settings.positions import InPositions
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.noise_source import (
@@ -30,6 +31,7 @@ from imubench_pipeline.steps.noise_source import (
     noise_source,
     segments_reason,
 )
+from imubench_pipeline.steps.positions import attitude_rows, true_angles
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.of_experiments import CALIBRATION_TABLES
 from imubench_pipeline.typing import Array, Row
@@ -63,6 +65,11 @@ def calibration_tables(
     if not logs:
         return rows
     sections = json.loads(settings)
+    if (positions := _positions(sections)) is not None:
+        stated = Sensor.model_validate(sections["sensor"])
+        names = {"sensor": sensor, "recording": recording}
+        rows["calibration"] = list(attitude_rows(names, logs, static, stated, *positions))
+        return rows
     declared, simulated = _declared(sections)
     # Of several gyros the notes name one: the ingest has seen to it.
     metadata = read_metadata(next(iter(logs.values())).path)
@@ -83,6 +90,18 @@ def calibration_tables(
     if isinstance(declared, OnRateTable):
         return rows | asdict(_on_rate_table(log, declared))
     return rows | asdict(_at_rest(log, declared))
+
+
+def _positions(sections: Mapping[str, Any]) -> tuple[InPositions, dict[str, float]] | None:
+    """Return the positions of a triad, and the true attitude of a simulated one; else None."""
+    if "simulated" in sections:
+        positions = SimulatedRecording.model_validate(sections["simulated"]).positions
+        if positions is None:
+            return None
+        return positions.declared, true_angles(positions.model_dump())
+    if "positions" in sections:
+        return InPositions.model_validate(sections["positions"]), {}
+    return None
 
 
 def _declared(

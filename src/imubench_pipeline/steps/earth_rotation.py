@@ -373,7 +373,12 @@ def _figure(course: Course, unsure: dict[str, Any]) -> dict[str, Any]:
         return row | {"status": "not_shown", "reason": course.reason}
     value = float(course.rate[-1])
     if course.sigma is None:
-        return row | {"value": value, "status": "given", "reason": _GIVEN}
+        return row | {
+            "value": value,
+            "status": "given",
+            "reason": _GIVEN,
+            "settled": None if course.settled in (None, math.inf) else course.settled,
+        }
     sigma = float(course.sigma[-1])
     row |= {
         "status": "ok",

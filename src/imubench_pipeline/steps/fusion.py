@@ -18,8 +18,10 @@ from imubench_pipeline.navigation.fusion.equivalence import (
     TemperaturePart,
     equivalence_rows,
 )
+from imubench_pipeline.navigation.fusion.grades import Grade, grade_rows
 from imubench_pipeline.recordings.fitness import left_out, with_doubts
 from imubench_pipeline.settings.config import FusionSettings
+from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
@@ -116,13 +118,39 @@ def fusion_rows(
     return with_doubts(rows, tables["recordings"].to_pylist(), pairs)
 
 
+TACTICAL = "tactical"
+"""First word of the price class whose datasheets are to be reached."""
+
+
+def grades_of_run(tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]) -> Iterator[Row]:
+    """Return the rows of the table ``grades``; `tables` as of `candidates`."""
+    grades = [
+        Grade(name, sensor.datasheet)
+        for name, sensor in sensors.items()
+        if (sensor.price_class or "").split(" ")[0].strip(",") == TACTICAL
+    ]
+    return grade_rows(candidates(tables, None), grades)
+
+
 def write_fusion(
-    inputs: Mapping[str, str], joint: list[Path], settings: str, outputs: list[Path]
+    inputs: Mapping[str, str],
+    joint: list[Path],
+    settings: str,
+    catalogue: str,
+    outputs: Mapping[str, list[Path]],
 ) -> None:
-    """Write the table ``fusion``, as Parquet and CSV; ``joint``: tables ``draws`` of recordings."""
+    """Write the tables ``fusion`` and ``grades``, as Parquet and CSV.
+
+    ``joint``: tables ``draws`` of recordings; ``outputs``: the files of each table.
+    """
     how = FusionSettings.model_validate_json(settings)
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
     of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}
-    table = build("fusion", fusion_rows(tables, how, of_recording))
-    for output in outputs:
-        write_arrow(table, output)
+    rows = {
+        "fusion": fusion_rows(tables, how, of_recording),
+        "grades": grades_of_run(tables, sensors_of(catalogue)),
+    }
+    for name, own in rows.items():
+        table = build(name, own)
+        for output in outputs[name]:
+            write_arrow(table, output)

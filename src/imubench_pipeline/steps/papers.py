@@ -15,9 +15,13 @@ from imubench_pipeline.tables import build, read, write_arrow
 def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
     """Write the tables ``published`` and ``accuracy``, as Parquet and CSV.
 
-    `tables` are joined ones of the run. Both are empty where it has no log of a paper.
+    `tables` are joined ones of the run, and parts of one table of recordings. Both are empty where
+    it has no log of a paper.
     """
-    evidence = Evidence({path.stem: read(path.stem, [path]) for path in tables})
+    parts: dict[str, list[Path]] = {}
+    for path in tables:
+        parts.setdefault(path.stem, []).append(path)
+    evidence = Evidence({name: read(name, paths) for name, paths in parts.items()})
     of_maia = any(evidence.has(*log) for log in MAIA.logs)
     made = {
         "published": build("published", published_rows(evidence)),

@@ -14,7 +14,8 @@ from imubench_pipeline.estimators.estimate import SI_UNITS
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.simulate.models import figures_of
+from imubench_pipeline.simulate.models import figures_of, imu_model
+from imubench_pipeline.steps.specimens import fused_model, specimens_of, weights_of
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
@@ -35,14 +36,15 @@ def published_rows(
     """Yield the rows of the table ``published_figures``.
 
     `truths`: the simulated recordings, as the plan wrote them; `truth`: the table
-    ``simulated_truth``; `tables`: ``parameters``, ``fixed_bias``, ``temperature`` and
-    ``datasheet`` of the same sensor.
+    ``simulated_truth``; `tables`: ``recordings``, ``allan``, ``parameters``, ``fixed_bias``,
+    ``temperature`` and ``datasheet`` of the same sensor.
     """
     entries = [SimulatedRecording.model_validate(entry) for entry in json.loads(truths)]
     if not any(settings.published for entry in entries for settings in entry.channels.values()):
         return
     true = _slowest(truth)
     curve, best = _estimates(tables)
+    curve = _lowest_points(tables) | curve
     printed = _printed(tables["datasheet"].to_pylist())
     for entry in entries:
         for channel, settings in entry.channels.items():
@@ -51,7 +53,9 @@ def published_rows(
             for figure in settings.published:
                 key = (entry.sensor, entry.recording, str(channel), figure.parameter)
                 estimate = _as_shown(best.get(key, {}))
-                sheet = printed.get(key, [])
+                sheet = [
+                    value for kind, value in printed.get(key, []) if figure.kind in (None, kind)
+                ]
                 shown = true.get((*key[:3], f"{figure.parameter} in the log"), true.get(key, {}))
                 yield {
                     "sensor": entry.sensor,
@@ -91,7 +95,7 @@ def _estimates(tables: Mapping[str, pa.Table]) -> tuple[dict[_Place, Any], dict[
     curve: dict[_Place, Any] = {}
     parameters = tables["parameters"].to_pylist()
     for row in parameters:
-        if row["method"] == "curve" and row["component"] == 1:
+        if row["method"] == "curve" and row["component"] == 1 and row["value"] is not None:
             curve[_place(row)] = row["value"]
     best = _slowest(row for row in parameters if row["recommended"])
     for row in tables["fixed_bias"].to_pylist():
@@ -100,6 +104,25 @@ def _estimates(tables: Mapping[str, pa.Table]) -> tuple[dict[_Place, Any], dict[
         if row["parameter"] in ("bias", "sensitivity"):
             best[_place(row)] = row
     return curve, best
+
+
+_LONGEST = 1.0 / 9.0
+"""Part of a log up to which its curve is read."""
+
+
+def _lowest_points(tables: Mapping[str, pa.Table]) -> dict[_Place, Any]:
+    """Return B by the lowest point of each curve, as a source reads it that shows no minimum."""
+    durations = {
+        (row["sensor"], row["recording"]): row["duration"]
+        for row in tables["recordings"].to_pylist()
+    }
+    lowest: dict[_Place, float] = {}
+    for row in tables["allan"].to_pylist():
+        duration = durations.get((row["sensor"], row["recording"]))
+        if duration is not None and row["tau"] <= _LONGEST * duration:
+            place = _place(row, "B")
+            lowest[place] = min(lowest.get(place, math.inf), row["adev"] / FLOOR)
+    return lowest
 
 
 def _slowest(rows: Iterable[Row]) -> dict[_Place, Row]:
@@ -119,14 +142,16 @@ def _slowest(rows: Iterable[Row]) -> dict[_Place, Row]:
     return {_place(row): row for row in sorted(with_value, key=slowness)}
 
 
-def _printed(rows: Iterable[Row]) -> dict[_Place, list[float]]:
-    """Return the figures of the datasheet, in the conventions of the parameters."""
-    figures: dict[_Place, list[float]] = {}
+def _printed(rows: Iterable[Row]) -> dict[_Place, list[tuple[str | None, float]]]:
+    """Return kind and value of the figures of the datasheet, in the parameters' conventions."""
+    figures: dict[_Place, list[tuple[str | None, float]]] = {}
     for row in rows:
         convention = _DATASHEET.get(row["statistic"]) or _DATASHEET.get(row["quantity"])
         if convention is not None and row["comparable"] is not None:
             parameter, factor = convention
-            figures.setdefault(_place(row, parameter), []).append(row["comparable"] * factor)
+            figures.setdefault(_place(row, parameter), []).append(
+                (row["kind"], row["comparable"] * factor)
+            )
     return figures
 
 
@@ -136,15 +161,32 @@ def truth_rows(truths: str) -> Iterator[Row]:
         recording = SimulatedRecording.model_validate(entry)
         rate = quantity_to_si(recording.rate, "frequency")
         for channel, truth in recording.channels.items():
+            factors = _of_fused(recording, str(channel))
             for figure in figures_of(truth, channel, rate):
+                factor = factors.get(figure.name.removesuffix(" in the log"), 1.0)
                 yield {
                     "sensor": recording.sensor,
                     "recording": recording.recording,
                     "channel": channel,
                     "parameter": figure.name,
                     "component": figure.component,
-                    "value": figure.value,
+                    "value": figure.value * factor,
                     "unit": figure.unit,
                     "assumed": bool({figure.setting, figure.name} & set(truth.assumed)),
                     "source": recording.source,
                 }
+
+
+def _of_fused(recording: SimulatedRecording, channel: str) -> dict[str, float]:
+    """Return by what the noise of a specimen is multiplied where several are fused."""
+    if recording.specimens is None:
+        return {}
+    models = [model.axes[channel].noise for model in specimens_of(recording)]
+    of_kind = imu_model(recording.channels, recording).axes[channel].noise
+    _, weights = weights_of(models, quantity_to_si(recording.rate, "frequency"))
+    fused = fused_model(models, weights)
+    return {
+        name: getattr(fused, name) / getattr(of_kind, name)
+        for name in ("N", "B", "K")
+        if getattr(of_kind, name)
+    }

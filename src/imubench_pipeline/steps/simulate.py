@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -12,12 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.alignment.attitude import matrix
+from imubench_pipeline.experiments.alignment.triad import Site
+from imubench_pipeline.experiments.alignment.turned import sensed
 from imubench_pipeline.experiments.earth_rate.experiment import Experiment
 from imubench_pipeline.experiments.earth_rate.simulation import true_rate
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.readers.text_log import TextLog
+from imubench_pipeline.settings.positions import TRIAD
 from imubench_pipeline.settings.sensor import TEMPERATURE, ColumnSource, LogFormat
 from imubench_pipeline.settings.simulated_recordings import (
+    SimulatedPositions,
     SimulatedRecording,
     SimulatedTable,
     SimulatedTurns,
@@ -26,6 +32,8 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import simulate_imu
 from imubench_pipeline.simulate.models import imu_model
 from imubench_pipeline.simulate.profiles import Profile, profiles_of
+from imubench_pipeline.steps.positions import true_angles
+from imubench_pipeline.steps.specimens import fused_blocks
 from imubench_pipeline.tables import making
 from imubench_pipeline.units import quantity_to_si
 
@@ -70,9 +78,14 @@ def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, ND
         name = f"{recording.sensor}/{recording.recording}"
         raise ConfigError(f"{name}: channels.{error}") from error
     motion, temperature = profiles_of(recording, Path())
+    motion = dict(motion)
     gyro = recording.experimental
     if gyro is not None:
         motion = motion | {gyro: _sensed(recording, rate)}
+    if recording.positions is not None:
+        motion = motion | _in_positions(recording.positions, rate, recording.samples)
+    if recording.specimens is not None:
+        return fused_blocks(recording, motion, temperature)
     return simulate_imu(
         model,
         rate,
@@ -104,6 +117,22 @@ def _sensed(recording: SimulatedRecording, rate: float) -> _Samples:
         return _on_table(recording.rate_table, rate, recording.samples)
     assert recording.pointing is not None  # there is no other experiment
     return _Samples(np.full(recording.samples, recording.pointing.true.rate), rate)
+
+
+def _in_positions(positions: SimulatedPositions, rate: float, samples: int) -> dict[str, _Samples]:
+    """Return what a triad senses that is turned at a steady rate between its positions."""
+    dwell, turning = positions.seconds("dwell"), positions.seconds("turning")
+    number = math.ceil(samples / rate / dwell) + 1
+    # Where it stands, and where it begins to turn; without a turn it is moved between two samples.
+    times = np.repeat(np.arange(number) * dwell, 2)
+    times[1::2] += dwell - max(turning, 0.5 / rate)
+    angles = np.repeat([positions.angle(k) for k in range(number)], 2)
+    at = np.arange(samples) / rate
+    angle = np.interp(at, times, angles)
+    turned = np.diff(np.interp(at[0] + (np.arange(samples + 1) - 0.5) / rate, times, angles)) * rate
+    attitude = matrix(*true_angles(positions.model_dump()).values())
+    true = sensed(Site(latitude=positions.latitude_si), attitude, angle, turned)
+    return {name: _Samples(true[:, k], rate) for k, name in enumerate(TRIAD)}
 
 
 def _on_table(table: SimulatedTable, rate: float, samples: int) -> _Samples:

@@ -16,7 +16,11 @@ from imubench_pipeline.tables.columns import (
 _RATE = "rad/s"
 _KEYS = (SENSOR, RECORDING, text("channel", "the gyro that was turned"))
 _PART = text("part", "whole, or the last minutes of the recording")
-_METHOD = text("method", "pairs, triples, filter, smoother; known_rate is given the rate")
+_METHOD = text(
+    "method",
+    "pairs, triples, filter, smoother; known_rate is given the rate and starts with 0.1 (deg/s)^2, "
+    "known_rate_radians with 0.1 (rad/s)^2",
+)
 
 EARTH_RATE_TABLES: dict[str, tuple[Column, ...]] = {
     "earth_rate": (
@@ -34,6 +38,7 @@ EARTH_RATE_TABLES: dict[str, tuple[Column, ...]] = {
         number("white", _RATE, "the least that it can be, N / sqrt(T) / cos(latitude)"),
         number("truth", _RATE, "the Earth's rate", required=True),
         number("off_sigma", "-", "value less truth, in sigma"),
+        number("settled", "s", "of known_rate: data until it stays within 10 % of the given"),
         count("dwells", "used"),
         count("turns", "between them"),
         count("samples", "used"),
@@ -106,7 +111,7 @@ _CALIBRATED = (SENSOR, RECORDING, text("channel", "the gyro that was calibrated"
 CALIBRATION_TABLES: dict[str, tuple[Column, ...]] = {
     "calibration": (
         *_CALIBRATED,
-        text("run", "rate_table, or at_rest with a direction that is stated"),
+        text("run", "rate_table; at_rest with a direction that is stated; positions of a triad"),
         *figure(
             "bias at the first sample used; present_bias: at the end; scale_factor (indicated over "
             "true rate), quadratic, asymmetry (of the scale factors of both senses, over their "

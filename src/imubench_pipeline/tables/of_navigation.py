@@ -144,6 +144,25 @@ NEXT_STEPS = (
 
 _SI = "rad/s or m/s^2"
 
+GRADES = (
+    text("quantity", "gyro or accel"),
+    text("sensor", "of which several are averaged"),
+    text("recording", "that answers for it: of its middle channel"),
+    text("channel", "that answers"),
+    flag("simulated", "that recording is simulated"),
+    text("grade", "sensor of the class that is to be reached, by its datasheet"),
+    text("option", "of that one", required=False),
+    text("statistic", "N, or sigma_min: the lowest point of the curve"),
+    number("value", "SI", "of one of them"),
+    number("lower", "SI", "lower 95 % limit"),
+    number("upper", "SI", "upper 95 % limit"),
+    number("printed", "SI", "of the grade, in the same convention"),
+    number("n", "-", "how many equal it, not rounded, if they have nothing in common"),
+    number("n_lower", "-", "by the lower limit"),
+    number("n_upper", "-", "by the upper limit"),
+    text("reason", "why there is no n", required=False),
+)
+
 FUSION = (
     text("quantity", "gyro or accel"),
     number("tau", "s", "averaging time at which they are compared", required=True),

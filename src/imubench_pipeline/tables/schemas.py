@@ -21,6 +21,7 @@ from imubench_pipeline.tables.of_fitness import DOUBTS, JUDGED
 from imubench_pipeline.tables.of_navigation import (
     BACKTEST,
     FUSION,
+    GRADES,
     IN_USE,
     NEXT_STEPS,
     RANKING,
@@ -41,7 +42,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         SENSOR,
         text("device", "specimen of the sensor; by default the recording's name"),
         RECORDING,
-        text("kind", "static, two_position or rate_table"),
+        text("kind", "static, two_position, rate_table or positions"),
         text("started", "date and time of the first sample, where known", required=False),
         flag("power_cycled", "without power before it; null: not known", required=False),
         flag("simulated", "made from known parameters, not measured"),
@@ -141,6 +142,16 @@ TABLES: dict[str, tuple[Column, ...]] = {
         number("high", "SI", "largest sample"),
         number("mean", "SI", "mean of the samples"),
         count("samples", "samples present", required=True),
+    ),
+    "samples_of_models": (
+        *KEYS,
+        text("of", "log; before: of the model that the curve reads; after: of the estimate"),
+        text("what", "deviation of all samples; stretch: each sample; envelope: over time"),
+        number("start", "s", "from the first sample", required=True),
+        number("end", "s", "its end", required=True),
+        number("low", "SI", "of an envelope: least sample"),
+        number("high", "SI", "largest sample"),
+        number("mean", "SI", "mean of the samples, the sample, or the deviation"),
     ),
     "histogram": (
         *KEYS,
@@ -373,6 +384,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "deterministic": DETERMINISTIC,
     "draws": DRAWS,
     "fusion": FUSION,
+    "grades": GRADES,
     **EARTH_RATE_TABLES,
     **CALIBRATION_TABLES,
     "alignment": ALIGNMENT,
@@ -385,7 +397,7 @@ PARTS_OF = {"curve": "allan", "estimate_findings": "findings"}
 SAMPLES = ("envelope", "histogram")
 """The tables of the samples themselves, for the pages of the recordings."""
 
-OF_ONE_RECORDING = (*SAMPLES, "draws")
+OF_ONE_RECORDING = (*SAMPLES, "samples_of_models", "draws")
 """The tables that are kept with each recording and not joined."""
 
 TURNED = tuple(EARTH_RATE_TABLES)

@@ -24,15 +24,18 @@ from imubench_pipeline.experiments.earth_rate.experiment import (
     block_means,
 )
 from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
-from imubench_pipeline.experiments.earth_rate.known_rate import track
+from imubench_pipeline.experiments.earth_rate.known_rate import STARTS, settled, track
 from imubench_pipeline.experiments.earth_rate.pairs import Differences, by_pairs, by_triples
 from imubench_pipeline.experiments.earth_rate.states import WIDE
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.sigma_range import sigma_range
 from imubench_pipeline.typing import Array
 
-METHODS = ("pairs", "triples", "filter", "smoother", "known_rate")
-"""In the order in which they are shown; the last is given the rate, and cannot find it."""
+GIVEN = {"known_rate": STARTS["degrees"], "known_rate_radians": STARTS["radians"]}
+"""The methods that are given the rate, and cannot find it; with the start of each, (rad/s)^2."""
+
+METHODS = ("pairs", "triples", "filter", "smoother", *GIVEN)
+"""In the order in which they are shown."""
 
 _KEPT = 400
 
@@ -49,6 +52,8 @@ class Course:
     rate: Array
     sigma: Array | None  # shape (k,); its standard deviation, rad/s; None where the method has none
     reason: str | None = None  # why there is no estimate: the arrays are empty then
+    # s of data after which it stays within a tenth of the rate that it was given, where it was
+    settled: float | None = None
 
 
 @dataclass(frozen=True)
@@ -128,7 +133,7 @@ def estimate_courses(
             filtered.rate_sigma[from_second],
         ),
         Course("smoother", whole, np.full(2, smoothed.rate[0]), np.full(2, smoothed.rate_sigma)),
-        _tracked(log, experiment, papers),
+        *(_tracked(log, experiment, papers, method) for method in GIVEN),
     )
     return Courses(
         courses, measured, longest, first + blocks.middle, smoothed.drift[0], smoothed.drift_sigma
@@ -144,12 +149,18 @@ def _differences(method: str, blocks: Blocks, estimate: Callable[[], Differences
     return Course(method, first + differences.time, differences.rate[0], differences.sigma)
 
 
-def _tracked(log: Array, experiment: Experiment, papers: NoiseModel) -> Course:
+def _tracked(log: Array, experiment: Experiment, papers: NoiseModel, method: str) -> Course:
     try:
-        tracked = track(log, experiment, papers, EARTH_RATE)
+        tracked = track(log, experiment, papers, EARTH_RATE, GIVEN[method])
     except ValueError as error:
-        return Course("known_rate", np.empty(0), np.empty(0), None, str(error))
-    return Course("known_rate", tracked.sample / experiment.rate, tracked.mean, None)
+        return Course(method, np.empty(0), np.empty(0), None, str(error))
+    return Course(
+        method,
+        tracked.sample / experiment.rate,
+        tracked.mean,
+        None,
+        settled=settled(tracked.mean, experiment.rate, EARTH_RATE),
+    )
 
 
 def thin(points: int) -> Iterator[int]:

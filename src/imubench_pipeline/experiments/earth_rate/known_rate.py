@@ -3,10 +3,17 @@
 It cannot find the Earth's rate. Its measurement y = w_ie - w~ is formed with the rate that is
 wanted: what it tracks is the gyro's error, and the reading less the error so tracked is, on
 average, the rate that was put in, whatever that was. Given twice the Earth's rate it "finds" twice
-the Earth's rate, as fast and as surely; the 30 to 60 s after which the paper's runs agree with the
-true value are the filter's own time constant. The sign of the dwell, which alone tells the rate
-from a bias, is not in it, nor is the latitude. What it is good for is the error of a gyro that
-stands still at a known attitude.
+the Earth's rate, as fast and as surely. The sign of the dwell, which alone tells the rate from a
+bias, is not in it, nor is the latitude. What it is good for is the error of a gyro that stands
+still at a known attitude.
+
+How the mean of what it calls the rate scatters is the same whatever it is given (`mean_sigma`):
+that of white noise, N / sqrt(t), once the filter has forgotten its start. The paper prints that
+start, P_0 = 0.1 I, without a unit (`STARTS`). In (deg/s)^2, as all else there is in degrees, the
+mean scatters less than white noise would at some 1,000 samples, in (rad/s)^2 it does not.
+
+As printed, eq. 13 is P+ = (I - K H)^-1 P-, where (I - K H) P- is meant: each measurement then
+adds to the covariance what it should take off, and P grows without bound (`as_printed`).
 """
 
 from __future__ import annotations
@@ -22,8 +29,8 @@ from imubench_pipeline.experiments.earth_rate.experiment import Experiment
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_START = 0.1
-"""P_0 = 0.1 I of the paper; it prints no unit, here (rad/s)^2."""
+STARTS = {"degrees": 0.1 * math.radians(1.0) ** 2, "radians": 0.1}
+"""P_0 = 0.1 I of the paper in (rad/s)^2, by the unit that it may be meant in: it prints none."""
 
 
 @dataclass(frozen=True)
@@ -37,44 +44,68 @@ class Tracked:
     mean: Array
 
 
-def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: float) -> Tracked:
+@dataclass(frozen=True)
+class _Filter:
+    """Its matrices: F = diag(decay, 1), H = [1, 1], Q_d = diag(of_f, of_rrw), R_d = white."""
+
+    decay: float
+    of_f: float
+    of_rrw: float
+    white: float
+    stationary: float  # variance of the process, which the approximate Q_d is not quite that of
+
+
+def _filter(model: NoiseModel, rate: float) -> _Filter:
+    processes = [term.gauss_markov for term in model.terms if term.gauss_markov is not None]
+    process = processes[0] if processes else None
+    if model.N == 0 or (model.B > 0 and model.T_B is None):
+        raise ValueError("the paper's filter needs N, and a Gauss-Markov process for B")
+    interval = 1.0 / rate
+    return _Filter(
+        math.exp(-interval / process.T_B) if process else 0.0,
+        interval * (process.density if process else 0.0),
+        interval * model.K**2,
+        model.N**2 / interval,
+        process.density * process.T_B / 2.0 if process else 0.0,
+    )
+
+
+def track(
+    log: Array,
+    experiment: Experiment,
+    model: NoiseModel,
+    known_rate: float,
+    start: float = STARTS["degrees"],
+) -> Tracked:
     """Track the bias of a gyro with the filter of the paper, which is given the Earth's rate.
 
-    F = diag(e^(-T/T_B), 1), H = [1, 1], R_d = N^2/T, Q_d = T diag(S_B, S_K), P_0 = 0.1 I, x_0 = 0
-    as printed, also where that is an approximation (the first entry of Q_d). Samples of turning are
-    left out, as if no time lay between dwells. The log, shape (samples,), is in rad/s, NaN where a
-    sample is missing, and so is the rate that the filter is given, and returns; of the model N, B
-    with T_B, and K are used.
+    F = diag(e^(-T/T_B), 1), H = [1, 1], R_d = N^2/T, Q_d = T diag(S_B, S_K), x_0 = 0 as printed,
+    also where that is an approximation (the first entry of Q_d), P_0 = ``start`` I. Samples of
+    turning are left out, as if no time lay between dwells. The log, shape (samples,), is in rad/s,
+    NaN where a sample is missing, and so is the rate that the filter is given, and returns; the
+    start is in (rad/s)^2; of the model N, B with T_B, and K are used.
 
     Raises
     ------
     ValueError
         If the model has no white noise, or its B no correlation time.
     """
-    processes = [term.gauss_markov for term in model.terms if term.gauss_markov is not None]
-    process = processes[0] if processes else None
-    if model.N == 0 or (model.B > 0 and model.T_B is None):
-        raise ValueError("the paper's filter needs N, and a Gauss-Markov process for B")
+    one = _filter(model, experiment.rate)
     sample = np.concatenate([np.arange(dwell.start, dwell.stop) for dwell in experiment.dwells])
     sample = sample[np.isfinite(log[sample])]
-    interval = 1.0 / experiment.rate
-    drift = _tracked(
-        log[sample] - known_rate,
-        math.exp(-interval / process.T_B) if process else 0.0,
-        interval * (process.density if process else 0.0),
-        interval * model.K**2,
-        model.N**2 / interval,
-    )
+    drift = _tracked(log[sample] - known_rate, start, one.decay, one.of_f, one.of_rrw, one.white)
     corrected = log[sample] - drift
     return Tracked(sample, drift, np.cumsum(corrected) / np.arange(1, len(sample) + 1))
 
 
 @njit(cache=True, nogil=True)
-def _tracked(error: Array, decay: float, of_f: float, of_rrw: float, white: float) -> Array:
+def _tracked(
+    error: Array, start: float, decay: float, of_f: float, of_rrw: float, white: float
+) -> Array:
     """Return z_f + z_rrw after each measurement of their sum."""
     drift = np.empty_like(error)
     f, rrw = 0.0, 0.0
-    var_f, cross, var_rrw = _START, 0.0, _START
+    var_f, cross, var_rrw = start, 0.0, start
     for k in range(error.size):
         to_f, to_rrw = var_f + cross, cross + var_rrw
         total = to_f + to_rrw + white
@@ -90,3 +121,94 @@ def _tracked(error: Array, decay: float, of_f: float, of_rrw: float, white: floa
         cross *= decay
         var_rrw += of_rrw
     return drift
+
+
+def settled(mean: Array, rate: float, known_rate: float, part: float = 0.1) -> float:
+    """Return from when on a mean stays near what the filter was given, s of data; inf: not yet.
+
+    Near is within a part of it; the mean is that of `track`, shape (n,), in rad/s as the known
+    rate, the rate that of sampling, Hz.
+    """
+    out = np.flatnonzero(np.abs(mean - known_rate) > part * abs(known_rate))
+    if len(out) == 0:
+        return 0.0
+    return math.inf if out[-1] == len(mean) - 1 else float(out[-1] + 1) / rate
+
+
+def mean_sigma(
+    model: NoiseModel, rate: float, samples: int, start: float, turn_on_bias: float
+) -> Array:
+    """Return the standard deviation of the mean of `track` after each sample, rad/s, shape (n,).
+
+    Exact, over the noise of the model and a fixed bias of the standard deviation ``turn_on_bias``,
+    rad/s: the covariance of the true errors, the tracked ones and the sum goes with the filter. It
+    is that whatever rate the filter is given. The start is in (rad/s)^2, the rate in Hz.
+
+    Raises
+    ------
+    ValueError
+        As `track`.
+    """
+    one = _filter(model, rate)
+    return _mean_sigma(
+        samples,
+        start,
+        np.array([one.decay, one.of_f, one.of_rrw, one.white]),
+        np.array([one.stationary, turn_on_bias**2]),
+    )
+
+
+def _mean_sigma(samples: int, start: float, matrices: Array, initial: Array) -> Array:
+    """Propagate the covariance of [z_f, z_rrw, tracked z_f, tracked z_rrw, sum of what is left]."""
+    decay, of_f, of_rrw, white = matrices
+    sigma = np.empty(samples)
+    joint = np.zeros((5, 5))
+    joint[0, 0], joint[1, 1] = initial
+    var_f, cross, var_rrw = start, 0.0, start
+    seen = np.array([[1.0, 1.0, -1.0, -1.0, 0.0]])
+    moved = np.array([decay, 1.0, decay, 1.0, 1.0])
+    driven = np.array([initial[0] * (1.0 - decay * decay), of_rrw])
+    for k in range(samples):
+        to_f, to_rrw = var_f + cross, cross + var_rrw
+        total = to_f + to_rrw + white
+        left = 1.0 - (to_f + to_rrw) / total
+        noise = np.array([[0.0], [0.0], [to_f / total], [to_rrw / total], [left]])
+        step = np.eye(5) + noise @ seen
+        joint = step @ joint @ step.T + white * (noise @ noise.T)
+        sigma[k] = math.sqrt(joint[4, 4]) / (k + 1)
+        joint = joint * np.outer(moved, moved)
+        joint[0, 0] += driven[0]
+        joint[1, 1] += driven[1]
+        var_f = decay * decay * (var_f - to_f * to_f / total) + of_f
+        cross = decay * (cross - to_f * to_rrw / total)
+        var_rrw += of_rrw - to_rrw * to_rrw / total
+    return sigma
+
+
+def as_printed(model: NoiseModel, rate: float, steps: int, start: float) -> Array:
+    """Return the trace of P after each measurement by eq. 13 as printed, (rad/s)^2, shape (steps,).
+
+    (I - K H)^-1 P in place of (I - K H) P. The start is in (rad/s)^2, the rate in Hz; where it
+    leaves all numbers the trace is infinite.
+
+    Raises
+    ------
+    ValueError
+        As `track`.
+    """
+    one = _filter(model, rate)
+    moved, driven = np.diag([one.decay, 1.0]), np.diag([one.of_f, one.of_rrw])
+    seen, covariance = np.ones((1, 2)), start * np.eye(2)
+    traces = np.full(steps, math.inf)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k in range(steps):
+            innovation = (seen @ covariance @ seen.T).item() + one.white
+            # (I - K H)^-1 = I + K H / (1 - H K): of one measurement, H K = 1 - R / S.
+            gain = covariance @ seen.T / innovation
+            covariance = covariance + gain @ (seen @ covariance) * (innovation / one.white)
+            trace = float(np.trace(covariance))
+            if not math.isfinite(trace):
+                break
+            traces[k] = trace
+            covariance = moved @ covariance @ moved.T + driven
+    return traces

@@ -82,8 +82,18 @@ SILVA = About(
     logs=(
         ("sirrs01_03", "sim_published"),
         *(("sirrs01_03", f"sim_run_{number}") for number in (1, 2, 3, 4)),
+        ("sirrs01_03_triad", "sim_aligned"),
     ),
-    declared=(),
+    declared=(
+        "The latitude is not printed, nor how long a turn takes, nor the bias: −23.3° (Londrina, "
+        "where the authors work), 2 s of each 30 s and 0.05 °/s are assumed.",
+        "The log at rest was a week long; here 48 h are simulated.",
+        "All logs are simulated from the four numbers of section 5.1: what is found of N, B, K and "
+        "T_B is the input come back. The estimates of section 6 are typed from the paper, and held "
+        "against what the noise of those four numbers allows.",
+        "The curves of the figures are not in the text: figures are compared by what is said of "
+        "them.",
+    ),
 )
 
 ENGERS = About(
@@ -91,7 +101,15 @@ ENGERS = About(
     name="Engers",
     title="three MEMS gyros on one board",
     logs=tuple((sensor, "sim_engers") for sensor in ("scc2130", "mpu9250", "bno055")),
-    declared=(),
+    declared=(
+        "He published no log: all are simulated from his Tables 2 to 7, so the ratios to these are "
+        "the simulator’s own input come back. T_B, K, the temperature and the noise of the BNO055 "
+        "that he could not simulate are assumed; so are the sensitivities, as in datasheets.",
+        "The tables are typed from the text, in which the figures are not: figures are compared by "
+        "what is said of them, and by their counterparts here.",
+        "Before the fit is what the curve of the simulated log reads; after it, the estimate. He "
+        "turned gains by hand until the curves looked alike.",
+    ),
 )
 
 PAPERS = (MAIA, SILVA, ENGERS)

@@ -199,6 +199,40 @@ kinds.series = (figure) => {
   return { traces, groups, layout };
 };
 
+const COMPARED = {
+  log: { light: "#0072B2", dark: "#4DA3D9" },
+  before: { light: "#D55E00", dark: "#F08A3C", dash: "dot" },
+  after: { light: "#007A5E", dark: "#3CC4A0", dash: "dash" },
+};
+
+kinds.compared = (figure) => {
+  const channel = figure.dataset.channel;
+  const drawn = pageData.of_models[channel];
+  const unit = unitOf(quantityOf(channel), "signal");
+  const overTime = figure.dataset.over === "envelope";
+  const named = Object.keys(COMPARED).filter((of) => drawn[of]);
+  const end = drawn.log[overTime ? "end" : "stretch_end"];
+  const scale = timeScale(end);
+  const traces = [];
+  for (const of of named) {
+    const look = COMPARED[of];
+    const mean = scaled(overTime ? drawn[of].mean : drawn[of].stretch, unit.factor);
+    const x = mean.map((_, i) => ((i + 0.5) * end) / mean.length / scale.size);
+    if (overTime) {
+      traces.push(...band(x, scaled(drawn[of].low, unit.factor), scaled(drawn[of].high, unit.factor), look, 0.18).map((trace) => ({ ...trace, group: of })));
+    }
+    traces.push({
+      ...line(x, mean, { ...look, width: 1 }), group: of, hoverinfo: "text",
+      text: x.map((t, i) => `${drawn[of].name}<br>${numberText(t, 4)} ${scale.name}: ${numberText(mean[i], 4)} ${unit.sign}`),
+    });
+  }
+  return {
+    traces,
+    groups: named.map((of) => ({ key: of, label: drawn[of].name, on: true, look: COMPARED[of] })),
+    layout: { xaxis: linearAxis(`time (${scale.name})`), yaxis: linearAxis(`${channel.replace("_", " ")} (${unit.sign})`) },
+  };
+};
+
 kinds.histogram = (figure) => {
   const channel = figure.dataset.channel;
   const histogram = pageData.samples.histogram[channel];

@@ -10,6 +10,7 @@ const COURSES = {
   triples: { light: "#9A6B00", dark: "#E0A82E", dash: "dot" },
   smoother: { light: "#5B5FC7", dark: "#A3A6F2", dash: "longdash" },
   known_rate: { light: "#7A4B3A", dark: "#C69A88", dash: "dashdot" },
+  known_rate_radians: { light: "#7A4B3A", dark: "#C69A88", dash: "dot" },
 };
 
 function ofEarth() {
@@ -112,7 +113,7 @@ kinds.earth_rate = (figure) => {
       ...line(x, value, look), group: method, hoverinfo: "text",
       text: value.map((v, i) => `${course.name}<br>${numberText(x[i], 4)} ${scale.name}: <b>${numberText(v, 4)} ${unit.sign}</b>${hasSigma ? ` ± ${numberText(2 * sigma[i], 2)} (2σ)` : ", no σ"}`),
     });
-    const label = method === "known_rate" ? `${course.name} (given the rate: no estimate)` : course.name;
+    const label = method.startsWith("known_rate") ? `${course.name} (given the rate: no estimate)` : course.name;
     groups.push({ key: method, label, on: true, look });
     if (hasSigma) groups.push({ key: `${method} band`, label: `2σ of the ${method === "triples" ? "A-B-A differences" : method}`, on: method === "filter" || method === "pairs", look: { ...look, filled: true } });
   }

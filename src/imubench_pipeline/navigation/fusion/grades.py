@@ -1,0 +1,114 @@
+"""How many of a sensor reach what is printed of a better class: rows of the table ``grades``.
+
+White noise and the lowest point of the curve of n sensors with noise of their own are 1/√n of one:
+n = (own / printed)^2, of each by itself. What they have in common, such as a temperature, no number
+takes off; what a fused log has of it shows in its own rows, as it is a sensor like any other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from imubench_pipeline.datasheets.comparable import Comparable, comparables
+from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
+from imubench_pipeline.settings.printed import Datasheet
+
+STATISTICS = {"N": "N", "adev_minimum": "sigma_min"}
+"""What is compared, by the name of a printed figure's statistic."""
+
+
+@dataclass(frozen=True)
+class Grade:
+    """A sensor of the class that is to be reached."""
+
+    sensor: str
+    datasheet: Datasheet
+
+    def printed(self, channel: str) -> Iterator[tuple[str | None, Comparable]]:
+        """Yield N and the floor as printed, SI, of each option; without a value where none is."""
+        sheet = getattr(self.datasheet, channel.split("_")[0])
+        if sheet is None:
+            return
+        names = ("noise_density", "random_walk", "bias_instability")
+        figures = [figure for name in names for figure in sheet.printed(name)]
+        options = dict.fromkeys(figure.option for figure in figures) or {None: None}
+        for option in options:
+            chosen = self.datasheet.model_copy(update={"options": [option] if option else []})
+            for one in comparables(chosen, channel):
+                of_option = one.figure is None or one.figure.option in (None, option)
+                if one.statistic in STATISTICS and of_option:
+                    yield option, one
+
+
+def grade_rows(
+    candidates: Iterable[FusionChannel], grades: Sequence[Grade]
+) -> Iterator[dict[str, Any]]:
+    """Yield the rows of the table ``grades``: each sensor against each printed figure.
+
+    The axis that is the middle one by N answers for a sensor, a measured one before a simulated.
+    """
+    by_sensor: dict[tuple[str, str], list[FusionChannel]] = {}
+    for channel in candidates:
+        quantity = channel.channel.split("_")[0]
+        by_sensor.setdefault((quantity, channel.sensor), []).append(channel)
+    for (quantity, sensor), channels in sorted(by_sensor.items()):
+        chosen = _middle(channels)
+        for grade in grades:
+            if grade.sensor == sensor:
+                continue
+            for option, printed in grade.printed(chosen.channel):
+                names: dict[str, Any] = {
+                    "quantity": quantity,
+                    "sensor": sensor,
+                    "recording": chosen.recording,
+                    "channel": chosen.channel,
+                    "simulated": chosen.simulated,
+                    "grade": grade.sensor,
+                    "option": option,
+                    "statistic": STATISTICS[printed.statistic],
+                }
+                yield names | _compared(_own(chosen, printed.statistic), printed)
+
+
+def _middle(channels: Sequence[FusionChannel]) -> FusionChannel:
+    measured = [channel for channel in channels if not channel.simulated] or list(channels)
+    return sorted(measured, key=lambda channel: channel.model.N)[len(measured) // 2]
+
+
+def _own(channel: FusionChannel, statistic: str) -> Parameter:
+    estimate = channel.estimate
+    of: Mapping[str, Parameter] = estimate.parameters
+    if statistic == "adev_minimum":
+        of = estimate.curve or {}
+    return of.get(STATISTICS[statistic], Parameter(None, "not_shown", "not estimated"))
+
+
+def _compared(own: Parameter, printed: Comparable) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "value": own.value,
+        "lower": own.lower,
+        "upper": own.upper,
+        "printed": printed.value,
+        "n": None,
+        "n_lower": None,
+        "n_upper": None,
+        "reason": None,
+    }
+    if printed.value is None:
+        return row | {"reason": printed.obstacle or printed.reason}
+
+    def needed(value: float | None) -> float | None:
+        return (
+            None if value is None else (value / printed.value) ** 2 if printed.value else math.inf
+        )
+
+    return row | {
+        "reason": None if own.value is not None else own.reason or own.status,
+        "n": needed(own.value),
+        "n_lower": needed(own.lower),
+        "n_upper": needed(own.upper),
+    }

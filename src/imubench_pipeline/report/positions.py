@@ -1,0 +1,27 @@
+"""The page of a recording of a triad that stood in several positions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.report.calibration import attitude_lines
+from imubench_pipeline.report.recording import about_of, summary_words
+from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.view import RecordingView
+from imubench_pipeline.report.words import noise_words
+
+
+def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    """Return what the template needs; ``folder`` is the recording's."""
+    rows = view.rows("calibration")
+    number = rows[0]["rates"] if rows else None
+    return {
+        **about_of(site, view, [], folder),
+        "summary": summary_words(view, [] if number is None else [f"{number} positions"]),
+        "lines": list(attitude_lines(rows)),
+        "noise": noise_words(rows),
+        "findings": view.findings,
+        "command": site.again(view, "calibration"),
+        "page": {"looks": {}, "channels": [], "findings": []},
+    }

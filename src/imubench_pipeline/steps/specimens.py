@@ -1,0 +1,110 @@
+"""Specimens of one sensor on a board, fused to one log: the aim of Engers (001 section 1).
+
+Each specimen has noise of its own, and parameters of its own about those of its kind; their
+weights are those of least white noise, N^-2 (`navigation.fusion.weights.best_constant`). What all
+of a kind have at the same time, such as T_B and the low-pass, is that of the fused log too, so that
+its noise is of the same terms, smaller by what `fused_model` says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from imubench_pipeline.navigation.fusion.board import Board
+from imubench_pipeline.navigation.fusion.samples import fuse
+from imubench_pipeline.navigation.fusion.weights import Constant, best_constant
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.settings.sensor import TEMPERATURE
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.simulate.imu import ImuModel, simulate_imu
+from imubench_pipeline.simulate.models import imu_model
+from imubench_pipeline.simulate.profiles import Profile
+from imubench_pipeline.typing import Array
+from imubench_pipeline.units import quantity_to_si
+
+_SPREAD = ("N", "B", "K")
+"""What differs from specimen to specimen."""
+
+
+def specimens_of(recording: SimulatedRecording) -> list[ImuModel]:
+    """Return the models of the specimens of a recording: one where none are declared."""
+    whole = imu_model(recording.channels, recording)
+    stated = recording.specimens
+    if stated is None:
+        return [whole]
+    made = []
+    for number in range(1, stated.number + 1):
+        axes = {}
+        for channel, model in whole.axes.items():
+            names = (recording.sensor, recording.recording, channel, f"specimen {number}")
+            rng = channel_rng(recording.seed, *names)
+            factors = np.exp(stated.spread * rng.standard_normal(len(_SPREAD)))
+            axes[channel] = replace(model, noise=_multiplied(model.noise, factors))
+        made.append(replace(whole, axes=axes))
+    return made
+
+
+def weights_of(models: Sequence[NoiseModel], rate: float) -> tuple[Board, Constant]:
+    """Return the board of noise models at one rate, Hz, and the weights that fuse them."""
+    board = Board(list(models), [rate] * len(models))
+    return board, best_constant(board)
+
+
+def fused_model(models: Sequence[NoiseModel], weights: Constant) -> NoiseModel:
+    """Return the noise of specimens of one kind fused: of each term the root of sum w^2 p^2.
+
+    Their correlation times are the same.
+    """
+    ratios = [
+        np.linalg.norm(weights.values * [getattr(model, name) for model in models])
+        / (getattr(models[0], name) or 1.0)
+        for name in _SPREAD
+    ]
+    return _multiplied(models[0], np.array(ratios))
+
+
+def _multiplied(model: NoiseModel, factors: Array) -> NoiseModel:
+    """Return a model with N, B and K so many times as large."""
+    n, b, k = map(float, factors)
+    return replace(model, N=n * model.N, B=b * model.B, K=k * model.K)
+
+
+def fused_blocks(
+    recording: SimulatedRecording,
+    motion: dict[str, Profile],
+    temperature: Profile | None,
+) -> Iterator[dict[str, Array]]:
+    """Yield the blocks of a log of fused specimens, and of the temperature that they share.
+
+    They are in SI; the temperature in °C, where there is one.
+    """
+    rate = quantity_to_si(recording.rate, "frequency")
+    models = specimens_of(recording)
+    fusing = {
+        channel: weights_of([model.axes[channel].noise for model in models], rate)
+        for channel in models[0].axes
+    }
+    logs = [
+        simulate_imu(
+            model,
+            rate,
+            recording.samples,
+            recording.seed,
+            (recording.sensor, recording.recording, f"specimen {number}"),
+            motion=motion,
+            temperature=temperature,
+        )
+        for number, model in enumerate(models, start=1)
+    ]
+    for parts in zip(*logs, strict=True):
+        blocks = {
+            channel: fuse(board, weights, [part[channel] for part in parts])
+            for channel, (board, weights) in fusing.items()
+        }
+        if TEMPERATURE in parts[0]:
+            blocks[TEMPERATURE] = parts[0][TEMPERATURE]
+        yield blocks

@@ -1,0 +1,77 @@
+"""The lines of Silva et al. that follow from printed figures, by other ways than the module's."""
+
+import math
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.experiments.papers import silva, silva_runs
+from imubench_pipeline.experiments.papers.claims import rows_of
+from imubench_pipeline.experiments.papers.evidence import Evidence
+
+ROWS = {(row["place"], row["quantity"]): row for row in rows_of(silva.PAPER, Evidence())}
+
+
+def test_every_figure_and_equation_has_a_line() -> None:
+    places = {place for place, _ in ROWS}
+    assert {f"Figure {number}" for number in range(1, 14)} <= places
+    assert {f"Equation {number}" for number in range(1, 17)} <= places
+
+
+def test_the_four_numbers_do_not_fit_each_other() -> None:
+    # 000 eq. 26 with the sign of the exponent that is meant, in degrees, on a grid of its own.
+    N, B, K, T = 0.0122, 0.0027, 6.8314e-5, 238.1
+    tau = np.arange(20.0, 500.0, 0.5)
+    S_B, e = 2 * B**2 * math.log(2) / (math.pi * 0.4365**2 * T), np.exp(-tau / T)
+    walk = S_B * T**2 / tau * (1 - T / (2 * tau) * (3 - 4 * e + e**2))
+    adev = np.sqrt(N**2 / tau + walk + K**2 * tau / 3)
+    at = int(np.argmin(adev))
+    assert tau[at] == pytest.approx(105, abs=1)
+    assert ROWS["Figure 2", "cluster time of the floor"]["found"] == pytest.approx(tau[at], abs=1)
+    floor = ROWS["Figure 2", "deviation at the floor"]
+    assert floor["found"] / floor["scale"] == pytest.approx(adev[at], rel=1e-3)
+    read = ROWS["Figure 3", "T_B, read from the curve of the printed numbers"]
+    assert read["found"] == pytest.approx(55.5, abs=0.5) and read["verdict"] == "differs"
+
+
+def test_a_filter_improves_the_pairs_by_a_per_cent() -> None:
+    gains = [silva_runs.gain_of_the_filter(run) for run in silva_runs.PRINTED]
+    assert 0.003 < min(gains) and max(gains) < 0.0135
+    assert ROWS["Section 8", "what a Kalman filter improves"]["found_words"] == (
+        "σ is 0.4 to 1.2 % less than that of the mean over pairs"
+    )
+
+
+def test_the_mean_of_all_samples_is_the_bias() -> None:
+    # Of an even number of dwells, north and south in turn.
+    senses = np.tile([1.0, -1.0], 12)
+    assert np.mean(0.05 + senses * 0.004178) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("run", "verdict"), [("1", "agrees"), ("2", "differs"), ("3", "differs"), ("4", "differs")]
+)
+def test_the_runs_within_and_beyond_the_noise(run: str, verdict: str) -> None:
+    assert ROWS["Section 6", f"Earth's rate, run {run}"]["verdict"] == verdict
+
+
+def test_what_each_cause_asks_for() -> None:
+    # With a pocket calculator: off = v - 0.0041781 deg/s, drift 2 cos(23.3 deg) off / 30 s.
+    assert (
+        "0.16 °/s (run 2), 0.16 °/s (run 3), 0.96 °/s (run 4)"
+        in (ROWS["Section 6", "hypothesis: warm-up"]["found_words"])
+    )
+    # (1 - v / w) / 2
+    assert (
+        "44 % of the time (run 2), 20 % of the time (run 3), 52 % of the time (run 4)"
+        in (ROWS["Section 6", "hypothesis: turns miscounted"]["found_words"])
+    )
+    assert (
+        "83° (run 2), 54° (run 3), 93° (run 4)"
+        in (ROWS["Section 6", "hypothesis: axis off the meridian"]["found_words"])
+    )
+
+
+def test_the_misprints() -> None:
+    misprints = {place for (place, _), row in ROWS.items() if row["verdict"] == "misprint"}
+    assert misprints == {"Equation 10", "Equation 13", "Section 3", "Section 7"}
