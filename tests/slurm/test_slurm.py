@@ -129,7 +129,7 @@ def test_the_tables_are_those_of_a_local_run(project: Project, tmp_path: Path) -
     (project.folder / "logs/one/doomed.csv").unlink()
     before = len(submitted(project.environment))
     local = Project(project.folder, tmp_path / "results", linked(tmp_path), project.settings)
-    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
+    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "papers", "catalogue")
     with ThreadPoolExecutor(1) as beside:  # Slurm is waited for
         of_slurm = beside.submit(project.run, *flags(1), cores=1)
         of_local = local.run(*rules)

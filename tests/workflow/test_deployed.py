@@ -136,7 +136,8 @@ def ways(tmp_path_factory: pytest.TempPathFactory) -> Ways:
     logs = folder / "kept"
     put_log(logs / "mine/run_1.csv", 1, samples=1_200)
     checkout = with_logs(in_checkout(folder / "checkout"), logs)
-    targets = ["tables", "fusion", "ranking", "shortlist", "repeatability", "catalogue", "exports"]
+    targets = ["tables", "fusion", "papers", "ranking", "shortlist", "repeatability", "catalogue"]
+    targets.append("exports")
     ended(snakemake("-c2", *targets, "--config", *GIVEN), checkout)
     package = installed(built(folder), folder / "venv")
     return Ways(logs, checkout, folder / "venv/bin", package, hosted(folder), folder)

@@ -178,6 +178,7 @@ def _joined() -> set[Job]:
             "shortlist",
             "repeatability",
             "fusion",
+            "papers",
             "exports",
             "figures",
             "report",

@@ -26,6 +26,7 @@ TOGETHER = {
         "shortlist",
         "repeatability",
         "fusion",
+        "papers",
         "exports",
         "figures",
         "report",

@@ -28,6 +28,7 @@ GLOBAL_STEPS = dict.fromkeys(
         "shortlist",
         "repeatability",
         "fusion",
+        "papers",
         "exports",
         "figures",
         "report",
@@ -229,8 +230,8 @@ def test_to_include_it_makes_the_tables_and_the_report_anew(project: Project) ->
     jobs = project.jobs()
     project.settings = METHODS
     assert set(jobs) == {
-        "sensor_tables", "tables", "ranking", "shortlist", "repeatability", "fusion", "exports",
-        "figures", "report",
+        "sensor_tables", "tables", "ranking", "shortlist", "repeatability", "fusion", "papers",
+        "exports", "figures", "report",
     }  # fmt: skip
 
 
@@ -262,7 +263,7 @@ def test_one_core_and_two_give_the_same_of_each_recording(project: Project, tmp_
 @pytest.mark.release
 def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path) -> None:
     both = Project(project.folder, tmp_path / "results", linked(tmp_path), METHODS)
-    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
+    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "papers", "catalogue")
     assert both.run(*rules, cores=2).returncode == 0
     made = sorted((both.results / "tables").iterdir())
     assert len(made) > 60
