@@ -230,7 +230,9 @@ def emitted() -> dict[str, str]:
     for tree, name_of_module in trees().items():
         for function, call in calls(tree, "Finding"):
             named = [keyword.value for keyword in call.keywords if keyword.arg == "finding"]
-            for name in texts([*call.args, *named][0], function, tree):
+            if not (stated := [*call.args, *named]):
+                continue  # of a row of a table, whose finding another module has said
+            for name in texts(stated[0], function, tree):
                 found[name] = name_of_module
     return found
 
