@@ -165,13 +165,13 @@ def _hypotheses() -> Iterator[Claim]:
     yield cause(
         "warm-up",
         "run 4 began 15 min after the sensor was powered",
-        "a bias that rises by "
+        "a bias that drifts one way by "
         + asks(lambda run: f"{drift(run) * run.duration / DEGREE:.2f} °/s")
         + f"; of run 4 with a time constant of {warmed.time_constant / 60.0:.0f} min",
         "differs",
         "it can explain all of them, and alone that the last 13 min of run 4 are "
         f"{causes.apart(last, first):.1f} σ nearer to the truth than the rest; but it asks as "
-        "steep a drift of run 2, of which no warm-up is told, and a rise that Figure 8 must show: "
+        "steep a drift of run 2, of which no warm-up is told, and a course that Figure 8 must show: "
         f"{warmed.total / PAPER_MODEL.N / math.sqrt(PAPER_RATE):.0f} times the deviation of a "
         "sample. A-B-A differences of the same samples would take it out",
     )
