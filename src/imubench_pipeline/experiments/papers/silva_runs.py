@@ -171,7 +171,7 @@ def _hypotheses() -> Iterator[Claim]:
         "differs",
         "it can explain all of them, and alone that the last 13 min of run 4 are "
         f"{causes.apart(last, first):.1f} σ nearer to the truth than the rest; but it asks as "
-        "steep a drift of run 2, of which no warm-up is told, and a course that Figure 8 must show: "
+        "steep a drift of run 2, of which no warm-up is told, and a course that Figure 8 shows: "
         f"{warmed.total / PAPER_MODEL.N / math.sqrt(PAPER_RATE):.0f} times the deviation of a "
         "sample. A-B-A differences of the same samples would take it out",
     )
