@@ -34,7 +34,7 @@ def channel(
 
 
 def rows_of(*channels: FusionChannel, grade: str = "stim300") -> dict[tuple[str, str], Any]:
-    grades = [Grade(grade, CATALOGUE[grade].datasheet)]
+    grades = [Grade(grade, grade, CATALOGUE[grade].datasheet)]
     rows = build("grades", grade_rows(channels, grades)).to_pylist()
     return {(row["option"] or "", row["statistic"]): row for row in rows}
 
@@ -70,5 +70,5 @@ def test_the_middle_axis_answers_and_a_measured_log_before_a_simulated() -> None
 
 
 def test_a_grade_is_not_held_against_itself() -> None:
-    grades = [Grade("cheap", Datasheet.model_validate({"gyro": {}}))]
+    grades = [Grade("cheap", "V cheap", Datasheet.model_validate({"gyro": {}}))]
     assert list(grade_rows([channel(0.1, 1.0)], grades)) == []

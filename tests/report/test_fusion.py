@@ -1,7 +1,7 @@
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.report.fusion import FUSION, equal_numbers, shared_words
+from imubench_pipeline.report.fusion import FUSION, equal_numbers, grade_lines, shared_words
 from imubench_pipeline.tables import build
 from tests.report.tables import joined, recording_rows, site
 
@@ -73,3 +73,25 @@ def test_a_single_sensor_is_not_compared(tmp_path: Path) -> None:
     found = FUSION.page(site(joined(recording_rows("one")), tmp_path)).context()
     assert found["lines"] == []
     assert set(found["price_classes"]) == {"one"}
+
+
+GRADE = {"quantity": "gyro", "sensor": "a", "recording": "r", "channel": "gyro_x",
+         "simulated": True, "grade": "b", "grade_name": "V B", "option": "C", "statistic": "N",
+         "value": 3e-5, "lower": 2.9e-5, "upper": 3.1e-5, "printed": 1e-5, "n": 9.0,
+         "n_lower": 8.41, "n_upper": 9.61}  # fmt: skip
+
+
+def test_how_many_reach_a_class_stands_in_a_line_of_both_figures() -> None:
+    floor = GRADE | {"statistic": "sigma_min", "value": None, "n": None, "n_lower": 0.0,
+                     "n_upper": 4.2, "reason": "it still falls"}  # fmt: skip
+    (found,) = grade_lines(build("grades", [GRADE, floor]).to_pylist())
+    assert (found["grade"], found["option"]) == ("V B", "C")
+    noise, lowest = found["cells"]
+    assert (noise["number"], noise["limits"]) == ("9", "9 to 10")
+    assert (lowest["number"], lowest["limits"]) == ("–", "at most 5")
+    assert lowest["reason"] == "it still falls"
+
+
+def test_a_class_of_which_nothing_is_printed_has_no_line() -> None:
+    nothing = GRADE | {"printed": None, "n": None, "n_lower": None, "n_upper": None}
+    assert list(grade_lines(build("grades", [nothing]).to_pylist())) == []

@@ -100,7 +100,7 @@ def grade_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             "quantity": QUANTITY_NAMES[quantity],
             "sensor": sensor,
             "simulated": any(row["simulated"] for row in by.values()),
-            "grade": grade,
+            "grade": next(row["grade_name"] for row in by.values()),
             "option": option,
             "symbol": quantity,
             "cells": [
@@ -126,7 +126,7 @@ def _number_limits(row: Row) -> str:
     if row["n"] is None or row["n_lower"] is None:
         return f"at most {upper}"
     lower = _whole(row["n_lower"])
-    return lower if lower == upper else f"{lower} to {upper}"
+    return "" if lower == upper else f"{lower} to {upper}"
 
 
 def _common(row: Row) -> str:

@@ -125,7 +125,7 @@ TACTICAL = "tactical"
 def grades_of_run(tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]) -> Iterator[Row]:
     """Return the rows of the table ``grades``; `tables` as of `candidates`."""
     grades = [
-        Grade(name, sensor.datasheet)
+        Grade(name, f"{sensor.vendor} {sensor.model}", sensor.datasheet)
         for name, sensor in sensors.items()
         if (sensor.price_class or "").split(" ")[0].strip(",") == TACTICAL
     ]

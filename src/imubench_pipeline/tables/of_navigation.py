@@ -151,6 +151,7 @@ GRADES = (
     text("channel", "that answers"),
     flag("simulated", "that recording is simulated"),
     text("grade", "sensor of the class that is to be reached, by its datasheet"),
+    text("grade_name", "its vendor and model"),
     text("option", "of that one", required=False),
     text("statistic", "N, or sigma_min: the lowest point of the curve"),
     number("value", "SI", "of one of them"),

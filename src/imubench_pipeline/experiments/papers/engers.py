@@ -383,7 +383,7 @@ def _figures() -> Iterator[Claim]:
             yield Claim(
                 place=place, quantity=f"samples measured and simulated, {NAMES[sensor]}",
                 printed="alike, by eye", found=_deviations(sensor), basis="simulated",
-                page=f"recordings/{sensor}/{_RECORDING}.html#samples-of-models",
+                page=f"recordings/{sensor}/{_RECORDING}.html#gyro_x",
                 check="tests/test_samples_of_models.py",
                 reason="the simulation before the fit has another deviation of samples",
             )  # fmt: skip

@@ -25,7 +25,8 @@ STATISTICS = {"N": "N", "adev_minimum": "sigma_min"}
 class Grade:
     """A sensor of the class that is to be reached."""
 
-    sensor: str
+    sensor: str  # of the catalogue
+    name: str  # vendor and model
     datasheet: Datasheet
 
     def printed(self, channel: str) -> Iterator[tuple[str | None, Comparable]]:
@@ -68,6 +69,7 @@ def grade_rows(
                     "channel": chosen.channel,
                     "simulated": chosen.simulated,
                     "grade": grade.sensor,
+                    "grade_name": grade.name,
                     "option": option,
                     "statistic": STATISTICS[printed.statistic],
                 }
