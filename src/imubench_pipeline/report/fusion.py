@@ -93,7 +93,7 @@ def grade_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
         key = (row["quantity"], row["sensor"], row["grade"], row["option"] or "")
         # A density of which the side is not printed is there twice: the first reading is shown.
         groups.setdefault(key, {}).setdefault(row["statistic"], row)
-    for (quantity, sensor, grade, option), by in groups.items():
+    for (quantity, sensor, _, option), by in groups.items():
         if not any(row["printed"] for row in by.values()):
             continue
         yield {
