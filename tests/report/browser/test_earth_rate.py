@@ -70,7 +70,8 @@ def test_the_estimates_over_time_are_those_of_the_tables(read: Open, rows: Any) 
     upper = [(row["value"] + 2 * row["sigma"]) * ARC for row in series]
     np.testing.assert_allclose(bands[0]["y"], upper, rtol=1e-5)
     count = len(traces(figure))
-    toggle(figure, "bias tracking with known rate (given the rate: no estimate)").uncheck()
+    known = "bias tracking with known rate, P₀ in (°/s)² (given the rate: no estimate)"
+    toggle(figure, known).uncheck()
     assert len(traces(figure)) == count - 1
 
 
