@@ -72,7 +72,7 @@ def test_the_reader_of_a_layout_reads_what_is_written(log: dict[str, Any], tmp_p
 def test_the_shipped_ones_can_all_be_written() -> None:
     sensors = read_sensors(PROJECT / "config/sensors")
     shipped = read_simulated(PROJECT / "config/simulated.yaml", sensors).recordings
-    assert len(shipped) == 12
+    assert len(shipped) == 14
     assert all(sensors[entry.sensor].log.reader == "csv" for entry in shipped)
     first = shipped[0].channels["gyro_x"].si("gyro_x")
     assert first == {"N": 8.4e-5, "B": 6.7e-5, "T_B": 89.5, "K": 8.2e-7}

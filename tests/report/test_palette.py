@@ -12,6 +12,7 @@ from imubench_pipeline.report.view import METHOD_NAMES
 
 MARKERS = {"circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x"}
 DASHES = {"solid", "dash", "dot", "dashdot", "longdash", "longdashdot"}
+DASHES |= {"7px,3px,2px,3px,2px,3px"}
 BACKGROUNDS = {"light": "#ffffff", "dark": "#161a1e"}  # of report.css
 
 

@@ -171,7 +171,8 @@ def test_the_next_run_puts_it_right_and_skips_what_grows(project: Project) -> No
     # The terminal shows the progress in one line; the file has what was said, and no drawing.
     assert b" steps, about " in b"".join(drawn)
     log = Path(found["log"]).read_bytes()
-    assert b"Job stats:" in log and b"\x1b" not in log and b" steps, about " not in log
+    assert b"\none/a: 0.00556 h at 100 Hz" in log
+    assert b"\x1b" not in log and b" steps, about " not in log
 
 
 def test_a_log_that_is_rewritten_keeps_its_results(project: Project) -> None:

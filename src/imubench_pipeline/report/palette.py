@@ -17,7 +17,8 @@ class Appearance:
     # light, dark: colour on a light and on a dark background
     light: str
     dark: str
-    dash: str  # ``solid``, ``dash``, ``dot``, ``dashdot``, ``longdash`` or ``longdashdot``
+    # ``solid``, ``dash``, ``dot``, ``dashdot``, ``longdash``, ``longdashdot``, or lengths
+    dash: str
     # ``circle``, ``square``, ``diamond``, ``triangle-up``, ``triangle-down``, ``cross``, ``x``
     marker: str
 
@@ -42,7 +43,7 @@ _METHODS = {
     "curve": Appearance("#D55E00", "#F08A3C", "dash", "triangle-up"),
     "paper": Appearance("#B3508C", "#DB8FBC", "dashdot", "triangle-down"),
     "weighted": Appearance("#0072B2", "#4DA3D9", "dot", "cross"),
-    "authors": Appearance("#7A4B3A", "#C69A88", "longdash", "circle"),
+    "authors": Appearance("#7A4B3A", "#C69A88", "7px,3px,2px,3px,2px,3px", "circle"),
 }
 
 

@@ -15,6 +15,7 @@ from pandas.util import hash_pandas_object
 
 from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.settings.sensor import AT_REST
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.tables.schemas import BY_RECORDING
 from imubench_pipeline.typing import Row
@@ -158,7 +159,7 @@ class RecordingView:
     @property
     def static(self) -> bool:
         """Whether it could be used, and its sensor was at rest all the time."""
-        return not self.left_out and self.row["kind"] == "static"
+        return not self.left_out and self.row["kind"] == AT_REST
 
     @property
     def key(self) -> str:

@@ -45,6 +45,9 @@ TABLE_RATE = "table_rate"
 Kind = Literal["static", "two_position", "rate_table", "positions"]
 """What was done with a sensor during a recording."""
 
+AT_REST: Kind = "static"
+"""Nothing: it was at rest all the time."""
+
 EXPERIMENTS = ("two_position", "rate_table", "positions", "pointing")
 """Keys of the notes that the ingest does not depend on; a recording has one at most."""
 

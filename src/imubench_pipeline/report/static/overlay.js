@@ -33,7 +33,8 @@ function startChooser(root) {
   }
   const method = document.createElement("select");
   method.append(new Option("recommended", "recommended"),
-    ...Object.entries(pageData.looks.methods).map(([key, look]) => new Option(look.name, key)));
+    ...Object.entries(pageData.looks.methods)
+      .filter(([key]) => pageData.channels.some((view) => key in view.models)).map(([key, look]) => new Option(look.name, key)));
   method.value = chosenMethod;
   method.addEventListener("change", () => {
     chosenMethod = method.value;

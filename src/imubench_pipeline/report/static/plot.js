@@ -187,7 +187,7 @@ function drawFigure(figure) {
   if (first) followZoom(canvas);
 }
 
-const DASHES = { solid: "", dash: "6 4", dot: "2 3", dashdot: "7 3 2 3", longdash: "11 4", longdashdot: "11 3 2 3" };
+const DASHES = { solid: "", dash: "6 4", dot: "2 3", dashdot: "7 3 2 3", longdash: "11 4", longdashdot: "11 3 2 3", "7px,3px,2px,3px,2px,3px": "7 3 2 3 2 3" };
 const SHAPES = {
   circle: '<circle cx="14" cy="7" r="4"/>', square: '<rect x="10" y="3" width="8" height="8"/>',
   diamond: '<path d="M14 2l5 5-5 5-5-5z"/>', "triangle-up": '<path d="M14 2l5 9H9z"/>',

@@ -88,6 +88,7 @@ _DASHES: dict[str, str | tuple[float, tuple[float, ...]]] = {
     "dashdot": (0.0, (5.0, 1.5, 1.0, 1.5)),
     "longdash": (0.0, (8.0, 2.0)),
     "longdashdot": (0.0, (8.0, 2.0, 1.0, 2.0)),
+    "7px,3px,2px,3px,2px,3px": (0.0, (5.0, 1.5, 1.0, 1.5, 1.0, 1.5)),
 }
 _MARKERS = {
     "circle": "o",
