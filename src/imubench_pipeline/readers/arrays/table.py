@@ -292,7 +292,9 @@ class StreamedArray(Array):
 
     def _at(self, stack: ExitStack, element: int) -> IO[bytes]:
         stream = stack.enter_context(self._opened())
-        skip(stream, self._offset + element * self.dtype.itemsize)
+        # The checksum of a member of an archive is of what is read of it, from its beginning.
+        place = self._offset + element * self.dtype.itemsize
+        skip(stream, place, seek=not self._checked)
         return stream
 
     def _next(self, stream: IO[bytes], elements: int) -> NDArray[Any]:
@@ -300,9 +302,9 @@ class StreamedArray(Array):
         return np.frombuffer(exactly(stream, wanted), self.dtype)
 
 
-def skip(stream: IO[bytes], size: int) -> None:
-    """Pass over bytes of a stream, whether it can seek or not."""
-    if stream.seekable():
+def skip(stream: IO[bytes], size: int, *, seek: bool = True) -> None:
+    """Pass over bytes of a stream; by reading them where it cannot seek, or is not to."""
+    if seek and stream.seekable():
         stream.seek(size, io.SEEK_CUR)
         return
     while size > 0:
