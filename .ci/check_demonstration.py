@@ -20,5 +20,5 @@ for row in pq.read_table(tables / "parameters.parquet").to_pylist():
     if abs(error) > 0.02:
         sys.exit("N is more than 2 % off")
     checked += 1
-if checked != 13:
-    sys.exit(f"{checked} channels, expected 13")
+if checked != 14:
+    sys.exit(f"{checked} channels, expected 14")
