@@ -87,6 +87,7 @@ ELSEWHERE = {
 """Commands that are not run here, as the pages have them, with the reason and what runs them."""
 
 COSTLY = (
+    ".venv/bin/imubench analyse run.csv",  # every day: tests/test_analyse.py
     ".venv/bin/imubench init lab",
     ".venv/bin/imubench run lab",
     "imubench init station/",
