@@ -171,7 +171,7 @@ def test_the_next_run_puts_it_right_and_skips_what_grows(project: Project) -> No
     # The terminal shows the progress in one line; the file has what was said, and no drawing.
     assert b" steps, about " in b"".join(drawn)
     log = Path(found["log"]).read_bytes()
-    assert b"\none/a: 0.00556 h at 100 Hz" in log
+    assert b"\n1 recording analysed" in log
     assert b"\x1b" not in log and b" steps, about " not in log
 
 
