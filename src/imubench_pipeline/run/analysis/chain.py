@@ -15,28 +15,35 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TypeVar
 
 import numpy as np
 import pyarrow as pa
 
-from imubench_pipeline.estimators import likelihood
+from imubench_pipeline.allan import cluster_sizes, of_blocks
 from imubench_pipeline.readers.bounded import BoundError, bounded
 from imubench_pipeline.recordings.ingest import write_failed
+from imubench_pipeline.recordings.recording import LogWriter, channel_logs
 from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import limits_of_steps
-from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
+from imubench_pipeline.settings.config import (
+    AllanSettings,
+    EstimateSettings,
+    ReconstructionSettings,
+)
 from imubench_pipeline.steps import allan as allan_step
 from imubench_pipeline.steps import datasheet as datasheet_step
 from imubench_pipeline.steps.error_budget import error_tables
-from imubench_pipeline.steps.estimate import Estimation, estimation
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel, estimation
 from imubench_pipeline.steps.ingest import write_recording
 from imubench_pipeline.steps.reconstruct import write_reconstruction
 from imubench_pipeline.steps.sensor_tables import joined_tables
 from imubench_pipeline.steps.tables import tables_of_all
 from imubench_pipeline.tables import build, write, write_arrow
 from imubench_pipeline.tables.failures import Cause, Failure, write_empty
+from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 T = TypeVar("T")
@@ -255,14 +262,29 @@ class _Chain:
 
 
 def _compile_all() -> None:
-    """Have all that estimates are computed with compiled, or loaded if it was compiled before."""
+    """Have all that estimates are computed with compiled, or loaded if it was compiled before.
+
+    It estimates a channel of white noise and a walk.
+    """
     rng = np.random.default_rng(1)
     samples = rng.standard_normal(_ENOUGH) + 0.05 * np.cumsum(rng.standard_normal(_ENOUGH))
-    likelihood.fit_blocks(
-        lambda: iter([samples]),
-        samples=_ENOUGH,
-        rate=100.0,
-        holes=False,
-        segments=((0, _ENOUGH),),
-        rng=rng,
-    )
+    with TemporaryDirectory(prefix="imubench.") as name:
+        folder = Path(name)
+        with LogWriter(folder / "log.parquet", {"gyro_x": pa.float64()}) as writer:
+            writer.write({"gyro_x": samples})
+            writer.finish(
+                {
+                    "rate": 100.0,
+                    "grid": _ENOUGH,
+                    "segments": [[0, _ENOUGH]],
+                    "holes": {"gyro_x": False},
+                    "unusable": [],
+                }
+            )
+        log = channel_logs(folder)["gyro_x"]
+        sizes = cluster_sizes(_ENOUGH)
+        curve = of_blocks(
+            log.blocks(), log.grid, log.rate, sizes, holes=log.holes, segments=log.segments
+        )
+        key = Key("compiled", "once", log.channel)
+        estimate_channel(key, log, curve, EstimateSettings(), None, Estimation())
