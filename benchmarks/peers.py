@@ -348,7 +348,7 @@ PEERS: tuple[Peer, ...] = (
     ),
     Peer(
         "allan-variance",
-        "pypi.org/project/allan-variance 1.0: compute_avar, estimate_parameters",
+        "the package allan-variance 1.0: compute_avar, estimate_parameters",
         allan_variance_package,
     ),
 )
