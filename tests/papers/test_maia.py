@@ -70,7 +70,7 @@ def test_the_demonstration_simulates_table_2_and_has_table_1_beside_it() -> None
     entries = {(entry.sensor, entry.recording): entry for entry in run.recordings}
     for channel in CHANNELS:
         entry = entries[channel.sensor, "sim_published"]
-        axis = entry.channels[channel.channel]  # type: ignore[index]
+        axis = entry.channels[channel.channel]  # type: ignore[index]  # its names are those keys
         assert axis.read is not None
         for model, figures in (
             (channel.table_2, axis.si(channel.channel)),

@@ -122,7 +122,7 @@ def equations() -> Iterator[Claim]:
             quantity=quantity,
             printed=printed,
             found=found,
-            **about,  # type: ignore[arg-type]
+            **about,  # type: ignore[arg-type]  # fields of a claim, of several types
         )
 
     process, T = _process(), 1.0 / _RATE

@@ -72,7 +72,7 @@ def _equations() -> Iterator[Claim]:
             place=f"Equation {number}",
             quantity=quantity,
             printed=printed,
-            **about,  # type: ignore[arg-type]
+            **about,  # type: ignore[arg-type]  # fields of a claim, of several types
         )
 
     yield equation(
