@@ -142,7 +142,7 @@ class Killer:
         if self._random.random() < 0.15:
             time.sleep(self._random.uniform(0.0, _BEGINNING))
         else:
-            self._until(process, run, self._random.uniform(0.0, latest))
+            self._until(process, self._random.uniform(0.0, latest))
             time.sleep(self._random.uniform(0.0, 0.5))
             if self._random.random() < 0.5:
                 self._until_writing(process, before)
@@ -153,7 +153,7 @@ class Killer:
         if not victims:
             process.wait(LONGEST)
             return False
-        self.kills.append(Kill(run, kind, steps, self._moment(run, before)))
+        self.kills.append(Kill(run, kind, steps, self._moment(before)))
         self._watch.look()
         status = process.wait(LONGEST)
         self._note_seen("at the kill")
@@ -169,7 +169,7 @@ class Killer:
                 self._settle(LONGEST)  # its Snakemake goes on
             if any(self.project.place.glob(".snakemake/locks/*")):
                 self.project.run("--unlock").check_returncode()
-        self._earlier_logs = self._nightly_logs()
+        self._earlier_logs = self._logs()
         with self._output.open("wb") as output:
             return subprocess.Popen(
                 command(self.project, run),
@@ -182,24 +182,25 @@ class Killer:
     def _output(self) -> Path:
         return self._folder / "output.txt"
 
-    def _said(self, run: str) -> str:
-        """Return what Snakemake says in a run."""
-        logs = {self._output} if run == SNAKEMAKE else self._nightly_logs() - self._earlier_logs
+    def _said(self) -> str:
+        """Return all that Snakemake says of the run that was started last."""
+        logs = self._logs() - self._earlier_logs
         return max(logs).read_text(errors="replace") if logs else ""
 
-    def _nightly_logs(self) -> set[Path]:
-        return set(self.project.results.glob("nightly/*.log"))
+    def _logs(self) -> set[Path]:
+        """Return the files in which Snakemake says all, named by their dates."""
+        return set(self.project.place.glob(".snakemake/log/*.log"))
 
-    def _progress(self, run: str) -> tuple[int, int]:
+    def _progress(self) -> tuple[int, int]:
         """Return how many steps are done, and of how many; 0 where that is not known yet."""
-        said = self._said(run)
+        said = self._said()
         total = re.search(r"^total +(\d+)$", said, re.MULTILINE)
         return said.count("\nFinished jobid"), int(total[1]) if total else 0
 
-    def _until(self, process: subprocess.Popen[bytes], run: str, share: float) -> None:
+    def _until(self, process: subprocess.Popen[bytes], share: float) -> None:
         """Wait until a share of the steps has been done, or the run ends."""
         while process.poll() is None:
-            done, total = self._progress(run)
+            done, total = self._progress()
             if total and done >= int(share * total):
                 return
             time.sleep(0.02)
@@ -212,11 +213,11 @@ class Killer:
                 return
             time.sleep(0.001)
 
-    def _moment(self, run: str, before: set[Path]) -> str:
+    def _moment(self, before: set[Path]) -> str:
         """Return how far a run was, and a file that was being written."""
         written = sorted(path.name for path in left_over(self.project.results) - before)
         names = [re.sub(r"^\.(.+)\.\w{8}\.part$", r"\1", name) for name in written[:1]]
-        done, total = self._progress(run)
+        done, total = self._progress()
         reached = f"{done} of {total} steps" if total else "before the first step"
         return reached + "".join(f", writing {name}" for name in names)
 
@@ -241,7 +242,7 @@ class Killer:
         faults = len(self.faults())
         status = self._start(run).wait(LONGEST)
         if not completed(run, status):
-            said = self._output.read_text(errors="replace") + self._said(run)
+            said = self._output.read_text(errors="replace") + self._said()
             self._note([f"{run} ended with {status}:\n{said[-4000:]}"], "the next run")
         self._note_seen("in the next run")
         try:
