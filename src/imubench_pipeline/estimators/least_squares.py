@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar, nnls
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import Estimate, Parameter, not_shown
 from imubench_pipeline.estimators.limits import with_limits
 from imubench_pipeline.noise import (
     PEAK_TAU,
@@ -82,6 +82,22 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
         If the method is not known.
     """
     return with_limits(*_solved(curve, method, longest))
+
+
+def fit_if_possible(curve: AllanCurve, *, method: Method, longest: float) -> Estimate:
+    """Fit N, B, T_B and K as `fit` does; what cannot be fitted is ``not_shown``, with the reason.
+
+    Parameters, and what is returned, are those of `fit`.
+
+    Raises
+    ------
+    ValueError
+        If the method is not known.
+    """
+    try:
+        return fit(curve, method=method, longest=longest)
+    except UnfitCurveError as error:
+        return not_shown(method, str(error))
 
 
 def solve(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 9) -> Estimate:

@@ -39,6 +39,11 @@ class Quality:
     gravity: dict[str, Any] | None = None
     """How gravity turns against the sensor (`recordings.quality.rotation.GravityTurn`)."""
 
+    @property
+    def grids(self) -> dict[str, int]:
+        """How many samples each channel has that goes on, missing ones with them."""
+        return {channel: int(about["grid"]) for channel, about in self.channels.items()}
+
     @classmethod
     def read(cls, path: Path) -> Quality:
         """Read the file that `write` wrote.

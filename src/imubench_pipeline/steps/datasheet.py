@@ -21,7 +21,7 @@ from imubench_pipeline.typing import Row
 def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:
     """Yield the rows of the table ``datasheet``; none of a rejected recording."""
     quality = Quality.read(folder / "quality.json")
-    measured = curves(folder / "allan.parquet", quality)
+    measured = curves(folder / "allan.parquet", quality.grids)
     temperatures = [quality.recording.get(f"temperature_{end}") for end in ("min", "max")]
     thermal = read("temperature", [folder / "temperature.parquet"]).to_pylist()
     biases = read("fixed_bias", [folder / "fixed_bias.parquet"]).to_pylist()
@@ -44,7 +44,7 @@ def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[R
 
 def curve_rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:
     """Yield the rows of the table ``datasheet_curve``; none where a datasheet has no line."""
-    measured = curves(folder / "allan.parquet", Quality.read(folder / "quality.json"))
+    measured = curves(folder / "allan.parquet", Quality.read(folder / "quality.json").grids)
     datasheet = Datasheet.model_validate(json.loads(settings)["datasheet"])
     for channel, curve in measured.items():
         names = {"sensor": sensor, "recording": recording, "channel": channel}

@@ -24,9 +24,7 @@ from imubench_pipeline.estimators.estimate import (
     SI_UNITS,
     Estimate,
     Parameter,
-    not_shown,
 )
-from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.estimators.rows import allan_rows, draw_rows, limit_rows, parameter_rows
@@ -36,7 +34,7 @@ from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperatu
 from imubench_pipeline.estimators.thermal.register import step_of
 from imubench_pipeline.estimators.thermal.result import ThermalFit, shift_by_effect
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.kept import Quality, kept_static_logs
+from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
@@ -135,28 +133,37 @@ class _Channel:
         self.courses = find_courses(
             log.blocks, log.grid, log.rate, segments=log.segments, highest=unfiltered
         )
+        self._bare = self._curve_of(self._blocks()) if self.courses.courses else curve
 
     def by_curve(self) -> dict[str, Estimate]:
         """Return the estimates that are read from the Allan variance, or fitted to it."""
-        settings, curve = self.settings, self.curve
-        if self.courses.courses:
-            curve = self._curve_of(self._blocks(), holes=self.log.holes)
+        settings, curve = self.settings, self._bare
         estimates: dict[str, Estimate] = {}
         if "curve" in settings.methods:
             estimates["curve"] = reading.read(curve, longest=settings.longest)
         for method in ("paper", "weighted"):
             if method in settings.methods:
-                try:
-                    fitted = least_squares.fit(curve, method=method, longest=settings.longest)
-                except UnfitCurveError as error:
-                    fitted = not_shown(method, str(error))
-                estimates[method] = fitted
+                estimates[method] = least_squares.fit_if_possible(
+                    curve, method=method, longest=settings.longest
+                )
         return estimates
 
     def by_likelihood(self, into: Estimation) -> dict[str, Estimate]:
         """Return the estimates from the spectrum; the rows that go with them are taken."""
         key, log = self.key, self.log
         fitted = self._fitted(self._blocks)
+        estimates = {estimate.method: estimate for estimate in fitted.estimates}
+        compensating = log.temperature and "compensated" in self.settings.methods
+        warm = self._temperature(fitted, into) if compensating else None
+        if warm is not None and warm.compensated:
+            without = warm.without_temperature
+            estimates["compensated"] = replace(without.estimates[0], method="compensated")
+            left = self._curve_of(warm.compensate(log.blocks()))
+            nothing = (np.zeros(len(values)) for values in log.blocks())
+            added = self._curve_of(
+                shift_by_effect(nothing, warm.path, warm.effect, 1.0), whole=True
+            )
+
         present = presence(log.blocks(), log.grid, log.segments) if log.holes else None
         limited = partial(with_fitted_limits, segments=log.segments, presence=present)
         into.allan += allan_rows(key, limited(self.curve, fitted))
@@ -168,24 +175,15 @@ class _Channel:
         into.lines += _line_rows(key, fitted)
         into.spectrum += _spectrum_rows(key, fitted)
         into.low_pass += _low_pass_rows(key, fitted)
-        estimates = {estimate.method: estimate for estimate in fitted.estimates}
-        if log.temperature and "compensated" in self.settings.methods:
-            warm = self._temperature(fitted, into)
+        if warm is not None:
             into.temperature += _temperature_rows(key, warm)
             if warm.compensated:
-                without = warm.without_temperature
-                estimates["compensated"] = replace(without.estimates[0], method="compensated")
-                left = self._curve_of(warm.compensate(log.blocks()), holes=log.holes)
-                nothing = (np.zeros(len(values)) for values in log.blocks())
-                added = shift_by_effect(nothing, warm.path, warm.effect, 1.0)
-                into.allan_compensated += _compensated_rows(
-                    key, limited(left, without), self._curve_of(added, holes=False)
-                )
+                into.allan_compensated += _compensated_rows(key, limited(left, without), added)
         return estimates
 
-    def _curve_of(self, blocks: Iterator[Array], *, holes: bool) -> AllanCurve:
+    def _curve_of(self, blocks: Iterator[Array], *, whole: bool = False) -> AllanCurve:
         """Return the Allan variance of what stands in place of the log, at the same clusters."""
-        log, sizes = self.log, self.curve.cluster_size
+        log, sizes, holes = self.log, self.curve.cluster_size, self.log.holes and not whole
         return of_blocks(blocks, log.grid, log.rate, sizes, holes=holes, segments=log.segments)
 
     def _temperature(self, fitted: Likelihood, into: Estimation) -> ThermalFit:
@@ -361,8 +359,9 @@ def estimation(
     """Return the rows that the channels leave, all or some; none of a rejected recording."""
     sections = json.loads(settings)
     into = Estimation()
-    measured = curves(curve, Quality.read(quality))
-    for channel, log in kept_static_logs(quality.parent).items():
+    logs = kept_static_logs(quality.parent)
+    measured = curves(curve, {channel: log.grid for channel, log in logs.items()})
+    for channel, log in logs.items():
         if channels is not None and channel not in channels:
             continue
         key = Key(sensor, recording, channel)

@@ -10,20 +10,22 @@ from typing import Any
 import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.keys import divided
 
 
-def curves(path: Path, quality: Quality) -> dict[str, AllanCurve]:
-    """Read the curves of a recording from its table ``allan`` or the first of it, by channel."""
+def curves(path: Path, samples: Mapping[str, int]) -> dict[str, AllanCurve]:
+    """Read the curves of a recording from its table ``allan`` or the first of it, by channel.
+
+    `samples`: how many each channel has, missing ones with them.
+    """
     by_channel = divided(read("allan", [path]), "channel")
     return {
         channel: AllanCurve(
             tau=table["tau"].to_numpy(),
             cluster_size=table["cluster_size"].to_numpy(),
             variance=table["adev"].to_numpy() ** 2,
-            samples=int(quality.channels[channel]["grid"]),
+            samples=samples[channel],
             exponent=table["exponent"].to_numpy(),
             averaged=table["averaged"].to_numpy(),
             share=table["share"].to_numpy(),

@@ -107,7 +107,7 @@ def write_reconstruction(
     """Write the tables ``reconstruction`` and ``scores`` of a recording."""
     quality, allan, parameters, compensated = inputs
     about = Quality.read(quality)
-    measured = curves(allan, about)
+    measured = curves(allan, about.grids)
     left = compensated_curves(compensated, measured)
     best = recommended_estimates(parameters)
     curve_rows: list[Mapping[str, Any]] = []
