@@ -113,6 +113,7 @@ NO_PRODUCTS = {"scc2130_x25", "sirrs01_03_triad"}
 def test_every_sensor_of_the_facts_has_a_file(shared: Path) -> None:
     assert set(FILES.values()) == set(facts(shared))
     assert set(CATALOGUE) == set(FILES.values()) | {"cats_tag", *NO_PRODUCTS}
+    assert {name for name, sensor in CATALOGUE.items() if not sensor.sold} == NO_PRODUCTS
 
 
 @pytest.mark.parametrize("name", FILES.values())

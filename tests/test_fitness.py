@@ -12,6 +12,7 @@ from imubench_pipeline.recordings.fitness import (
     fitness,
     judged,
     left_out,
+    not_sold,
     undecided,
     with_doubts,
     with_doubts_of_all,
@@ -23,6 +24,13 @@ from tests.test_selection import errors_of
 
 ABOUT = {"sensor": "s", "recording": "a", "status": "ok"}
 KEY = {"sensor": "s", "recording": "a", "channel": "gyro_x"}
+
+
+def test_what_is_not_sold_decides_nothing() -> None:
+    (doubt,) = not_sold([ABOUT, ABOUT | {"sensor": "other"}], {"s"})
+    (row,) = judged([ABOUT], [doubt], ())
+    assert (row["fitness"], row["decides"], row["doubts"]) == ("unfit", False, "not sold")
+    assert left_out([row]) == {("s", "a"): "a does not decide: not sold"}
 
 
 def finding(name: str, severity: str = "warning", **changes: Any) -> dict[str, Any]:

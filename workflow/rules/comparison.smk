@@ -63,7 +63,7 @@ rule shortlist:
     params:
         settings=plan.ranking_settings(),
         catalogue=plan.catalogue(
-            "price_class", "temperature_range", "rate", "mass", "power"
+            "price_class", "sold", "temperature_range", "rate", "mass", "power"
         ),
         code=plan.code("shortlist"),
     script:

@@ -57,7 +57,7 @@ rule sensor_tables:
         ),
     params:
         truths=lambda w: plan.truths(w.sensor),
-        catalogue=plan.catalogue("price_class"),
+        catalogue=plan.catalogue("price_class", "sold"),
         decide=plan.settings("decide"),
         code=plan.code("sensor_tables"),
         attempt=tried("sensor_tables"),

@@ -3,7 +3,8 @@
 All doubts are derived here, from the rows that the steps leave, and what decides or is exported
 (ranking, pooling, exports) asks here. A doubt is *unfit* where the figures may be of something else
 than the noise of a sensor at rest in the unit that is stated: it was moved or turned, the unit is
-another, an axis is dead. Others leave the figures, and are said beside them.
+another, an axis is dead; or where no such sensor can be bought. Others leave the figures, and are
+said beside them.
 """
 
 from __future__ import annotations
@@ -140,6 +141,28 @@ def doubts(
         if row["status"] == "doubtful"
     ]
     yield from sorted(every, key=lambda doubt: not doubt.unfit)
+
+
+def not_sold(recordings: Iterable[Row], sensors: Collection[str]) -> Iterator[Doubt]:
+    """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing.
+
+    Parameters
+    ----------
+    recordings : iterable of mapping
+        Rows of the table ``recordings``.
+    sensors : collection of str
+        Those that are not sold.
+    """
+    for row in recordings:
+        if row["sensor"] in sensors:
+            yield Doubt(
+                row["sensor"],
+                row["recording"],
+                None,
+                "not_sold",
+                "no such sensor is sold",
+                unfit=True,
+            )
 
 
 def fitness(of_recording: Iterable[Doubt]) -> Fitness:

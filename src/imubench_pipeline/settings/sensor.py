@@ -251,6 +251,11 @@ class Sensor(Strict):
     vendor: Shown
     model: Shown
     price_class: Shown | None = None
+    sold: bool = Field(
+        True,
+        description="false: no such sensor can be bought, as a board of several that is simulated; "
+        "its recordings decide nothing, and it is on no shortlist",
+    )
     price: Text | None = Field(None, description="with its currency and number, such as 12 EUR")
     mass: Annotated[Text, of_size("mass")] | None = Field(
         None, examples=["15 g"], description="null: not known"

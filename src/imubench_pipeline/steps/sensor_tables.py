@@ -18,6 +18,7 @@ from imubench_pipeline.recordings.fitness import (
     doubts,
     judged,
     left_out,
+    not_sold,
     undecided,
     with_doubts,
     with_doubts_of_all,
@@ -78,7 +79,10 @@ def joined_tables(
     if "backtest" in joined:
         findings += comparison.findings(joined["backtest"].to_pylist())
     joined["findings"] = build("findings", findings)
-    doubted = list(doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()))
+    doubted = [
+        *not_sold(about, {name for name, sensor in sensors.items() if not sensor.sold}),
+        *doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()),
+    ]
     about = judged(about, doubted, json.loads(decide).get("include", ()))
     joined["recordings"] = build("recordings", about)
     joined["doubts"] = build("doubts", (doubt.row() for doubt in doubted))

@@ -39,6 +39,7 @@ def rows_of_run(
     OSError, ValueError
         If a table cannot be read, or is of another form.
     """
+    sensors = {name: sensor for name, sensor in sensors.items() if sensor.sold}
     rows = {name: read(name, [path]).to_pylist() for name, path in tables.items()}
     recordings = rows.get("recordings", [])
     classes = {name: sensor.price_class for name, sensor in sensors.items()}

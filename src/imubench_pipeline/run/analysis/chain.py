@@ -212,7 +212,10 @@ class _Chain:
             own = {name: [folder / f"{name}.parquet" for folder in folders] for name in names}
             own["quality"] = [folder / _OF_INGEST["quality"] for folder in folders]
             tables = joined_tables(
-                own, plan.truths(sensor), plan.catalogue("price_class"), plan.settings("decide")
+                own,
+                plan.truths(sensor),
+                plan.catalogue("price_class", "sold"),
+                plan.settings("decide"),
             )
             for name, table in tables.items():
                 path = plan.run.results / "sensors" / sensor / f"{name}.parquet"
