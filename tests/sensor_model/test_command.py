@@ -205,7 +205,7 @@ def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
         (["bno055", "--hours", "1", "--channels", "accel_x"], "no figures of accel_x"),
         (["ln_200", "--hours", "1"], "prints no noise"),
         (["no.yaml", "--hours", "1"], "no.yaml: no such file"),
-        (["bno055", "--hours", "1", "--results", "nowhere"], "not the tables of a run"),
+        (["bno055", "--hours", "1", "--results", "nowhere"], "no table recordings"),
     ],
 )
 def test_what_cannot_be_simulated_is_said(

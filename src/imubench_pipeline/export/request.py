@@ -23,7 +23,7 @@ from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.export.temperature import TemperatureEffect, temperature_effect
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import left_out
-from imubench_pipeline.tables import read, tables_folder
+from imubench_pipeline.tables import read, tables_folder, tables_of_run
 
 Tables = Mapping[str, pa.Table]
 
@@ -77,11 +77,11 @@ def load(path: Path) -> dict[str, pa.Table]:
     ExportError
         If a table is missing or of another form.
     """
-    folder = tables_folder(path)
     try:
-        return {name: read(name, [folder / f"{name}.parquet"]) for name in NEEDED}
+        paths = tables_of_run(path, NEEDED)
+        return {name: read(name, [table]) for name, table in paths.items()}
     except (OSError, ValueError) as error:
-        raise ExportError(f"{folder}: {error}") from error
+        raise ExportError(str(error)) from error
 
 
 def recordings_of(path: Path) -> Path:

@@ -33,7 +33,6 @@ def run(arguments: argparse.Namespace) -> int:
     # Only what computes or draws loads this: the other commands answer at once.
     from imubench_pipeline.experiments.papers.about import PAPERS
     from imubench_pipeline.report.show import show
-    from imubench_pipeline.tables import tables_folder
 
     if arguments.results is None:
         from imubench_pipeline.experiments.papers.registry import rows_without_a_run
@@ -41,17 +40,10 @@ def run(arguments: argparse.Namespace) -> int:
         rows = list(rows_without_a_run())
         expected = "without the results of a run: what needs no log"
     else:
-        from imubench_pipeline.tables import read
+        from imubench_pipeline.tables import read, tables_of_run
 
-        path = tables_folder(arguments.results) / "published.parquet"
-        if not path.is_file():
-            print(
-                f"{path}: is not there; expected the folder of the results of a finished run, such "
-                "as results: `snakemake -c2` makes it",
-                file=sys.stderr,
-            )
-            return 2
         try:
+            path = tables_of_run(arguments.results, ["published"])["published"]
             rows = read("published", [path]).to_pylist()
         except (OSError, ValueError) as error:
             print(error, file=sys.stderr)

@@ -95,17 +95,14 @@ class _ShowError(ValueError):
 
 
 def _load(results: Path) -> dict[str, Rows]:
-    from imubench_pipeline.tables import read, tables_folder
+    from imubench_pipeline.tables import TableError, read, tables_of_run
 
-    folder = tables_folder(results)
-    missing = [name for name in _NEEDED if not (folder / f"{name}.parquet").is_file()]
-    if missing:
-        raise _ShowError(
-            f"{folder}: no table {', '.join(missing)}; expected the folder of the results of a "
-            "finished run, such as results: `snakemake -c2` makes it"
-        )
     try:
-        return {name: read(name, [folder / f"{name}.parquet"]).to_pylist() for name in _NEEDED}
+        paths = tables_of_run(results, _NEEDED)
+    except TableError as error:
+        raise _ShowError(str(error)) from error
+    try:
+        return {name: read(name, [path]).to_pylist() for name, path in paths.items()}
     except (OSError, ValueError) as error:
         raise _ShowError(f"{error}\n`snakemake -c2` makes the tables again") from error
 

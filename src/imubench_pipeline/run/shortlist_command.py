@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     from imubench_pipeline.settings.validation import ConfigError
     from imubench_pipeline.settings.yaml_files import read_settings
     from imubench_pipeline.steps.shortlist import NEEDED, rows_of_run
-    from imubench_pipeline.tables import tables_folder
+    from imubench_pipeline.tables import tables_of_run
 
     try:
         path = Path(options.requirement)
@@ -60,8 +60,7 @@ def run(options: argparse.Namespace) -> int:
         sensors = read_sensors(folders(options.sensors or Run().sensors, "sensors"))
         tables = {}
         if options.results is not None:
-            folder = tables_folder(options.results)
-            tables = {table: folder / f"{table}.parquet" for table in NEEDED}
+            tables = tables_of_run(options.results, NEEDED)
         rows = list(rows_of_run({name: asked}, sensors, tables))
     except (ConfigError, OSError, ValueError) as error:
         print(error, file=sys.stderr)

@@ -17,7 +17,7 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
-from imubench_pipeline.tables import read, tables_folder
+from imubench_pipeline.tables import read, tables_folder, tables_of_run
 
 Rows = list[dict[str, Any]]
 _NEEDED = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
@@ -40,9 +40,10 @@ def with_estimates(
     """
     folder = tables_folder(results)
     try:
-        tables = {table: read(table, [folder / f"{table}.parquet"]) for table in _NEEDED}
+        paths = tables_of_run(results, _NEEDED)
+        tables = {table: read(table, [path]) for table, path in paths.items()}
     except (OSError, ValueError) as error:
-        raise ConfigError(f"{folder}: not the tables of a run: {error}") from error
+        raise ConfigError(str(error)) from error
     recorded = _recording(tables["recordings"], folder, name, recording)
     chosen = recorded["recording"]
     of_log = {

@@ -150,6 +150,24 @@ def tables_folder(results: Path) -> Path:
     return inside if inside.is_dir() else results
 
 
+def tables_of_run(results: Path, names: Iterable[str]) -> dict[str, Path]:
+    """Return where tables of a run lie, by name; ``results`` as `tables_folder` takes it.
+
+    Raises
+    ------
+    TableError
+        If one is not there.
+    """
+    folder = tables_folder(results)
+    paths = {name: folder / f"{name}.parquet" for name in names}
+    if missing := [name for name, path in paths.items() if not path.is_file()]:
+        raise TableError(
+            f"{folder}: no table {', '.join(missing)}; expected the folder of the results of a "
+            "finished run, such as results: `snakemake -c2` makes it"
+        )
+    return paths
+
+
 def read(table: str, paths: Sequence[Path]) -> pa.Table:
     """Read and join files of one table, in the order given."""
     return joined(table, [read_part(table, path) for path in paths])

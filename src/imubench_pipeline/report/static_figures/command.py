@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from imubench_pipeline.tables import read, tables_folder
+from imubench_pipeline.tables import read, tables_folder, tables_of_run
 from imubench_pipeline.tables.schemas import TABLES
 
 if TYPE_CHECKING:
@@ -99,15 +99,11 @@ def _load(results: Path) -> dict[str, pa.Table]:
     """Read the tables of a run; ``results`` may be the folder ``tables`` itself."""
     folder = tables_folder(results)
     paths = {name: folder / f"{name}.parquet" for name in TABLES}
-    missing = [name for name in NEEDED if not paths[name].is_file()]
-    if missing:
-        raise SelectionError(
-            f"{folder}: found no {missing[0]}.parquet, expected the tables of a run"
-        )
     try:
+        tables_of_run(results, NEEDED)
         return {name: read(name, [path] if path.is_file() else []) for name, path in paths.items()}
     except (OSError, ValueError) as error:
-        raise SelectionError(f"{folder}: {error}") from error
+        raise SelectionError(str(error)) from error
 
 
 def select(
