@@ -107,7 +107,7 @@ rule fusion:
         **cost(OfMany(memory=300, memory_of_each=0.2, time=6, time_of_each=0.01)),
     params:
         settings=plan.settings("fusion"),
-        catalogue=plan.catalogue("price_class"),
+        catalogue=plan.catalogue("price_class", "sold"),
         code=plan.code("fusion"),
     script:
         "../scripts/fusion.py"

@@ -369,8 +369,15 @@ class Plan:
         )
 
     def ranking_settings(self) -> str:
-        """Return what the ranking depends on: requirements, and what the sensors have."""
-        sensors = self._described("price_class")
+        """Return what the ranking depends on: requirements, and what the sensors have.
+
+        Of those that can be bought.
+        """
+        sensors = {
+            name: about
+            for name, about in self._described("price_class").items()
+            if self.sensors[name].sold
+        }
         for name, about in sensors.items():
             about["abilities"] = abilities(self.sensors[name]).model_dump(mode="json")
         requirements = self._requirements("title", "note", "example", "environment")

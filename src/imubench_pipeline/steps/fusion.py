@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
 
@@ -31,7 +31,9 @@ NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
 
 
 def candidates(
-    tables: Mapping[str, pa.Table], joint: Mapping[tuple[str, str], Path] | None
+    tables: Mapping[str, pa.Table],
+    joint: Mapping[tuple[str, str], Path] | None,
+    besides: Container[str] = (),
 ) -> Iterator[FusionChannel]:
     """Yield the channels of recordings that decide, each with the estimate of the method to use.
 
@@ -43,6 +45,8 @@ def candidates(
         Those of `NEEDED`, of a run.
     joint : mapping of (str, str) to Path, optional
         The table ``draws`` of recordings, by sensor and recording.
+    besides : container of str
+        Sensors whose recordings are taken although they do not decide.
     """
     recordings, parameters = tables["recordings"], tables["parameters"]
     warm = _temperature_parts(tables)
@@ -62,7 +66,7 @@ def candidates(
         return read(path).get((channel, method))
 
     for (sensor, recording, channel, method), rows in groups.items():
-        if (sensor, recording) in apart:
+        if (sensor, recording) in apart and sensor not in besides:
             continue
         path = (joint or {}).get((sensor, recording))
         of = about[sensor, recording]
@@ -123,13 +127,17 @@ TACTICAL = "tactical"
 
 
 def grades_of_run(tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]) -> Iterator[Row]:
-    """Return the rows of the table ``grades``; `tables` as of `candidates`."""
+    """Return the rows of the table ``grades``; `tables` as of `candidates`.
+
+    Of sensors that are not sold, too: a board of several is made to reach such a grade.
+    """
     grades = [
         Grade(name, f"{sensor.vendor} {sensor.model}", sensor.datasheet)
         for name, sensor in sensors.items()
         if (sensor.price_class or "").split(" ")[0].strip(",") == TACTICAL
     ]
-    return grade_rows(candidates(tables, None), grades)
+    not_sold = {name for name, sensor in sensors.items() if not sensor.sold}
+    return grade_rows(candidates(tables, None, not_sold), grades)
 
 
 def write_fusion(

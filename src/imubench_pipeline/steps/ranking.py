@@ -29,7 +29,9 @@ def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -
         recommended.to_pylist(),
         joined["backtest"].to_pylist(),
     )
-    judged = list(judgements(asked.to_pylist(), requirements, sections["sensors"], basis))
+    sensors = sections["sensors"]
+    of_sensors = [row for row in asked.to_pylist() if row["sensor"] in sensors]
+    judged = list(judgements(of_sensors, requirements, sensors, basis))
     built = {
         "ranking": build("ranking", ranked(judged, basis)),
         "next_steps": build("next_steps", next_step_rows(judged, basis)),
