@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from imubench_pipeline.experiments.papers import silva, silva_runs
+from imubench_pipeline.experiments.papers import silva, silva_runs, silva_weeks
 from imubench_pipeline.experiments.papers.claims import rows_of
 from imubench_pipeline.experiments.papers.evidence import Evidence
 
@@ -32,6 +33,22 @@ def test_the_four_numbers_do_not_fit_each_other() -> None:
     assert floor["found"] / floor["scale"] == pytest.approx(adev[at], rel=1e-3)
     read = ROWS["Figure 3", "T_B, read from the curve of the printed numbers"]
     assert read["found"] == pytest.approx(55.5, abs=0.5) and read["verdict"] == "differs"
+
+
+def test_a_week_shows_k_by_reading_and_two_days_seldom_do() -> None:
+    of_weeks, of_days = silva_weeks.read_values(168), silva_weeks.read_values(48)
+    assert len(of_days["K"]) <= silva_weeks.LOGS // 2 < len(of_weeks["K"])
+    assert max(of_weeks["T_B"]) < 100.0  # never the 238.1 s that the logs are made with
+    # A week by other means: no code of the simulator, and the slope of 5 to 15 h, where K rules.
+    rng, phi = np.random.default_rng(1), math.exp(-1 / 238.1)
+    of_process = 0.0027 / 0.4365 * math.sqrt(math.log(2) / math.pi)  # its standard deviation
+    slow = lfilter([1.0], [1.0, -phi], rng.normal(size=604_800)) * math.sqrt(1 - phi**2)
+    walk = np.cumsum(rng.normal(size=604_800)) * 6.8314e-5
+    log = of_process * slow + walk + 0.0122 * rng.normal(size=604_800)
+    means = log.reshape(-1, 3600).mean(axis=1)
+    k = math.sqrt(0.5 * np.mean(np.diff(means) ** 2) * 3 / 3600)
+    median = float(np.median(of_weeks["K"])) / silva_runs.DEGREE
+    assert median == pytest.approx(k, rel=0.2) and median == pytest.approx(6.8314e-5, rel=0.15)
 
 
 def test_a_filter_improves_the_pairs_by_a_per_cent() -> None:

@@ -87,7 +87,8 @@ SILVA = About(
     declared=(
         "The latitude is not printed, nor how long a turn takes, nor the bias: −23.3° (Londrina, "
         "where the authors work), 2 s of each 30 s and 0.05 °/s are assumed.",
-        "The log at rest was a week long; here 48 h are simulated.",
+        "The log at rest was a week long; here 48 h at the full rate are simulated, and, where the "
+        "length is what matters (K, T_B by reading), 20 weeks at 1 Hz.",
         "All logs are simulated from the four numbers of section 5.1: what is found of N, B, K and "
         "T_B is the input come back. The estimates of section 6 are typed from the paper, and held "
         "against what the noise of those four numbers allows.",

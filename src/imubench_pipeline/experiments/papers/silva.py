@@ -22,10 +22,12 @@ from imubench_pipeline.experiments.papers.silva_runs import (
     said,
     turned,
 )
+from imubench_pipeline.experiments.papers.silva_weeks import of_weeks
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 
 AT_REST = Log(SENSOR, "sim_published", "gyro_x")
 _TEST = "tests/papers/test_silva.py"
+_WEEKS = f"{_TEST}::test_a_week_shows_k_by_reading_and_two_days_seldom_do"
 _GIVEN = "tests/earth_rate/test_known_rate.py"
 
 
@@ -196,6 +198,19 @@ def _noise() -> Iterator[Claim]:
             value=value, unit=unit, printed_unit=shown, scale=DEGREE, found=_read(name),
             basis="simulated", page=page, check="tests/test_estimation.py",
             reason="read where the other terms add to it",
+        )  # fmt: skip
+    for name, printed, value, unit, scale, why in (
+        ("K", "6.8314 × 10⁻⁵ °/s^(3/2)", PAPER_MODEL.K, "rad/s^(3/2)", DEGREE, "read where the "
+         "process adds to it"),
+        ("T_B", "238.1 s", 238.1, "s", 1.0, "N and K move the floor of the curve: no week of these "
+         "numbers reads so"),
+    ):  # fmt: skip
+        yield Claim(
+            place="Figure 3", quantity=f"{name}, read from curves of simulated weeks",
+            printed=printed, value=value, unit=unit, scale=scale,
+            printed_unit="°/s^(3/2)" if name == "K" else "",
+            found=of_weeks(name, AT_REST, NO_LOG), basis="simulated", page=page, check=_WEEKS,
+            reason=why,
         )  # fmt: skip
 
 
