@@ -41,7 +41,7 @@ ELSEWHERE = {
     "install --no-deps --no-build-isolation -e . && .venv/bin/snakemake -c2": INSTALLS,
     "python3 -m venv .venv-test && .venv-test/bin/pip install -r requirements/test.txt && "
     ".venv-test/bin/pip install --no-deps --no-build-isolation -e . && .venv-test/bin/python -m "
-    "pytest -n 2": INSTALLS,
+    "pytest -n 3": INSTALLS,
     ".venv-test/bin/pip install -r requirements/docs.txt && .venv-test/bin/sphinx-build -W -q docs "
     "docs/_build/html": INSTALLS,
     ".venv/bin/pip install -r requirements/docs.txt && .venv/bin/sphinx-build -W -q docs "
@@ -51,7 +51,7 @@ ELSEWHERE = {
     ".venv/bin/ruff check . && .venv/bin/ruff format .": "of the whole project: .ci/run",
     ".venv/bin/snakefmt Snakefile workflow": "of the whole project: .ci/run",
     ".venv/bin/mypy": "of the whole project: .ci/run",
-    ".venv/bin/python -m pytest -n 2": "these tests themselves: .ci/run",
+    ".venv/bin/python -m pytest -n 3": "these tests themselves: .ci/run",
     "cyclonedx-py environment --output-reproducible --of JSON -o sbom.json .venv": "an "
     "environment of its own, before a release",
     "pip-audit --disable-pip --require-hashes -r requirements/run.txt": "asks a service",
