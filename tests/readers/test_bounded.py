@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -47,6 +49,30 @@ def test_what_takes_more_is_ended(
         bounded(0.5 if function is time.sleep else 30.0, MEMORY, function, given)
     assert time.monotonic() - begin < 20.0
     assert len(np.ones(2 * MEMORY // 8)) == 2 * MEMORY // 8  # not limited here
+
+
+def compute(seconds: float) -> float:
+    while time.process_time() < seconds:  # of a process that has just begun
+        pass
+    return seconds
+
+
+def test_what_others_keep_waiting_is_not_ended_for_it() -> None:
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    try:
+        begin = time.monotonic()
+        assert bounded(0.6, MEMORY, compute, 0.3) == 0.3  # with a third of a core at most
+        assert time.monotonic() - begin > 0.6
+        with pytest.raises(BoundError, match=r"took more than 0.3 s"):
+            bounded(0.3, MEMORY, compute, 60.0)
+        assert time.monotonic() - begin < 20.0
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+        os.sched_setaffinity(0, cores)
 
 
 def test_the_command_says_what_listing_took(

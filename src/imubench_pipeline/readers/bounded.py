@@ -15,10 +15,15 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, ParamSpec, TypeVar
 
+import psutil
+
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _READ = 1 << 20
+
+_OVERLOADED = 5.0
+"""Times as long may take what waits for a core or a disk that others use."""
 
 _FORKING = Lock()
 """Held while a pipe is open in two processes that ought to have one end each: what another thread
@@ -51,6 +56,8 @@ def bounded(
 
     Parameters
     ----------
+    seconds : float
+        How long it may take; of a busy machine, how much time of a core, and five times as long.
     memory : int
         Bytes that it may take beside what this process has.
     function : callable
@@ -72,7 +79,7 @@ def bounded(
         os.close(ours)
         _answer(theirs, memory, lambda: function(*arguments, **named))
     try:
-        answer = _received(ours, seconds)
+        answer = _received(ours, seconds, psutil.Process(process))
     finally:
         os.close(ours)
         with suppress(ProcessLookupError):
@@ -107,13 +114,28 @@ def _answer(pipe: int, memory: int, called: Callable[[], Any]) -> None:
         os._exit(0)
 
 
-def _received(pipe: int, seconds: float) -> bytes | None:
+def _received(pipe: int, seconds: float, sender: psutil.Process) -> bytes | None:
     """Return what comes through a pipe until its end; None where that takes longer."""
-    end = time.monotonic() + seconds
+    begin = time.monotonic()
+    end, last = begin + seconds, begin + _OVERLOADED * seconds
     received: list[bytes] = []
-    while select.select([pipe], [], [], max(0.0, end - time.monotonic()))[0]:
-        block = os.read(pipe, _READ)
-        if not block:
-            return b"".join(received)
-        received.append(block)
-    return None
+    while True:
+        if select.select([pipe], [], [], max(0.0, end - time.monotonic()))[0]:
+            block = os.read(pipe, _READ)
+            if not block:
+                return b"".join(received)
+            received.append(block)
+        elif end < last and _is_kept_waiting(sender, seconds):
+            end = min(end + seconds / 4.0, last)
+        else:
+            return None
+
+
+def _is_kept_waiting(process: psutil.Process, seconds: float) -> bool:
+    """Tell whether a process had less time of a core than it may, and would go on if it had one."""
+    try:
+        used = process.cpu_times()
+        waiting = process.status() in (psutil.STATUS_RUNNING, psutil.STATUS_DISK_SLEEP)
+    except psutil.NoSuchProcess:
+        return False
+    return waiting and used.user + used.system < seconds
