@@ -11,10 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.readers.bounded import BoundError, bounded
+from imubench_pipeline.readers.bounded import BoundError, bounded, is_kept_waiting
 from imubench_pipeline.run.cli import main
 from tests.readers.hostile import ATTACKS
 
@@ -51,28 +52,30 @@ def test_what_takes_more_is_ended(
     assert len(np.ones(2 * MEMORY // 8)) == 2 * MEMORY // 8  # not limited here
 
 
-def compute(seconds: float) -> float:
-    while time.process_time() < seconds:  # of a process that has just begun
-        pass
-    return seconds
-
-
 def test_what_others_keep_waiting_is_not_ended_for_it() -> None:
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(cores)})
-    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    busy, idle = (
+        subprocess.Popen([sys.executable, "-c", code])
+        for code in ("while True: pass", "import time; time.sleep(60)")
+    )
     try:
-        begin = time.monotonic()
-        assert bounded(0.3, MEMORY, compute, 0.15) == 0.15  # with a third of a core at most
-        assert time.monotonic() - begin > 0.3
-        with pytest.raises(BoundError, match=r"took more than 0.1 s"):
-            bounded(0.1, MEMORY, compute, 60.0)
-        assert time.monotonic() - begin < 20.0
+        working, sleeping = psutil.Process(busy.pid), psutil.Process(idle.pid)
+        while working.cpu_times().user < 0.1 or sleeping.status() != psutil.STATUS_SLEEPING:
+            time.sleep(0.01)
+        assert is_kept_waiting(working, 60.0)  # it had less than a minute of a core, and goes on
+        assert not is_kept_waiting(working, 0.1)  # it had what it may
+        assert not is_kept_waiting(sleeping, 60.0)  # a core would not help it
     finally:
-        for process in busy:
+        for process in (busy, idle):
             process.kill()
             process.wait()
-        os.sched_setaffinity(0, cores)
+    assert not is_kept_waiting(working, 60.0)
+    with pytest.raises(BoundError, match=r"took more than 0.1 s"):
+        bounded(0.1, MEMORY, compute)
+
+
+def compute() -> None:
+    while True:
+        pass
 
 
 def test_the_command_says_what_listing_took(

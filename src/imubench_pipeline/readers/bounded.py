@@ -125,13 +125,13 @@ def _received(pipe: int, seconds: float, sender: psutil.Process) -> bytes | None
             if not block:
                 return b"".join(received)
             received.append(block)
-        elif end < last and _is_kept_waiting(sender, seconds):
+        elif end < last and is_kept_waiting(sender, seconds):
             end = min(end + seconds / 4.0, last)
         else:
             return None
 
 
-def _is_kept_waiting(process: psutil.Process, seconds: float) -> bool:
+def is_kept_waiting(process: psutil.Process, seconds: float) -> bool:
     """Tell whether a process had less time of a core than it may, and would go on if it had one."""
     try:
         used = process.cpu_times()
