@@ -46,19 +46,40 @@ def test_a_printed_figure_stands_beside_what_was_measured() -> None:
     (row,) = deltas(FIGURE | {"condition": "25 °C", "sidedness": "one-sided"})
     assert row["quantity"] == "N"
     assert row["printed"] == "0.3 deg/sqrt(h)"
-    assert row["about"] == "typ, read as one-sided, 25 °C"
-    assert (row["comparable"], row["unit"]) == ("0.3", "°/√h")
-    assert row["measured"] == ["0.33", "0.3 to 0.36"]
-    assert row["delta"] == ["+10 %", "+0 % to +20 %"]
+    assert row["about"] == "typ, 25 °C"
+    (reading,) = row["readings"]
+    assert reading["as"] == "read as one-sided"
+    assert (reading["comparable"], reading["unit"]) == ("0.3", "°/√h")
+    assert reading["measured"] == ["0.33", "0.3 to 0.36"]
+    assert reading["delta"] == ["+10 %", "+0 % to +20 %"]
     assert row["verdict"] == "as printed"
     (row,) = deltas(FIGURE, system="si")
-    assert (row["comparable"], row["unit"]) == ("8.727×10⁻⁵", "rad/s/√Hz")
+    (reading,) = row["readings"]
+    assert (reading["comparable"], reading["unit"]) == ("8.727×10⁻⁵", "rad/s/√Hz")
+
+
+def test_a_printed_figure_has_one_verdict_however_it_is_read() -> None:
+    one, two = (FIGURE | {"sidedness": side} for side in ("one-sided", "two-sided"))
+    (row,) = deltas(one, two)
+    assert row["verdict"] == "as printed" and len(row["readings"]) == 2
+    (row,) = deltas(one, two | {"verdict": "better than typ"})
+    assert row["verdict"] == "depends on sidedness"
+    assert row["reason"] == "as one-sided: as printed; as two-sided: better than typ"
+    # What vendors print as the bias instability is the lowest point of the curve.
+    instability = FIGURE | {"quantity": "bias_instability", "statistic": "adev_minimum"}
+    (row,) = deltas(instability, instability | {"statistic": "plateau", "verdict": "not sure"})
+    assert row["verdict"] == "as printed"
+    assert [reading["as"] for reading in row["readings"]] == [
+        "lowest point of the curve",
+        "0.664 B alone",
+    ]
 
 
 def test_less_than_printed_has_a_minus() -> None:
     (row,) = deltas(FIGURE | {"delta": -0.257, "delta_lower": None, "delta_upper": None})
-    assert row["delta"] == ["−26 %"]
-    assert row["value"] == -0.257
+    (reading,) = row["readings"]
+    assert reading["delta"] == ["−26 %"]
+    assert reading["value"] == -0.257
 
 
 def test_an_unpublished_figure_is_told_from_one_that_cannot_be_compared() -> None:
@@ -70,8 +91,9 @@ def test_an_unpublished_figure_is_told_from_one_that_cannot_be_compared() -> Non
     assert (unpublished["published"], unpublished["printed"]) == (False, "–")
     assert unpublished["reason"] == ""
     assert incomparable["published"] is True
-    assert (incomparable["comparable"], incomparable["measured"]) == ("–", ["–"])
-    assert incomparable["delta"] == ["–"]
+    (reading,) = incomparable["readings"]
+    assert (reading["comparable"], reading["measured"]) == ("–", ["–"])
+    assert reading["delta"] == ["–"]
     assert incomparable["reason"] == "another convention"
 
 
@@ -90,8 +112,8 @@ def test_what_nobody_looked_up_is_not_said_to_be_unpublished(quantity: str, figu
 @pytest.mark.parametrize(
     ("statistic", "quantity", "name", "unit"),
     [
-        ("adev_minimum", "bias_instability", "bias instability (minimum)", "°/h"),
-        ("plateau", "bias_instability", "bias instability (0.664 B)", "°/h"),
+        ("adev_minimum", "bias_instability", "bias instability", "°/h"),
+        ("plateau", "bias_instability", "bias instability", "°/h"),
         ("K", "K", "K", "°/h/√h"),
         ("T_B", "T_B", "T_B", "s"),
         ("mean", "zero_rate_offset", "zero rate offset", "°/h"),
@@ -101,7 +123,7 @@ def test_figures_have_names_and_units_of_their_own(
     statistic: str, quantity: str, name: str, unit: str
 ) -> None:
     (row,) = deltas(FIGURE | {"statistic": statistic, "quantity": quantity})
-    assert (row["quantity"], row["unit"]) == (name, unit)
+    assert (row["quantity"], row["readings"][0]["unit"]) == (name, unit)
 
 
 def test_methods_that_are_not_recommended_are_left_out() -> None:
@@ -126,23 +148,26 @@ def test_one_line_a_figure_over_all_recordings_of_a_sensor() -> None:
     first, second = deltas_of_sensors(found, "practical")
     assert (first["sensor"], first["simulated"], first["channel"]) == ("a", False, "gyro_x")
     assert first["recordings"] == 3
-    assert first["measured"] == "0.33 to 0.6"
-    assert first["difference"] == "+10 % to +100 %"
+    (reading,) = first["readings"]
+    assert reading["measured"] == "0.33 to 0.6"
+    assert reading["difference"] == "+10 % to +100 %"
     assert first["delta"] == 0.2
     assert first["verdicts"] == "as printed (1), worse than typ (2)"
     assert (first["printed"], first["about"]) == ("0.3 deg/sqrt(h)", "typ")
     assert (second["sensor"], second["simulated"]) == ("b", True)
-    assert (second["measured"], second["difference"]) == ("0.33", "+10 %")
+    (reading,) = second["readings"]
+    assert (reading["measured"], reading["difference"]) == ("0.33", "+10 %")
     assert second["verdicts"] == "as printed"
 
 
-def test_both_readings_of_a_density_have_lines_of_their_own() -> None:
-    found = views(
-        with_figures(FIGURE | {"sidedness": "one-sided"}, FIGURE | {"sidedness": "two-sided"})
-    )
-    assert [row["about"] for row in deltas_of_sensors(found, "practical")] == [
-        "typ, read as one-sided",
-        "typ, read as two-sided",
+def test_both_readings_of_a_density_stand_in_one_line() -> None:
+    other = {"sidedness": "two-sided", "delta": -0.2, "verdict": "better than typ"}
+    found = views(with_figures(FIGURE | {"sidedness": "one-sided"}, FIGURE | other))
+    (row,) = deltas_of_sensors(found, "practical")
+    assert (row["about"], row["verdicts"]) == ("typ", "depends on sidedness")
+    assert [(one["as"], one["difference"]) for one in row["readings"]] == [
+        ("read as one-sided", "+10 %"),
+        ("read as two-sided", "−20 %"),
     ]
 
 

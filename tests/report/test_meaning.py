@@ -1,4 +1,5 @@
 import math
+import re
 from typing import Any
 
 import pytest
@@ -45,9 +46,9 @@ def test_sensors_stand_in_their_order_with_what_decides() -> None:
     ]
     assert [group["simulated"] for group in shown["groups"]] == [True, False, False]
     heading, position = shown["groups"][1]["limits"]
-    assert (heading["unit"], position["unit"]) == ("°", "m")
-    # The bias from 10 s at rest, held for 100 s: N sqrt(t^2 / W) against N sqrt(t).
-    assert heading["sigma"] == f"{math.degrees(1e-3 * math.sqrt(100 + 100**2 / 10)):.3g}"
+    assert (heading["sigma"].unit, position["allowed"].unit) == ("°", "m")
+    # The bias from 10 s at rest, held for 100 s: N sqrt(t^2 / W) against N sqrt(t), known to 10 %.
+    assert heading["sigma"] == f"{math.degrees(1e-3 * math.sqrt(100 + 100**2 / 10)):.2g} °"
     assert position["decides"] and position["source"].startswith("gyro N in the static window (")
 
 
@@ -68,12 +69,12 @@ def test_a_budget_names_its_sources_and_what_is_missing() -> None:
     ]  # fmt: skip
     lines = {line["error"]: line["cells"][0] for line in tables[0]["lines"]}
     assert tables[0]["times"] == ["60 s"]
-    assert lines["heading (°)"]["lines"][0] == f"{math.degrees(1e-3 * math.sqrt(120)):.3g}"
-    assert "gyro N 50 %" in lines["heading (°)"]["lines"]
-    north = lines["north, found at rest (°)"]["lines"]  # 1e-3 rad/s against the Earth's rate
+    assert lines["heading"]["lines"][0] == f"{math.degrees(1e-3 * math.sqrt(120)):.3g} °"
+    assert "gyro N 50 %" in lines["heading"]["lines"]
+    north = lines["north, found at rest"]["lines"]  # 1e-3 rad/s against the Earth's rate
     assert north[0] == "not to be found"
     assert [line["error"] for line in tables[2]["lines"]] == [
-        "heading (°)", "north, found at rest (°)",
+        "heading", "north, found at rest",
     ]  # fmt: skip
     assert "velocity, one axis: no accelerometer in the recording" in tables[2]["missing"]
 
@@ -100,11 +101,11 @@ def test_one_channel_that_is_the_worst_and_the_median_stands_once() -> None:
     table = shown(budget())
     assert table["times"] == ["60 s", "10 min"]
     (line,) = table["lines"]
-    assert (line["error"], line["axis"]) == ("heading (°)", "worst, median")
+    assert (line["error"], line["axis"]) == ("heading", "worst, median")
     first, last = (cell["lines"] for cell in line["cells"])
-    # 0.01 rad are 0.573°; 0.8² of the variance are 64 %.
-    assert first == ["0.573", "0.286 to 1.15", "gyro N 64 %", "gyro K 36 %"]
-    assert last[0] == "2.29"
+    # 0.01 rad are 0.573°, known to 0.4°; 0.8² of the variance are 64 %.
+    assert first == ["0.57 °", "0.29 to 1.1", "gyro N 64 %", "gyro K 36 %"]
+    assert last[0] == "2.3 °"
 
 
 def test_axes_that_differ_stand_in_lines_of_their_own() -> None:
@@ -117,18 +118,28 @@ def test_axes_that_differ_stand_in_lines_of_their_own() -> None:
 
 def test_a_budget_has_the_units_of_the_settings() -> None:
     (line,) = shown(budget(), "si")["lines"]
-    assert line["error"] == "heading (rad)"
-    assert line["cells"][0]["lines"][:2] == ["0.01", "0.005 to 0.02"]
+    assert line["error"] == "heading"
+    assert line["cells"][0]["lines"][:2] == ["0.01 rad", "0.005 to 0.02"]
+
+
+@pytest.mark.parametrize(
+    ("size", "text"),
+    [(6.1e-4, "0.61 mm"), (0.0853, "85 mm"), (0.5, "0.5 m"), (950.0, "950 m"), (21500.0, "22 km")],
+)
+def test_a_length_has_the_prefix_that_is_easily_read(size: float, text: str) -> None:
+    ends = {"lower": 0.9 * size, "upper": 1.1 * size}
+    rows = [row | ends for row in budget(error="position", unit="m", sigma=size)]
+    assert shown(rows)["lines"][0]["cells"][0]["lines"][0] == text
 
 
 def test_an_error_of_more_than_a_right_angle_is_no_number() -> None:
     (line,) = shown(budget(sigma=2.0))["lines"]
-    assert line["cells"][0]["lines"][0] == "over 90"
+    assert line["cells"][0]["lines"][0] == "over 90 °"
     (line,) = shown(budget(sigma=2.0, error="north"))["lines"]
     assert line["cells"][0]["lines"][0] == "not to be found"
     assert not any(" to " in one for one in line["cells"][0]["lines"][1:])
     limit = ranked(sigma=2.0, upper=9.0)
-    assert (limit["sigma"], limit["interval"]) == ("over 90", "–")
+    assert (limit["sigma"], limit["interval"]) == ("over 90 °", "–")
 
 
 def test_what_is_assumed_is_said_once_with_the_errors_that_it_is_about() -> None:
@@ -164,9 +175,12 @@ def ranked(**changes: Any) -> dict[str, Any]:
 def test_a_limit_is_told_with_what_it_comes_of() -> None:
     limit = ranked()
     assert limit["limit"] == "heading, 100 s"
-    assert (limit["allowed"], limit["sigma"], limit["unit"]) == ("0.573", "0.286", "°")
-    assert limit["interval"] == "0.229 to 0.344"
+    assert (limit["allowed"], limit["sigma"]) == ("0.573 °", "0.29 °")
+    assert limit["sigma"].source == "ranking/robot/s/heading/100/sigma"
+    assert re.sub("<[^>]*>", "", limit["interval"]) == "0.23 to 0.34"
     assert (limit["margin"], limit["chance"]) == ("2", "99 %")
+    # 0.01 over 0.006 and 0.004.
+    assert re.sub("<[^>]*>", "", limit["margins"]) == "1.7 to 2.5"
     assert (limit["source"], limit["reached"]) == ("gyro N (75 %)", "2 h")
     assert limit["simulated"] is True
 

@@ -109,10 +109,10 @@ def test_a_percentage_never_hides_that_an_interval_is_wide(
 def group(sensor: str, verdict: str, rank: int | str = "–", **values: Any) -> dict[str, Any]:
     reason = values.pop("reason", "")
     limits = [
-        {"limit": "heading, 60 s", "sigma": "0.5", "unit": "°", "interval": "0.4 to 0.6",
-         "allowed": "1", "decides": False, "reason": "not that"},
-        {"limit": "position, 2 min", "sigma": "3", "unit": "m", "interval": "2 to 4",
-         "allowed": "5", "decides": True, "reason": reason},
+        {"limit": "heading, 60 s", "sigma": "0.5 °", "interval": "0.4 to 0.6",
+         "allowed": "1 °", "decides": False, "reason": "not that"},
+        {"limit": "position, 2 min", "sigma": "3 m", "interval": "2 to 4",
+         "allowed": "5 m", "decides": True, "reason": reason},
     ]  # fmt: skip
     made = {"sensor": sensor, "verdict": verdict, "rank": rank, "limits": limits}
     return (

@@ -113,7 +113,7 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
         assert value == pytest.approx({"gyro_x": gyro, "accel_x": 1e-3}[channel], rel=0.05)
     for name in ("scores", "reconstruction", "datasheet", "findings", "simulated_truth", "allan"):
         assert (project.results / f"tables/{name}.csv").is_file()
-    page = (project.results / "report/index.html").read_text()
+    page = (project.results / "report/recordings.html").read_text()
     assert "10 recordings of 3 sensors" in page and "4 analysed, 6 rejected" in page
     assert set(project.pages()) == {
         "index.html",

@@ -107,6 +107,7 @@ def suspicious(
     figures: Mapping[str, float],
     usual: UsualFigures,
     printed: Mapping[str, float] | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> list[str]:
     """Say which figures are twenty times off what is usual, and in which unit they would not be.
 
@@ -114,7 +115,8 @@ def suspicious(
     times the median of the catalogue (`usual_figures`); too small, since there are sensors of every
     price, what is below a twentieth of its least. A figure as the sensor's own datasheet prints it,
     SI, is neither. Another unit is named where its factor explains the figure: what is left is
-    usual of the sensor, or of the catalogue where its datasheet prints nothing.
+    usual of the sensor, or of the catalogue where its datasheet prints nothing. ``names``: what a
+    figure is called, where it is not N or B itself.
     """
     sentences = []
     for figure, value in figures.items():
@@ -139,7 +141,8 @@ def suspicious(
         doubt = _explained(quantity, figure, value, least, most)
         shown = _text(quantity, figure, value)
         than = _text(quantity, figure, other)
-        sentences.append(f"{quantity} {figure} = {shown} is {how}{than}: {doubt}")
+        name = (names or {}).get(figure, figure)
+        sentences.append(f"{quantity} {name} = {shown} is {how}{than}: {doubt}")
     return sentences
 
 
@@ -155,6 +158,10 @@ def _explained(quantity: str, figure: str, value: float, least: float, most: flo
 def _text(quantity: str, figure: str, value: float) -> str:
     unit, dimension = _SHOWN[quantity, figure]
     return f"{from_si(value, unit, dimension):.3g} {unit}"
+
+
+_LOWEST = {"B": "σ_min"}
+"""What estimates are compared by, with what vendors print as B."""
 
 
 def unusual_rows(
@@ -173,6 +180,6 @@ def unusual_rows(
             continue
         quantity, sensor = quantity_of(row["channel"]), sensors.get(row["sensor"])
         printed = printed_figures(sensor, quantity) if sensor else None
-        for sentence in suspicious(quantity, {figure: value}, usual, printed):
+        for sentence in suspicious(quantity, {figure: value}, usual, printed, _LOWEST):
             finding = Finding("unusual_figure", "warning", sentence, value, row["channel"])
             yield finding.row(row["sensor"], row["recording"])

@@ -31,15 +31,12 @@ from imubench_pipeline.estimators.missing import (
     fill_missing,
     slow_part,
 )
-from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
+from imubench_pipeline.estimators.model_choice import LEAST_SHARE, PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
-
-_LEAST_SHARE = 0.05
-"""Candidates of a smaller share do not enter the intervals."""
 
 _FEWEST_DRAWS = 4_000
 _FLEXIBLE = Terms("NFK", 1)
@@ -221,7 +218,7 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     frame, whittle, candidates = fit_models(spectrum, frame)
     chosen = candidates[0]
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
-    alike = [chosen] + [c for c in candidates[1:] if c.share >= _LEAST_SHARE and not c.terms.ramp]
+    alike = [chosen] + [c for c in candidates[1:] if c.share >= LEAST_SHARE and not c.terms.ramp]
     wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms)]
     papers = next(c for c in candidates if c.terms == PAPERS)
     # As the log shows them, and with N before the sensor's low-pass.

@@ -96,7 +96,7 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     order = sorted(tried.values(), key=bic)
     bics = np.array([bic(maximum) for maximum in order])
     aics = np.array([2.0 * (maximum.cost + maximum.terms.parameters) for maximum in order])
-    weights, shares = _relative(bics), _relative(aics)
+    weights, shares = relative(bics), relative(aics)
     return [
         Candidate(
             maximum,
@@ -137,7 +137,7 @@ def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> l
     gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
     bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
     aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)
-    weights, shares = _relative(bics), _relative(aics)
+    weights, shares = relative(bics), relative(aics)
     return [
         replace(
             candidates[i],
@@ -150,7 +150,12 @@ def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> l
     ]
 
 
-def _relative(scores: Array) -> Array:
+LEAST_SHARE = 0.05
+"""Candidates of a smaller share by AIC do not enter the intervals."""
+
+
+def relative(scores: Array) -> Array:
+    """Return the shares of models by their scores, BIC or AIC; their sum is 1."""
     weights = np.exp(-0.5 * (scores - scores.min()))
     return np.asarray(weights / weights.sum())
 

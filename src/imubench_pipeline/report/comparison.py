@@ -7,11 +7,10 @@ from itertools import chain
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import SHOWN
-from imubench_pipeline.report.parameters import cell, shown_symbols
+from imubench_pipeline.report.parameters import cell, model_words, shown_symbols
 from imubench_pipeline.report.payload import Arrays, compared, datasheet_lines
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
-from imubench_pipeline.report.words import model_text
 
 _PAPERS = "likelihood_gm"
 
@@ -64,7 +63,7 @@ class Comparison:
             "channel": channel.channel,
             "warnings": channel.warnings,
             "asked": asked,
-            "model": model_text(channel.parameters[method][0]["model"]),
+            "model": model_words(channel, method),
             "cells": {
                 symbol: cell(channel, method, symbol, duration, self._system)
                 for symbol in shown_symbols(chain(*channel.parameters.values()))

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.practical import PageUnit, System, digits_by, page_unit
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.typing import Row
 
 _STATISTIC_NAMES = {
     "N": "N",
-    "adev_minimum": "bias instability (minimum)",
-    "plateau": "bias instability (0.664 B)",
+    "adev_minimum": "bias instability",
+    "plateau": "bias instability",
     "K": "K",
     "T_B": "T_B",
 }
@@ -37,69 +37,121 @@ _SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up"
 def delta_rows(
     view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
 ) -> Iterator[dict[str, Any]]:
-    """Yield each figure of the datasheet, what was measured, and the difference.
+    """Yield each figure of the datasheet with all its readings, what was measured, and a verdict.
 
     ``coverage`` tells whether sensor, quantity and figure are published.
     """
-    for row in view.datasheet:
-        if row["method"] not in (view.recommended, *_BESIDE):
-            continue
-        unit = page_unit(view.quantity, _SYMBOLS.get(row["quantity"], "B"), system)
-        published = row["printed"] is not None
-        figure = "B" if row["quantity"] == "bias_instability" else row["quantity"]
+    own = [row for row in view.datasheet if row["method"] in (view.recommended, *_BESIDE)]
+    for rows in _by_figure(own, *_FIGURE).values():
+        first = rows[0]
+        published = first["printed"] is not None
+        figure = "B" if first["quantity"] == "bias_instability" else first["quantity"]
+        verdict, why = one_verdict(rows)
         yield {
-            "quantity": _figure_name(row),
+            "quantity": _figure_name(first),
             "published": published,
             "coverage": coverage.get((view.sensor, view.quantity, figure), "not looked up"),
-            "printed": f"{row['printed']:g} {row['unit']}" if published else "–",
-            "about": ", ".join(filter(None, (row["kind"], _read_as(row), row["condition"]))),
-            "comparable": unit.text(row["comparable"]),
-            "measured": _with_limits(row, unit.text),
-            "unit": "" if row["comparable"] is None and not row["measured"] else unit.sign,
-            "delta": _with_limits(row, _percent, "delta"),
-            "value": row["delta"],
-            "verdict": row["verdict"],
-            "reason": (row["reason"] or "") if published else "",
+            "printed": f"{first['printed']:g} {first['unit']}" if published else "–",
+            "about": ", ".join(filter(None, (first["kind"], first["condition"]))),
+            "readings": [_reading(row, view.quantity, system) for row in rows],
+            "verdict": verdict,
+            "reason": why if published else "",
         }
+
+
+def _reading(row: Row, quantity: str, system: System) -> dict[str, Any]:
+    """Return one way to read a printed figure, and what was measured beside it."""
+    unit = page_unit(quantity, _SYMBOLS.get(row["quantity"], "B"), system)
+    return {
+        "as": _read_as(row),
+        "comparable": unit.text(row["comparable"]),
+        "measured": _with_limits(row, unit),
+        "unit": "" if row["comparable"] is None and row["measured"] is None else unit.sign,
+        "delta": _shares_with_limits(row),
+        "value": row["delta"],
+    }
+
+
+def _by_figure(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
+    """Return the readings of each printed figure, by what names it."""
+    figures: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        figures.setdefault(tuple(row[name] for name in names), []).append(row)
+    return figures
+
+
+_FIGURE = ("quantity", "printed", "unit", "kind", "condition")
+"""What names a printed figure of a channel, however it is read."""
+
+
+def one_verdict(readings: Sequence[Row]) -> tuple[str, str]:
+    """Return the verdict on a printed figure, of the rows of its readings, and its reason.
+
+    A bias instability is judged by the minimum of the curve, which is what vendors print. A density
+    of which the datasheet does not say whether it is one-sided has a verdict where both readings
+    have the same.
+    """
+    minima = [row for row in readings if row["statistic"] == "adev_minimum"]
+    judged = minima or list(readings)
+    verdicts = list(dict.fromkeys(row["verdict"] for row in judged))
+    if len(verdicts) == 1:
+        return verdicts[0], judged[0]["reason"] or ""
+    each = "; ".join(f"as {row['sidedness']}: {row['verdict']}" for row in judged)
+    return DEPENDS, each
+
+
+DEPENDS = "depends on sidedness"
+"""The verdict where the readings of a density differ."""
 
 
 def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterator[dict[str, Any]]:
     """Yield each printed figure of a channel against all recordings of the sensor."""
-    groups: dict[tuple[Any, ...], list[Row]] = {}
+    groups: dict[tuple[Any, ...], list[list[Row]]] = {}
     for view in views:
         recommended = view.recommended()
-        for row in view.rows("datasheet"):
-            if row["method"] not in (recommended[row["channel"]], *_BESIDE):
-                continue
-            if row["delta"] is not None:
-                figure = ("quantity", "statistic", "printed", "unit", "kind", "sidedness")
-                key = (view.sensor, view.simulated, row["channel"], *(row[f] for f in figure))
-                groups.setdefault(key, []).append(row)
+        own = [
+            row
+            for row in view.rows("datasheet")
+            if row["method"] in (recommended[row["channel"]], *_BESIDE) and row["delta"] is not None
+        ]
+        for key, rows in _by_figure(own, "channel", *_FIGURE).items():
+            groups.setdefault((view.sensor, view.simulated, *key), []).append(rows)
     for (sensor, simulated, channel, *_), group in groups.items():
-        first = group[0]
-        symbol = _SYMBOLS.get(first["quantity"], "B")
-        unit = page_unit(quantity_of(channel), symbol, system)
-        deltas = sorted(row["delta"] for row in group)
-        measured = sorted(row["measured"] for row in group)
-        verdicts = Counter(row["verdict"] for row in group)
+        first = group[0][0]
+        unit = page_unit(quantity_of(channel), _SYMBOLS.get(first["quantity"], "B"), system)
+        verdicts = Counter(one_verdict(rows)[0] for rows in group)
+        readings = [
+            [row for rows in group for row in rows if _read_as(row) == name]
+            for name in dict.fromkeys(_read_as(row) for rows in group for row in rows)
+        ]
         yield {
             "sensor": sensor,
             "simulated": simulated,
             "channel": channel,
             "quantity": _figure_name(first),
             "printed": f"{first['printed']:g} {first['unit']}",
-            "about": ", ".join(filter(None, (first["kind"], _read_as(first)))),
-            "comparable": unit.text(first["comparable"]),
+            "about": first["kind"] or "",
             "unit": unit.sign,
-            "measured": _range([unit.text(value) for value in (measured[0], measured[-1])]),
-            "delta": median(deltas),
-            "difference": _range([_percent(value) for value in (deltas[0], deltas[-1])]),
+            "readings": [_over_recordings(rows, unit) for rows in readings],
+            "delta": median(row["delta"] for row in readings[0]),
             "recordings": len(group),
             "verdicts": ", ".join(
                 verdict if len(group) == 1 else f"{verdict} ({count})"
                 for verdict, count in verdicts.items()
             ),
         }
+
+
+def _over_recordings(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
+    """Return one way to read a printed figure against all recordings of a sensor."""
+    deltas = sorted(row["delta"] for row in rows)
+    measured = sorted(row["measured"] for row in rows)
+    return {
+        "as": _read_as(rows[0]),
+        "comparable": unit.text(rows[0]["comparable"]),
+        "measured": _range([unit.text(value, 3) for value in (measured[0], measured[-1])]),
+        "difference": _range([_percent(value) for value in (deltas[0], deltas[-1])]),
+    }
 
 
 def repeatability_lines(
@@ -120,7 +172,7 @@ def repeatability_lines(
             "printed": f"{row['printed']:g} {row['unit']}",
             "about": ", ".join(filter(None, (row["kind"], row["condition"]))),
             "comparable": unit.text(row["comparable"]),
-            "measured": _with_limits(row, unit.text),
+            "measured": _with_limits(row, unit),
             "unit": unit.sign,
             "delta": _percent(row["delta"]),
             "verdict": row["verdict"],
@@ -133,7 +185,13 @@ def _figure_name(row: Row) -> str:
 
 
 def _read_as(row: Row) -> str:
-    return f"read as {row['sidedness']}" if row["sidedness"] else ""
+    """Return how a reading takes the printed figure, where there is more than one way."""
+    if row["sidedness"]:
+        return f"read as {row['sidedness']}"
+    return _STATISTICS.get(row["statistic"], "")
+
+
+_STATISTICS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
 
 
 def _range(ends: Sequence[str]) -> str:
@@ -152,13 +210,21 @@ def _percent(share: float | None) -> str:
     return "–" if share is None else f"{round(100 * share):+d} %".replace("-", "−")
 
 
-def _with_limits(row: Row, text: Callable[[float | None], str], of: str = "") -> list[str]:
-    """Return a figure, and its 95 % limits below it."""
-    value, ends = (of, f"{of}_") if of else ("measured", "")
-    lower, upper = row[f"{ends}lower"], row[f"{ends}upper"]
+def _with_limits(row: Row, unit: PageUnit) -> list[str]:
+    """Return what was measured, and its 95 % limits below it."""
+    value, lower, upper = row["measured"], row["lower"], row["upper"]
+    if value is None or lower is None or upper is None:
+        return [unit.text(value)]
+    digits = digits_by(value, lower, upper)
+    return [unit.text(value, digits), f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"]
+
+
+def _shares_with_limits(row: Row) -> list[str]:
+    """Return the difference, and its 95 % limits below it."""
+    lower, upper = row["delta_lower"], row["delta_upper"]
     if lower is None or upper is None:
-        return [text(row[value])]
-    return [text(row[value]), f"{text(lower)} to {text(upper)}"]
+        return [_percent(row["delta"])]
+    return [_percent(row["delta"]), f"{_percent(lower)} to {_percent(upper)}"]
 
 
 def coverage_tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:

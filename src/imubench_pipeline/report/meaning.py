@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
+
+from markupsafe import Markup
 
 from imubench_pipeline.navigation.suitability.conditions import parts_of
 from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.practical import (
     PageUnit,
     System,
+    digits_by,
     duration_text,
     interval_text,
-    number_text,
     unit_of,
 )
+from imubench_pipeline.report.told import Told, margin, of_budget, of_ranking
 from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.typing import Row
@@ -85,17 +88,17 @@ _MERIT = ("passes", "probably passes", "passes if", "probably passes if")
 
 
 def _limit(row: Row, system: System) -> dict[str, Any]:
-    unit = unit_of(DIMENSIONS[row["error"]], system)
     has_sigma = row["sigma"] is not None
     reached = row["reached_after"]
+    size = margin(row)
     return {
-        "limit": f"{_NAMES[row['error']]}, {duration_text(row['time'])}",
-        "allowed": unit.text(row["limit"], 3),
-        "sigma": _shown(row["error"], row["sigma"], unit) if has_sigma else "–",
-        "interval": interval_text(row, unit) if has_sigma and _sensible(row, row["sigma"]) else "–",
-        "unit": unit.sign,
-        "margin": number_text(row["margin"], 3) if has_sigma else "–",
-        "chance": _percent(row["chance"]) if has_sigma else "–",
+        "limit": limit_words(row),
+        "allowed": _allowed(row, system),
+        "sigma": _expected(row, system) if has_sigma else "–",
+        "interval": _interval(row, system) if has_sigma else "–",
+        "margin": size[0] if size else "–",
+        "margins": Markup("{} to {}").format(size[1], size[2]) if size else "",
+        "chance": of_ranking(row, "chance", _percent(row["chance"]), "%") if has_sigma else "–",
         "source": f"{row['source']} ({_percent(row['share'])})" if row["source"] else "–",
         "parts": (row["parts"] or "–").split("; "),
         "reached": duration_text(reached) if reached is not None else "–",
@@ -103,6 +106,47 @@ def _limit(row: Row, system: System) -> dict[str, Any]:
         "reason": row["reason"] or "",
         "backtest": standing_text(row),
     }
+
+
+def _allowed(row: Row, system: System) -> Told:
+    unit = unit_of(DIMENSIONS[row["error"]], system, row["limit"])
+    return of_ranking(row, "limit", f"{unit.text(row['limit'], 3)} {unit.sign}", unit.sign)
+
+
+Place = Callable[[Row, str, str, str], Told]
+"""Gives a number, of a row and a column, its place: `told.of_ranking` or `told.of_budget`."""
+
+
+def _expected(row: Row, system: System, place: Place = of_ranking) -> str:
+    """Return the error of a row, which has one."""
+    unit = unit_of(DIMENSIONS[row["error"]], system, row["sigma"])
+    text = _shown(row, unit)
+    return place(row, "sigma", text, unit.sign) if _sensible(row, row["sigma"]) else text
+
+
+def _interval(row: Row, system: System, place: Place = of_ranking) -> str:
+    """Return the limits of the error of a row, in the unit of the error."""
+    if not _sensible(row, row["sigma"]) or row["lower"] is None or row["upper"] is None:
+        return "–"
+    unit = unit_of(DIMENSIONS[row["error"]], system, row["sigma"])
+    digits = digits_by(row["sigma"], row["lower"], row["upper"])
+    ends = (place(row, name, unit.text(row[name], digits), unit.sign) for name in _ENDS)
+    return Markup("{} to {}").format(*ends)
+
+
+_ENDS = ("lower", "upper")
+
+
+def error_of_recording(total: Row, system: System) -> tuple[str, str]:
+    """Return the error of a recording and its limits, of a total of ``error_budget``."""
+    if total["sigma"] is None:
+        return "–", ""
+    return _expected(total, system, of_budget), _interval(total, system, of_budget)
+
+
+def limit_words(row: Row) -> str:
+    """Return the error and the time of a limit, of a row of ``ranking`` or ``error_budget``."""
+    return f"{_NAMES[row['error']]}, {duration_text(row['time'])}"
 
 
 def budget_tables(
@@ -120,7 +164,6 @@ def budget_tables(
         lines: dict[tuple[str, tuple[float | None, ...]], dict[str, Any]] = {}
         missing: dict[str, None] = {}
         for error, axis in dict.fromkeys((row["error"], row["axis"]) for row in parts):
-            unit = unit_of(DIMENSIONS[error], system)
             chosen = [row for row in parts if (row["error"], row["axis"]) == (error, axis)]
             sigmas = tuple(row["sigma"] for row in chosen if row["source"] == "total")
             if not any(sigmas):
@@ -129,9 +172,8 @@ def budget_tables(
                 # One channel is the worst and the median.
                 lines[error, sigmas]["axis"] += f", {axis}"
             else:
-                cells = [_cell([row for row in chosen if row["time"] == t], unit) for t in times]
-                name = f"{_NAMES[error]} ({unit.sign})"
-                lines[error, sigmas] = {"error": name, "axis": axis, "cells": cells}
+                cells = [_cell([r for r in chosen if r["time"] == t], system) for t in times]
+                lines[error, sigmas] = {"error": _NAMES[error], "axis": axis, "cells": cells}
         yield {
             "sensor": key[0],
             "recording": key[1],
@@ -154,13 +196,14 @@ def _notes(lines: Iterable[Mapping[str, Any]]) -> Iterator[str]:
         yield f"{', '.join(errors).capitalize()}: {note}"
 
 
-def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
+def _cell(rows: Sequence[Row], system: System) -> dict[str, Any]:
     """Return an error with its interval, and what it comes of."""
     (total,) = (row for row in rows if row["source"] == "total")
-    shown = _shown(total["error"], total["sigma"], unit)
-    lines = [shown]
+    unit = unit_of(DIMENSIONS[total["error"]], system, total["sigma"])
+    lines = [_shown(total, unit)]
     if _sensible(total, total["sigma"]):
-        lines.append(interval_text(total, unit))
+        digits = digits_by(total["sigma"], total["lower"], total["upper"])
+        lines.append(interval_text(total, unit, digits))
     sources = [row for row in rows if row["source"] != "total"]
     if total["sigma"] > 0.0:
         lines += (parts_of(total["sigma"], sources) or "").split("; ")
@@ -172,10 +215,13 @@ def _sensible(row: Row, sigma: float) -> bool:
     return DIMENSIONS[row["error"]] != "angle" or sigma <= _QUARTER_TURN
 
 
-def _shown(error: str, sigma: float, unit: PageUnit) -> str:
-    if DIMENSIONS[error] == "angle" and sigma > _QUARTER_TURN:  # type: ignore[index]  # the table has known errors alone
-        return "not to be found" if error == "north" else f"over {unit.text(_QUARTER_TURN, 3)}"
-    return unit.text(sigma, 3)
+def _shown(row: Row, unit: PageUnit) -> str:
+    """Return the error of a row with its unit, with the digits that its limits leave."""
+    if not _sensible(row, row["sigma"]):
+        north = row["error"] == "north"
+        return "not to be found" if north else f"over {unit.text(_QUARTER_TURN, 3)} {unit.sign}"
+    digits = digits_by(row["sigma"], row["lower"], row["upper"])
+    return f"{unit.text(row['sigma'], digits)} {unit.sign}"
 
 
 def _percent(share: float) -> str:

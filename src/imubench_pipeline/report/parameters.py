@@ -6,10 +6,13 @@ from collections.abc import Iterable, Sequence
 from itertools import chain
 from typing import Any
 
+import numpy as np
+
 from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
+from imubench_pipeline.estimators.model_choice import LEAST_SHARE, relative
 from imubench_pipeline.report.practical import System, limit_digits, page_unit
 from imubench_pipeline.report.view import ChannelView
-from imubench_pipeline.report.words import model_text, untold
+from imubench_pipeline.report.words import counted, model_text, untold
 from imubench_pipeline.typing import Row
 
 
@@ -28,7 +31,7 @@ def methods_table(
         {
             "method": method,
             "recommended": method == channel.recommended,
-            "model": model_text(channel.parameters[method][0]["model"]),
+            "model": model_words(channel, method),
             "cells": [cell(channel, method, s, duration, system) for s in symbols],
         }
         for method in channel.parameters
@@ -37,6 +40,23 @@ def methods_table(
         cells = [_truth(channel.true_components.get(symbol, [])) for symbol in symbols]
         lines.append({"method": None, "recommended": False, "model": "", "cells": cells})
     return symbols, lines
+
+
+def model_words(channel: ChannelView, method: str) -> str:
+    """Return the model of a method, and how many more its intervals allow for.
+
+    Those of the likelihood allow for all models that the log does not tell from the best, so that
+    the papers' model alone has others, even where it is the best.
+    """
+    text = model_text(channel.parameters[method][0]["model"])
+    if method != "likelihood" or not channel.models:
+        return text
+    shares = relative(np.array([row["aic"] for row in channel.models]))
+    others = sum(
+        share >= LEAST_SHARE and not row["chosen"] and "R" not in row["model"].split("+")
+        for share, row in zip(shares, channel.models, strict=True)
+    )
+    return f"{text} or {counted(others, 'other')}" if others else text
 
 
 def cell(

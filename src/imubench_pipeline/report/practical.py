@@ -150,9 +150,23 @@ def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
     return _page_unit(signs.get(symbol) or signs[alike], dimension)
 
 
-def unit_of(dimension: str, system: System) -> PageUnit:
-    """Return the unit in which a page shows an angle, a velocity or a length."""
-    return _page_unit(_OF_DIMENSION[system][dimension], dimension)
+def unit_of(dimension: str, system: System, size: float | None = None) -> PageUnit:
+    """Return the unit in which a page shows an angle, a velocity or a length.
+
+    ``size``, SI: of what is shown, for which a prefix is chosen; SI has none.
+    """
+    sign = _OF_DIMENSION[system][dimension]
+    if system == "practical" and dimension in _PREFIXED and size:
+        for least, prefix in _PREFIXES:
+            if abs(size) >= least:
+                sign = prefix + sign
+                break
+    return _page_unit(sign, dimension)
+
+
+_PREFIXED = ("velocity", "length")
+_PREFIXES = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
+"""From which size in SI a prefix is easily read."""
 
 
 def _page_unit(sign: str, dimension: str) -> PageUnit:
@@ -174,6 +188,22 @@ def limit_digits(lower: float | None, upper: float | None, least: int = 3) -> in
         return least
     ratio = max(abs(lower), abs(upper)) / (upper - lower)
     return min(max(least, math.ceil(math.log10(ratio)) + 1), _MOST_DIGITS)
+
+
+def digits_by(value: float, lower: float | None, upper: float | None, otherwise: int = 3) -> int:
+    """Return with how many digits a value and its limits are printed: what its interval tells.
+
+    The last digit is the first of half the interval, or the second where that begins with 1. They
+    are two at least. Where there are no limits, they are as many as ``otherwise``.
+    """
+    if lower is None or upper is None or not upper > lower or not value:
+        return otherwise
+    half = (upper - lower) / 2.0
+    if not math.isfinite(half):
+        return 2
+    place = math.floor(math.log10(half))
+    place -= half < 2.0 * 10.0**place
+    return min(max(math.floor(math.log10(abs(value))) - place + 1, 2), _MOST_DIGITS)
 
 
 def interval_text(row: Mapping[str, Any], unit: PageUnit, least: int = 3) -> str:

@@ -35,9 +35,11 @@ _SCRIPTS = (
     "channel",
     "earth_rate",
     "calibration",
-    "decisions",
+    "trend",
     "start",
 )
+
+_STYLES = ("report", "decisions")
 
 Progress = Callable[[str], None]
 
@@ -126,7 +128,9 @@ def _rendered(
 
 def _assets() -> dict[str, str]:
     return {
-        "assets/report.css": (_STATIC / "report.css").read_text(encoding="utf-8"),
+        "assets/report.css": "".join(
+            (_STATIC / f"{name}.css").read_text(encoding="utf-8") for name in _STYLES
+        ),
         "assets/report.js": _script(),
         "assets/plotly.min.js": get_plotlyjs(),
     }

@@ -7,10 +7,9 @@ from dataclasses import asdict
 from typing import Any
 
 from imubench_pipeline.navigation.drift import LEVEL
-from imubench_pipeline.navigation.suitability.conditions import in_words
-from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
+from imubench_pipeline.report.evidence import evidence
 from imubench_pipeline.report.meaning import budget_tables, budget_words
 from imubench_pipeline.report.palette import places
 from imubench_pipeline.report.payload import FOREST, looks
@@ -18,7 +17,7 @@ from imubench_pipeline.report.practical import limit_digits, symbol_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
-from imubench_pipeline.report.words import counted, verdict_words
+from imubench_pipeline.report.words import counted
 from imubench_pipeline.typing import Row
 
 _MANY = 12
@@ -33,7 +32,7 @@ def sensor_page(site: Site, sensor: str) -> Page:
         *(view.device_page for view in own),
         [row for row in site.rows("pooled") if row["sensor"] == sensor],
         [row for row in site.rows("repeatability") if row["sensor"] == sensor],
-        list(_standings(site, sensor)),
+        [row for row in site.rows("ranking") if row["decides"] or row["sensor"] == sensor],
         [row for row in site.rows("coverage") if row["sensor"] == sensor],
         site.looks[sensor],
     )
@@ -51,7 +50,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
     return {
         "name": site.names[sensor],
         "summary": _about(site, sensor) + summary(own, several=False),
-        "standings": list(_standings(site, sensor)),
+        "verdicts": list(evidence(site, sensor, own)),
         "devices": list(_devices(own)),
         "forest": FOREST,
         "several": sum(view.static for view in own) > 1,
@@ -89,27 +88,6 @@ def _deltas(site: Site, views: Sequence[RecordingView]) -> Iterator[dict[str, An
 def _about(site: Site, sensor: str) -> str:
     price_class = site.settings["sensors"].get(sensor, {}).get("price_class")
     return f"Price class: {price_class}. " if price_class else ""
-
-
-def _standings(site: Site, sensor: str) -> Iterator[dict[str, str]]:
-    """Yield how the sensor stands to each requirement."""
-    deciding = [row for row in site.rows("ranking") if row["decides"]]
-    for row in deciding:
-        if row["sensor"] == sensor:
-            title = site.settings["requirements"][row["requirement"]]["title"]
-            text = in_words(row)
-            if row["rank"]:
-                judged = sum(
-                    other["rank"] is not None and other["requirement"] == row["requirement"]
-                    for other in deciding
-                )
-                text = f"{verdict_words(row)}; rank {row['rank']} of {judged} that could be judged"
-            if row["unless"]:
-                text += f"; {row['unless']}"
-            shown = standing_text(row)
-            if shown:
-                text += f"; {shown}"
-            yield {"title": title, "text": text}
 
 
 def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:

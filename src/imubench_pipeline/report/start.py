@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
+from imubench_pipeline.report.decisions import matrix, strip
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.payload import FOREST, looks
@@ -33,9 +33,13 @@ def _start(site: Site) -> dict[str, Any]:
     together = Comparison(views, site.names, site.system)
     warned = [view for view in views if view.warnings]
     return {
-        "summary": summary(views),
+        "strip": strip(site),
+        "about": " ".join(filter(None, (dated(views), made(views)))),
+        "matrix": matrix(site),
         "failures": list(_failures(site)),
-        "rejected": [view for view in views if view.rejected],
+        "rejected": [
+            {"view": view, "reason": folded(view.row["reason"])} for view in views if view.rejected
+        ],
         "warned": [
             {
                 "view": view,
@@ -44,7 +48,7 @@ def _start(site: Site) -> dict[str, Any]:
             }
             for view in warned
         ],
-        "warning_count": _warning_count(site, warned),
+        "in_doubt": _in_doubt(site, warned),
         "not_found": list(_without_result(site.turned, "earth_rate")),
         "not_calibrated": list(_without_result(site.calibrated, "calibration")),
         "changed": site.changed_devices(),
@@ -53,26 +57,26 @@ def _start(site: Site) -> dict[str, Any]:
         "forest": FOREST,
         "twins": [(name, name.replace("_", " ")) for name in site.channel_names],
         "parameter_tables": list(together.tables()),
-        "sensors": [_sensor(site, name) for name in site.sensors],
+        "sensors": {name: _sensor(site, name) for name in site.sensors},
         "page": {
             "grouped": "sensor",
             "looks": looks(site.looks),
             "names": site.names,
-            "rankings": {ranking["name"]: ranking["drawn"] for ranking in ranked},
             **together.page,
         },
     }
 
 
-def _warning_count(site: Site, warned: Sequence[RecordingView]) -> str:
-    """Return how many warnings there are, and how many of them nobody expects."""
-    every = [(site.on_purpose(view), row) for view in warned for row in view.warnings]
-    unexpected = sum(row["finding"] not in shown for shown, row in every)
-    text = f"{counted(len(every), 'warning')} in {counted(len(warned), 'recording')}"
-    if unexpected == len(every):
+def _in_doubt(site: Site, warned: Sequence[RecordingView]) -> str:
+    """Return how many recordings have warnings, and how many have some that nobody expects."""
+    unexpected = sum(
+        any(row["finding"] not in site.on_purpose(view) for row in view.warnings) for view in warned
+    )
+    text = f"{counted(len(warned), 'recording')} in doubt"
+    if unexpected == len(warned):
         return text
     others = f"all but {unexpected}" if unexpected else "all"
-    return f"{text}, {others} of simulated logs that are made to show them"
+    return f"{text}, {others} simulated to show it"
 
 
 def _failures(site: Site) -> Iterator[dict[str, Any]]:
@@ -95,28 +99,51 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
     sensors = {view.sensor for view in views}
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected
-    made = sum(view.simulated for view in views)
     of = f" of {counted(len(sensors), 'sensor')}" if several else ""
     parts = [counted(len(views), "recording") + of]
     lasting = sum(view.row["duration"] or 0.0 for view in views)
     if lasting:
         parts.append(f"{duration_text(lasting)} of data")
-    started = sorted(view.row["started"][:10] for view in views if view.row["started"])
-    if started:
-        dated = f"recorded from {started[0]} to {started[-1]}"
-        if started[0] == started[-1]:
-            dated = f"recorded on {started[0]}"
-        if any(not view.row["started"] and not view.left_out for view in views):
-            dated += f" ({len(started)} of {len(views)} say when)"
-        parts.append(dated)
+    if recorded := dated(views):
+        parts.append(recorded)
     text = ", ".join(parts) + f": {len(views) - rejected - failed} analysed, {rejected} rejected"
     text += f", {failed} failed." if failed else "."
-    if made:
-        of_them = f"{made} of them {'is' if made == 1 else 'are'}"
-        whole = made == len(views)
-        text += f" {'All are' if whole else of_them} simulated from published parameters, "
-        text += "not measured."
+    return f"{text} {made(views)}".rstrip()
+
+
+def dated(views: Sequence[RecordingView]) -> str:
+    """Return when recordings were made; empty where none says."""
+    started = sorted(view.row["started"][:10] for view in views if view.row["started"])
+    if not started:
+        return ""
+    text = f"recorded from {started[0]} to {started[-1]}"
+    if started[0] == started[-1]:
+        text = f"recorded on {started[0]}"
+    if any(not view.row["started"] and not view.left_out for view in views):
+        text += f" ({len(started)} of {len(views)} say when)"
     return text
+
+
+def made(views: Sequence[RecordingView]) -> str:
+    """Return in a sentence how many recordings are simulated; empty where none is."""
+    number = sum(view.simulated for view in views)
+    if not number:
+        return ""
+    of_them = f"{number} of them {'is' if number == 1 else 'are'}"
+    whole = number == len(views)
+    return f"{'All are' if whole else of_them} simulated from published parameters, not measured."
+
+
+def folded(reason: str) -> tuple[str, str]:
+    """Return the beginning of a reason that fits on a line, and the whole; empty if that is all."""
+    if len(reason) <= _LINE:
+        return reason, ""
+    begin = reason[: _LINE - 1]
+    return f"{begin[: begin.rfind(' ')].rstrip(',;:')} …", reason
+
+
+_LINE = 100
+"""Characters of a reason that stand on one line."""
 
 
 def _grouped(rows: Sequence[Row]) -> list[tuple[str, str]]:
@@ -144,11 +171,6 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
         yield ranking | {
             "asked": requirement_words(ranking["requirement"]),
             "verdict": requirement_verdict(ranking["groups"], site.names, basis),
-            "drawn": [
-                _margin(decisive[group["sensor"]], group)
-                for group in ranking["groups"]
-                if group["rank"] != "–"
-            ],
             "tied": {
                 group["sensor"]: [
                     site.names.get(name, name)
@@ -157,11 +179,6 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
                 for group in ranking["groups"]
                 if group["tied_with"]
             },
-            "undrawn": ", ".join(
-                f"{site.names[group['sensor']]} ({in_words(group)})"
-                for group in ranking["groups"]
-                if group["rank"] == "–"
-            ),
         }
 
 
@@ -216,31 +233,20 @@ _SPREAD_OF = {
 }
 
 
-def _margin(row: Row, group: dict[str, Any]) -> dict[str, Any]:
-    has_margin = row["margin"] is not None
-    bounded = has_margin and bool(row["lower"]) and bool(row["upper"])
-    return {
-        "sensor": row["sensor"],
-        "verdict": group["verdict"],
-        "weak": group["weak"],
-        "margin": row["margin"] if has_margin else None,
-        "low": row["limit"] / row["upper"] if bounded else None,
-        "high": row["limit"] / row["lower"] if bounded else None,
-    }
-
-
 def _sensor(site: Site, name: str) -> dict[str, Any]:
     own = [view for view in site.views if view.sensor == name]
     counts = counted(len(own), "recording")
     for status in ("rejected", "failed"):
         number = sum(view.row["status"] == status for view in own)
         counts += f", {number} {status}" if number else ""
-    if all(view.simulated for view in own):
+    simulated = all(view.simulated for view in own)
+    if simulated:
         counts += ", simulated"
     return {
         "name": name,
         "price_class": site.settings["sensors"].get(name, {}).get("price_class"),
         "counts": counts,
+        "simulated": simulated,
     }
 
 

@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from markupsafe import Markup
+
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED, in_words
 from imubench_pipeline.report.practical import (
     PageUnit,
@@ -132,14 +134,12 @@ def requirement_verdict(
     first = _first(best_name, verdict, len(ranked), len(groups))
     if best["weak"]:
         first += f", on weak evidence ({best['weak']})"
-    figures = (
-        f"The limit that decides is {decides['limit']}: {decides['sigma']} "
-        f"{decides['unit']} expected ({decides['interval']}), {decides['allowed']} "
-        f"{decides['unit']} allowed (1σ)."
+    figures = Markup("The limit that decides is {}: {} expected ({}), {} allowed (1σ).").format(
+        *(decides[name] for name in ("limit", "sigma", "interval", "allowed"))
     )
     if decides["reason"]:
         figures += f" Not counted: {decides['reason']}."
-    lines = [f"{first}.", f"{figures} {basis[best['sensor']]}"]
+    lines = [f"{first}.", figures + f" {basis[best['sensor']]}"]
     if conditions:
         lines.append(f"Conditions: {'; '.join(conditions)}.")
     if best["tied_with"]:

@@ -134,10 +134,10 @@ kinds.overlay = (figure) => {
   const { ink } = inks();
   const plain = { light: ink, dark: ink };
   const layers = [
-    { key: "measured", label: "curves", on: true, look: plain },
-    { key: "limits", label: "95 % limits", on: here.length <= 12, look: { ...plain, filled: true } },
-    { key: "model", label: "model", on: false, look: plain },
-    { key: "datasheet", label: "datasheet", on: false, look: { ...plain, dash: "dot" } },
+    { key: "measured", layer: true, label: "curves", on: true, look: plain },
+    { key: "limits", layer: true, label: "95 % limits", on: here.length <= 12, look: { ...plain, filled: true } },
+    { key: "model", layer: true, label: "model", on: false, look: plain },
+    { key: "datasheet", layer: true, label: "datasheet", on: false, look: { ...plain, dash: "dot" } },
   ];
   return {
     traces, groups: [...layers, ...groups.values()],
@@ -158,7 +158,8 @@ kinds.forest = (figure) => {
   const symbol = figure.dataset.symbol;
   const quantity = quantityOf(chosenChannel);
   const unit = unitOf(quantity, symbol);
-  const here = comparedChannels(chosenChannel);
+  const overlay = document.querySelector("figure[data-kind=overlay]");
+  const here = comparedChannels(chosenChannel).filter((view) => shown(overlay, groupOf(view)));
   const names = [...new Set(here.map(groupOf))].reverse();
   const traces = [];
   const counts = new Map();

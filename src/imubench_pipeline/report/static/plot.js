@@ -216,24 +216,33 @@ function drawControls(figure, groups) {
     box.checked = group.on;
     box.addEventListener("change", () => {
       choices.get(figure).set(group.key, box.checked);
-      drawFigure(figure);
+      redrawChosen(figure);
     });
     const sign = document.createElement("span");
     label.append(box, sign, ` ${group.label}`);
     controls.append(label);
   }
-  if (groups.length > 8) controls.append(allOrNone(figure, true), allOrNone(figure, false));
+  if (groups.length > 8) controls.append(allOrNone(figure, groups, true), allOrNone(figure, groups, false));
 }
 
-function allOrNone(figure, on) {
+// What is chosen among curves holds for the other figures of the page.
+function redrawChosen(figure) {
+  if (figure.dataset.kind === "overlay") redrawAll();
+  else drawFigure(figure);
+}
+
+// Layers, such as the curves themselves, stay: without them none that is switched on would be seen.
+function allOrNone(figure, groups, on) {
   const button = document.createElement("button");
   button.type = "button";
   button.textContent = on ? "all on" : "all off";
   button.addEventListener("click", () => {
-    const shownGroups = choices.get(figure);
-    shownGroups.forEach((_, key) => shownGroups.set(key, on));
-    figure.querySelectorAll(".controls input[type=checkbox]").forEach((box) => (box.checked = on));
-    drawFigure(figure);
+    for (const { key, layer } of groups) {
+      if (layer) continue;
+      choices.get(figure).set(key, on);
+      figure.querySelector(`.controls [data-group="${CSS.escape(key)}"] input`).checked = on;
+    }
+    redrawChosen(figure);
   });
   return button;
 }

@@ -15,6 +15,7 @@ class LongTable {
     if (!this.further?.matches("script.rows")) this.further = null;
     this.rows = [...this.body.rows];
     this.asked = {};
+    this.selects = new Map();
     this.all = false;
     this.order = null;
     [...table.tHead.rows[0].cells].forEach((head, column) => this.addSort(head, column));
@@ -56,9 +57,12 @@ class LongTable {
     const button = document.createElement("button");
     button.type = "button";
     button.className = "sort";
-    button.setAttribute("aria-label", `Sort by ${head.textContent.trim()}`);
+    button.setAttribute("aria-label", `Sort by ${head.dataset.name ?? head.textContent.trim()}`);
     button.addEventListener("click", () => {
-      const direction = head.getAttribute("aria-sort") === "ascending" ? -1 : 1;
+      // Where the largest is the best it stands first.
+      const [first, second] = head.dataset.first === "descending" ? [-1, 1] : [1, -1];
+      const before = head.getAttribute("aria-sort");
+      const direction = before === (first === 1 ? "ascending" : "descending") ? second : first;
       this.table.querySelectorAll("thead th[aria-sort]").forEach((other) => other.removeAttribute("aria-sort"));
       head.setAttribute("aria-sort", direction === 1 ? "ascending" : "descending");
       this.order = { column, direction, kind: head.dataset.sort };
@@ -86,14 +90,22 @@ class LongTable {
         this.asked[key] = select.value;
         this.show();
       });
+      this.selects.set(key, select);
       this.bar.append(labelled(capital(key), select));
     }
-    this.bar.append(this.count, this.more);
+    this.clear = Object.assign(document.createElement("button"), { type: "button", hidden: true, textContent: "clear the filters" });
+    this.clear.addEventListener("click", () => {
+      for (const key of Object.keys(this.asked)) this.asked[key] = "";
+      search.value = "";
+      this.selects.forEach((each) => (each.value = ""));
+      this.show();
+    });
+    this.bar.append(this.count, this.more, this.clear);
   }
 
-  fits(row) {
+  fits(row, besides = null) {
     return Object.entries(this.asked).every(([key, value]) =>
-      !value || (key === "text" ? row.textContent.toLowerCase().includes(value) : row.dataset[key] === value));
+      !value || key === besides || (key === "text" ? row.textContent.toLowerCase().includes(value) : row.dataset[key] === value));
   }
 
   show() {
@@ -103,10 +115,20 @@ class LongTable {
     shown.forEach((row) => (row.hidden = false));
     this.body.replaceChildren(...shown);
     showUnits(this.body);
-    const those = fitting.length === this.rows.length ? `${fitting.length} rows` : `${fitting.length} of ${this.rows.length} rows`;
+    const those = fitting.length === this.rows.length ? `${fitting.length} rows` : `${fitting.length} of ${this.rows.length} rows${fitting.length ? "" : ": none has all that is asked for"}`;
     this.count.textContent = shown.length < fitting.length ? `the first ${shown.length} of ${those}` : those;
     this.more.hidden = shown.length === fitting.length;
     this.more.textContent = `show all ${fitting.length}`;
+    if (this.clear) this.clear.hidden = fitting.length > 0;
+    this.offer();
+  }
+
+  // A filter offers what is left by the others.
+  offer() {
+    this.selects.forEach((select, key) => {
+      const left = new Set(this.rows.filter((row) => this.fits(row, key)).map((row) => row.dataset[key]));
+      for (const option of select.options) option.disabled = option.value !== "" && !left.has(option.value);
+    });
   }
 }
 
@@ -122,7 +144,7 @@ function sortRows(rows, { column, direction, kind }) {
 
 function sortKey(row, column, kind) {
   const cell = row.cells[column];
-  const value = cell.dataset.value ?? (cell.classList.contains("none") ? "" : cell.querySelector("data")?.value);
+  const value = cell.dataset.order ?? cell.dataset.value ?? (cell.classList.contains("none") ? "" : cell.querySelector("data")?.value);
   const text = value ?? cell.textContent.trim();
   if (kind !== "number") return text;
   return text === "" || Number.isNaN(Number(text)) ? null : Number(text);

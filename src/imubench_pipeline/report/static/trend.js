@@ -1,36 +1,4 @@
-// The figures that decide: the margin to a requirement, and a device over time.
-
-kinds.margins = (figure) => {
-  const standings = pageData.rankings[figure.dataset.requirement].filter((standing) => standing.margin !== null);
-  const names = standings.map((standing) => standing.sensor).reverse();
-  const { ink, mark, paper } = inks();
-  const traces = standings.map((standing) => {
-    const look = pageData.looks.sensors[standing.sensor];
-    const colour = colourOf(look);
-    return {
-      type: "scatter", mode: "markers", x: [standing.margin], y: [names.indexOf(standing.sensor)],
-      marker: { color: standing.weak ? paper : colour, size: 11, symbol: look.marker, line: { color: colour, width: standing.weak ? 2 : 0 } },
-      error_x: standing.low !== null ? {
-        type: "data", symmetric: false, array: [standing.high - standing.margin], arrayminus: [standing.margin - standing.low], color: colour, thickness: 2, width: 5,
-      } : undefined,
-      hovertemplate: `${nameOf(standing.sensor)}: ${standing.verdict}${standing.weak ? `<br>weak evidence: ${standing.weak}` : ""}<br>allowed over expected error: <b>${numberText(standing.margin, 3)}</b><br>95 %: ${interval(standing.low ?? NaN, standing.high ?? NaN)}<extra></extra>`,
-    };
-  });
-  const every = standings.flatMap((standing) => [standing.margin, standing.low, standing.high]).filter((value) => value > 0);
-  return {
-    traces, groups: [], height: 100 + 34 * names.length,
-    layout: {
-      margin: { l: 10, r: 14, t: 26, b: 50 },
-      xaxis: logAxis("allowed / expected error", logRange([0.5, 2, ...every], 0.12)),
-      yaxis: { ...linearAxis(""), tickvals: names.map((_, i) => i), ticktext: names.map((key) => wrapped(nameOf(key))), range: [-0.6, names.length - 0.4], fixedrange: true },
-      shapes: [{ type: "line", x0: 1, x1: 1, yref: "paper", y0: 0, y1: 1, line: { color: mark, width: 2 } }],
-      annotations: [
-        { x: 0, xref: "x", yref: "paper", y: 1, yanchor: "bottom", xanchor: "right", text: "fails ◂ ", showarrow: false, font: { color: ink } },
-        { x: 0, xref: "x", yref: "paper", y: 1, yanchor: "bottom", xanchor: "left", text: " ▸ passes", showarrow: false, font: { color: ink } },
-      ],
-    },
-  };
-};
+// A device over time: each estimate beside what its earlier recordings let expect.
 
 kinds.trend = (figure) => {
   const trend = pageData.trends[figure.dataset.trend];

@@ -1,0 +1,262 @@
+"""The decision matrix: every sensor and requirement, in a word, a margin and a bar.
+
+All of it is of the rows of the table ``ranking`` that decide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from imubench_pipeline.navigation.suitability.conditions import EXCLUDED
+from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.told import Told, margin, margin_limits, of_ranking
+from imubench_pipeline.report.words import counted, evidence_words
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.typing import Row
+
+WORDS: Mapping[str, str] = {
+    "passes": "chance of 97.5 % or more",
+    "likely": "50 to 97.5 %",
+    "open": "2.5 to 50 %, or known too badly",
+    "fails": "below 2.5 %",
+    "not judged": "no figure, or not admitted",
+}
+"""The words of the matrix, the best first, and what they mean."""
+
+_WORD_OF = {
+    "passes": "passes",
+    "passes if": "passes",
+    "probably passes": "likely",
+    "probably passes if": "likely",
+    "probably fails": "open",
+    "surely fails": "fails",
+}
+
+_LOGS = 4.0
+"""Decades to either side of 1 beyond which margins are sorted alike."""
+
+_DECADES = 2.0
+"""Decades to either side of 1 that a bar shows at most."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The logarithmic scale on which all margins of a matrix are drawn."""
+
+    low: float  # decades, of the left end
+    high: float
+
+    @classmethod
+    def of(cls, margins: Iterable[float]) -> Scale:
+        """Return the scale that shows margins, half and twice the limit at least."""
+        logs = [math.log10(value) for value in margins if 0.0 < value < math.inf]
+        low, high = min([*logs, math.log10(0.5)]), max([*logs, math.log10(2.0)])
+        return cls(max(low, -_DECADES) - 0.08, min(high, _DECADES) + 0.08)
+
+    def place(self, value: float) -> float:
+        """Return where a margin is drawn, % of the width; at an end what lies beyond it."""
+        log = math.log10(value) if value > 0.0 else -math.inf
+        share = (min(max(log, self.low), self.high) - self.low) / (self.high - self.low)
+        return round(100.0 * share, 2)
+
+    @property
+    def ticks(self) -> list[tuple[str, float]]:
+        """Decades with their places."""
+        powers = range(math.ceil(self.low), math.floor(self.high) + 1)
+        return [(number_text(10.0**power), self.place(10.0**power)) for power in powers]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A sensor and a requirement."""
+
+    requirement: str
+    sensor: str
+    word: str
+    conditions: int  # figures that are not known, on which the word rests
+    margin: tuple[Told, Told, Told] | None  # with its 95 % limits
+    bar: tuple[float, float, float] | None  # of these, the places
+    weak: str  # what makes the evidence weak, in words
+    doubts: str  # what is doubted of the recordings
+    reason: str  # why it is not judged
+    otherwise: Sequence[tuple[str, Told, float]]  # as logged, and mended: margins and places
+    order: float  # larger is better
+
+    @property
+    def hatched(self) -> bool:
+        """Whether the evidence is weak or in doubt."""
+        return bool(self.weak or self.doubts)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A requirement."""
+
+    name: str
+    title: str
+    short: str
+    limits: Sequence[str]
+    answer: str
+
+
+def matrix(site: Site) -> dict[str, Any] | None:
+    """Return the matrix of a report; None where nothing is asked of its sensors."""
+    requirements = site.settings["requirements"]
+    rows = {
+        (row["requirement"], row["sensor"]): row for row in site.rows("ranking") if row["decides"]
+    }
+    if not rows:
+        return None
+    scale = Scale.of(value for row in rows.values() for value in _drawn(row))
+    lines = {
+        sensor: [_cell(name, sensor, rows.get((name, sensor)), scale) for name in requirements]
+        for sensor in site.sensors
+    }
+    order = sorted(lines, key=lambda sensor: (_merit(lines[sensor]), site.names[sensor]))
+    return {
+        "columns": [
+            _column(name, declared, answer([cells[place] for cells in lines.values()], site.names))
+            for place, (name, declared) in enumerate(requirements.items())
+        ],
+        "lines": [(sensor, lines[sensor]) for sensor in order],
+        "scale": scale,
+        "words": WORDS,
+    }
+
+
+def _merit(cells: Sequence[Cell]) -> tuple[float, ...]:
+    """Return a key that puts first what passes most, then what is likely to, and so on."""
+    words = list(WORDS)
+    counts = [-sum(cell.word == word for cell in cells) for word in words]
+    return (*counts, -sum(cell.order for cell in cells))
+
+
+def answer(cells: Sequence[Cell], names: Mapping[str, str]) -> str:
+    """Return in a line which sensor to choose, of the cells of a requirement."""
+    judged = [cell for cell in cells if cell.word != "not judged"]
+    if not judged:
+        return "no sensor could be judged."
+    best = max(judged, key=lambda cell: cell.order)
+    name = names[best.sensor]
+    if best.word in ("passes", "likely"):
+        verb = "passes" if best.word == "passes" else "is likely to pass"
+        text = f"{name} {verb}"
+        if best.conditions:
+            text += f" if {counted(best.conditions, 'condition')} {_hold(best.conditions)}"
+        text += f", the best of {len(judged)} judged" if len(judged) > 1 else ", alone judged"
+    else:
+        of = (
+            f"none of {len(judged)} judged"
+            if len(judged) > 1
+            else "the one that is judged does not"
+        )
+        verb = "passes" if len(judged) > 1 else "pass"
+        text = f"{of} {verb}; {name} is nearest"
+    return f"{text}{', on weak evidence' * bool(best.weak)}."
+
+
+def _hold(number: int) -> str:
+    return "holds" if number == 1 else "hold"
+
+
+def _column(name: str, declared: Mapping[str, Any], answer: str) -> Column:
+    requirement = Requirement.model_validate(declared)
+    short = name.replace("_", " ").capitalize()
+    limits = [f"{x.error} {x.at_most} in {x.after}" for x in requirement.limits]
+    return Column(name, requirement.title, short, limits, answer)
+
+
+def _drawn(row: Row) -> list[float]:
+    """Return the margins of a row that are drawn."""
+    known = [row[name] for name in ("logged_margin", "unless_margin") if row[name] is not None]
+    return known if row["margin"] is None else [row["margin"], *margin_limits(row)]
+
+
+def word_of(row: Row) -> str:
+    """Return the word of a row of the table ``ranking`` that decides."""
+    if row["verdict"] == "not enough data" and row["margin"] is not None:
+        return "open"
+    return _WORD_OF.get(row["verdict"], "not judged")
+
+
+def _cell(requirement: str, sensor: str, row: Row | None, scale: Scale) -> Cell:
+    if row is None:
+        nothing = "no recording at rest"
+        return Cell(
+            requirement, sensor, "not judged", 0, None, None, "", "", nothing, (), -math.inf
+        )
+    word = word_of(row)
+    judged = word != "not judged"
+    shown = margin(row) if judged else None
+    bar = [scale.place(x) for x in (row["margin"], *margin_limits(row))] if shown else None
+    ranked = list(WORDS)
+    return Cell(
+        requirement,
+        sensor,
+        word,
+        _conditions(row) if judged else 0,
+        shown,
+        (bar[0], bar[1], bar[2]) if bar else None,
+        evidence_words(row) if judged else "",
+        row["doubts"] or "",
+        "" if judged else _reason(row),
+        [] if judged else _otherwise(row, scale),
+        _order(len(WORDS) - ranked.index(word), row["margin"]) if judged else -math.inf,
+    )
+
+
+def _order(place: int, size: float | None) -> float:
+    log = math.log10(size) if size else -_LOGS
+    return round(10.0 * place + min(max(log, -_LOGS), _LOGS), 4)
+
+
+def _conditions(row: Row) -> int:
+    """Return on how many conditions a verdict rests."""
+    return len((row["conditions"] or "").split("; ")) if row["verdict"].endswith(" if") else 0
+
+
+def _reason(row: Row) -> str:
+    """Return in a few words why a sensor is not judged."""
+    if row["verdict"] == EXCLUDED:
+        return str(row["conditions"])
+    if row["verdict"] != "not enough data":
+        return str(row["verdict"])
+    if row["left_out"]:
+        return "in doubt" if row["doubts"] else str(row["left_out"])
+    return str(row["reason"] or "too little is known")
+
+
+def _otherwise(row: Row, scale: Scale) -> list[tuple[str, Told, float]]:
+    """Return the margins that a recording in doubt would have."""
+    named = (("as logged", "logged_margin"), ("mended", "unless_margin"))
+    return [
+        (words, of_ranking(row, name, number_text(row[name], 3)), scale.place(row[name]))
+        for words, name in named
+        if row[name] is not None
+    ]
+
+
+def strip(site: Site) -> list[dict[str, Any]]:
+    """Return what the report is of, in numbers: each with its words, and where it leads."""
+    views = site.views
+    rejected = sum(view.rejected for view in views)
+    failed = sum(view.left_out for view in views) - rejected
+    days = sum(view.row["duration"] or 0.0 for view in views) / 86400.0
+    doubted = sum(bool(view.warnings) for view in views)
+    parts = [
+        (len(site.sensors), counted(len(site.sensors), "sensor"), "#sensors"),
+        (len(views), counted(len(views), "recording"), "recordings.html"),
+        (days, f"{number_text(days, 3)} days of data", "recordings.html"),
+        (rejected, f"{rejected} rejected", "#rejected" if rejected else "recordings.html"),
+        (doubted, f"{doubted} in doubt", "#warnings" if doubted else "recordings.html"),
+    ]
+    if failed:
+        parts.append((failed, f"{failed} failed", "#failed"))
+    return [
+        {"number": text.split(" ")[0], "words": text.split(" ", 1)[1], "to": to, "bad": bad}
+        for bad, (_, text, to) in zip((0, 0, 0, rejected, doubted, failed), parts, strict=False)
+    ]

@@ -1,0 +1,98 @@
+"""What the verdicts on a sensor stand on: every number of the decision matrix, and where from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from imubench_pipeline.report.decisions import word_of
+from imubench_pipeline.report.meaning import error_of_recording, limit_words, rankings
+from imubench_pipeline.report.practical import duration_text, number_text
+from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.told import of_ranking
+from imubench_pipeline.report.view import RecordingView
+from imubench_pipeline.report.words import counted, requirement_words
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.typing import Row
+
+
+def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
+    """Yield each requirement with how a sensor stands to it, and all that this rests on.
+
+    A requirement by which the sensor is not judged is there, too. ``own``: its recordings.
+    """
+    rows = site.rows("ranking")
+    own_rows = [row for row in rows if row["sensor"] == sensor]
+    totals = {view.name: list(_totals(view)) for view in own if view.static}
+    simulated = {view.full_name: view.simulated for view in own}
+    requirements = site.settings["requirements"] if rows else {}
+    for ranking in rankings(own_rows, requirements, simulated, site.system):
+        name, requirement = ranking["name"], ranking["requirement"]
+        about = {"name": name, "title": requirement.title, "asked": requirement_words(requirement)}
+        stands = next((r for r in own_rows if r["requirement"] == name and r["decides"]), None)
+        if stands is None:
+            yield about | {"row": None, "word": "not judged"}
+            continue
+        (group,) = ranking["groups"]
+        judged = sum(
+            row["rank"] is not None and row["decides"] and row["requirement"] == name
+            for row in rows
+        )
+        yield about | {
+            "row": stands,
+            "word": word_of(stands),
+            "group": group,
+            "place": f"rank {stands['rank']} of {judged} that could be judged"
+            if stands["rank"]
+            else "",
+            "conditions": (stands["conditions"] or "").split("; ")
+            if stands["verdict"].endswith(" if")
+            else [],
+            "otherwise": list(_otherwise(stands)),
+            "window": _window(requirement),
+            "limits": [limit_words(row) for row in own_rows if row["requirement"] == name],
+            "recordings": [
+                _recording(site, view, [t for t in totals[view.name] if t["requirement"] == name])
+                for view in own
+                if view.static
+            ],
+        }
+
+
+def _otherwise(row: Row) -> Iterator[tuple[str, str, str]]:
+    """Yield what the verdict would be: in which case, the verdict and its margin."""
+    for words, name in (("As logged", "logged"), ("With the unit mended", "unless")):
+        size = row[f"{name}_margin"]
+        if size is not None:
+            text = of_ranking(row, f"{name}_margin", number_text(size, 3))
+            yield words, row[f"{name}_verdict"], text
+
+
+def _window(requirement: Requirement) -> str:
+    """Return from what biases are taken, which all errors of the requirement have in common."""
+    if requirement.static_window:
+        return f"{requirement.static_window} at rest right before"
+    return "turn-on biases that nothing has taken off" if requirement.turn_on else ""
+
+
+def _totals(view: RecordingView) -> Iterator[Row]:
+    for row in view.rows("error_budget"):
+        if row["requirement"] is not None and row["source"] == "total":
+            yield row
+
+
+def _recording(site: Site, view: RecordingView, totals: Sequence[Row]) -> dict[str, Any]:
+    axes = counted(len(view.recommended()), "axis", "axes")
+    temperature = ""
+    if view.row["temperature_min"] is not None:
+        ends = (number_text(view.row[f"temperature_{end}"], 3) for end in ("min", "max"))
+        temperature = " to ".join(ends) + " °C"
+    return {
+        "view": view,
+        "device": view.row["device"],
+        "length": f"{duration_text(view.row['duration'])}, {axes}",
+        "temperature": temperature,
+        "decides": view.row["decides"] is not False,
+        "doubts": view.row["doubts"] or "",
+        "errors": [error_of_recording(total, site.system) for total in totals],
+    }

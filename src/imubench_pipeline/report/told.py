@@ -1,0 +1,68 @@
+"""Numbers of verdicts, which know the value of the tables that they are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from markupsafe import Markup
+
+from imubench_pipeline.report.practical import digits_by, number_text
+from imubench_pipeline.typing import Row
+
+
+class Told(str):
+    """A number as a page prints it; in HTML it says from which value of the tables it is.
+
+    ``source`` is ``ranking/<requirement>/<sensor>/<error>/<time>/<column>``, or that of a total of
+    ``error_budget``, with the recording after the sensor; two columns with a colon between them are
+    a ratio. ``unit`` is that of the number.
+    """
+
+    __slots__ = ("source", "unit")
+    source: str
+    unit: str
+
+    def __new__(cls, text: str, source: str, unit: str = "") -> Told:
+        """Return the text, with its source."""
+        told = super().__new__(cls, text)
+        told.source, told.unit = source, unit
+        return told
+
+    def __html__(self) -> Markup:
+        """Return it as an element with its source."""
+        unit = Markup(' data-in="{}"').format(self.unit) if self.unit else ""
+        return Markup('<span data-from="{}"{}>{}</span>').format(self.source, unit, str(self))
+
+
+def of_ranking(row: Row, column: str, text: str, unit: str = "") -> Told:
+    """Return a number of a row of the table ``ranking``."""
+    return _told("ranking", row, ("requirement", "sensor"), column, text, unit)
+
+
+def of_budget(row: Row, column: str, text: str, unit: str = "") -> Told:
+    """Return a number of a total of the table ``error_budget``, of a requirement."""
+    names = ("requirement", "sensor", "recording")
+    return _told("error_budget", row, names, column, text, unit)
+
+
+def _told(table: str, row: Row, names: Iterable[str], column: str, text: str, unit: str) -> Told:
+    key = (table, *(row[name] for name in names), row["error"], f"{row['time']:g}", column)
+    return Told(text, "/".join(key), unit)
+
+
+def margin(row: Row) -> tuple[Told, Told, Told] | None:
+    """Return the margin of a row of the table ``ranking`` with its 95 % limits, if there is one."""
+    if row["margin"] is None:
+        return None
+    low, high = margin_limits(row)
+    digits = digits_by(row["margin"], low, high)
+    named = (("margin", row["margin"]), ("limit:upper", low), ("limit:lower", high))
+    first, lower, upper = (of_ranking(row, name, number_text(x, digits)) for name, x in named)
+    return first, lower, upper
+
+
+def margin_limits(row: Row) -> tuple[float, float]:
+    """Return the 95 % limits of the margin of a row of the table ``ranking`` that has one."""
+    low, high = (row["limit"] / row[end] if row[end] else math.inf for end in ("upper", "lower"))
+    return low, high
