@@ -25,7 +25,7 @@ def test_a_doubtful_value_is_never_given_without_that_word(tmp_path: Path) -> No
     plain = text_of(tmp_path / "plain", KNOWN)
     assert "B 10 °/h (± 25 %); T_B" in plain and "doubtful);" not in plain
     text = text_of(tmp_path / "doubtful", KNOWN | {"B": doubtful})
-    assert "N 0.333 °/√h (± 10 %); B 10 °/h (± 25 %, doubtful); T_B" in text
+    assert "N 0.33 °/√h (± 10 %); B 10 °/h (± 25 %, doubtful); T_B" in text
     assert "B: the log has steps." in text
 
 

@@ -10,7 +10,13 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
 from imubench_pipeline.estimators.model_choice import LEAST_SHARE, relative
-from imubench_pipeline.report.practical import System, limit_digits, page_unit
+from imubench_pipeline.report.practical import (
+    PageUnit,
+    System,
+    digits_by,
+    limit_digits,
+    page_unit,
+)
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import counted, model_text, untold
 from imubench_pipeline.typing import Row
@@ -74,7 +80,7 @@ def cell(
         }
         for row in rows
     ]
-    digits = max((limit_digits(row["lower"], row["upper"]) for row in rows), default=3)
+    digits = max((digits_of(row, unit) for row in rows), default=3)
     words = [sentence for row in rows if (sentence := untold(row, unit, duration))]
     return {
         "parts": parts,
@@ -82,6 +88,18 @@ def cell(
         "value": rows[0]["value"] if rows else None,
         "digits": digits,
     }
+
+
+def digits_of(row: Row, unit: PageUnit) -> int:
+    """Return with how many digits a parameter and its limits are printed in a unit.
+
+    Those that its interval leaves, and no fewer than tell the limits apart.
+    """
+    value, lower, upper = row["value"], row["lower"], row["upper"]
+    if value is None or lower is None or upper is None:
+        return limit_digits(lower, upper)
+    by = unit.per_si
+    return max(digits_by(by * value, by * lower, by * upper), limit_digits(lower, upper, 2))
 
 
 def _truth(rows: Sequence[Row]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from imubench_pipeline.report.backtest import backtest_lines
 from imubench_pipeline.report.calibration import at_rest
 from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words
-from imubench_pipeline.report.parameters import methods_table
+from imubench_pipeline.report.parameters import digits_of, methods_table
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks, samples_payload
 from imubench_pipeline.report.practical import (
     System,
@@ -227,7 +227,8 @@ def _answer(channel: ChannelView, system: System) -> str:
             if row["value"] is not None:
                 doubt = "doubtful" if row["status"] == "doubtful" else ""
                 certainty = ", ".join(filter(None, [precision(row, unit), doubt]))
-                text = f"{symbol_text(symbol)} {unit.text(row['value'], 3)} {unit.sign}"
+                size = unit.text(row["value"], digits_of(row, unit))
+                text = f"{symbol_text(symbol)} {size} {unit.sign}"
                 parts.append(f"{text} ({certainty})" if certainty else text)
     if channel.fixed_bias is not None:
         unit = page_unit(channel.quantity, "signal", system)

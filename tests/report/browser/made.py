@@ -84,7 +84,11 @@ REQUIREMENTS = {
         {"title": "Rover", "static_window": "60 s",
          "limits": [{"error": "heading", "after": "60 s", "at_most": "1 deg"},
                     {"error": "velocity", "after": "10 s", "at_most": "0.5 m/s"}]}
-    )
+    ),
+    "wheels": Requirement.model_validate(
+        {"title": "Wheels & heading", "static_window": "30 s", "axis": "median",
+         "limits": [{"error": "heading", "after": "120 s", "at_most": "0.6 deg"}]}
+    ),
 }  # fmt: skip
 
 

@@ -38,8 +38,7 @@ def test_every_figure_is_drawn(seen: Seen, bench: Report) -> None:
     assert empty == {}
     night = seen.figures[f"recordings/alpha/{made.NIGHT.recording}.html"]
     assert night == 3 * len(("allan", "spectrum", "series", "histogram"))
-    forest, margins = len(FOREST), len(made.REQUIREMENTS)
-    assert seen.figures["index.html"] == 1 + forest + margins
+    assert seen.figures["index.html"] == 1 + len(FOREST)
     assert seen.figures["sensors/gamma.html"] == seen.figures["recordings/gamma/only.html"] == 0
     followed = {(row["channel"], row["parameter"]) for row in bench.rows["drift"]}
     device = bench.page("devices/")
@@ -122,7 +121,7 @@ def test_a_sensor_without_a_datasheet_says_so(seen: Seen) -> None:
 def test_a_report_of_one_recording(read: Open, tmp_path: Path) -> None:
     publish(made.single(tmp_path), tmp_path / "report")
     reader = read(tmp_path / "report")
-    assert reader.draw_all() == 1 + len(FOREST) + len(made.REQUIREMENTS)
+    assert reader.draw_all() == 1 + len(FOREST)
     for path in ("sensors/beta.html", "recordings/beta/alone.html"):
         reader.open(path)
         assert reader.draw_all() > 0

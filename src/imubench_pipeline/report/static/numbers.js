@@ -62,11 +62,12 @@ function startUnits(first) {
 }
 
 // A figure in the text is <data value=SI>; it has data-unit="gyro.N", or the head of its column has
-// it. Limits, in <small>, have fewer digits, unless their cell has data-digits. A unit in the text is a <span data-sign="gyro.N">.
+// it. Its digits are said by data-digits of it, its cell or its table; else limits, in <small>, have
+// 3, and others 4. A unit in the text is a <span data-sign="gyro.N">.
 function showUnits(root) {
   root.querySelectorAll("data").forEach((element) => {
     const of = element.dataset.unit ?? unitOfColumn(element.closest("td"));
-    const digits = element.dataset.digits ?? element.closest("td")?.dataset.digits ?? (element.parentNode.localName === "small" ? 3 : 4);
+    const digits = element.dataset.digits ?? element.closest("[data-digits]")?.dataset.digits ?? (element.parentNode.localName === "small" ? 3 : 4);
     element.textContent = numberText(Number(element.value) * unitOf(...of.split(".")).factor, Number(digits));
   });
   root.querySelectorAll("[data-sign]").forEach((element) => {

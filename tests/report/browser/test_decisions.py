@@ -1,0 +1,253 @@
+"""The decision matrix: the first thing to see, of the tables, and each number leads to its like."""
+
+import math
+import posixpath
+import re
+from collections import Counter
+from urllib.parse import unquote
+
+import pytest
+
+from tests.report.browser import made
+from tests.report.browser.made import Report
+from tests.report.browser.reader import TOO_WIDE, Open, Reader, toggle, traces
+from tests.report.browser.test_numbers import number
+from tests.report.browser.test_tables import bar_of, cells, table_of
+from tests.report.pages import Element, Read, read_pages
+
+# Of a unit of the pages in SI; a degree is pi / 180.
+SIZES = {"°": 180 / math.pi, "m/s": 1.0, "mm/s": 1e3, "m": 1.0, "mm": 1e3, "km": 1e-3, "": 1.0}
+KEYS = {
+    "ranking": ("requirement", "sensor", "error", "time"),
+    "error_budget": ("requirement", "sensor", "recording", "error", "time"),
+}
+FIRST = ("alpha", "beta", "gamma")
+
+
+@pytest.fixture(scope="module")
+def pages(bench: Report) -> dict[str, Read]:
+    return read_pages(bench.folder)
+
+
+def told(page: Read) -> list[Element]:
+    """Return the numbers that say from which value of the tables they are."""
+    return [one for one in page.elements if "data-from" in one.attributes]
+
+
+def value_of(bench: Report, source: str) -> float:
+    table, *key, column = source.split("/")
+    assert len(key) == len(KEYS[table])
+    named = dict(zip(KEYS[table], key, strict=True))
+    rows = [
+        row
+        for row in bench.rows[table]
+        if row.get("source", "total") == "total" or table == "ranking"
+        if all(f"{row[n]:g}" == t if n == "time" else row[n] == t for n, t in named.items())
+    ]
+    (row,) = rows
+    above, _, below = column.partition(":")
+    return row[above] / row[below] if below else row[above]
+
+
+def equal(shown: float, value: float) -> bool:
+    """Tell whether a number is another that is rounded to two digits or more."""
+    rounded = (float(f"{value:.{digits}e}") for digits in range(1, 7))
+    return any(math.isclose(shown, one, rel_tol=1e-9) for one in rounded)
+
+
+def test_every_number_of_a_verdict_is_that_of_its_table(
+    pages: dict[str, Read], bench: Report
+) -> None:
+    columns = Counter()
+    for path, page in pages.items():
+        for one in told(page):
+            source = one.attributes["data-from"] or ""
+            unit = one.attributes.get("data-in") or ""
+            value, text = value_of(bench, source), one.text.split(" ")[0]
+            if unit == "%":
+                assert number(text) == round(100 * value), (path, source)
+            else:
+                assert equal(number(text), value * SIZES[unit]), (path, source, one.text, value)
+            if " " in one.text:
+                assert one.text.split(" ", 1)[1] == unit
+            columns[source.rpartition("/")[2]] += 1
+    assert columns.keys() >= {
+        "margin", "limit:upper", "limit:lower", "sigma", "lower", "upper", "limit", "chance",
+    }  # fmt: skip
+    assert min(columns.values()) > 2
+
+
+def test_every_number_of_the_matrix_stands_again_where_it_leads(
+    pages: dict[str, Read],
+) -> None:
+    page = pages["index.html"]
+    places = [n for n, one in enumerate(page.elements) if "data-word" in one.attributes]
+    assert len(places) == len(FIRST) * len(made.REQUIREMENTS)
+    numbers = 0
+    for place in places:
+        link = next(one for one in page.elements[place:] if one.tag == "a")
+        path, _, section = (link.attributes["href"] or "").partition("#")
+        other = pages[posixpath.normpath(unquote(path))]
+        assert section in other.ids
+        end = next(
+            (
+                n
+                for n in range(place + 1, len(page.elements))
+                if page.elements[n].tag in ("td", "tr", "p")
+            ),
+            None,
+        )
+        own = [one for one in page.elements[place:end] if "data-from" in one.attributes]
+        for one in own:
+            same = [
+                each
+                for each in told(other)
+                if each.attributes["data-from"] == one.attributes["data-from"]
+            ]
+            assert same and {each.text for each in same} == {one.text}
+            numbers += 1
+    judged = [one for one in places if page.elements[one].attributes["data-word"] != "not judged"]
+    assert numbers == 3 * len(judged) > 0
+
+
+def test_the_windows_at_rest_of_a_verdict_stand_with_it(pages: dict[str, Read]) -> None:
+    text = " ".join(pages["sensors/alpha.html"].text.split())
+    for one in made.REQUIREMENTS.values():
+        assert f"Errors (1σ) after {one.static_window} at rest right before" in text
+
+
+def test_words_of_the_matrix_are_those_of_the_ranking(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    table = reader.page.locator("[data-decisions]")
+    heads = table.locator("thead th").all_inner_texts()
+    assert [head.split("\n")[0].strip() for head in heads] == ["Sensor", "Rover", "Wheels"]
+    words = {"passes": "passes", "probably fails": "open", "not enough data": "not judged"}
+    for row in bench.of("ranking", decides=True):
+        name = f"{made.SENSORS[row['sensor']].vendor} {made.SENSORS[row['sensor']].model}"
+        line = table.get_by_role("row").filter(has=reader.page.get_by_role("rowheader", name=name))
+        cell = line.locator("td").nth(list(made.REQUIREMENTS).index(row["requirement"]))
+        word = words[row["verdict"]]
+        assert cell.get_attribute("data-word") == word
+        # Word and shape, so that the colour alone tells nothing.
+        assert word in cell.inner_text() and cell.locator("svg.shape").count() == 1
+        hatched = "hatched" in (cell.get_attribute("class") or "")
+        assert hatched == (word != "not judged" and row["evidence"] == "weak")
+        assert cell.locator("svg.bar").count() == (row["margin"] is not None)
+        if hatched:
+            assert "weak evidence: " in (cell.text_content() or "")
+    gamma = table.get_by_role("row").filter(has_text="Other C")
+    assert gamma.get_by_text("no recording at rest").count() == len(made.REQUIREMENTS)
+
+
+def bars(reader: Reader) -> list[tuple[float, float, float, float]]:
+    """Return begin, middle and end of each bar of the matrix, and the place of 1, in pixels."""
+    found = reader.page.evaluate(
+        """() => [...document.querySelectorAll("[data-decisions] svg.bar")].map((bar) => {
+          const box = (one) => one.getBoundingClientRect();
+          const [limit, span] = bar.querySelectorAll("rect");
+          const dot = box(bar.querySelector("circle"));
+          return [box(span).left, dot.left + dot.width / 2, box(span).right, box(limit).left,
+            box(bar).left];
+        })"""
+    )
+    return [tuple(end - left for end in ends) for *ends, left in found]
+
+
+def test_bars_are_the_intervals_of_the_margins(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    drawn = bars(reader)
+    rows = [row for row in bench.of("ranking", decides=True) if row["margin"] is not None]
+    assert len(drawn) == len(rows) > 2
+    # A log scale: as many pixels for each decade, in all cells, from 1 on.
+    expected = sorted(
+        [row["limit"] / row["upper"], row["margin"], row["limit"] / row["lower"]] for row in rows
+    )
+    found = sorted([begin - one, middle - one, end - one] for begin, middle, end, one in drawn)
+    scale = found[0][0] / math.log10(expected[0][0])
+    for places, margins in zip(found, expected, strict=True):
+        assert [place / scale for place in places] == pytest.approx(
+            [math.log10(margin) for margin in margins], abs=0.02
+        )
+
+
+@pytest.mark.parametrize(("width", "height"), [(1400, 900), (1280, 900), (768, 900), (390, 844)])
+def test_the_answer_is_on_the_first_screen(
+    width: int, height: int, read: Open, bench: Report
+) -> None:
+    reader = read(bench.folder, width=width, height=height)
+    page = reader.page
+    assert page.locator(".strip li").count() == 5
+    for name in ("verdict", "next-steps"):
+        if page.locator(f"#{name}").count():
+            assert page.locator(f"#{name}").bounding_box()["y"] < height  # type: ignore[index]
+    answers = page.locator(".answers li").all_inner_texts()
+    assert len(answers) == len(made.REQUIREMENTS)
+    assert "A-1 passes" in answers[0] and "A-1 is nearest" in answers[1]
+    last = page.locator("[data-decisions] tbody tr").first.bounding_box()
+    assert last is not None and last["y"] + last["height"] < height
+    assert page.evaluate(TOO_WIDE) == []
+    # Nothing is cut off, and if there is more to the right the names stay.
+    table = page.locator("[data-decisions]").bounding_box()
+    assert table is not None and table["x"] + table["width"] <= width
+    assert (
+        page.locator("[data-decisions] tbody th").first.evaluate(
+            "one => getComputedStyle(one).position"
+        )
+        == "sticky"
+    )
+
+
+def test_the_matrix_is_sorted_by_the_keyboard(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    table = reader.page.locator("[data-decisions]")
+    for name, best in (("Rover", "A-1"), ("Wheels", "A-1")):
+        button = table.get_by_role("button", name=f"Sort by {name}")
+        button.press("Enter")
+        names = cells(table, 1)
+        assert best in names[0]  # the best first
+        button.press("Enter")
+        # What is not judged stands last either way.
+        assert "Other C" in cells(table, 1)[-1] and table.locator("th[aria-sort]").count() == 1
+
+
+def test_what_is_counted_is_what_is_listed(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    page = reader.page
+    counts = {
+        text.split(" ", 1)[1]: text.split(" ")[0]
+        for text in page.locator(".strip li").all_inner_texts()
+    }
+    rows = bench.rows["recordings"]
+    assert counts["sensors"] == str(len(made.SENSORS))
+    assert counts["recordings"] == str(len(rows))
+    days = sum(row.get("duration") or 0 for row in rows) / 86400
+    assert number(counts["days of data"]) == pytest.approx(days, rel=5e-3)
+    assert counts["rejected"] == str(page.locator("#rejected li").count()) == "2"
+    doubted = {r["recording"] for r in bench.rows["findings"] if r["severity"] == "warning"}
+    assert counts["in doubt"] == str(page.locator("#warnings li").count()) == str(len(doubted))
+    assert page.locator("#warnings h2").inner_text().startswith(f"{len(doubted)} recording")
+
+
+def test_curves_that_are_left_out_are_left_out_of_every_figure(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    figure = reader.figure("overlay")
+    forest = reader.figure("forest", symbol="N")
+    every = len(traces(forest))
+    toggle(figure, "Other B").uncheck()
+    assert 0 < len(traces(forest)) < every
+    toggle(figure, "Other B").check()
+    assert len(traces(forest)) == every
+
+
+def test_filters_offer_what_the_others_leave(read: Open, bench: Report) -> None:
+    table = table_of(read(bench.folder, "recordings.html"), "All recordings")
+    bar = bar_of(table)
+    bar.get_by_label("Sensor").select_option("Other C")
+    status = bar.get_by_label("Status")
+    assert status.locator("option:not([disabled])").all_inner_texts() == ["all", "rejected"]
+    assert bar.get_by_role("button", name="clear the filters").is_hidden()
+    bar.get_by_role("searchbox", name="Find").fill("nothing like it")
+    assert re.search("^0 of .*none has all that is asked for$", bar.locator("output").inner_text())
+    bar.get_by_role("button", name="clear the filters").click()
+    assert len(cells(table, 1)) == len(bench.rows["recordings"])
+    assert status.locator("option[disabled]").count() == 0
