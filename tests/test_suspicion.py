@@ -8,6 +8,7 @@ from imubench_pipeline.datasheets.suspicion import (
     Usual,
     printed_figures,
     suspicious,
+    unusual_rows,
     usual_figures,
 )
 from imubench_pipeline.settings.sensor import Sensor, read_sensors
@@ -93,3 +94,16 @@ def test_a_printed_figure_is_held_against_the_others() -> None:
     }
     assert [name for name in said if said[name]] == ["odd"]
     assert usual_figures({name: sensors[name] for name in ("s0", "s1", "odd")}) == {}
+
+
+def test_an_estimate_is_told_by_the_name_and_digits_that_its_table_prints() -> None:
+    printed = {"gyro": {"bias_instability": {"value": 6, "unit": "deg/h"}}}
+    sensors = {f"s{i}": parse(Sensor, SENSOR | {"datasheet": printed}, "s.yaml") for i in range(5)}
+    # 397.8 °/h, known to 30: the first digit of that is the last of the figure.
+    value, lower, upper = (x / 3600 * DEG for x in (397.8, 343.0, 408.5))
+    row = {"sensor": "odd", "recording": "r", "channel": "gyro_x", "value": value,
+           "lower": lower, "upper": upper}  # fmt: skip
+    found = unusual_rows([row | {"parameter": name} for name in ("B", "sigma_min")], sensors)
+    (said,) = (finding["detail"] for finding in found)
+    # The papers' B is another figure, and 1.5 times as large.
+    assert said.startswith("gyro σ_min = 400 °/h is 66.3 times the median of 5 sensors, 6 °/h")

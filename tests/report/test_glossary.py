@@ -30,6 +30,7 @@ from imubench_pipeline.navigation.shortlist import rows as shortlist
 from imubench_pipeline.navigation.suitability import conditions
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
+from imubench_pipeline.report.datasheets import DEPENDS
 from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
 from imubench_pipeline.report.theory import words_of_reading
 from imubench_pipeline.settings.validation import ConfigError
@@ -280,6 +281,7 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
         *get_args(comparison.Verdict),
     ]:
         yield verdict, "verdict"
+    yield DEPENDS, "verdict"
     for verdict in strings_in("navigation/verdicts/standing.py", "verdict"):
         yield verdict, "verdict"
     for verdict in strings_in("navigation/verdicts/judgement.py", "_outside"):

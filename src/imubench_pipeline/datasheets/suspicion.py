@@ -10,6 +10,7 @@ from typing import Any
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import from_si
@@ -107,7 +108,7 @@ def suspicious(
     figures: Mapping[str, float],
     usual: UsualFigures,
     printed: Mapping[str, float] | None = None,
-    names: Mapping[str, str] | None = None,
+    written: Mapping[str, str] | None = None,
 ) -> list[str]:
     """Say which figures are twenty times off what is usual, and in which unit they would not be.
 
@@ -115,8 +116,8 @@ def suspicious(
     times the median of the catalogue (`usual_figures`); too small, since there are sensors of every
     price, what is below a twentieth of its least. A figure as the sensor's own datasheet prints it,
     SI, is neither. Another unit is named where its factor explains the figure: what is left is
-    usual of the sensor, or of the catalogue where its datasheet prints nothing. ``names``: what a
-    figure is called, where it is not N or B itself.
+    usual of the sensor, or of the catalogue where its datasheet prints nothing. ``written``: how a
+    figure is written, with its name, where it is not N or B itself to three digits.
     """
     sentences = []
     for figure, value in figures.items():
@@ -139,10 +140,9 @@ def suspicious(
         else:
             continue
         doubt = _explained(quantity, figure, value, least, most)
-        shown = _text(quantity, figure, value)
+        shown = (written or {}).get(figure) or f"{figure} = {_text(quantity, figure, value)}"
         than = _text(quantity, figure, other)
-        name = (names or {}).get(figure, figure)
-        sentences.append(f"{quantity} {name} = {shown} is {how}{than}: {doubt}")
+        sentences.append(f"{quantity} {shown} is {how}{than}: {doubt}")
     return sentences
 
 
@@ -155,13 +155,13 @@ def _explained(quantity: str, figure: str, value: float, least: float, most: flo
     return "is its unit right?"
 
 
-def _text(quantity: str, figure: str, value: float) -> str:
+def _text(quantity: str, figure: str, value: float, digits: int = 3) -> str:
     unit, dimension = _SHOWN[quantity, figure]
-    return f"{from_si(value, unit, dimension):.3g} {unit}"
+    return f"{float(f'{from_si(value, unit, dimension):.{digits}g}'):g} {unit}"
 
 
-_LOWEST = {"B": "σ_min"}
-"""What estimates are compared by, with what vendors print as B."""
+_NAMES = {"N": "N", "B": "σ_min"}
+"""What estimates are compared by, with what vendors print."""
 
 
 def unusual_rows(
@@ -180,6 +180,12 @@ def unusual_rows(
             continue
         quantity, sensor = quantity_of(row["channel"]), sensors.get(row["sensor"])
         printed = printed_figures(sensor, quantity) if sensor else None
-        for sentence in suspicious(quantity, {figure: value}, usual, printed, _LOWEST):
+        unit, dimension = _SHOWN[quantity, figure]
+        known = row["lower"] is not None and row["upper"] is not None
+        names = ("value", "lower", "upper") if known else ("value",)
+        size, *limits = (from_si(row[name], unit, dimension) for name in names)
+        digits = digits_by(size, *(limits or (None, None)))
+        text = f"{_NAMES[figure]} = {_text(quantity, figure, value, digits)}"
+        for sentence in suspicious(quantity, {figure: value}, usual, printed, {figure: text}):
             finding = Finding("unusual_figure", "warning", sentence, value, row["channel"])
             yield finding.row(row["sensor"], row["recording"])

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from imubench_pipeline.report.practical import PageUnit, System, digits_by, page_unit
+from imubench_pipeline.estimators.digits import digits_by
+from imubench_pipeline.report.practical import PageUnit, System, page_unit
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.typing import Row

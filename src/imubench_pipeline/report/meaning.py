@@ -8,12 +8,12 @@ from typing import Any
 
 from markupsafe import Markup
 
+from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.navigation.suitability.conditions import parts_of
 from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.practical import (
     PageUnit,
     System,
-    digits_by,
     duration_text,
     interval_text,
     unit_of,

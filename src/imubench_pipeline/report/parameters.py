@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
 from imubench_pipeline.estimators.model_choice import LEAST_SHARE, relative
 from imubench_pipeline.report.practical import (
     PageUnit,
     System,
-    digits_by,
     limit_digits,
     page_unit,
 )

@@ -190,22 +190,6 @@ def limit_digits(lower: float | None, upper: float | None, least: int = 3) -> in
     return min(max(least, math.ceil(math.log10(ratio)) + 1), _MOST_DIGITS)
 
 
-def digits_by(value: float, lower: float | None, upper: float | None, otherwise: int = 3) -> int:
-    """Return with how many digits a value and its limits are printed: what its interval tells.
-
-    The last digit is the first of half the interval, or the second where that begins with 1. They
-    are two at least. Where there are no limits, they are as many as ``otherwise``.
-    """
-    if lower is None or upper is None or not upper > lower or not value:
-        return otherwise
-    half = (upper - lower) / 2.0
-    if not math.isfinite(half):
-        return 2
-    place = math.floor(math.log10(half))
-    place -= half < 2.0 * 10.0**place
-    return min(max(math.floor(math.log10(abs(value))) - place + 1, 2), _MOST_DIGITS)
-
-
 def interval_text(row: Mapping[str, Any], unit: PageUnit, least: int = 3) -> str:
     """Return ``lower to upper`` of a row of a table; a dash where they are not known."""
     lower, upper = row["lower"], row["upper"]

@@ -297,13 +297,13 @@ function redrawAll() {
 }
 
 // A printed page has its own width, that figures do not learn in time: they are given one.
-const PRINTED = { width: 660, height: 330 };
+const PRINTED = { width: 660, height: 260 };
 
 function startPrinting() {
-  const everyFigure = () => document.querySelectorAll("figure[data-kind]");
+  const everyFigure = () => document.querySelectorAll("figure[data-kind]:not(.on-screen *)");
   window.addEventListener("beforeprint", () => {
     document.documentElement.dataset.printing = "yes";
-    document.querySelectorAll("details:not([open])").forEach((each) => {
+    document.querySelectorAll("details:not([open]):not(.on-screen)").forEach((each) => {
       each.dataset.closed = "yes";
       each.open = true;
     });

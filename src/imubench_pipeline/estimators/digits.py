@@ -1,0 +1,23 @@
+"""With how many digits a number is printed: those that its interval leaves."""
+
+from __future__ import annotations
+
+import math
+
+_MOST = 7
+
+
+def digits_by(value: float, lower: float | None, upper: float | None, otherwise: int = 3) -> int:
+    """Return with how many digits a value and its limits are printed: what its interval tells.
+
+    The last digit is the first of half the interval, or the second where that begins with 1. They
+    are two at least. Where there are no limits, they are as many as ``otherwise``.
+    """
+    if lower is None or upper is None or not upper > lower or not value:
+        return otherwise
+    half = (upper - lower) / 2.0
+    if not math.isfinite(half):
+        return 2
+    place = math.floor(math.log10(half))
+    place -= half < 2.0 * 10.0**place
+    return min(max(math.floor(math.log10(abs(value))) - place + 1, 2), _MOST)
