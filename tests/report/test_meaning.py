@@ -69,7 +69,7 @@ def test_a_budget_names_its_sources_and_what_is_missing() -> None:
     ]  # fmt: skip
     lines = {line["error"]: line["cells"][0] for line in tables[0]["lines"]}
     assert tables[0]["times"] == ["60 s"]
-    assert lines["heading"]["lines"][0] == f"{math.degrees(1e-3 * math.sqrt(120)):.3g} °"
+    assert lines["heading"]["lines"][0] == f"{math.degrees(1e-3 * math.sqrt(120)):.2g} °"
     assert "gyro N 50 %" in lines["heading"]["lines"]
     north = lines["north, found at rest"]["lines"]  # 1e-3 rad/s against the Earth's rate
     assert north[0] == "not to be found"

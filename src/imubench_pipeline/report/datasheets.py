@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.report.practical import PageUnit, System, page_unit
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
@@ -216,7 +215,7 @@ def _with_limits(row: Row, unit: PageUnit) -> list[str]:
     value, lower, upper = row["measured"], row["lower"], row["upper"]
     if value is None or lower is None or upper is None:
         return [unit.text(value)]
-    digits = digits_by(value, lower, upper)
+    digits = unit.digits(value, lower, upper)
     return [unit.text(value, digits), f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"]
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 from markupsafe import Markup
 
-from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.navigation.suitability.conditions import parts_of
 from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.practical import (
@@ -129,7 +128,7 @@ def _interval(row: Row, system: System, place: Place = of_ranking) -> str:
     if not _sensible(row, row["sigma"]) or row["lower"] is None or row["upper"] is None:
         return "–"
     unit = unit_of(DIMENSIONS[row["error"]], system, row["sigma"])
-    digits = digits_by(row["sigma"], row["lower"], row["upper"])
+    digits = unit.digits(row["sigma"], row["lower"], row["upper"])
     ends = (place(row, name, unit.text(row[name], digits), unit.sign) for name in _ENDS)
     return Markup("{} to {}").format(*ends)
 
@@ -202,7 +201,7 @@ def _cell(rows: Sequence[Row], system: System) -> dict[str, Any]:
     unit = unit_of(DIMENSIONS[total["error"]], system, total["sigma"])
     lines = [_shown(total, unit)]
     if _sensible(total, total["sigma"]):
-        digits = digits_by(total["sigma"], total["lower"], total["upper"])
+        digits = unit.digits(total["sigma"], total["lower"], total["upper"])
         lines.append(interval_text(total, unit, digits))
     sources = [row for row in rows if row["source"] != "total"]
     if total["sigma"] > 0.0:
@@ -220,7 +219,7 @@ def _shown(row: Row, unit: PageUnit) -> str:
     if not _sensible(row, row["sigma"]):
         north = row["error"] == "north"
         return "not to be found" if north else f"over {unit.text(_QUARTER_TURN, 3)} {unit.sign}"
-    digits = digits_by(row["sigma"], row["lower"], row["upper"])
+    digits = unit.digits(row["sigma"], row["lower"], row["upper"])
     return f"{unit.text(row['sigma'], digits)} {unit.sign}"
 
 

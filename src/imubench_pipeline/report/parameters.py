@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
 from imubench_pipeline.estimators.model_choice import LEAST_SHARE, relative
 from imubench_pipeline.report.practical import (
@@ -98,8 +97,7 @@ def digits_of(row: Row, unit: PageUnit) -> int:
     value, lower, upper = row["value"], row["lower"], row["upper"]
     if value is None or lower is None or upper is None:
         return limit_digits(lower, upper)
-    by = unit.per_si
-    return max(digits_by(by * value, by * lower, by * upper), limit_digits(lower, upper, 2))
+    return max(unit.digits(value, lower, upper), limit_digits(lower, upper, 2))
 
 
 def _truth(rows: Sequence[Row]) -> dict[str, Any]:

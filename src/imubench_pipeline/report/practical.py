@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 from typing import Any, Literal
 
+from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import conversion
@@ -55,6 +56,12 @@ class PageUnit:
     def text(self, value: float | None, digits: int = 4) -> str:
         """Return a SI value in this unit, rounded to some digits; a dash where there is none."""
         return "–" if value is None else number_text(value * self.per_si, digits)
+
+    def digits(self, value: float, lower: float | None, upper: float | None) -> int:
+        """Return with how many digits a SI value and its limits are printed in this unit."""
+        if lower is None or upper is None:
+            return digits_by(value, None, None)
+        return digits_by(value * self.per_si, lower * self.per_si, upper * self.per_si)
 
 
 def _signs(

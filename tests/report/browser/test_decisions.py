@@ -251,3 +251,22 @@ def test_filters_offer_what_the_others_leave(read: Open, bench: Report) -> None:
     bar.get_by_role("button", name="clear the filters").click()
     assert len(cells(table, 1)) == len(bench.rows["recordings"])
     assert status.locator("option[disabled]").count() == 0
+
+
+def test_the_same_model_of_a_log_has_the_same_numbers(read: Open, bench: Report) -> None:
+    for path in ("index.html", "sensors/alpha.html"):
+        reader = read(bench.folder, path)
+        for method in reader.page.get_by_role("combobox", name="Method").all():
+            method.select_option("all")
+        seen: dict[tuple[str, ...], set[tuple[str, ...]]] = {}
+        for table in reader.page.locator("table[id^=parameters-]").all():
+            heads = [text.split("\n")[0] for text in table.locator("thead th").all_inner_texts()]
+            model = next(n for n, text in enumerate(heads) if text.startswith("Model"))
+            for row in table.locator("tbody tr").all():
+                texts = row.locator("> *").all_inner_texts()
+                what, numbers = texts[: model + 1], texts[model + 1 : -1]
+                seen.setdefault((heads[model + 1], *what), set()).add(tuple(numbers))
+        assert len(seen) > 5
+        # The likelihood is as wide as all models that the log does not tell apart, and says so.
+        assert any("or 1 other" in key[-1] for key in seen)
+        assert {key: found for key, found in seen.items() if len(found) > 1} == {}
