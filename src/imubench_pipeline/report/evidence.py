@@ -11,7 +11,7 @@ from imubench_pipeline.report.practical import duration_text, number_text
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.told import of_ranking
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import counted, requirement_words
+from imubench_pipeline.report.words import counted, requirement_words, spread_words
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.typing import Row
 
@@ -48,6 +48,7 @@ def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[
             "conditions": (stands["conditions"] or "").split("; ")
             if stands["verdict"].endswith(" if")
             else [],
+            "spread": spread_words(stands) if stands["spread"] is not None else "",
             "otherwise": list(_otherwise(stands)),
             "window": _window(requirement),
             "limits": [limit_words(row) for row in own_rows if row["requirement"] == name],

@@ -20,6 +20,7 @@ from imubench_pipeline.report.words import (
     requirement_verdict,
     requirement_words,
     sentence,
+    spread_words,
 )
 from imubench_pipeline.typing import Row
 
@@ -217,20 +218,13 @@ def _basis(site: Site, row: Row) -> str:
         of = f"{counted(row['recordings'], 'recording')} of {counted(row['specimens'], 'specimen')}"
         text = f"Judged by {of}, of which {log} is nearest to what is expected of the next one."
     if row["spread"] is not None:
-        text += f" Spread: {100 * row['spread']:.2g} %, {_SPREAD_OF[row['spread_of']]}."
+        text += f" Spread: {spread_words(row)}."
     doubts = list(dict.fromkeys(finding["finding"] for finding in chosen.warnings))
     if row["recordings"] > 1:  # those of all of them
         text += f" Doubts: {row['doubts']}." if row["doubts"] else ""
     elif doubts:
         text += f" Doubts: {', '.join(term(name).name for name in doubts)}."
     return text + left_out
-
-
-_SPREAD_OF = {
-    "specimens": "from specimen to specimen",
-    "recordings": "from recording to recording of one specimen",
-    "other sensors": "taken from other sensors with several specimens",
-}
 
 
 def _sensor(site: Site, name: str) -> dict[str, Any]:

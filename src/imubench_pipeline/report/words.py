@@ -108,6 +108,18 @@ def _weakness(code: str, row: Row) -> str:
     return code.replace("_", " ")
 
 
+def spread_words(row: Row) -> str:
+    """Return how much specimens differ, of a row of ``ranking`` that says so."""
+    return f"{number_text(100.0 * row['spread'], 2)} %, {_SPREAD_OF[row['spread_of']]}"
+
+
+_SPREAD_OF = {
+    "specimens": "from specimen to specimen",
+    "recordings": "from recording to recording of one specimen",
+    "other sensors": "taken from other sensors with several specimens",
+}
+
+
 def requirement_verdict(
     groups: Sequence[Mapping[str, Any]], names: Mapping[str, str], basis: Mapping[str, str]
 ) -> list[str]:
