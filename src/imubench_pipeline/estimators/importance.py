@@ -57,18 +57,25 @@ class Mixture:
 
     def densities(self, points: Array) -> Array:
         """Return weight times density of each component, up to a constant, shape (n, c)."""
-        inverses = np.linalg.inv(np.linalg.cholesky(self.scales))
+        return self._densities(points, np.linalg.inv(np.linalg.cholesky(self.scales)))
+
+    def _densities(self, points: Array, inverses: Array) -> Array:
+        densities = np.empty((len(points), len(self.weights)))
         freedom = _freedom(points.shape[1])
-        return np.asarray(_densities(points, self.weights, self.means, inverses, freedom))
+        _set_densities(points, self.weights, self.means, inverses, freedom, densities)
+        return densities
 
     def fitted(self, points: Array) -> Mixture:
         """Return the mixture after a step towards points (expectation and maximisation)."""
         inverses = np.linalg.inv(np.linalg.cholesky(self.scales))
-        freedom = _freedom(points.shape[1])
-        weights, means, scales = _fitted(
-            points, self.weights, self.means, inverses, freedom, _LEAST_MASS
-        )
-        return Mixture(weights / weights.sum(), means, scales) if len(weights) else self
+        parts, freedom = self._densities(points, inverses), _freedom(points.shape[1])
+        weights, means = np.empty_like(self.weights), np.empty_like(self.means)
+        scales = np.zeros_like(self.scales)
+        new = (weights, means, scales)
+        number = _fit(points, parts, self.means, inverses, freedom, _LEAST_MASS, *new)
+        if not number:
+            return self
+        return Mixture(weights[:number] / weights[:number].sum(), means[:number], scales[:number])
 
     def beside(self, other: Mixture, part: float) -> Mixture:
         """Return a mixture of which a part is another."""
@@ -177,9 +184,10 @@ def _square(point: Array, mean: Array, inverse: Array) -> float:
 
 
 @njit(cache=True)
-def _densities(points: Array, weights: Array, means: Array, inverses: Array, freedom: int) -> Array:
+def _set_densities(
+    points: Array, weights: Array, means: Array, inverses: Array, freedom: int, densities: Array
+) -> None:
     n, d = points.shape
-    result = np.empty((n, weights.size))
     for k in range(weights.size):
         factor = weights[k]
         for a in range(d):
@@ -189,24 +197,32 @@ def _densities(points: Array, weights: Array, means: Array, inverses: Array, fre
             value = factor
             for _ in range((freedom + d) // 2):
                 value *= base
-            result[i, k] = value
-    return result
+            densities[i, k] = value
 
 
 @njit(cache=True)
-def _fitted(
-    points: Array, weights: Array, means: Array, inverses: Array, freedom: int, least: float
-) -> tuple[Array, Array, Array]:
+def _fit(
+    points: Array,
+    parts: Array,
+    means: Array,
+    inverses: Array,
+    freedom: int,
+    least: float,
+    new_weights: Array,
+    new_means: Array,
+    new_scales: Array,
+) -> int:
+    """Set the components that are kept, from the densities at points; return their number."""
     n, d = points.shape
-    parts = _densities(points, weights, means, inverses, freedom)
+    near = np.empty(n)
     for i in range(n):
-        total = parts[i].sum()
-        for k in range(weights.size):
+        total = 0.0
+        for k in range(new_weights.size):
+            total += parts[i, k]
+        for k in range(new_weights.size):
             parts[i, k] /= n * max(total, 1e-300)
-    new_weights, new_means = np.empty(weights.size), np.empty((weights.size, d))
-    new_scales = np.zeros((weights.size, d, d))
     count = 0
-    for k in range(weights.size):
+    for k in range(new_weights.size):
         mass, squares = 0.0, 0.0
         for i in range(n):
             mass += parts[i, k]
@@ -214,12 +230,16 @@ def _fitted(
         if mass <= least or mass**2 <= (2 * d + 2) * squares:
             continue
         mean, scale = new_means[count], new_scales[count]
-        near = np.empty(n)
+        near_total = 0.0
         for i in range(n):
             square = _square(points[i], means[k], inverses[k])
             near[i] = parts[i, k] * (freedom + d) / (freedom + square)
+            near_total += near[i]
         for a in range(d):
-            mean[a] = np.sum(near * points[:, a]) / near.sum()
+            total = 0.0
+            for i in range(n):
+                total += near[i] * points[i, a]
+            mean[a] = total / near_total
         for i in range(n):
             for a in range(d):
                 for e in range(a + 1):
@@ -233,4 +253,4 @@ def _fitted(
             scale[a, a] = scale[a, a] * (1.0 + d * squares / mass**2) + 1e-14
         new_weights[count] = mass
         count += 1
-    return new_weights[:count], new_means[:count], new_scales[:count]
+    return count
