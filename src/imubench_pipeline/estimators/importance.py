@@ -10,11 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
+from imubench_pipeline.estimators.importance_kernels import fit, set_densities
 from imubench_pipeline.typing import Array
 
 _FREEDOM = 5
@@ -62,7 +62,7 @@ class Mixture:
     def _densities(self, points: Array, inverses: Array) -> Array:
         densities = np.empty((len(points), len(self.weights)))
         freedom = _freedom(points.shape[1])
-        _set_densities(points, self.weights, self.means, inverses, freedom, densities)
+        set_densities(points, self.weights, self.means, inverses, freedom, densities)
         return densities
 
     def fitted(self, points: Array) -> Mixture:
@@ -72,7 +72,7 @@ class Mixture:
         weights, means = np.empty_like(self.weights), np.empty_like(self.means)
         scales = np.zeros_like(self.scales)
         new = (weights, means, scales)
-        number = _fit(points, parts, self.means, inverses, freedom, _LEAST_MASS, *new)
+        number = fit(points, parts, self.means, inverses, freedom, _LEAST_MASS, *new)
         if not number:
             return self
         return Mixture(weights[:number] / weights[:number].sum(), means[:number], scales[:number])
@@ -170,87 +170,3 @@ def sample_adaptively(
 def _freedom(dimensions: int) -> int:
     """Return degrees of freedom that are even with the dimensions, for a power without a root."""
     return _FREEDOM + (_FREEDOM + dimensions) % 2
-
-
-@njit(cache=True)
-def _square(point: Array, mean: Array, inverse: Array) -> float:
-    total = 0.0
-    for a in range(point.size):
-        z = 0.0
-        for e in range(a + 1):
-            z += inverse[a, e] * (point[e] - mean[e])
-        total += z * z
-    return total
-
-
-@njit(cache=True)
-def _set_densities(
-    points: Array, weights: Array, means: Array, inverses: Array, freedom: int, densities: Array
-) -> None:
-    n, d = points.shape
-    for k in range(weights.size):
-        factor = weights[k]
-        for a in range(d):
-            factor *= inverses[k, a, a]
-        for i in range(n):
-            base = 1.0 / (1.0 + _square(points[i], means[k], inverses[k]) / freedom)
-            value = factor
-            for _ in range((freedom + d) // 2):
-                value *= base
-            densities[i, k] = value
-
-
-@njit(cache=True)
-def _fit(
-    points: Array,
-    parts: Array,
-    means: Array,
-    inverses: Array,
-    freedom: int,
-    least: float,
-    new_weights: Array,
-    new_means: Array,
-    new_scales: Array,
-) -> int:
-    """Set the components that are kept, from the densities at points; return their number."""
-    n, d = points.shape
-    near = np.empty(n)
-    for i in range(n):
-        total = 0.0
-        for k in range(new_weights.size):
-            total += parts[i, k]
-        for k in range(new_weights.size):
-            parts[i, k] /= n * max(total, 1e-300)
-    count = 0
-    for k in range(new_weights.size):
-        mass, squares = 0.0, 0.0
-        for i in range(n):
-            mass += parts[i, k]
-            squares += parts[i, k] ** 2
-        if mass <= least or mass**2 <= (2 * d + 2) * squares:
-            continue
-        mean, scale = new_means[count], new_scales[count]
-        near_total = 0.0
-        for i in range(n):
-            square = _square(points[i], means[k], inverses[k])
-            near[i] = parts[i, k] * (freedom + d) / (freedom + square)
-            near_total += near[i]
-        for a in range(d):
-            total = 0.0
-            for i in range(n):
-                total += near[i] * points[i, a]
-            mean[a] = total / near_total
-        for i in range(n):
-            for a in range(d):
-                for e in range(a + 1):
-                    scale[a, e] += near[i] * (points[i, a] - mean[a]) * (points[i, e] - mean[e])
-        for a in range(d):
-            for e in range(a + 1):
-                scale[a, e] /= mass
-                scale[e, a] = scale[a, e]
-        for a in range(d):
-            # The covariance of few points is too narrow in some direction.
-            scale[a, a] = scale[a, a] * (1.0 + d * squares / mass**2) + 1e-14
-        new_weights[count] = mass
-        count += 1
-    return count
