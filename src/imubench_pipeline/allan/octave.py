@@ -32,8 +32,9 @@ from imubench_pipeline.typing import Array
 Integers = NDArray[np.int64]
 Samples = NDArray[np.floating[Any]]
 
-Grid = tuple[Integers, Integers, Integers]
-"""Ascending sizes of short clusters, their levels, and the samples that must be there."""
+Grid = tuple[Integers, Integers, Integers, Integers]
+"""Ascending sizes of short clusters, in samples, in strides of their level, and in strides of all
+lanes; and at which of them each level begins."""
 
 Room = tuple[Array, Array, Integers]
 """Arrays that a thread uses again and again."""
@@ -90,7 +91,10 @@ class OctaveSums:
         self._sizes, self._holes, self._threads = sizes, holes, max(1, threads)
         self._short = _level(sizes) < _LEVELS
         short = sizes[self._short]
-        self._grid = (short, _level(short), enough_present(short))
+        level = _level(short)
+        steps = short >> level
+        self._grid = (short, steps, _LANES * steps, np.searchsorted(level, np.arange(_LEVELS + 1)))
+        self._enough = enough_present(short)
         self._sums = np.zeros((4, len(short)))
         # The end of the log is a point of the grid only if it falls on it.
         points = samples // DECIMATION + 1
@@ -166,12 +170,11 @@ class OctaveSums:
         # Of one type, whatever the blocks were: the kernel is compiled once.
         head, body = head.view(), body.astype(head.dtype, copy=False).view()
         head.flags.writeable = body.flags.writeable = False
-        arguments = (head, heads, body, self._bias, self._holes, self._grid)
 
         def work(low: int, high: int) -> tuple[NDArray[Any], ...]:
             room = self._rooms.get()
             try:
-                return _sections(low, high, *arguments, room)
+                return self._sections(low, high, head, heads, body, room)
             finally:
                 self._rooms.put(room)
 
@@ -193,6 +196,39 @@ class OctaveSums:
             self._present_at = int(present[-1])
         self._filled += points
 
+    def _sections(
+        self, low: int, high: int, head: Samples, heads: int, body: Samples, room: Room
+    ) -> tuple[Array, Array, Array, Integers]:
+        """Sum the clusters that begin in sections ``low`` to ``high``.
+
+        Returned are sums, shape (sections, 4, sizes), as `results`; totals, the sum of the samples
+        less the bias by section; edges, shape (sections, SECTION / DECIMATION), cumulative sums
+        within the section; and counts, cumulative numbers of samples present at the edges, and of
+        the section (empty: all are).
+        """
+        theta, tail, present = room
+        number, points = high - low, SECTION // DECIMATION
+        sums, totals = np.zeros((number, 4, len(self._grid[0]))), np.zeros(number)
+        edges = np.zeros((number, points))
+        counts = np.zeros((number, points + 1 if self._holes else 0), dtype=np.int64)
+        whole = np.zeros(number, dtype=np.bool_)
+        common = (self._bias, self._grid, theta)
+        _sum_sections(low, head, heads, body, *common, tail, sums, totals, edges, whole)
+        for section in range(number):
+            in_head = low + section < heads
+            begin = (low + section - (0 if in_head else heads)) * SECTION
+            samples = (head if in_head else body)[begin : begin + SECTION + _AHEAD]
+            of_section = (*common, sums[section], edges[section])
+            if len(samples) < SECTION + _AHEAD:
+                totals[section], whole[section] = _sum_end(samples, *of_section)
+            if self._holes and whole[section]:
+                counts[section] = np.minimum(np.arange(points + 1) * DECIMATION, len(samples))
+            elif self._holes:
+                totals[section] = _sum_present(
+                    samples, *of_section, self._enough, present, counts[section]
+                )
+        return sums, totals, edges, counts
+
 
 def _room(holes: bool) -> Room:
     """Return room for the phase of a section, of what follows it, and for counts."""
@@ -208,74 +244,45 @@ def _room(holes: bool) -> Room:
 
 
 @njit(cache=True, nogil=True)
-def _sections(
+def _sum_sections(
     low: int,
-    high: int,
     head: Samples,
     heads: int,
     body: Samples,
     bias: float,
-    holes: bool,
     grid: Grid,
-    room: Room,
-) -> tuple[Array, Array, Array, Integers]:
-    """Sum the clusters that begin in sections ``low`` to ``high``.
+    theta: Array,
+    tail: Array,
+    sums: Array,
+    totals: Array,
+    edges: Array,
+    whole: NDArray[np.bool_],
+) -> None:
+    """Do what `OctaveSums._sections` does, for sections with all samples that their clusters need.
 
-    Returned are sums, shape (sections, 4, sizes), as `OctaveSums.results`; totals, the sum of the
-    samples less the bias by section; edges, shape (sections, SECTION / DECIMATION), cumulative sums
-    within the section; and counts, cumulative numbers of samples present at the edges, and of the
-    section (empty: all are).
+    They are told as whole.
     """
-    theta, tail, present = room
-    points = SECTION // DECIMATION
-    sums = np.zeros((high - low, 4, grid[0].size))
-    totals = np.zeros(high - low)
-    edges = np.zeros((high - low, points))
-    counts = np.zeros((high - low, points + 1 if holes else 0), dtype=np.int64)
-    for section in range(high - low):
+    offsets = np.empty(_LANES + 1)
+    for section in range(totals.size):
         begin = (low + section) * SECTION
         source = head
         if low + section >= heads:
             begin -= heads * SECTION
             source = body
         samples = source[begin : min(begin + SECTION + _AHEAD, source.size)]
-        own = min(SECTION, samples.size)
-        own_points = (own + DECIMATION - 1) // DECIMATION
         if samples.size == SECTION + _AHEAD:
-            offsets = _phase_in_lanes(samples, bias, theta, tail)
-            totals[section] = offsets[-1]
-            whole = np.isfinite(offsets[-1] + tail[_AHEAD])
-            if whole:
+            _phase_in_lanes(samples, bias, theta, tail, offsets)
+            totals[section] = offsets[_LANES]
+            whole[section] = np.isfinite(offsets[_LANES] + tail[_AHEAD])
+            if whole[section]:
                 _lanes(offsets, theta, tail, grid, sums[section], edges[section])
-        else:
-            theta[0] = 0.0
-            accumulate(samples, bias, theta)
-            totals[section] = theta[own]
-            whole = np.isfinite(theta[samples.size])
-            if whole:
-                _one_lane(own, samples.size + 1, theta, grid, sums[section])
-                for i in range(own_points):  # no slice: numba would compile its errors for seconds
-                    edges[section, i] = theta[i]
-        if holes and whole:
-            for i in range(points):
-                counts[section, i] = i * DECIMATION
-            counts[section, points] = own
-        elif holes:
-            theta[0] = 0.0
-            present[0] = 0
-            accumulate_present(samples, bias, theta, present)
-            totals[section] = theta[own]
-            counts[section, points] = present[own]
-            _with_holes(own, samples.size + 1, theta, present, grid, sums[section])
-            for i in range(own_points):
-                edges[section, i] = theta[i]
-                counts[section, i] = present[i]
-    return sums, totals, edges, counts
 
 
 @njit(cache=True, nogil=True)
-def _phase_in_lanes(samples: Samples, bias: float, theta: Array, tail: Array) -> Array:
-    """Sum up a section in four lanes, interleaved, and what follows it; return where each begins.
+def _phase_in_lanes(
+    samples: Samples, bias: float, theta: Array, tail: Array, offsets: Array
+) -> None:
+    """Sum up a section in four lanes, interleaved, and what follows it; set where each begins.
 
     One sum alone would wait for each addition; and of interleaved lanes the loads that sum
     differences are aligned, for any size.
@@ -296,7 +303,8 @@ def _phase_in_lanes(samples: Samples, bias: float, theta: Array, tail: Array) ->
         d += fourth[i] - bias
     tail[0] = 0.0
     accumulate(samples[SECTION:], bias, tail)
-    return np.array([0.0, a, a + b, a + b + c, a + b + c + d])
+    offsets[0], offsets[1] = 0.0, a
+    offsets[2], offsets[3], offsets[4] = a + b, a + b + c, a + b + c + d
 
 
 @njit(cache=True, nogil=True)
@@ -304,9 +312,10 @@ def _lanes(
     offsets: Array, theta: Array, tail: Array, grid: Grid, sums: Array, edges: Array
 ) -> None:
     """Sum the clusters that begin in a section in lanes, and decimate its phase."""
+    sizes, _, steps, begins = grid
     rows = SECTION // _LANES
     lengths = np.empty(_LANES)
-    for lane in range(_LANES):  # numba would compile np.diff for seconds
+    for lane in range(_LANES):
         lengths[lane] = offsets[lane + 1] - offsets[lane]
     for level in range(_LEVELS):
         # A lane goes on where the next one begins.
@@ -314,7 +323,8 @@ def _lanes(
             for lane in range(_LANES - 1):
                 theta[(rows + i) * _LANES + lane] = lengths[lane] + theta[i * _LANES + lane + 1]
             theta[(rows + i) * _LANES + _LANES - 1] = lengths[_LANES - 1] + tail[i]
-        _sum_level(theta, _LANES, _LANES * rows, _LANES * (rows + _REACH), level, grid, sums)
+        starts, points = _LANES * rows, _LANES * (rows + _REACH)
+        _sum_level(theta, starts, points, sizes, steps, begins[level], begins[level + 1], sums)
         rows //= 2
         for i in range(rows):
             for lane in range(_LANES):
@@ -327,29 +337,49 @@ def _lanes(
 
 
 @njit(cache=True, nogil=True)
-def _one_lane(own: int, points: int, theta: Array, grid: Grid, sums: Array) -> None:
-    """Sum the clusters that begin in a section at the end of the log, and decimate its phase."""
+def _sum_end(
+    samples: Samples, bias: float, grid: Grid, theta: Array, sums: Array, edges: Array
+) -> tuple[float, bool]:
+    """Sum the clusters that begin in a section at the end of the log, and decimate its phase.
+
+    Returned are the sum of its samples less the bias, and whether it is whole; nothing is set if
+    not.
+    """
+    sizes, steps, _, begins = grid
+    own, points = min(SECTION, samples.size), samples.size + 1
+    theta[0] = 0.0
+    accumulate(samples, bias, theta)
+    total = theta[own]
+    if not np.isfinite(theta[samples.size]):
+        return total, False
     for level in range(_LEVELS):
         starts = (own + (1 << level) - 1) >> level
-        _sum_level(theta, 1, starts, points, level, grid, sums)
+        _sum_level(theta, starts, points, sizes, steps, begins[level], begins[level + 1], sums)
         points = (points + 1) // 2
         for i in range(points):
             theta[i] = theta[2 * i]
+    for i in range((own + DECIMATION - 1) // DECIMATION):
+        edges[i] = theta[i]
+    return total, True
 
 
 @njit(cache=True, nogil=True)
 def _sum_level(
-    theta: Array, lanes: int, starts: int, points: int, level: int, grid: Grid, sums: Array
+    theta: Array,
+    starts: int,
+    points: int,
+    sizes: Integers,
+    steps: Integers,
+    low: int,
+    high: int,
+    sums: Array,
 ) -> None:
-    """Sum the differences of the clusters whose starts are one stride apart, over all lanes."""
-    sizes, levels, _ = grid
-    low, high = int(np.searchsorted(levels, level)), int(np.searchsorted(levels, level + 1))
-    steps = (sizes[low:high] >> level) * lanes
+    """Sum the differences of the clusters of sizes ``low`` to ``high``, of one level."""
     for block in range(0, starts, _INNER):
         stop = min(block + _INNER, starts)
-        sum_sizes(theta[:points], block, stop, steps, sums[0, low:high])
+        sum_sizes(theta[:points], block, stop, steps[low:high], sums[0, low:high])
     for j in range(low, high):
-        most = max(0, min(starts, points - 2 * (sizes[j] >> level) * lanes))
+        most = max(0, min(starts, points - 2 * steps[j]))
         sums[0, j] /= sizes[j] * sizes[j]
         sums[1, j] = most / sizes[j]
         sums[2, j] = most
@@ -357,21 +387,39 @@ def _sum_level(
 
 
 @njit(cache=True, nogil=True)
-def _with_holes(
-    own: int, points: int, theta: Array, present: Integers, grid: Grid, sums: Array
-) -> None:
-    """Sum the clusters that begin in a section where samples are missing; decimate its phase."""
-    sizes, levels, enough = grid
+def _sum_present(
+    samples: Samples,
+    bias: float,
+    grid: Grid,
+    theta: Array,
+    sums: Array,
+    edges: Array,
+    enough: Integers,
+    present: Integers,
+    counts: Integers,
+) -> float:
+    """Sum the clusters that begin in a section where samples are missing; decimate its phase.
+
+    Returned is the sum of the samples less the bias.
+    """
+    _, steps, _, begins = grid
+    own, points = min(SECTION, samples.size), samples.size + 1
+    theta[0] = 0.0
+    present[0] = 0
+    accumulate_present(samples, bias, theta, present)
+    total, counts[counts.size - 1] = theta[own], present[own]
     for level in range(_LEVELS):
         starts = (own + (1 << level) - 1) >> level
-        for j in range(sizes.size):
-            if levels[j] == level:
-                m = sizes[j] >> level
-                most = max(0, min(starts, points - 2 * m))
-                of_size = sum_present(theta, present, m, enough[j], 0, most)
-                sums[0, j], sums[1, j], sums[2, j] = of_size[0], of_size[1], float(of_size[2])
-                sums[3, j] = most
+        for j in range(begins[level], begins[level + 1]):
+            most = max(0, min(starts, points - 2 * steps[j]))
+            of_size = sum_present(theta, present, steps[j], enough[j], 0, most)
+            sums[0, j], sums[1, j], sums[2, j] = of_size[0], of_size[1], float(of_size[2])
+            sums[3, j] = most
         points = (points + 1) // 2
         for i in range(points):
             theta[i] = theta[2 * i]
             present[i] = present[2 * i]
+    for i in range((own + DECIMATION - 1) // DECIMATION):
+        edges[i] = theta[i]
+        counts[i] = present[i]
+    return total

@@ -279,6 +279,7 @@ def full_sums(
     terms = np.zeros(len(sizes), dtype=np.int64)
     possible = np.zeros(len(sizes), dtype=np.int64)
     samples = sizes * stride
+    sizes = sizes.copy()  # so that it may be written to: the kernels are compiled for that
     for start, stop in phase.segments:
         theta = phase.theta[start : stop + 1]
         blocks = -(-len(theta) // BLOCK)
@@ -299,17 +300,20 @@ def full_sums(
     return total, thinned, terms, possible
 
 
-@njit(cache=True, nogil=True)
 def _full(theta: Array, sizes: NDArray[np.int64], low: int, high: int) -> tuple[Array]:
     """Return the sum of squared second differences of each block and size."""
-    sums = np.zeros((high - low, sizes.size))
-    for block in range(high - low):
-        start = (low + block) * BLOCK
-        sum_sizes(theta, start, start + BLOCK, sizes, sums[block])
+    sums = np.zeros((high - low, len(sizes)))
+    _sum_blocks(theta, sizes, low, sums)
     return (sums,)
 
 
 @njit(cache=True, nogil=True)
+def _sum_blocks(theta: Array, sizes: NDArray[np.int64], low: int, sums: Array) -> None:
+    for block in range(sums.shape[0]):
+        start = (low + block) * BLOCK
+        sum_sizes(theta, start, start + BLOCK, sizes, sums[block])
+
+
 def _full_with_holes(
     theta: Array,
     present: NDArray[np.integer[Any]],
@@ -319,17 +323,27 @@ def _full_with_holes(
     high: int,
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Return, by block and size, what `full_sums` adds up, over the samples present."""
-    points = theta.size
-    sums = np.zeros((high - low, sizes.size))
-    inverse = np.zeros((high - low, sizes.size))
-    numbers = np.zeros((high - low, sizes.size), dtype=np.int64)
-    for block in range(high - low):
+    shape = (high - low, len(sizes))
+    rows = np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.int64)
+    _sum_blocks_present(theta, present, sizes, enough, low, *rows)
+    return rows
+
+
+@njit(cache=True, nogil=True)
+def _sum_blocks_present(
+    theta: Array,
+    present: NDArray[np.integer[Any]],
+    sizes: NDArray[np.int64],
+    enough: NDArray[np.int64],
+    low: int,
+    sums: Array,
+    inverse: Array,
+    numbers: NDArray[np.int64],
+) -> None:
+    for block in range(sums.shape[0]):
         start = (low + block) * BLOCK
         for j in range(sizes.size):
             n = sizes[j]
-            stop = min(start + BLOCK, points - 2 * n)
-            total, thinned, number = sum_present(theta, present, n, enough[j], start, stop)
-            sums[block, j] = total
-            inverse[block, j] = thinned
-            numbers[block, j] = number
-    return sums, inverse, numbers
+            stop = min(start + BLOCK, theta.size - 2 * n)
+            of_size = sum_present(theta, present, n, enough[j], start, stop)
+            sums[block, j], inverse[block, j], numbers[block, j] = of_size

@@ -10,11 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
+from imubench_pipeline.estimators.importance_kernels import fit, set_densities
 from imubench_pipeline.typing import Array
 
 _FREEDOM = 5
@@ -57,18 +57,25 @@ class Mixture:
 
     def densities(self, points: Array) -> Array:
         """Return weight times density of each component, up to a constant, shape (n, c)."""
-        inverses = np.linalg.inv(np.linalg.cholesky(self.scales))
+        return self._densities(points, np.linalg.inv(np.linalg.cholesky(self.scales)))
+
+    def _densities(self, points: Array, inverses: Array) -> Array:
+        densities = np.empty((len(points), len(self.weights)))
         freedom = _freedom(points.shape[1])
-        return np.asarray(_densities(points, self.weights, self.means, inverses, freedom))
+        set_densities(points, self.weights, self.means, inverses, freedom, densities)
+        return densities
 
     def fitted(self, points: Array) -> Mixture:
         """Return the mixture after a step towards points (expectation and maximisation)."""
         inverses = np.linalg.inv(np.linalg.cholesky(self.scales))
-        freedom = _freedom(points.shape[1])
-        weights, means, scales = _fitted(
-            points, self.weights, self.means, inverses, freedom, _LEAST_MASS
-        )
-        return Mixture(weights / weights.sum(), means, scales) if len(weights) else self
+        parts, freedom = self._densities(points, inverses), _freedom(points.shape[1])
+        weights, means = np.empty_like(self.weights), np.empty_like(self.means)
+        scales = np.zeros_like(self.scales)
+        new = (weights, means, scales)
+        number = fit(points, parts, self.means, inverses, freedom, _LEAST_MASS, *new)
+        if not number:
+            return self
+        return Mixture(weights[:number] / weights[:number].sum(), means[:number], scales[:number])
 
     def beside(self, other: Mixture, part: float) -> Mixture:
         """Return a mixture of which a part is another."""
@@ -163,74 +170,3 @@ def sample_adaptively(
 def _freedom(dimensions: int) -> int:
     """Return degrees of freedom that are even with the dimensions, for a power without a root."""
     return _FREEDOM + (_FREEDOM + dimensions) % 2
-
-
-@njit(cache=True)
-def _square(point: Array, mean: Array, inverse: Array) -> float:
-    total = 0.0
-    for a in range(point.size):
-        z = 0.0
-        for e in range(a + 1):
-            z += inverse[a, e] * (point[e] - mean[e])
-        total += z * z
-    return total
-
-
-@njit(cache=True)
-def _densities(points: Array, weights: Array, means: Array, inverses: Array, freedom: int) -> Array:
-    n, d = points.shape
-    result = np.empty((n, weights.size))
-    for k in range(weights.size):
-        factor = weights[k]
-        for a in range(d):
-            factor *= inverses[k, a, a]
-        for i in range(n):
-            base = 1.0 / (1.0 + _square(points[i], means[k], inverses[k]) / freedom)
-            value = factor
-            for _ in range((freedom + d) // 2):
-                value *= base
-            result[i, k] = value
-    return result
-
-
-@njit(cache=True)
-def _fitted(
-    points: Array, weights: Array, means: Array, inverses: Array, freedom: int, least: float
-) -> tuple[Array, Array, Array]:
-    n, d = points.shape
-    parts = _densities(points, weights, means, inverses, freedom)
-    for i in range(n):
-        total = parts[i].sum()
-        for k in range(weights.size):
-            parts[i, k] /= n * max(total, 1e-300)
-    new_weights, new_means = np.empty(weights.size), np.empty((weights.size, d))
-    new_scales = np.zeros((weights.size, d, d))
-    count = 0
-    for k in range(weights.size):
-        mass, squares = 0.0, 0.0
-        for i in range(n):
-            mass += parts[i, k]
-            squares += parts[i, k] ** 2
-        if mass <= least or mass**2 <= (2 * d + 2) * squares:
-            continue
-        mean, scale = new_means[count], new_scales[count]
-        near = np.empty(n)
-        for i in range(n):
-            square = _square(points[i], means[k], inverses[k])
-            near[i] = parts[i, k] * (freedom + d) / (freedom + square)
-        for a in range(d):
-            mean[a] = np.sum(near * points[:, a]) / near.sum()
-        for i in range(n):
-            for a in range(d):
-                for e in range(a + 1):
-                    scale[a, e] += near[i] * (points[i, a] - mean[a]) * (points[i, e] - mean[e])
-        for a in range(d):
-            for e in range(a + 1):
-                scale[a, e] /= mass
-                scale[e, a] = scale[a, e]
-        for a in range(d):
-            # The covariance of few points is too narrow in some direction.
-            scale[a, a] = scale[a, a] * (1.0 + d * squares / mass**2) + 1e-14
-        new_weights[count] = mass
-        count += 1
-    return new_weights[:count], new_means[:count], new_scales[:count]

@@ -89,77 +89,105 @@ def log_posteriors(points: Array, problem: Problem) -> tuple[Array, Array, Array
     return values, best, information
 
 
-@njit(cache=True)
 def mode_at(start: Array, times: Array, problem: Problem) -> tuple[Array, Array, Array]:
     """Return the mode of the log amplitudes for given log T_B, the curvature and D there.
 
     ``start`` holds log amplitudes; D_j, shape (b, p), is the density of a term over that of the
     model, times 2. The curvature of the posterior is sum nu D_j D_k / 2, and 2 from a flat
     amplitude: it keeps a term that is absent from running off to 0.
+
+    Raises
+    ------
+    LinAlgError
+        If the curvature is not finite, or has no inverse.
     """
     fixed, bins, with_ramp, table = problem
-    nu, density, cross, ramp = bins
     b, linear = fixed.shape
-    p = linear + times.size
-    columns = np.empty((b, p))
-    shape = np.empty(b)
-    for i in range(b):
-        for j in range(linear):
-            columns[i, j] = fixed[i, j]
-    for g in range(times.size):
-        shape_at(times[g], table, shape)
-        for i in range(b):
-            columns[i, linear + g] = shape[i]
-    x = start.copy()
-    model, data, parts = np.empty(b), density.copy(), np.empty((b, p))
-    best = -np.inf
-    curvature = np.eye(p)
-    step = np.zeros(p)
+    p = linear + len(times)
+    columns, shape = np.empty((b, p)), np.empty(b)
+    columns[:, :linear] = fixed
+    for g, time in enumerate(times):
+        shape_at(time, table, shape)
+        columns[:, linear + g] = shape
+    x, best, step = start.copy(), -math.inf, np.zeros(p)
+    gradient, curvature, parts = np.empty(p), np.eye(p), np.empty((b, p))
     for _ in range(_MOST_STEPS):
-        size = 1.0
-        moved = False
-        for _ in range(8):
-            proposal = x + size * step
-            powers = np.exp(2.0 * proposal)
-            for i in range(b):
-                total = 0.0
-                for j in range(p):
-                    total += powers[j] * columns[i, j]
-                model[i] = total
-            if with_ramp:
-                R, _ = _ramp_at(bins, model)
-                for i in range(b):
-                    data[i] = max(density[i] - 2.0 * R * cross[i] + R * R * ramp[i], 0.0)
-            value = proposal.sum() - cost_of(nu, data, model)
-            if value >= best:
-                moved = True
-                break
-            size *= 0.5
-        if not moved:
+        value = _climb(x, best, step, columns, bins, with_ramp, gradient, curvature, parts)
+        if math.isnan(value):
             break
-        gained = value - best
-        x, best = proposal, value
-        gradient = np.ones(p)
-        curvature[:] = 0.0
-        for i in range(b):
-            excess = 0.5 * nu[i] * (1.0 - data[i] / model[i])
-            for j in range(p):
-                parts[i, j] = 2.0 * powers[j] * columns[i, j] / model[i]
-                gradient[j] -= excess * parts[i, j]
-                for k in range(j + 1):
-                    curvature[j, k] += 0.5 * nu[i] * parts[i, j] * parts[i, k]
-        for j in range(p):
-            for k in range(j):
-                curvature[k, j] = curvature[j, k]
-        for j in range(p):
-            curvature[j, j] += 2.0
+        gained, best = value - best, value
         if gained < _TOLERANCE:
             break
         step = np.linalg.solve(curvature, gradient)
-        longest = np.max(np.abs(step))
+        longest = np.abs(step).max()
+        if not math.isfinite(longest):
+            raise np.linalg.LinAlgError("the curvature of the posterior is not finite")
         if longest > _LONGEST_STEP:
             step *= _LONGEST_STEP / longest
     return x, curvature, parts
+
+
+@njit(cache=True)
+def _climb(
+    x: Array,
+    best: float,
+    step: Array,
+    columns: Array,
+    bins: Bins,
+    with_ramp: bool,
+    gradient: Array,
+    curvature: Array,
+    parts: Array,
+) -> float:
+    """Go a step, or a part of it, that leads no lower than ``best``, and set what the next needs.
+
+    Returned is the logarithm of the posterior there; NaN, and nothing is set, if no part does.
+    """
+    nu, density, cross, ramp = bins
+    b, p = columns.shape
+    proposal, powers = np.empty(p), np.empty(p)
+    model, data = np.empty(b), np.empty(b)
+    value, size = np.nan, 1.0
+    moved = False
+    for _ in range(8):
+        total = 0.0
+        for j in range(p):
+            proposal[j] = x[j] + size * step[j]
+            powers[j] = math.exp(2.0 * proposal[j])
+            total += proposal[j]
+        for i in range(b):
+            density_i = 0.0
+            for j in range(p):
+                density_i += powers[j] * columns[i, j]
+            model[i] = density_i
+        R = _ramp_at(bins, model)[0] if with_ramp else 0.0
+        for i in range(b):
+            data[i] = density[i]
+            if with_ramp:
+                data[i] = max(density[i] - 2.0 * R * cross[i] + R * R * ramp[i], 0.0)
+        value = total - cost_of(nu, data, model)
+        if value >= best:
+            moved = True
+            break
+        size *= 0.5
+    if not moved:
+        return np.nan
+    for j in range(p):
+        x[j] = proposal[j]
+    gradient[:] = 1.0
+    curvature[:] = 0.0
+    for i in range(b):
+        excess = 0.5 * nu[i] * (1.0 - data[i] / model[i])
+        for j in range(p):
+            parts[i, j] = 2.0 * powers[j] * columns[i, j] / model[i]
+            gradient[j] -= excess * parts[i, j]
+            for k in range(j + 1):
+                curvature[j, k] += 0.5 * nu[i] * parts[i, j] * parts[i, k]
+    for j in range(p):
+        for k in range(j):
+            curvature[k, j] = curvature[j, k]
+        curvature[j, j] += 2.0
+    return value
 
 
 def chain(
@@ -174,45 +202,72 @@ def chain(
     ----------
     H. Haario, E. Saksman and J. Tamminen, "An adaptive Metropolis algorithm", Bernoulli 7, 2001.
     """
-    number = _BURN_IN + draws
-    root = np.linalg.cholesky(covariance) * 2.4 / np.sqrt(len(start))
-    normals = rng.standard_normal((number, len(start)))
-    return _metropolis(start, root, normals, np.log(rng.random(number)), problem)
+    number, d = _BURN_IN + draws, len(start)
+    root = np.linalg.cholesky(covariance) * 2.4 / np.sqrt(d)
+    normals = rng.standard_normal((number, d))
+    log_uniforms = np.log(rng.random(number))
+    x, mean, covariance = start.copy(), start.copy(), root @ root.T * d / 5.76
+    current, scale = log_posteriors(start[None], problem)[0][0], 1.0
+    points = np.empty((number, d))
+    # Learn the covariance, and the scale, while burning in only.
+    for first in range(0, _BURN_IN, _ADAPT_EVERY):
+        part = slice(first, first + _ADAPT_EVERY)
+        proposals = (normals[part], log_uniforms[part], points[part])
+        taken, current = _walk(x, current, scale, root, *proposals, problem)
+        _learn(mean, covariance, points[part], first)
+        scale *= min(2.0, max(0.5, math.exp(2.0 * (taken / _ADAPT_EVERY - 0.27))))
+        stable = covariance.copy()
+        np.fill_diagonal(stable, np.diag(covariance) * (1.0 + 1e-6) + 1e-14)
+        root = np.ascontiguousarray(np.linalg.cholesky(stable, upper=True).T) * 2.4 / np.sqrt(d)
+    part = slice(_BURN_IN, number)
+    _walk(x, current, scale, root, normals[part], log_uniforms[part], points[part], problem)
+    return points[part]
 
 
 @njit(cache=True)
-def _metropolis(
-    start: Array, root: Array, normals: Array, log_uniforms: Array, problem: Problem
-) -> Array:
+def _walk(
+    x: Array,
+    current: float,
+    scale: float,
+    root: Array,
+    normals: Array,
+    log_uniforms: Array,
+    points: Array,
+    problem: Problem,
+) -> tuple[int, float]:
+    """Take or refuse one proposal after the other, and set the points; return how many were taken.
+
+    ``current`` is the logarithm of the posterior at ``x``; so is what is returned beside it.
+    """
     n, d = normals.shape
     model, shape = np.empty(problem.bins.nu.size), np.empty(problem.bins.nu.size)
-    x = start.copy()
-    current = log_posterior(x, problem, model, shape)[0]
-    mean, covariance = x.copy(), root @ root.T * d / 5.76
-    draws = np.empty((n - _BURN_IN, d))
-    recent, scale = 0, 1.0
+    away, proposal = np.empty(d), np.empty(d)
+    taken = 0
     for k in range(n):
-        proposal = x + scale * (root @ normals[k])
+        np.dot(root, normals[k], away)
+        for a in range(d):
+            proposal[a] = x[a] + scale * away[a]
         proposed = log_posterior(proposal, problem, model, shape)[0]
         if log_uniforms[k] < proposed - current:
-            x, current = proposal, proposed
-            recent += 1
-        if k >= _BURN_IN:
-            draws[k - _BURN_IN] = x
-            continue
-        # Learn the covariance, and the scale, while burning in only.
-        gain = 1.0 / (k / 2.0 + 50.0)
-        change = x - mean
-        mean = mean + gain * change
+            for a in range(d):
+                x[a] = proposal[a]
+            current = proposed
+            taken += 1
+        for a in range(d):
+            points[k, a] = x[a]
+    return taken, current
+
+
+@njit(cache=True)
+def _learn(mean: Array, covariance: Array, points: Array, first: int) -> None:
+    """Move mean and covariance towards points, of which ``first`` came before."""
+    n, d = points.shape
+    change = np.empty(d)
+    for k in range(n):
+        gain = 1.0 / ((first + k) / 2.0 + 50.0)
+        for a in range(d):
+            change[a] = points[k, a] - mean[a]
+            mean[a] += gain * change[a]
         for a in range(d):
             for c in range(d):
                 covariance[a, c] += gain * (change[a] * change[c] - covariance[a, c])
-        if k % _ADAPT_EVERY == _ADAPT_EVERY - 1:
-            rate = recent / _ADAPT_EVERY
-            scale *= min(2.0, max(0.5, np.exp(2.0 * (rate - 0.27))))
-            recent = 0
-            stable = covariance.copy()
-            for a in range(d):
-                stable[a, a] = stable[a, a] * (1.0 + 1e-6) + 1e-14
-            root = np.linalg.cholesky(stable) * 2.4 / np.sqrt(d)
-    return draws

@@ -1,4 +1,9 @@
-"""The compiled inner loops of the Whittle likelihood; data and densities are in units near 1."""
+"""The compiled inner loops of the Whittle likelihood; data and densities are in units near 1.
+
+Loops over scalars, where NumPy has a word for it: what numba compiles of NumPy's functions (`max`,
+`flatnonzero`, `@`, assignments of slices) takes longer than the kernel, and is waited for at the
+first use.
+"""
 
 from __future__ import annotations
 
@@ -70,10 +75,15 @@ def cost_of(nu: Array, data: Array, density: Array) -> float:
 @njit(cache=True)
 def _solved(gram: Array, target: Array, free: NDArray[np.bool_]) -> Array:
     """Return x with gram x = target over what is free, 0 elsewhere (Cholesky's root)."""
-    chosen = np.flatnonzero(free)
-    m = chosen.size
-    root = np.empty((m, m))
-    y = np.empty(m)
+    p = target.size
+    chosen = np.empty(p, dtype=np.int64)
+    m = 0
+    for j in range(p):
+        if free[j]:
+            chosen[m] = j
+            m += 1
+    root = np.empty((p, p))
+    y = np.empty(p)
     for a in range(m):
         for b in range(a + 1):
             total = gram[chosen[a], chosen[b]]
@@ -91,7 +101,8 @@ def _solved(gram: Array, target: Array, free: NDArray[np.bool_]) -> Array:
         for c in range(a):
             total -= root[a, c] * y[c]
         y[a] = total / root[a, a]
-    x = np.zeros(target.size)
+    x = np.empty(p)
+    x[:] = 0.0
     for a in range(m - 1, -1, -1):
         total = y[a]
         for c in range(a + 1, m):
@@ -107,27 +118,38 @@ def _non_negative(gram: Array, target: Array, guess: Array) -> Array:
     ``guess`` is above 0 where x may be: mostly that is right.
     """
     p = target.size
-    small = 1e-12 * np.max(np.abs(target))
-    free = guess > 0.0
-    if free.any():
+    free = np.empty(p, dtype=np.bool_)
+    made = np.empty(p)  # gram x
+    largest = 0.0
+    number = 0
+    for j in range(p):
+        free[j] = guess[j] > 0.0
+        number += free[j]
+        if abs(target[j]) > largest or np.isnan(target[j]):
+            largest = abs(target[j])
+    small = 1e-12 * largest
+    if number > 0:
         x = _solved(gram, target, free)
-        gradient = target - gram @ x
+        np.dot(gram, x, made)
         right = True
         for j in range(p):
-            right &= x[j] > 0.0 if free[j] else gradient[j] <= small
+            right &= x[j] > 0.0 if free[j] else target[j] - made[j] <= small
         if right:
             return x
-    x = np.zeros(p)
+    x = np.empty(p)
+    x[:] = 0.0
     free[:] = False
+    number = 0
     for _ in range(10 * p):
-        gradient = target - gram @ x
+        np.dot(gram, x, made)
         best, steepest = -1, small
         for j in range(p):
-            if not free[j] and gradient[j] > steepest:
-                best, steepest = j, gradient[j]
+            if not free[j] and target[j] - made[j] > steepest:
+                best, steepest = j, target[j] - made[j]
         if best < 0:
             return x
         free[best] = True
+        number += 1
         while True:
             solution = _solved(gram, target, free)
             step, blocking = 1.0, -1
@@ -143,7 +165,8 @@ def _non_negative(gram: Array, target: Array, guess: Array) -> Array:
                 break
             x[blocking] = 0.0
             free[blocking] = False
-            if not free.any():
+            number -= 1
+            if number == 0:
                 break
     return x
 
@@ -156,12 +179,13 @@ def best_powers(
     nu, density, cross, ramp = bins
     b, p = columns.shape
     R = 0.0
-    data = density.copy()
-    # From above: the weights of a first guess must not be ruled by bins that happen to be low.
-    model = np.empty(b)
+    data, model, tried_model = np.empty(b), np.empty(b), np.empty(b)
     for i in range(b):
+        data[i] = density[i]
+        # From above: the weights of a first guess must not be ruled by bins that happen to be low.
         model[i] = density[i] + 1e-3
-    powers = np.ones(p)
+    powers, gram, target = np.empty(p), np.empty((p, p)), np.empty(p)
+    powers[:] = 1.0
     cost = np.inf
     for iteration in range(_MOST_STEPS):
         if with_ramp and iteration > 0:
@@ -173,8 +197,8 @@ def best_powers(
             for i in range(b):
                 data[i] = max(density[i] - 2.0 * R * cross[i] + R * R * ramp[i], 0.0)
             cost = cost_of(nu, data, model)
-        gram = np.zeros((p, p))
-        target = np.zeros(p)
+        gram[:] = 0.0
+        target[:] = 0.0
         for i in range(b):
             weight = nu[i] / (model[i] * model[i])
             for j in range(p):
@@ -188,17 +212,22 @@ def best_powers(
         wanted = _non_negative(gram, target, powers)
         if iteration == 0:
             powers = wanted
-            model = columns @ powers
-            floor = 1e-12 * np.max(model)
+            np.dot(columns, powers, model)
+            largest = model[0]
             for i in range(b):
-                model[i] = max(model[i], floor)
+                if model[i] > largest or np.isnan(model[i]):
+                    largest = model[i]
+            for i in range(b):
+                model[i] = max(model[i], 1e-12 * largest)
             cost = cost_of(nu, data, model)
             continue
         step = 1.0
         moved = False
+        tried = np.empty(p)
         for _ in range(14):
-            tried = powers + step * (wanted - powers)
-            tried_model = columns @ tried
+            for j in range(p):
+                tried[j] = powers[j] + step * (wanted[j] - powers[j])
+            np.dot(columns, tried, tried_model)
             tried_cost = cost_of(nu, data, tried_model)
             if tried_cost <= cost:
                 moved = True
@@ -207,7 +236,8 @@ def best_powers(
         if not moved:
             break
         gain = cost - tried_cost
-        powers, model, cost = tried, tried_model, tried_cost
+        powers, cost = tried, tried_cost
+        model, tried_model = tried_model, model
         if gain < tolerance:
             break
     return powers, R, cost
@@ -220,12 +250,15 @@ def cost_at(places: Array, problem: Problem, tolerance: float) -> float:
     b, p = fixed.shape
     columns = np.empty((b, p + places.size))
     shape = np.empty(b)
-    for i in range(b):  # a slice would have numba compile its errors for seconds
+    for i in range(b):
         for j in range(p):
             columns[i, j] = fixed[i, j]
     for g in range(places.size):
         shape_at(places[g], table, shape)
-        mean = shape.mean()
+        total = 0.0
+        for i in range(b):
+            total += shape[i]
+        mean = total / b
         for i in range(b):
             columns[i, p + g] = shape[i] / mean
     return best_powers(columns, bins, with_ramp, tolerance)[2]

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from threading import Lock
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 import psutil
 
@@ -70,34 +70,71 @@ def bounded(
     BoundError
         If it takes more, or is ended by the system.
     """
-    with _FORKING:
-        ours, theirs = os.pipe()
-        process = os.fork()
-        if process:
-            os.close(theirs)
-    if process == 0:
-        os.close(ours)
-        _answer(theirs, memory, lambda: function(*arguments, **named))
-    try:
-        answer = _received(ours, seconds, psutil.Process(process))
-    finally:
-        os.close(ours)
-        with suppress(ProcessLookupError):
-            os.kill(process, signal.SIGKILL)  # it has answered, or it will not
-        _, status = os.waitpid(process, 0)
-    if answer is None:
-        raise BoundError(f"took more than {seconds:g} s")
-    try:
-        returned, value = pickle.loads(answer)
-    except (EOFError, pickle.UnpicklingError):
-        ended = os.waitstatus_to_exitcode(status)
-        raise BoundError(f"ended the process that read it ({ended})") from None
-    if returned:
-        result: T = value
-        return result
-    if isinstance(value, MemoryError):
-        raise BoundError(f"took more than {memory >> 20} MiB of memory")
-    raise value
+    return Bounded(memory, function, *arguments, **named).result(seconds)
+
+
+class Bounded(Generic[T]):
+    """A function that is called in a process of its own, which begins at once.
+
+    Parameters
+    ----------
+    memory, function, *arguments, **named
+        As of `bounded`.
+    """
+
+    def __init__(
+        self, memory: int, function: Callable[P, T], *arguments: P.args, **named: P.kwargs
+    ) -> None:
+        self._memory = memory
+        self._status: int | None = None
+        with _FORKING:
+            self._pipe, theirs = os.pipe()
+            self._process = os.fork()
+            if self._process:
+                os.close(theirs)
+        if self._process == 0:
+            os.close(self._pipe)
+            _answer(theirs, memory, lambda: function(*arguments, **named))
+
+    @property
+    def answered(self) -> bool:
+        """Whether `result` would not wait."""
+        return self._status is not None or bool(select.select([self._pipe], [], [], 0.0)[0])
+
+    def end(self) -> None:
+        """End the process, unless that was done."""
+        if self._status is None:
+            os.close(self._pipe)
+            with suppress(ProcessLookupError):
+                os.kill(self._process, signal.SIGKILL)
+            _, self._status = os.waitpid(self._process, 0)
+
+    def result(self, seconds: float) -> T:
+        """Return what it returns, or raise what it raises; ask once.
+
+        Raises
+        ------
+        BoundError
+            If that takes more than ``seconds`` from now on, or more memory than it may, or the
+            process is ended by the system.
+        """
+        try:
+            answer = _received(self._pipe, seconds, psutil.Process(self._process))
+        finally:
+            self.end()  # it has answered, or it will not
+        if answer is None:
+            raise BoundError(f"took more than {seconds:g} s")
+        try:
+            returned, value = pickle.loads(answer)
+        except (EOFError, pickle.UnpicklingError):
+            ended = os.waitstatus_to_exitcode(self._status or 0)
+            raise BoundError(f"ended the process that read it ({ended})") from None
+        if returned:
+            result: T = value
+            return result
+        if isinstance(value, MemoryError):
+            raise BoundError(f"took more than {self._memory >> 20} MiB of memory")
+        raise value
 
 
 def _answer(pipe: int, memory: int, called: Callable[[], Any]) -> None:

@@ -237,18 +237,21 @@ def gather(values: Array, reached: int, edges: NDArray[np.int64], figures: Array
 
     The values have the shape (n,), the edges of b buckets (b + 1,), the figures (b, 4).
     """
-    bucket = np.searchsorted(edges, reached, side="right") - 1
-    begin = 0
+    bucket, begin = 0, 0
+    while edges[bucket + 1] <= reached:
+        bucket += 1
     while begin < values.size:
         end = min(values.size, edges[bucket + 1] - reached)
-        low, high, total, present = figures[bucket]
+        low, high = figures[bucket, 0], figures[bucket, 1]
+        total, present = figures[bucket, 2], figures[bucket, 3]
         for i in range(begin, end):
             x = values[i]
             if not np.isnan(x):
                 low, high = min(low, x), max(high, x)
                 total += x
                 present += 1.0
-        figures[bucket] = low, high, total, present
+        figures[bucket, 0], figures[bucket, 1] = low, high
+        figures[bucket, 2], figures[bucket, 3] = total, present
         begin = end
         bucket += 1
 

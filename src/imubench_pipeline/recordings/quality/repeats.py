@@ -206,15 +206,20 @@ def _meet(
 @njit(cache=True, nogil=True)
 def _thin(limit: np.uint64, keys: Words, places: Numbers, numbers: Numbers) -> None:
     """Forget the windows with a hash above the limit."""
-    slots = np.flatnonzero((keys != np.uint64(0)) & (keys <= limit))
-    kept_keys, kept_places = keys[slots], places[slots]
+    kept_keys, kept_places = np.empty_like(keys), np.empty_like(places)
+    number = 0
+    for slot in range(keys.size):
+        if keys[slot] != np.uint64(0) and keys[slot] <= limit:
+            kept_keys[number] = keys[slot]
+            kept_places[number, 0], kept_places[number, 1] = places[slot, 0], places[slot, 1]
+            number += 1
     keys[:] = np.uint64(0)
     mask = np.uint64(_SLOTS - 1)
-    for k in range(slots.size):
-        slot = kept_keys[k] & mask
-        while keys[slot] != np.uint64(0):
-            slot = (slot + np.uint64(1)) & mask
-        keys[slot] = kept_keys[k]
-        places[slot] = kept_places[k]
-    numbers[_HELD] = slots.size
+    for k in range(number):
+        place = kept_keys[k] & mask
+        while keys[place] != np.uint64(0):
+            place = (place + np.uint64(1)) & mask
+        keys[place] = kept_keys[k]
+        places[place, 0], places[place, 1] = kept_places[k, 0], kept_places[k, 1]
+    numbers[_HELD] = number
     numbers[_SHIFT] += 1

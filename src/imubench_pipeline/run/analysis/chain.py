@@ -2,48 +2,41 @@
 
 The same functions as the rules call, with the same settings, so that the numbers are the same. The
 work is shared among forks of one process, as in a run, but of one recording the channels are
-estimated side by side. What is compiled at the first use is compiled beside the reading of the
-first log.
+estimated side by side.
 """
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from itertools import chain
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TypeVar
 
-import numpy as np
 import pyarrow as pa
 
-from imubench_pipeline.allan import cluster_sizes, of_blocks
 from imubench_pipeline.readers.bounded import BoundError, bounded
 from imubench_pipeline.recordings.ingest import write_failed
-from imubench_pipeline.recordings.recording import LogWriter, channel_logs
 from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.run.analysis.compilation import Compilation
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import limits_of_steps
 from imubench_pipeline.settings.config import (
     AllanSettings,
-    EstimateSettings,
     ReconstructionSettings,
 )
 from imubench_pipeline.steps import allan as allan_step
 from imubench_pipeline.steps import datasheet as datasheet_step
 from imubench_pipeline.steps.error_budget import error_tables
-from imubench_pipeline.steps.estimate import Estimation, estimate_channel, estimation
+from imubench_pipeline.steps.estimate import Estimation, estimation
 from imubench_pipeline.steps.ingest import write_recording
 from imubench_pipeline.steps.reconstruct import write_reconstruction
 from imubench_pipeline.steps.sensor_tables import joined_tables
 from imubench_pipeline.steps.tables import tables_of_all
 from imubench_pipeline.tables import build, write, write_arrow
 from imubench_pipeline.tables.failures import Cause, Failure, write_empty
-from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 T = TypeVar("T")
@@ -66,14 +59,13 @@ _OUTPUTS: dict[str, tuple[str, ...]] = {
     "reconstruct": _OF_RECONSTRUCTION,
 }
 """The tables that a step leaves."""
-_ENOUGH = 1 << 12
-"""Samples of a log that calls all that is compiled."""
-_LONGEST_COMPILATION, _MEMORY_OF_IT = 600.0, 4 << 30
 _SLOW = 3.0
 """s; who waits for longer is told for what."""
 
 
-def analysed(plan: Plan, cores: int, say: Say, *, pages: bool) -> dict[str, pa.Table]:
+def analysed(
+    plan: Plan, compiling: Compilation, cores: int, say: Say, *, pages: bool
+) -> dict[str, pa.Table]:
     """Run the steps of all recordings of a plan; return every joined table.
 
     A step that fails for a recording leaves that out, and `failures` says so.
@@ -82,6 +74,8 @@ def analysed(plan: Plan, cores: int, say: Say, *, pages: bool) -> dict[str, pa.T
     ----------
     plan : Plan
         Whose results are in a folder of their own.
+    compiling : Compilation
+        Estimates wait for it.
     cores : int
         Processes that compute at a time.
     say : callable
@@ -91,21 +85,28 @@ def analysed(plan: Plan, cores: int, say: Say, *, pages: bool) -> dict[str, pa.T
         empty.
     """
     with ThreadPoolExecutor(cores) as beside:
-        return _Chain(plan, beside, say, pages=pages).run()
+        return _Chain(plan, compiling, beside, say, pages=pages).run()
 
 
 class _Chain:
-    def __init__(self, plan: Plan, beside: ThreadPoolExecutor, say: Say, *, pages: bool) -> None:
-        self._plan, self._beside, self._say, self._pages = plan, beside, say, pages
+    def __init__(
+        self,
+        plan: Plan,
+        compiling: Compilation,
+        beside: ThreadPoolExecutor,
+        say: Say,
+        *,
+        pages: bool,
+    ) -> None:
+        self._plan, self._compiling, self._beside = plan, compiling, beside
+        self._say, self._pages = say, pages
         self._limits = limits_of_steps(plan)
         self._failed: dict[tuple[str, str], Failure] = {}
 
     def run(self) -> dict[str, pa.Table]:
         recordings = list(self._plan.recordings)
-        compiling = self._beside.submit(self._compile)
         channels = self._each("ingest", recordings, self._read)
-        compiling.result()
-        _compile_all()  # from the cache, so that no fork does so again
+        self._compiling.finish()
         estimated = self._each(
             "estimate",
             [(*key, channel) for key in recordings for channel in channels.get(key, ())],
@@ -117,17 +118,6 @@ class _Chain:
             self._each("reconstruct", recordings, self._reconstruct)
             self._each("datasheet", recordings, self._compare)
         return self._joined()
-
-    def _compile(self) -> None:
-        """Have a process of its own compile what estimates need, where that was not done before."""
-        told = threading.Timer(
-            _SLOW, self._say, ["compiling, once after the installation: some seconds"]
-        )
-        told.start()
-        try:
-            bounded(_LONGEST_COMPILATION, _MEMORY_OF_IT, _compile_all)
-        finally:
-            told.cancel()
 
     # ------------------------------------------------------------------ the steps of a recording
 
@@ -262,32 +252,3 @@ class _Chain:
                 self._plan.ingest_settings(sensor, recording), failure, folder / "quality.json"
             )
         write_empty((folder / f"{name}.parquet" for name in _OUTPUTS[step]), failure)
-
-
-def _compile_all() -> None:
-    """Have all that estimates are computed with compiled, or loaded if it was compiled before.
-
-    It estimates a channel of white noise and a walk.
-    """
-    rng = np.random.default_rng(1)
-    samples = rng.standard_normal(_ENOUGH) + 0.05 * np.cumsum(rng.standard_normal(_ENOUGH))
-    with TemporaryDirectory(prefix="imubench.") as name:
-        folder = Path(name)
-        with LogWriter(folder / "log.parquet", {"gyro_x": pa.float64()}) as writer:
-            writer.write({"gyro_x": samples})
-            writer.finish(
-                {
-                    "rate": 100.0,
-                    "grid": _ENOUGH,
-                    "segments": [[0, _ENOUGH]],
-                    "holes": {"gyro_x": False},
-                    "unusable": [],
-                }
-            )
-        log = channel_logs(folder)["gyro_x"]
-        sizes = cluster_sizes(_ENOUGH)
-        curve = of_blocks(
-            log.blocks(), log.grid, log.rate, sizes, holes=log.holes, segments=log.segments
-        )
-        key = Key("compiled", "once", log.channel)
-        estimate_channel(key, log, curve, EstimateSettings(), None, Estimation())

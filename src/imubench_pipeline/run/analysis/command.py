@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from imubench_pipeline.report.practical import System
+    from imubench_pipeline.run.analysis.compilation import Compilation
     from imubench_pipeline.run.plan import Plan
 
 _DESCRIPTION = (
@@ -69,6 +70,13 @@ def run(arguments: argparse.Namespace) -> int:
     # A process computes with one core, and forks for the others.
     for library in ("OMP", "OPENBLAS", "MKL"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    from imubench_pipeline.run.analysis.compilation import Compilation
+
+    with Compilation(_say) as compiling:  # while this process imports all else
+        return _run(arguments, compiling)
+
+
+def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
     from imubench_pipeline.run.analysis.chain import analysed
     from imubench_pipeline.run.analysis.project import Stated, lay_out
     from imubench_pipeline.run.plan import Plan
@@ -85,9 +93,10 @@ def run(arguments: argparse.Namespace) -> int:
         except ConfigError as error:
             print(f"imubench analyse: {error}", file=sys.stderr)
             return 2
-        tables = analysed(plan, arguments.cores, _say, pages=arguments.output is not None)
+        pages = arguments.output is not None
+        tables = analysed(plan, compiling, arguments.cores, _say, pages=pages)
         _print(tables, arguments.units)
-        if arguments.output is not None:
+        if pages:
             _write(plan, tables, arguments)
     statuses = set(tables["recordings"]["status"].to_pylist())
     return 0 if statuses == {"ok"} else 1

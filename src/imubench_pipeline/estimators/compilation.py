@@ -1,0 +1,35 @@
+"""The kernels that every estimate of a noise model calls, compiled before any does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imubench_pipeline.estimators.importance_kernels import fit, set_densities
+from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
+from imubench_pipeline.estimators.whittle_kernels import (
+    Bins,
+    Problem,
+    ShapeTable,
+    best_powers,
+    cost_at,
+)
+
+
+def compile_kernels() -> None:
+    """Compile them, or load what was compiled before.
+
+    It imports numba alone, so that a process of its own can begin with it while others import all
+    else. What it calls has the types of what an estimate calls: `tests/estimators/test_compilation`
+    holds that nothing is left to compile.
+    """
+    bins = Bins(*np.ones((4, 8)))
+    problem = Problem(np.ones((8, 1)), bins, False, ShapeTable(0.0, 1.0, np.zeros((2, 8))))
+    place = np.zeros(1)
+    cost_at(place, problem, 1.0)
+    best_powers(problem.fixed, bins, False, 1.0)
+    mode_at(np.zeros(2), place, problem)
+    log_posteriors(np.zeros((1, 3)), problem)
+    weights, means, scales = np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1))
+    points, densities = np.arange(3.0)[:, None], np.empty((3, 1))
+    set_densities(points, weights, means, scales, 5, densities)
+    fit(points, densities, means, scales, 5, 0.0, weights, means.copy(), scales.copy())
