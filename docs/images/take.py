@@ -32,7 +32,8 @@ def main(results: Path) -> None:
         clip = {"x": 0, "y": 0, "width": WIDTH, "height": end + 12}
         taken = Image.open(io.BytesIO(page.screenshot(full_page=True, clip=clip)))
         opened.close()
-    taken.convert("RGB").quantize(256, kmeans=2).save(Path(__file__).with_name("report.png"), optimize=True)
+    few = taken.convert("RGB").quantize(256, kmeans=2)
+    few.save(Path(__file__).with_name("report.png"), optimize=True)
 
 
 if __name__ == "__main__":
