@@ -87,7 +87,7 @@ REQUIREMENTS = {
     ),
     "wheels": Requirement.model_validate(
         {"title": "Wheels & heading", "static_window": "30 s", "axis": "median",
-         "limits": [{"error": "heading", "after": "60 s", "at_most": "0.3 deg"}]}
+         "limits": [{"error": "heading", "after": "120 s", "at_most": "0.6 deg"}]}
     ),
 }  # fmt: skip
 

@@ -115,7 +115,6 @@ def test_words_of_the_matrix_are_those_of_the_ranking(read: Open, bench: Report)
     assert [head.split("\n")[0].strip() for head in heads] == ["Sensor", "Rover", "Wheels"]
     words = {
         "passes": "passes",
-        "probably passes": "likely",
         "probably fails": "open",
         "not enough data": "not judged",
     }
@@ -179,7 +178,7 @@ def test_the_answer_is_on_the_first_screen(
             assert page.locator(f"#{name}").bounding_box()["y"] < height  # type: ignore[index]
     answers = page.locator(".answers li").all_inner_texts()
     assert len(answers) == len(made.REQUIREMENTS)
-    assert "A-1 passes" in answers[0] and "A-1 is likely to pass" in answers[1]
+    assert "A-1 passes" in answers[0] and "A-1 is nearest" in answers[1]
     last = page.locator("[data-decisions] tbody tr").first.bounding_box()
     assert last is not None and last["y"] + last["height"] < height
     assert page.evaluate(TOO_WIDE) == []
