@@ -1,8 +1,8 @@
-"""Take the picture of the README: the top of a report's start page, and its Allan deviations.
+"""Take the picture of the README: the first screen of a report, with its decision matrix.
 
     python docs/images/take.py results    (of the demonstration; with what `test` installs)
 
-What lies between is left out, and the colours are reduced to 64.
+The colours are reduced to 256.
 """
 
 from __future__ import annotations
@@ -14,19 +14,9 @@ import sys
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import sync_playwright
 
 WIDTH = 1080
-
-
-def part(page: Page, first: str, after: str) -> Image.Image:
-    """Return what the page shows between two elements."""
-    top, end = (
-        page.eval_on_selector(one, "e => e.getBoundingClientRect().top + scrollY")
-        for one in (first, after)
-    )
-    clip = {"x": 0, "y": top, "width": WIDTH, "height": end - top}
-    return Image.open(io.BytesIO(page.screenshot(full_page=True, clip=clip)))
 
 
 def main(results: Path) -> None:
@@ -36,17 +26,14 @@ def main(results: Path) -> None:
         opened = driver.chromium.launch(executable_path=browser, args=["--no-sandbox"])
         page = opened.new_page(viewport={"width": WIDTH, "height": 900})
         page.goto((results / "report/index.html").resolve().as_uri())
-        page.locator("#comparison").scroll_into_view_if_needed()  # figures are drawn when seen
-        page.wait_for_selector("figure[data-kind=overlay] .main-svg")
-        parts = [
-            part(page, "body", "#verdict"),
-            part(page, "#comparison", "figure[data-kind=overlay] figcaption"),
-        ]
+        end = page.eval_on_selector(
+            "#next-steps + ol", "e => e.getBoundingClientRect().bottom + scrollY"
+        )
+        clip = {"x": 0, "y": 0, "width": WIDTH, "height": end + 12}
+        taken = Image.open(io.BytesIO(page.screenshot(full_page=True, clip=clip)))
         opened.close()
-    whole = Image.new("RGB", (WIDTH, sum(one.height for one in parts)), "white")
-    for place, one in enumerate(parts):
-        whole.paste(one, (0, sum(before.height for before in parts[:place])))
-    whole.quantize(64).save(Path(__file__).with_name("report.png"), optimize=True)
+    few = taken.convert("RGB").quantize(256, kmeans=2)
+    few.save(Path(__file__).with_name("report.png"), optimize=True)
 
 
 if __name__ == "__main__":

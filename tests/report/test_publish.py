@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import pyarrow.compute as pc
 import pytest
 
 from imubench_pipeline.estimators.estimate import Parameter
@@ -531,6 +532,21 @@ def test_names_of_any_kind_break_nothing(tmp_path: Path) -> None:
     assert whole.faults == []
     known = {one.tag for page in read.values() for one in page.elements} | {"template", "style"}
     assert {one.tag for one in whole.elements} <= known
+
+
+def test_what_is_not_sold_is_not_said_to_lack_a_recording(tmp_path: Path) -> None:
+    board = recording_rows("board", "r", ("gyro_x", "accel_x"), requirements=ASKED)
+    (row,) = board["recordings"]
+    board["recordings"] = [row | {"decides": False, "doubts": "not sold"}]
+    other = recording_rows("a", "r", ("gyro_x", "accel_x"), requirements=ASKED)
+    made = run(board, other, asked=ASKED)
+    ranking = made.tables["ranking"]
+    made.tables["ranking"] = ranking.filter(pc.field("sensor") != "board")  # type: ignore[index]
+    publish(made, tmp_path)
+    read = sound(tmp_path)
+    (line,) = read["index.html"].naming("not judged", "tr")
+    assert "board" in line.text and "not sold" in line.text
+    assert "It is in no ranking: not sold." in read["sensors/board.html"].text
 
 
 def test_a_tie_of_sensors_with_commas_in_their_names_is_told(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from imubench_pipeline.navigation.suitability.conditions import EXCLUDED
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.told import Told, margin, margin_limits, of_ranking
+from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import counted, evidence_words
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.typing import Row
@@ -113,7 +114,10 @@ def matrix(site: Site) -> dict[str, Any] | None:
         return None
     scale = Scale.of(value for row in rows.values() for value in _drawn(row))
     lines = {
-        sensor: [_cell(name, sensor, rows.get((name, sensor)), scale) for name in requirements]
+        sensor: [
+            _cell(row, scale) if (row := rows.get((name, sensor))) else _empty(site, name, sensor)
+            for name in requirements
+        ]
         for sensor in site.sensors
     }
     order = sorted(lines, key=lambda sensor: (_merit(lines[sensor]), site.names[sensor]))
@@ -183,20 +187,30 @@ def word_of(row: Row) -> str:
     return _WORD_OF.get(row["verdict"], "not judged")
 
 
-def _cell(requirement: str, sensor: str, row: Row | None, scale: Scale) -> Cell:
-    if row is None:
-        nothing = "no recording at rest"
-        return Cell(
-            requirement, sensor, "not judged", 0, None, None, "", "", nothing, (), -math.inf
-        )
+def unranked(own: Iterable[RecordingView]) -> str:
+    """Return in a few words why a sensor is in no ranking, of its recordings."""
+    at_rest = [view for view in own if view.static]
+    if not at_rest:
+        return "no recording at rest"
+    return "; ".join(dict.fromkeys(view.row["doubts"] for view in at_rest if view.row["doubts"]))
+
+
+def _empty(site: Site, requirement: str, sensor: str) -> Cell:
+    """Return the cell of a sensor that is in no ranking."""
+    reason = unranked(view for view in site.views if view.sensor == sensor)
+    word = "not judged"
+    return Cell(requirement, sensor, word, 0, None, None, "", "", reason, (), -math.inf)
+
+
+def _cell(row: Row, scale: Scale) -> Cell:
     word = word_of(row)
     judged = word != "not judged"
     shown = margin(row) if judged else None
     bar = [scale.place(x) for x in (row["margin"], *margin_limits(row))] if shown else None
     ranked = list(WORDS)
     return Cell(
-        requirement,
-        sensor,
+        row["requirement"],
+        row["sensor"],
         word,
         _conditions(row) if judged else 0,
         shown,

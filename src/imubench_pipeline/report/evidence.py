@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.report.decisions import word_of
+from imubench_pipeline.report.decisions import unranked, word_of
 from imubench_pipeline.report.meaning import error_of_recording, limit_words, rankings
 from imubench_pipeline.report.practical import duration_text, number_text
 from imubench_pipeline.report.site import Site
@@ -31,7 +31,7 @@ def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[
         about = {"name": name, "title": requirement.title, "asked": requirement_words(requirement)}
         stands = next((r for r in own_rows if r["requirement"] == name and r["decides"]), None)
         if stands is None:
-            yield about | {"row": None, "word": "not judged"}
+            yield about | {"row": None, "word": "not judged", "why": unranked(own)}
             continue
         (group,) = ranking["groups"]
         judged = sum(

@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from markupsafe import Markup
-
 from imubench_pipeline.navigation.suitability.conditions import parts_of
 from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.practical import (
@@ -17,7 +15,7 @@ from imubench_pipeline.report.practical import (
     interval_text,
     unit_of,
 )
-from imubench_pipeline.report.told import Told, margin, of_budget, of_ranking
+from imubench_pipeline.report.told import Between, Told, margin, of_budget, of_ranking
 from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.typing import Row
@@ -96,7 +94,7 @@ def _limit(row: Row, system: System) -> dict[str, Any]:
         "sigma": _expected(row, system) if has_sigma else "–",
         "interval": _interval(row, system) if has_sigma else "–",
         "margin": size[0] if size else "–",
-        "margins": Markup("{} to {}").format(size[1], size[2]) if size else "",
+        "margins": Between(size[1], size[2]) if size else "",
         "chance": of_ranking(row, "chance", _percent(row["chance"]), "%") if has_sigma else "–",
         "source": f"{row['source']} ({_percent(row['share'])})" if row["source"] else "–",
         "parts": (row["parts"] or "–").split("; "),
@@ -129,11 +127,10 @@ def _interval(row: Row, system: System, place: Place = of_ranking) -> str:
         return "–"
     unit = unit_of(DIMENSIONS[row["error"]], system, row["sigma"])
     digits = unit.digits(row["sigma"], row["lower"], row["upper"])
-    ends = (place(row, name, unit.text(row[name], digits), unit.sign) for name in _ENDS)
-    return Markup("{} to {}").format(*ends)
-
-
-_ENDS = ("lower", "upper")
+    lower, upper = (
+        place(row, name, unit.text(row[name], digits), unit.sign) for name in ("lower", "upper")
+    )
+    return Between(lower, upper)
 
 
 def error_of_recording(total: Row, system: System) -> tuple[str, str]:

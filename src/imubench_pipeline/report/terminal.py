@@ -220,8 +220,7 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
         if every or limit["decides"]:
             shown = limit["reason"]
             if limit["sigma"] != "–":
-                unit = limit["unit"] if limit["unit"] == "°" else f" {limit['unit']}"
-                shown = f"{limit['sigma']} of {limit['allowed']}{unit}"
+                shown = f"{limit['sigma']} of {limit['allowed']}"
                 shown += f"\n{limit['interval']}"
             error, _, after = limit["limit"].rpartition(", ")
             yield [*first, shown, f"{error}\nafter {after}", limit["margin"]]

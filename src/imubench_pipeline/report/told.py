@@ -36,6 +36,23 @@ class Told(str):
         return Markup('<span data-from="{}"{}>{}</span>').format(self.source, unit, str(self))
 
 
+class Between(str):
+    """Two limits as a page prints them; in HTML each says from which value of the tables it is."""
+
+    __slots__ = ("ends",)
+    ends: tuple[Told, Told]
+
+    def __new__(cls, lower: Told, upper: Told) -> Between:
+        """Return ``lower to upper``."""
+        between = super().__new__(cls, f"{lower} to {upper}")
+        between.ends = (lower, upper)
+        return between
+
+    def __html__(self) -> Markup:
+        """Return them as elements with their sources."""
+        return Markup("{} to {}").format(*self.ends)
+
+
 def of_ranking(row: Row, column: str, text: str, unit: str = "") -> Told:
     """Return a number of a row of the table ``ranking``."""
     return _told("ranking", row, ("requirement", "sensor"), column, text, unit)

@@ -113,7 +113,11 @@ def test_words_of_the_matrix_are_those_of_the_ranking(read: Open, bench: Report)
     table = reader.page.locator("[data-decisions]")
     heads = table.locator("thead th").all_inner_texts()
     assert [head.split("\n")[0].strip() for head in heads] == ["Sensor", "Rover", "Wheels"]
-    words = {"passes": "passes", "probably fails": "open", "not enough data": "not judged"}
+    words = {
+        "passes": "passes",
+        "probably fails": "open",
+        "not enough data": "not judged",
+    }
     for row in bench.of("ranking", decides=True):
         name = f"{made.SENSORS[row['sensor']].vendor} {made.SENSORS[row['sensor']].model}"
         line = table.get_by_role("row").filter(has=reader.page.get_by_role("rowheader", name=name))
