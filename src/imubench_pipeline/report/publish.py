@@ -27,11 +27,16 @@ _OF_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
 _FOLDERS = ("recordings", "sensors", "devices")
 _STATIC = Path(__file__).with_name("static")
 _SCRIPTS = (
+    "address",
     "numbers",
     "terms",
     "tables",
+    "tools",
     "plot",
     "overlay",
+    "ratios",
+    "comparison",
+    "side_by_side",
     "channel",
     "earth_rate",
     "calibration",

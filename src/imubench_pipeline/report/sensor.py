@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
+from urllib.parse import urlencode
 
 from imubench_pipeline.navigation.drift import LEVEL
 from imubench_pipeline.report.comparison import Comparison
@@ -51,6 +52,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
         "name": site.names[sensor],
         "summary": _about(site, sensor) + summary(own, several=False),
         "verdicts": list(evidence(site, sensor, own)),
+        "beside": urlencode({"a": sensor}) if any(view.static for view in own) else "",
         "devices": list(_devices(own)),
         "forest": FOREST,
         "several": sum(view.static for view in own) > 1,

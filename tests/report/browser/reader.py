@@ -74,8 +74,14 @@ class Reader:
         return [*self.complaints]
 
     def open(self, path: str, stored: Mapping[str, str] | None = None) -> None:
-        """Open a page; ``stored`` is what the storage of the browser has from an earlier one."""
-        address = (self.folder / path).as_uri()
+        """Open a page; ``stored`` is what the storage of the browser has from an earlier one.
+
+        What is chosen may follow the path, after a ``#``: the page is loaded anew for it.
+        """
+        file, mark, state = path.partition("#")
+        address = (self.folder / file).as_uri() + mark + state
+        if self.page.url.partition("#")[0] == address.partition("#")[0]:
+            self.page.goto("about:blank")
         if stored:
             self.page.goto(address)
             for pair in stored.items():

@@ -13,8 +13,9 @@ from tests.report.browser.reader import TOO_WIDE, Open, Reader
 
 OF_NIGHT = f"recordings/alpha/{made.NIGHT.recording}.html"
 KINDS = (
-    "index", "recordings.html", "datasheets", "theory", "made", "sensors/alpha", "sensors/gamma",
-    "devices/", "recordings/alpha/night 1", "recordings/alpha/night 2", "recordings/beta/run_1",
+    "index", "compare", "recordings.html", "datasheets", "theory", "made", "sensors/alpha",
+    "sensors/gamma", "devices/", "recordings/alpha/night 1", "recordings/alpha/night 2",
+    "recordings/beta/run_1",
 )  # fmt: skip
 
 

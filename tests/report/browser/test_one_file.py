@@ -82,7 +82,8 @@ def test_every_link_of_one_file_leads_somewhere(read: Open, alone: Path) -> None
               const url = new URL(link.getAttribute("href"), `file:///${path}`);
               const page = pages.get(decodeURIComponent(url.pathname.slice(1)));
               const section = decodeURIComponent(url.hash.slice(1));
-              if (page && (!section || page.getElementById(section))) continue;
+              const state = section.includes("=");  // what is chosen on the page
+              if (page && (!section || state || page.getElementById(section))) continue;
               lost.push(`${path}: ${link.outerHTML}`);
             }
           }
@@ -98,3 +99,17 @@ def test_the_choice_of_units_lasts_from_page_to_page(read: Open, alone: Path) ->
     reader.page.get_by_role("link", name=NIGHT).first.click()
     cell = reader.page.locator("tr.recommended data").first
     expect(cell).to_have_text("8.7×10⁻⁵")
+
+
+def test_what_is_chosen_stands_behind_the_page(read: Open, alone: Path) -> None:
+    reader = read(alone.parent, f"{alone.name}#/compare.html#a=alpha&b=beta&axis=gyro_x")
+    page = reader.page
+    chosen = page.locator(".pickers select")
+    assert [one.input_value() for one in chosen.all()] == ["alpha", "beta"]
+    chosen.last.select_option("beta/run_2")
+    assert page.url.endswith("#/compare.html#a=alpha&b=beta%2Frun_2&axis=gyro_x")
+    page.get_by_role("link", name="Theory").first.click()
+    assert page.url.endswith("#/theory.html")
+    page.go_back()
+    page.wait_for_function("document.querySelector('h1').textContent === 'Side by side'")
+    assert chosen.last.input_value() == "beta/run_2"
