@@ -58,6 +58,7 @@ function start() {
   readState();
   startUnits(JSON.parse(document.body.dataset.units));
   startTerms();
+  startSearch();
   startCopying();
   startPrinting();
   if (document.body.dataset.oneFile === "yes") startPages(main);
