@@ -38,6 +38,7 @@ _SCRIPTS = (
     "ratios",
     "comparison",
     "side_by_side",
+    "tabs",
     "search",
     "channel",
     "earth_rate",

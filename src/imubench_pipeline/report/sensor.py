@@ -11,7 +11,7 @@ from imubench_pipeline.navigation.drift import LEVEL
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
 from imubench_pipeline.report.evidence import evidence
-from imubench_pipeline.report.meaning import budget_tables, budget_words
+from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.palette import places
 from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.practical import limit_digits, symbol_text
@@ -71,8 +71,9 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
             "grouped": "recording",
             "recordings": [view.name for view in own],
             "looks": looks({sensor: site.looks[sensor]})
-            | {"places": [asdict(look) for look in places()]},
+            | {"places": [asdict(look) for look in places(site.looks[sensor])]},
             "names": site.names,
+            "budgets": [budget_bars(view.budget, site.system) for view in shown if view.budget],
             **together.page,
         },
     }

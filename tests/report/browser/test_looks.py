@@ -20,7 +20,7 @@ KINDS = (
 
 
 INK = """() => document.querySelector("figure[data-kind=allan] .canvas").data
-  .find((one) => one.mode === "lines+markers").line.color"""
+  .find((one) => one.name === "likelihood").line.color"""
 
 
 def luminance(colour: str) -> float:
@@ -34,7 +34,7 @@ def background(reader: Reader) -> float:
 
 
 def ink(reader: Reader) -> str:
-    """Return the colour of the measured curve."""
+    """Return the colour of the model to use."""
     reader.figure("allan", channel="gyro_x")
     return str(reader.page.evaluate(INK))
 

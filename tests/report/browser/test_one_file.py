@@ -42,19 +42,20 @@ def test_pages_of_one_file_are_turned(read: Open, alone: Path) -> None:
     assert page.title() == f"Vendor & Sons A-1: {NIGHT}"
     assert "#/recordings/alpha/" in page.url
     assert traces(reader.figure("allan", channel="gyro_x"))
-    page.get_by_role("link", name="Accelerometer x").first.click()
+    page.get_by_role("tab", name="Accelerometer x").click()
     expect(page.locator("h2#accel_x")).to_be_in_viewport()
     page.get_by_role("navigation", name="Pages").get_by_role("link", name="Theory").click()
     expect(page.locator("main h1")).to_contain_text("Theory")
     page.get_by_role("link", name="Densities").click()
     expect(page.locator("#sidedness")).to_be_in_viewport()
-    for expected in (r"#/theory\.html$", r"#accel_x$", r"night.*\.html$", r"report\.html$"):
+    for expected in (r"#/theory\.html$", r"#channel=accel_x$", r"report\.html$"):
         page.go_back()
         expect(page).to_have_url(re.compile(expected))
     assert head(page) == made.TITLE
     page.go_forward()
     expect(page.locator("main h1")).to_contain_text(NIGHT)
     assert page.locator("main h1").count() == 1
+    expect(page.locator("h2#accel_x")).to_be_visible()
 
 
 def test_a_place_in_one_file_has_an_address(read: Open, alone: Path) -> None:

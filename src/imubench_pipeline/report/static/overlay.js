@@ -124,6 +124,10 @@ kinds.overlay = (figure) => {
       traces.push(line(array(times), scaled(curve, unit.factor), { ...look, width: 1.2 }, { group: [key, "model"], opacity: 0.8 }));
     }
   }
+  const ranges = {
+    x: logRange(here.flatMap((view) => array(view.tau)), 0.1), y: logRange(here.flatMap((view) => scaled(view.adev, unit.factor)), 0.4),
+  };
+  const slopes = slopeGuides(ranges.x, ranges.y);
   const drawnSheets = new Set();
   for (const view of here) {
     if (drawnSheets.has(view.sensor)) continue;
@@ -138,19 +142,28 @@ kinds.overlay = (figure) => {
         }));
     });
   }
-  const { ink } = inks();
+  const { ink, soft } = inks();
   const plain = { light: ink, dark: ink };
+  // Names stand at the ends of the curves, where there is room for them.
+  const named = new Map();
+  for (const view of here) if (shown(figure, groupOf(view)) && shown(figure, "measured")) named.set(groupOf(view), view);
+  const roomy = figure.clientWidth > 700 && named.size <= 12;
+  const labels = roomy ? directLabels([...named].map(([key, view]) => ({
+    y: Math.log10(scaled(view.adev, unit.factor).at(-1)), text: wrapped(nameOf(key)), colour: colourOf(lookOf(view)),
+  })), ranges.y) : [];
   const layers = [
     { key: "measured", layer: true, label: "curves", on: true, look: plain },
     { key: "limits", layer: true, label: "95 % limits", on: here.length <= 12, look: { ...plain, filled: true } },
     { key: "model", layer: true, label: "model", on: false, look: plain },
     { key: "datasheet", layer: true, label: "datasheet", on: false, look: { ...plain, dash: "dot" } },
+    { key: "slopes", layer: true, label: "slopes", on: true, look: { light: soft, dark: soft } },
   ];
   return {
     traces, groups: [...layers, ...groups.values()],
     layout: {
-      xaxis: logAxis("averaging time τ (s)", logRange(here.flatMap((view) => array(view.tau)), 0.1)),
-      yaxis: logAxis(`Allan deviation (${unit.sign})`, logRange(here.flatMap((view) => scaled(view.adev, unit.factor)), 0.4)),
+      ...(roomy ? { margin: { l: 60, r: 150, t: 14, b: 50 } } : {}),
+      xaxis: logAxis("averaging time τ (s)", ranges.x), yaxis: logAxis(`Allan deviation (${unit.sign})`, ranges.y),
+      annotations: [...labels, ...(shown(figure, "slopes") ? slopes.annotations : [])], shapes: shown(figure, "slopes") ? slopes.shapes : [],
     },
   };
 };

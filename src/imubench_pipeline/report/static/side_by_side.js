@@ -3,18 +3,18 @@
 const SLOPES = [[-0.5, "−½", "white noise"], [0, "0", "bias instability"], [0.5, "+½", "random walk"]];
 
 // Short lines in the corner with the slope of each kind of noise, for the eye to lay beside a curve.
-function slopeGuides(xRange, yRange, yaxis = "y") {
+function slopeGuides(xRange, yRange) {
   const length = Math.min(0.1 * (xRange[1] - xRange[0]), 0.24 * (yRange[1] - yRange[0]));
   const x = xRange[0] + 0.05 * (xRange[1] - xRange[0]);
   const y = yRange[0] + 0.12 * (yRange[1] - yRange[0]);
   const { soft } = inks();
   return {
-    traces: SLOPES.map(([slope]) => ({
-      group: "slopes", type: "scatter", mode: "lines", hoverinfo: "skip", yaxis, meta: { guide: true },
-      x: [10 ** x, 10 ** (x + length)], y: [10 ** y, 10 ** (y + slope * length)], line: { color: soft, width: 1.2 },
+    shapes: SLOPES.map(([slope]) => ({
+      type: "line", xref: "x", yref: "y", layer: "below", x0: 10 ** x, x1: 10 ** (x + length), y0: 10 ** y, y1: 10 ** (y + slope * length),
+      line: { color: soft, width: 1.2 },
     })),
     annotations: SLOPES.map(([slope, text, of]) => ({
-      xref: "x", yref: yaxis, x: x + length, y: y + slope * length, xanchor: "left", yanchor: "middle", text: `${text} ${of}`, showarrow: false,
+      xref: "x", yref: "y", x: x + length, y: y + slope * length, xanchor: "left", yanchor: "middle", text: `${text} ${of}`, showarrow: false,
       font: { size: 11, color: soft },
     })),
   };
@@ -87,7 +87,6 @@ kinds.pair = (figure) => {
     });
   });
   const slopes = slopeGuides(ranges.x, ranges.y);
-  traces.unshift(...slopes.traces);
   const ratioRange = logRange(extent, 0.06);
   const { ink, soft } = inks();
   const upper = [0.36, 1];
@@ -113,6 +112,7 @@ kinds.pair = (figure) => {
       shapes: [
         { type: "line", xref: "paper", x0: 0, x1: 1, yref: "y2", y0: 1, y1: 1, line: { color: ink, width: 1 } },
         { type: "line", xref: "x", x0: crossed, x1: crossed, yref: "paper", y0: 0, y1: 1, line: { color: soft, width: 1, dash: "dot" } },
+        ...(shown(figure, "slopes") ? slopes.shapes : []),
       ],
     },
   };
@@ -363,7 +363,7 @@ function stackedShares(rows, shares, titles) {
   return {
     traces,
     groups: order.map((source, number) => ({ key: `source ${source}`, label: source, on: true, look: { light: source === "others" ? "#8a9299" : PLACES[number % PLACES.length][0], dark: source === "others" ? "#6b7680" : PLACES[number % PLACES.length][1], filled: true } })),
-    height: 100 + 64 * Math.max(rows.length, 1),
+    height: 90 + (rows.length > 6 ? 26 : 64) * Math.max(rows.length, 1),
     layout: {
       barmode: "stack", bargap: 0.3, margin: { l: 10, r: 14, t: 8, b: 46 },
       xaxis: { ...linearAxis("part of the variance (%)"), range: [0, 100] },

@@ -7,6 +7,8 @@ function openPage(main) {
   decoded = [];
   showUnits(main);
   startTables(main);
+  startTabs(main);
+  startMatrices(main);
   startChooser(main);
   startComparison(main);
   startFigures(main);
@@ -60,6 +62,7 @@ function start() {
   startTerms();
   startSearch();
   startCopying();
+  startPrintingTabs();
   startPrinting();
   if (document.body.dataset.oneFile === "yes") startPages(main);
   else openPage(main);
