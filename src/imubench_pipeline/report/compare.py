@@ -81,12 +81,16 @@ def _path(site: Site, view: RecordingView, table: str) -> Path:
 
 
 def _kept(site: Site, view: RecordingView, table: str) -> Mapping[str, Any]:
-    """Return the columns of a table of a recording; none where a report is made without it."""
+    """Return columns of a table of a recording; none where a report is made without it."""
     path = _path(site, view, table)
     if not path.is_file():
         return {}
     rows = read(table, [path])
-    return {name: np.array(rows[name].to_pylist()) for name in rows.column_names}
+    return {
+        name: rows[name].to_numpy()
+        for name in rows.column_names
+        if name not in ("sensor", "recording", "unit")
+    }
 
 
 def _recording(view: RecordingView) -> dict[str, Any]:
@@ -138,7 +142,7 @@ def _drawn(
     """Yield of each channel its Allan deviation at some tau, and those of models drawn, sorted."""
     if not kept:
         return
-    of_draw = np.array([draw is not None for draw in kept["draw"]], dtype=bool)
+    of_draw = np.isfinite(np.asarray(kept["draw"], dtype=np.float64))  # null: the estimate itself
     decade = np.log10(kept["tau"])
     wanted = np.abs(decade - decade.round()) < 1e-6 if few else np.ones(len(decade), dtype=bool)
     for channel in dict.fromkeys(kept["channel"].tolist()):
