@@ -15,7 +15,12 @@ import numpy as np
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.payload import Arrays, compared, datasheet_lines, looks
-from imubench_pipeline.report.practical import duration_text, number_text, unit_of
+from imubench_pipeline.report.practical import (
+    duration_text,
+    number_text,
+    unit_of,
+    units_by_size,
+)
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
@@ -56,7 +61,7 @@ def _context(site: Site) -> dict[str, Any]:
             "channels": channels,
             "datasheets": datasheets,
             "recordings": recordings,
-            "errors": {error: _unit(site, error) for error in _ERRORS},
+            "errors": {error: _units(site, error) for error in _ERRORS},
             "window": quantity_to_si(budget["static_window"], "time"),
             "limits": list(_limits(site)),
             "arrays": arrays.texts,
@@ -116,9 +121,15 @@ def _recording(view: RecordingView) -> dict[str, Any]:
     }
 
 
-def _unit(site: Site, error: str) -> list[Any]:
-    unit = unit_of(DIMENSIONS[error], site.system)  # type: ignore[index]  # a key of it
-    return [unit.sign, unit.per_si]
+def _units(site: Site, error: str) -> dict[str, Any]:
+    """Return the unit of an axis, and those of a number: from which size in SI, sign and factor."""
+    dimension = DIMENSIONS[error]  # type: ignore[index]  # a key of it
+    axis = unit_of(dimension, site.system)
+    sized = units_by_size(dimension, site.system)
+    return {
+        "axis": [axis.sign, axis.per_si],
+        "sized": [[least, unit.sign, unit.per_si] for least, unit in sized],
+    }
 
 
 def _limits(site: Site) -> Iterator[dict[str, Any]]:

@@ -199,12 +199,11 @@ def budget_bars(rows: Sequence[Row], system: System) -> list[dict[str, Any]]:
     for (error, time), parts in sorted(
         groups.items(), key=lambda group: _ERRORS.index(group[0][0])
     ):
-        sigma = next(row["sigma"] for row in parts if row["source"] == "total")
+        (total,) = (row for row in parts if row["source"] == "total")
+        sigma = total["sigma"]
         if not sigma:
             continue
-        unit = unit_of(DIMENSIONS[error], system)
-        shown = _shown(error, sigma, unit)
-        size = f"{shown} {unit.sign}" if shown[0].isdigit() else shown
+        size = _shown(total, unit_of(DIMENSIONS[error], system, sigma))
         bars.append(
             {
                 "label": f"{error} {duration_text(time)}: {size}",

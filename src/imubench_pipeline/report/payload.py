@@ -266,7 +266,8 @@ def samples_payload(
 
 
 def _rounded(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.6g}")
+    # As `report.html` writes a number into a page: what is printed of it is the same.
+    return None if value is None else float(f"{value:.7g}")
 
 
 def numbers(rows: Sequence[Row], name: str) -> list[float]:

@@ -33,7 +33,7 @@ def _entries(site: Site) -> Iterator[Found]:
     for page, view in devices.items():
         yield "device", f"{site.names[view.sensor]}: device {view.row['device']}", page, ""
     for name, requirement in site.settings["requirements"].items():
-        yield "requirement", requirement["title"], "index.html", name
+        yield "requirement", requirement["title"], f"index.html#requirement-{name}", name
     for file, title in site.navigation:
         yield "page", title, file, ""
     for entry in glossary().values():

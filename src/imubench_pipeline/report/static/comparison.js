@@ -181,21 +181,22 @@ function verdictCell(ratio, first, second) {
 function ratioCell(ratio) {
   const cell = cellOf("", { className: "number ratio" });
   Object.assign(cell.dataset, { ratio: ratio.value ?? "", lower: ratio.lower ?? "", upper: ratio.upper ?? "" });
-  const digits = limitDigits(ratio.lower, ratio.upper);
+  const digits = digitsOf(ratio.value, ratio.lower, ratio.upper);
   cell.append(Object.assign(document.createElement("strong"), { textContent: ratio.value === null ? "–" : numberText(ratio.value, digits) }));
   cell.append(document.createElement("br"), Object.assign(document.createElement("small"), { textContent: ratioText(ratio) }));
   return cell;
 }
 
-function ownCell(one, unit) {
+function ownCell(one, unit, digitsFor = digitsOf) {
   const cell = cellOf("", { className: "number" });
-  const factor = unit.factor;
-  const bounded = one.lower !== null && one.upper !== null;
-  const digits = limitDigits(bounded ? one.lower : null, bounded ? one.upper : null, 3);
-  if (one.value !== null) cell.append(`${numberText(one.value * factor, digits)} ${unit.sign}`);
-  else cell.append(one.status === "absent" && one.upper !== null ? `below ${numberText(one.upper * factor, 2)} ${unit.sign}` : one.status.replaceAll("_", " "));
-  if (bounded && one.value !== null) {
-    cell.append(document.createElement("br"), Object.assign(document.createElement("small"), { textContent: `${numberText(one.lower * factor, digits)} to ${numberText(one.upper * factor, digits)}` }));
+  const { sign, factor } = typeof unit === "function" ? unit(one.value) : unit;
+  const [value, lower, upper] = [one.value, one.lower, one.upper].map((number) => (number === null ? null : number * factor));
+  const bounded = lower !== null && upper !== null;
+  const digits = digitsFor(value, lower, upper);
+  if (value !== null) cell.append(`${numberText(value, digits)} ${sign}`);
+  else cell.append(one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : one.status.replaceAll("_", " "));
+  if (bounded && value !== null) {
+    cell.append(document.createElement("br"), Object.assign(document.createElement("small"), { textContent: `${numberText(lower, digits)} to ${numberText(upper, digits)}` }));
   }
   return cell;
 }
@@ -216,7 +217,7 @@ function linesOf(figures) {
     head.append(name);
     row.append(head);
     figure.ratios.forEach((ratio, place) => row.append(verdictCell(ratio, chosen[0], chosen[place + 1]), ratioCell(ratio)));
-    row.append(...figure.own.map((one) => ownCell(one, figure.unit)));
+    row.append(...figure.own.map((one) => ownCell(one, figure.unit, figure.digits)));
     return row;
   });
 }

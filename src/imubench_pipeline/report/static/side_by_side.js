@@ -246,6 +246,16 @@ function startGrowth(root) {
   form.replaceChildren(labelled("Error", select), slider("window", windows, "At rest before"), slider("time", times, "After"));
 }
 
+function errorUnit(error, size) {
+  const [, sign, factor] = pageData.errors[error].sized.find(([least]) => size >= least);
+  return { sign, factor };
+}
+
+function errorText(error, { value, lower, upper }) {
+  const { sign, factor } = errorUnit(error, value);
+  return `${numberText(value * factor, digitsBy(value * factor, lower * factor, upper * factor))} ${sign}`;
+}
+
 const timeText = (seconds) => (seconds >= 120 ? `${numberText(seconds / 60, 3)} min` : `${numberText(seconds, 3)} s`);
 
 function drawErrors(root) {
@@ -262,8 +272,7 @@ function drawErrors(root) {
         return { value, lower, upper, status: "ok" };
       });
       if (own.includes(null)) continue;
-      const [sign, factor] = pageData.errors[error];
-      figures.push({ symbol: error, label: error, unit: { sign, factor }, own, ratios: own.slice(1).map((other) => ratioOfParameters(own[0], other)) });
+      figures.push({ symbol: error, label: error, unit: (size) => errorUnit(error, size), digits: digitsBy, own, ratios: own.slice(1).map((other) => ratioOfParameters(own[0], other)) });
     }
   }
   table.tHead.replaceChildren(headOf(`After ${timeText(growthOf.time)}`, ...headsOfPairs(), ...chosen.map(shortName)));
@@ -273,7 +282,7 @@ function drawErrors(root) {
 }
 
 kinds.growth = () => {
-  const [sign, factor] = pageData.errors[growthOf.error];
+  const [sign, factor] = pageData.errors[growthOf.error].axis;
   const traces = [];
   const extent = [];
   const ends = [];
@@ -325,7 +334,6 @@ kinds.growth = () => {
 };
 
 kinds.sources = () => {
-  const [sign, factor] = pageData.errors[growthOf.error];
   const here = chosen.filter(grownOf).reverse();
   const at = (one) => {
     const { times, window, time } = chosenPlace(one);
@@ -333,7 +341,10 @@ kinds.sources = () => {
   };
   const shares = here.map((one) => Object.entries(grownOf(one).sources).map(([source, of]) => [source, array(of)[at(one)]]));
   return stackedShares(
-    here.map((one) => `${wrapped(shortName(one))}<br>${numberText(array(grownOf(one).sigma)[at(one)] * factor, 3)} ${sign}`),
+    here.map((one) => {
+      const [value, lower, upper] = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[at(one)]);
+      return `${wrapped(shortName(one))}<br>${errorText(growthOf.error, { value, lower, upper })}`;
+    }),
     shares, here.map(shortName),
   );
 };
