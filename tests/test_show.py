@@ -148,8 +148,8 @@ def test_a_ranking_has_its_verdicts_in_words(
     text = shown(capsys, results, "--width", 120)
     lines = text.partition("Ranking for robot")[2].partition("\n\n")[0].splitlines()
     (good,) = (i for i, line in enumerate(lines) if line.startswith("1 "))
-    assert words(lines[good]) == "1 good passes 0.25 of 1° heading 4"
-    assert words(lines[good + 1]) == "tied with made 0.2 to 0.333 after 60 s"
+    assert words(lines[good]) == "1 good passes 0.25 of 1 ° heading 4"
+    assert words(lines[good + 1]) == "tied with made 0.2 to 0.33 after 60 s"
     assert "surely fails" in lines[good + 2] and "made (simulated)" in lines[good + 2]
     (third,) = (line for line in lines if "not enough data" in line)
     assert "no accelerometer in the recording" in third

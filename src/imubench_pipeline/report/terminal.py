@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
+from markupsafe import Markup
 from rich.console import RenderableType
 from rich.text import Text
 
@@ -220,9 +221,11 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
         if every or limit["decides"]:
             shown = limit["reason"]
             if limit["sigma"] != "–":
-                unit = limit["unit"] if limit["unit"] == "°" else f" {limit['unit']}"
-                shown = f"{limit['sigma']} of {limit['allowed']}{unit}"
-                shown += f"\n{limit['interval']}"
+                # The pages have the limits with their source, as HTML.
+                interval = Markup(limit["interval"]).striptags()
+                unit = limit["allowed"].rpartition(" ")[2]
+                sigma = limit["sigma"].removesuffix(f" {unit}")
+                shown = f"{sigma} of {limit['allowed']}\n{interval}"
             error, _, after = limit["limit"].rpartition(", ")
             yield [*first, shown, f"{error}\nafter {after}", limit["margin"]]
             first = ["", "", ""]

@@ -65,7 +65,7 @@ kinds.pair = (figure) => {
         group: "datasheet", type: "scatter", mode: "lines+markers", name: `${one.letter} datasheet: ${printed.label}`, x: at,
         y: at.map((t) => (printed.of === "N" ? value / Math.sqrt(t) : value)), line: { color: colourOf(look), width: 1.2, dash: "dot" },
         marker: { color: inks().paper, symbol: "diamond", size: [0.1, 10, 0.1], line: { color: colourOf(look), width: 1.6 } },
-        hovertemplate: `${one.letter} datasheet: ${printed.label}<extra></extra>`,
+        hoverinfo: ["skip", "text", "skip"], text: `${one.letter} datasheet: ${printed.label}`,
       });
     }
   }
@@ -192,6 +192,9 @@ kinds.dumbbells = (figure) => {
       xaxis: logAxis(`times that of ${shortName(chosen[0])}`, logRange(extent, 0.08)),
       yaxis: { ...linearAxis(""), tickvals: words.map((_, i) => i), ticktext: words, range: [-0.6, Math.max(figures.length, 1) - 0.4], fixedrange: true },
       shapes: [{ type: "line", x0: 1, x1: 1, yref: "paper", y0: 0, y1: 1, line: { color: soft, width: 1 } }],
+      annotations: figures.flatMap(({ own }, y) => (own[0].value ? [] : [{
+        xref: "paper", x: 0.01, y, xanchor: "left", showarrow: false, text: `${chosen[0].letter} has no value to compare with`, font: { color: soft, size: 12 },
+      }])),
     },
   };
 };
@@ -333,7 +336,7 @@ kinds.growth = () => {
   };
 };
 
-kinds.sources = () => {
+kinds.sources = (figure) => {
   const here = chosen.filter(grownOf).reverse();
   const at = (one) => {
     const { times, window, time } = chosenPlace(one);
@@ -345,12 +348,13 @@ kinds.sources = () => {
       const [value, lower, upper] = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[at(one)]);
       return `${wrapped(shortName(one))}<br>${errorText(growthOf.error, { value, lower, upper })}`;
     }),
-    shares, here.map(shortName),
+    shares, here.map(shortName), figure.clientWidth,
   );
 };
 
 // Bars of parts of a variance; parts below 2 % are one.
-function stackedShares(rows, shares, titles) {
+function stackedShares(rows, shares, titles, width) {
+  const inner = Math.max(width - 190, 100); // px of a whole bar, about
   const total = new Map();
   const large = shares.map((parts) => {
     const kept = parts.filter(([, share]) => share >= 0.02);
@@ -366,7 +370,10 @@ function stackedShares(rows, shares, titles) {
     return {
       group: `source ${source}`, type: "bar", orientation: "h", name: source, x: sums.map((share) => 100 * share), y: rows.map((_, i) => i), meta: { flat: true },
       marker: { color: faint(colourOf(look), 0.55), line: { color: inks().paper, width: 1 }, pattern: { fillmode: "overlay", shape: ["", "/", ".", "x", "-", "\\"][number % 6], fgcolor: inks().paper, size: 7 } },
-      text: sums.map((share) => (share >= 0.3 ? `${source} ${numberText(100 * share, 2)} %` : share >= 0.08 ? `${numberText(100 * share, 2)} %` : "")), textposition: "inside", insidetextanchor: "middle",
+      text: sums.map((share) => {
+        const percent = `${numberText(100 * share, 2)} %`;
+        return [`${source} ${percent}`, percent].find((words) => 7 * words.length < share * inner) ?? "";
+      }), textposition: "inside", insidetextanchor: "middle",
       insidetextfont: { color: inks().ink, size: 12 }, constraintext: "none", textangle: 0,
       hovertext: own.map((parts, i) => `${titles[i]}<br>${parts.map(([name, share]) => `${name}: ${numberText(100 * share, 2)} %`).join("<br>")}`), hovertemplate: "%{hovertext}<extra></extra>",
     };

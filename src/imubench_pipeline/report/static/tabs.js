@@ -94,5 +94,5 @@ function startPrintingTabs() {
 
 kinds.budget = (figure) => {
   const bars = [...pageData.budgets[Number(figure.dataset.budget)]].reverse();
-  return stackedShares(bars.map((bar) => bar.label), bars.map((bar) => bar.shares), bars.map((bar) => bar.label));
+  return stackedShares(bars.map((bar) => bar.label), bars.map((bar) => bar.shares), bars.map((bar) => bar.label), figure.clientWidth);
 };
