@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -25,9 +26,10 @@ import pyarrow as pa
 import yaml
 
 from imubench_pipeline.navigation.drift import drift_rows
+from imubench_pipeline.report.compare import KEPT as COMPARED
 from imubench_pipeline.report.publish import publish, site_of
 from imubench_pipeline.report.static_figures.of_run import draw_comparison
-from imubench_pipeline.tables import build, read
+from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from resident import peak_memory
 
@@ -39,6 +41,7 @@ TRUTH = {
     "accel": {"N": "60 ug/sqrt(Hz)", "B": "30 ug", "T_B": "60 s", "K": "100 ug/sqrt(h)"},
 }
 CHANNELS = [f"{quantity}_{axis}" for quantity in TRUTH for axis in "xyz"]
+SCALED = ("adev", "lower", "upper", "value", "sigma")
 OF_ALL = (
     "ranking",
     "shortlist",
@@ -104,12 +107,18 @@ def multiplied(results: Path, number: int) -> dict[str, pa.Table]:
         recommended, tables["fixed_bias"].to_pylist(), tables["recordings"].to_pylist()
     )
     tables["drift"] = build("drift", rows)
-    for sensor, recording in names:
+    kept = results / "recordings/one/sim_one"
+    compared = {table: read(table, [kept / f"{table}.parquet"]) for table in COMPARED}
+    for (sensor, recording), factor in zip(names, factors, strict=True):
         target = results / "recordings" / sensor / recording
         target.mkdir(parents=True, exist_ok=True)
-        for path in (results / "recordings/one/sim_one").glob("*.parquet"):
+        for path in kept.glob("*.parquet"):
             if path.stem in (*OF_ONE_RECORDING, "log"):
                 shutil.copyfile(path, target / path.name)
+        # Arrays that are alike stand in a page once.
+        for table, one in compared.items():
+            own = _copy(one, sensor, recording, 0, factor)
+            write_arrow(own, target / f"{table}.parquet")
     return tables
 
 
@@ -125,7 +134,9 @@ def _copy(table: pa.Table, sensor: str, recording: str, number: int, factor: flo
         column = table[name]
         if name in changed:
             column = pa.array([changed[name]] * table.num_rows, pa.string())
-        elif name in ("adev", "lower", "upper", "value") and pa.types.is_floating(column.type):
+        elif name in ("adev", "lower", "upper", "value", "sigma") and pa.types.is_floating(
+            column.type
+        ):
             column = pa.array(column.to_numpy() * factor, from_pandas=True)
         columns.append(column)
     return pa.Table.from_arrays(columns, schema=table.schema)
@@ -144,9 +155,10 @@ def opening(report: Path) -> Iterator[tuple[str, float, float]]:
     from playwright.sync_api import sync_playwright
 
     pages = ["index.html", "sensors/sensor_00.html", "recordings/sensor_00/night_000.html"]
-    pages += ["recordings.html", "datasheets.html"]
+    pages += ["compare.html", "recordings.html", "datasheets.html"]
     with sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=shutil.which("chromium"))
+        root = ["--no-sandbox"] if os.geteuid() == 0 else []
+        browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=root)
         for page in pages:
             tab = browser.new_page()
             start = time.perf_counter()

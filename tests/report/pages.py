@@ -168,7 +168,8 @@ def lost_links(pages: dict[str, Read], folder: Path, besides: set[str] = frozens
                 )
             found = "/".join(parts)
             if found in pages:
-                if section and unquote(section) not in pages[found].ids:
+                state = "=" in section  # what is chosen on the page
+                if section and not state and unquote(section) not in pages[found].ids:
                     lost.add(f"{path}: {link}")
             elif found not in besides and not (folder / found).is_file():
                 lost.add(f"{path}: {link}")

@@ -1,7 +1,13 @@
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.report.fusion import FUSION, equal_numbers, grade_lines, shared_words
+from imubench_pipeline.report.fusion import (
+    FUSION,
+    equal_numbers,
+    grade_lines,
+    matrices,
+    shared_words,
+)
 from imubench_pipeline.tables import build
 from tests.report.tables import joined, recording_rows, site
 
@@ -95,3 +101,21 @@ def test_how_many_reach_a_class_stands_in_a_line_of_both_figures() -> None:
 def test_a_class_of_which_nothing_is_printed_has_no_line() -> None:
     nothing = GRADE | {"printed": None, "n": None, "n_lower": None, "n_upper": None}
     assert list(grade_lines(build("grades", [nothing]).to_pylist())) == []
+
+
+def test_a_matrix_has_the_quietest_first_and_a_number_where_one_is_not_enough() -> None:
+    rows = [
+        ROW,
+        ROW | {"other": "c", "other_adev": 2e-5, "n": 2.3, "lower": 2.0, "upper": 2.6},
+        ROW | {"sensor": "c", "adev": 2e-5, "n": 4.0, "lower": 3.1, "upper": 5.0},
+    ]
+    (matrix,) = matrices(list(equal_numbers(build("fusion", rows).to_pylist())))
+    assert (matrix["name"], matrix["sensors"]) == ("Gyroscope, 10 s", ["b", "c", "a"])
+    assert matrix["levels"] == [1e-5, 2e-5, 3e-5]
+    numbers = [[cell and cell["number"] for cell in row] for row in matrix["cells"]]
+    assert numbers == [[None, None, None], ["4", None, None], ["11", "3", None]]
+
+
+def test_a_sensor_of_which_nothing_is_known_is_in_no_matrix() -> None:
+    row = ROW | {"adev": None, "n": None, "lower": None, "upper": None, "reason": "too short"}
+    assert list(matrices(list(equal_numbers(build("fusion", [row]).to_pylist())))) == []

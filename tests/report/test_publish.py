@@ -43,7 +43,7 @@ from tests.report.tables import (
     site,
 )
 
-ASSETS = {"assets/report.css", "assets/report.js", "assets/plotly.min.js"}
+ASSETS = {f"assets/{name}" for name in ("report.css", "report.js", "search.js", "plotly.min.js")}
 OF_ALL = {"index.html", "recordings.html", "datasheets.html", "fusion.html"}
 KEPT = {"pages.json", "settings.json"}
 ASKED = {"robot": ROBOT}
@@ -68,6 +68,8 @@ def _quick() -> Iterator[None]:
 def once(made: Site) -> set[str]:
     """The pages that there is one of: none of boards, the Earth's rate, and papers."""
     files = {entry.file for entry in ENTRIES} - {"boards.html", "earth_rate.html", "papers.html"}
+    if not any(view.static for view in made.views):
+        files -= {"compare.html"}
     assert files == {path for path, _ in made.navigation} > OF_ALL
     return files
 
@@ -585,7 +587,7 @@ def old(first: Path, tmp_path: Path) -> Path:
 
 
 def republished(folder: Path, *after: Rows) -> tuple[set[str], set[str]]:
-    """Return what a run writes after another, and what it only looks at.
+    """Return what pages a run writes after another, and what it only looks at.
 
     What is there then is what a first run would write.
     """
@@ -594,7 +596,7 @@ def republished(folder: Path, *after: Rows) -> tuple[set[str], set[str]]:
     assert touched(folder) - KEPT == set(written)
     publish(run(*after, asked=ASKED), folder.parent / "fresh")
     assert files(folder) == files(folder.parent / "fresh")
-    return set(written), set(made) - set(written)
+    return set(written) - ASSETS, set(made) - set(written)
 
 
 def test_a_changed_score_rewrites_its_page_alone(old: Path) -> None:
@@ -603,7 +605,7 @@ def test_a_changed_score_rewrites_its_page_alone(old: Path) -> None:
     written, seen = republished(old, *after)
     assert written == {"recordings/one/day1.html"}
     # These show the tables of the recording, but not this column.
-    assert seen == OF_ALL - {"fusion.html"} | {"sensors/one.html"}
+    assert seen == OF_ALL - {"fusion.html"} | {"sensors/one.html", "compare.html"}
 
 
 def test_a_changed_parameter_rewrites_its_page_and_those_that_compare(old: Path) -> None:
@@ -612,7 +614,8 @@ def test_a_changed_parameter_rewrites_its_page_and_those_that_compare(old: Path)
     (row,) = (row for row in rows if row["recommended"] and row["parameter"] == "N")
     row["upper"] *= 1.5
     written, seen = republished(old, *after)
-    assert written == {"recordings/one/day1.html", "sensors/one.html", "index.html"}
+    showing = {"sensors/one.html", "index.html", "compare.html"}
+    assert written == {"recordings/one/day1.html"} | showing
     assert seen == OF_ALL - {"index.html"}
 
 
@@ -639,6 +642,7 @@ def test_a_new_finding_leaves_the_pages_of_other_recordings_alone(old: Path) -> 
         "recordings/one/day2.html",
         "sensors/one.html",
         "recordings.html",
+        "compare.html",
         "index.html",
     }
     assert seen == {"datasheets.html", "devices/one/unit 7.html"}
@@ -649,7 +653,8 @@ def test_a_new_recording_leaves_the_pages_of_other_sensors_alone(old: Path) -> N
     after.insert(0, recording_rows("one", "day0", ("gyro_x", "gyro_y", "gyro_z"), found=[0.2]))
     written, seen = republished(old, *after)
     # What answers for the sensor is the same as before.
-    assert written == OF_ALL - {"fusion.html"} | {"recordings/one/day0.html", "sensors/one.html"}
+    showing = OF_ALL - {"fusion.html"} | {"compare.html"}
+    assert written == showing | {"recordings/one/day0.html", "sensors/one.html"}
     assert seen == {"fusion.html"}
 
 
@@ -671,7 +676,7 @@ def test_the_page_of_a_removed_recording_disappears(old: Path) -> None:
     del after[0]
     written, _ = republished(old, *after)
     # Of one recording less the interval is another, and with it the rank of the other sensor.
-    assert written == OF_ALL | {"sensors/one.html", "sensors/two.html"}
+    assert written == OF_ALL | {"compare.html", "sensors/one.html", "sensors/two.html"}
     assert "recordings/one/day1.html" not in files(old)
 
 

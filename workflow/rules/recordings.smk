@@ -192,6 +192,8 @@ rule error_budget:
     output:
         error_budget=KEPT + "/error_budget.parquet",
         backtest=KEPT + "/backtest.parquet",
+        error_growth=KEPT + "/error_growth.parquet",
+        drawn_deviations=KEPT + "/drawn_deviations.parquet",
     log:
         LOGS + "/recordings/{sensor}/{recording}/error_budget.log",
     group:

@@ -7,6 +7,11 @@ rule report:
         quality=every("quality.json"),
         samples=[file for name in SAMPLES for file in every(f"{name}.parquet")],
         of_models=of_each(plan.on_boards, "samples_of_models"),
+        compared=[
+            file
+            for name in ("error_growth", "drawn_deviations")
+            for file in every(f"{name}.parquet")
+        ],
     output:
         page=report(RESULTS + "/report/index.html", category="Comparison"),
     log:

@@ -44,7 +44,7 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
 
-_NAMELESS: Mapping[str, Figures] = MappingProxyType({})
+NO_FIGURES_OF_CHANNELS: Mapping[str, Figures] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def error_rows(
     *,
     draws: int,
     seed: int,
-    figures: Mapping[str, Figures] = _NAMELESS,
+    figures: Mapping[str, Figures] = NO_FIGURES_OF_CHANNELS,
 ) -> Iterator[Row]:
     """Yield the rows of the table ``error_budget`` of a recording.
 
@@ -194,22 +194,15 @@ def error_rows(
     figures : mapping of str to mapping
         Of each channel, what is known of the errors that come in use (`printed_errors.in_use`).
     """
-    # Of a log too short for any estimate nothing is known: that is not a sensor without noise.
-    with_noise = {
-        channel: estimate for channel, estimate in estimates.items() if estimate.model.terms
-    }
-    axes = {
-        channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
-        for channel, estimate in with_noise.items()
-    }
+    axes = axes_of(estimates, figures)
 
     def drawn_of(channel: str) -> list[AxisErrors]:
         stream = partial(channel_rng, seed, *names.values(), channel)
-        models = draw_models(with_noise[channel], draws, stream("budget"))
+        models = draw_models(estimates[channel], draws, stream("budget"))
         of_use = _drawn(axes[channel].figures, draws, stream("temperature of the budget"))
         return [AxisErrors(*pair) for pair in zip(models, of_use, strict=True)]
 
-    drawn = {channel: drawn_of(channel) for channel in with_noise}
+    drawn = {channel: drawn_of(channel) for channel in axes}
     for question in questions:
         asked: dict[str, Any] = {
             **names,
@@ -220,18 +213,15 @@ def error_rows(
             "limit": question.limit,
             "unit": SI_UNITS[DIMENSIONS[question.error]],
         }
-        missing = [
-            _missing(quantity, estimates)
-            for quantity in question.needs
-            if not any(quantity_of(channel) == quantity for channel in with_noise)
-        ]
-        if missing:
+        chosen = answering(question, axes)
+        if chosen is None:
+            missing = [
+                _missing(quantity, estimates)
+                for quantity in question.needs
+                if not _of(quantity, axes)
+            ]
             yield asked | {"source": "total", "reason": "; ".join(missing)}
             continue
-        chosen = {
-            quantity: _axis(question, quantity, axes) if quantity in question.needs else None
-            for quantity in ("gyro", "accel")
-        }
         pair = [axes[c] if c else _NOTHING for c in chosen.values()]
         many = [drawn[c] if c else [_NOTHING] * draws for c in chosen.values()]
         nominal = question.answer(*pair)
@@ -243,6 +233,34 @@ def error_rows(
             yield asked | chosen | source_row(contribution) | largest.of_bias(contribution)
         for missed in nominal.missing if question.limit is not None else ():
             yield asked | chosen | largest.of_missing(missed)
+
+
+def axes_of(
+    estimates: Mapping[str, Estimate], figures: Mapping[str, Figures]
+) -> dict[str, AxisErrors]:
+    """Return what is known of the axes of which something is known.
+
+    Of a log too short for any estimate nothing is known: that is not a sensor without noise.
+    """
+    return {
+        channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
+        for channel, estimate in estimates.items()
+        if estimate.model.terms
+    }
+
+
+def answering(question: Question, axes: Mapping[str, AxisErrors]) -> dict[str, str | None] | None:
+    """Return the channels of gyro and accelerometer that answer; None: one of them is missing."""
+    if not all(_of(quantity, axes) for quantity in question.needs):
+        return None
+    return {
+        quantity: _axis(question, quantity, axes) if quantity in question.needs else None
+        for quantity in ("gyro", "accel")
+    }
+
+
+def _of(quantity: str, axes: Mapping[str, AxisErrors]) -> list[str]:
+    return [channel for channel in axes if quantity_of(channel) == quantity]
 
 
 def _total(
@@ -321,7 +339,7 @@ def _axis(question: Question, quantity: str, axes: Mapping[str, AxisErrors]) -> 
         pair = (own, _NOTHING) if quantity == "gyro" else (_NOTHING, own)
         return question.answer(*pair).total
 
-    ranked = sorted((c for c in axes if quantity_of(c) == quantity), key=part)
+    ranked = sorted(_of(quantity, axes), key=part)
     # Of two axes the median is the worse one.
     return ranked[-1] if question.axis == "worst" else ranked[len(ranked) // 2]
 

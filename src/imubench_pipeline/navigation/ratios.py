@@ -14,7 +14,7 @@ Statistics in Medicine 27, 2008 (eq. 2, and 3 for a ratio by logarithms).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,12 +24,16 @@ from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.navigation.fusion.equivalence import FusionChannel, number_needed
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.typing import Array
+from imubench_pipeline.noise.stacked import summed
+from imubench_pipeline.typing import Array, Row
 
 Verdict = Literal["lower", "higher", "not told apart", "not known"]
 
 _TAIL = 0.025
 """Beyond each 95 % limit."""
+
+_PER_DECADE = 2
+"""Tau of the table ``drawn_deviations``."""
 
 
 @dataclass(frozen=True)
@@ -134,15 +138,7 @@ def ratio_of_deviations(
     if not first.model.terms or not second.model.terms:
         return Ratio(None, None, None, "one has no noise model")
     value = math.sqrt(float(number_needed(first.variance(tau), 0.0, second.variance(tau))))
-    own, other = (
-        _variances(
-            channel.drawn(
-                draws, channel_rng(seed, channel.sensor, channel.recording, channel.channel, place)
-            ),
-            tau,
-        )
-        for place, channel in (("first", first), ("second", second))
-    )
+    own, other = (_variances(_drawn(channel, draws, seed), [tau])[0] for channel in (first, second))
     ratios = np.sqrt(number_needed(own[:, None], 0.0, other[None, :]))
     lower, upper = np.quantile(ratios, [_TAIL, 1.0 - _TAIL], method="inverted_cdf")
     unknown = "; ".join(dict.fromkeys([*first.unknown(tau), *second.unknown(tau)])) or None
@@ -151,5 +147,48 @@ def ratio_of_deviations(
     return Ratio(None if unknown else value, *limits, unknown)
 
 
-def _variances(models: Sequence[NoiseModel], tau: float) -> Array:
-    return np.array([float(model.allan_variance(tau)) for model in models])
+def _drawn(channel: FusionChannel, draws: int, seed: int) -> list[NoiseModel]:
+    stream = channel_rng(seed, channel.sensor, channel.recording, channel.channel, "ratio")
+    return channel.drawn(draws, stream)
+
+
+def _variances(models: Sequence[NoiseModel], tau: Sequence[float]) -> Array:
+    """Return the Allan variances of models, shape (tau, models)."""
+    times = np.asarray(tau, dtype=np.float64)[:, np.newaxis]
+    return summed(models, lambda term: term.allan_variance(times), len(tau))
+
+
+def deviation_rows(
+    channel: FusionChannel, rate: float, *, longest: float, draws: int, seed: int
+) -> Iterator[Row]:
+    """Yield the rows of the table ``drawn_deviations`` of a channel.
+
+    What `ratio_of_deviations` needs to know of it, at tau of two a decade from the sampling
+    interval on, so that any two channels can be compared without their logs.
+
+    Parameters
+    ----------
+    channel : FusionChannel
+    rate : float
+        Of its log, Hz.
+    longest : float
+    draws, seed : int
+        All three as `ratio_of_deviations` takes them.
+    """
+    if not channel.model.terms:
+        return
+    first, last = (
+        _PER_DECADE * math.log10(end) for end in (1.0 / rate, longest * channel.duration)
+    )
+    taus = [
+        10.0 ** (step / _PER_DECADE)
+        for step in range(math.ceil(first - 1e-9), math.floor(last + 1e-9) + 1)
+    ]
+    drawn = np.sqrt(_variances(_drawn(channel, draws, seed), taus))
+    names = {name: getattr(channel, name) for name in ("sensor", "recording", "channel")}
+    for tau, deviations in zip(taus, drawn, strict=True):
+        at = {**names, "tau": tau}
+        unknown = "; ".join(dict.fromkeys(channel.unknown(tau))) or None
+        yield at | {"adev": math.sqrt(channel.variance(tau)), "unknown": unknown}
+        for number, deviation in enumerate(np.sort(deviations).tolist()):
+            yield at | {"draw": number, "adev": deviation}

@@ -5,16 +5,29 @@ from __future__ import annotations
 import cmath
 import math
 from functools import lru_cache
+from typing import overload
 
 import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.typing import Array
 
 _SERIES_BELOW = 2.0
 """Below, the recurrence of phi and the sum of `squared_response` cancel; their series do not."""
 
 _LONGEST_SERIES = 48
 
+_ARRAY_SERIES = 28
+"""Terms for arrays: the next is below 2^28 / 28! = 9e-22 of the first."""
 
-def phi(order: int, z: complex) -> complex:
+ComplexArray = NDArray[np.complex128]
+
+
+@overload
+def phi(order: int, z: complex) -> complex: ...
+@overload
+def phi(order: int, z: Array | ComplexArray) -> ComplexArray: ...
+def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray:
     """Return phi_k(z), the integral of (1 - s)^(k-1) / (k-1)! e^(z s) over s from 0 to 1.
 
     phi_k(z) = z^-k (e^z - sum_{j<k} z^j / j!) = sum_n z^n / (n + k)!, k from 0.
@@ -23,6 +36,8 @@ def phi(order: int, z: complex) -> complex:
     ----------
     M. Hochbruck and A. Ostermann, "Exponential integrators", Acta Numerica 19, 2010.
     """
+    if isinstance(z, np.ndarray):
+        return _phi_of_array(order, z)
     if abs(z) < _SERIES_BELOW:
         term: complex = complex(1.0 / math.factorial(order))
         total = term
@@ -36,12 +51,31 @@ def phi(order: int, z: complex) -> complex:
     return value
 
 
-def decay(order: int, x: float) -> float:
+def _phi_of_array(order: int, z: Array | ComplexArray) -> ComplexArray:
+    small = np.abs(z) < _SERIES_BELOW
+    series = [1.0 / math.factorial(n + order) for n in range(_ARRAY_SERIES)]
+    near = np.polynomial.polynomial.polyval(np.where(small, z, 0.0), series)
+    far = np.where(small, _SERIES_BELOW, z)
+    value = np.exp(far)
+    for j in range(order):
+        value = (value - 1.0 / math.factorial(j)) / far
+    return np.asarray(np.where(small, near, value), dtype=np.complex128)
+
+
+@overload
+def decay(order: int, x: float) -> float: ...
+@overload
+def decay(order: int, x: Array) -> Array: ...
+def decay(order: int, x: float | Array) -> float | Array:
     """Return phi_k(-x) for a real x from 0: 1/k! at 0, and then falling."""
     return phi(order, -x).real
 
 
-def squared_response(order: int, x: float) -> float:
+@overload
+def squared_response(order: int, x: float) -> float: ...
+@overload
+def squared_response(order: int, x: Array) -> Array: ...
+def squared_response(order: int, x: float | Array) -> float | Array:
     """Return x^-(2m+3) times the integral of E(v)^2 from 0 to x, E(v) = v^(m+1) phi_{m+1}(-v).
 
     E is what a pulse grows to through a Gauss-Markov process of unit correlation time and m + 1
@@ -50,11 +84,23 @@ def squared_response(order: int, x: float) -> float:
 
         sum_{j=0..m} (-1)^j x^(m-j) / (m-j)! E_{m+2+j}(x) - E_{m+1}(x)^2 / 2.
     """
-    m = order
+    if isinstance(x, np.ndarray):
+        small = x < _SERIES_BELOW
+        near = np.polynomial.polynomial.polyval(np.where(small, x, 0.0), _squared_series(order))
+        return np.where(small, near, _squared_sum(order, np.where(small, _SERIES_BELOW, x)))
     if x < _SERIES_BELOW:
-        return float(np.polynomial.polynomial.polyval(x, _squared_series(m)))
-    total = sum((-1) ** j * decay(m + 2 + j, x) / math.factorial(m - j) for j in range(m + 1))
-    return (total - 0.5 * decay(m + 1, x) ** 2) / x
+        return float(np.polynomial.polynomial.polyval(x, _squared_series(order)))
+    return _squared_sum(order, x)
+
+
+@overload
+def _squared_sum(order: int, x: float) -> float: ...
+@overload
+def _squared_sum(order: int, x: Array) -> Array: ...
+def _squared_sum(order: int, x: float | Array) -> float | Array:
+    m = order
+    parts = [(-1) ** j * decay(m + 2 + j, x) / math.factorial(m - j) for j in range(m + 1)]
+    return (sum(parts) - 0.5 * decay(m + 1, x) ** 2) / x
 
 
 @lru_cache(maxsize=8)

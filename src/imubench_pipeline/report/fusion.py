@@ -27,6 +27,7 @@ def _context(site: Site) -> dict[str, Any]:
     }
     return {
         "lines": lines,
+        "matrices": list(matrices(lines)),
         "grades": list(grade_lines(site.rows("grades"))),
         "filters": filters,
         "shared": shared_words(site.settings["settings"]["fusion"]["common"]),
@@ -81,6 +82,35 @@ def equal_numbers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             "limits": _limits(row),
             "common": _common(row),
         }
+
+
+def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Yield a matrix of each quantity and averaging time, of the lines of `equal_numbers`.
+
+    Rows and columns are the sensors, the quietest first; a cell says how many of its row equal one
+    of its column. A sensor that is at least as good needs one, and has no line.
+    """
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for line in lines:
+        groups.setdefault((line["quantity"], line["tau"]), []).append(line)
+    for (quantity, tau), own in groups.items():
+        by_pair = {(line["sensor"], line["other"]): line for line in own}
+        levels = {line[of]: line[adev] for line in own for of, adev in _ENDS if line[adev]}
+        sensors = sorted(levels, key=lambda sensor: (levels[sensor], sensor))
+        if 1 < len(sensors) <= _MOST:
+            cells = [[by_pair.get((row, column)) for column in sensors] for row in sensors]
+            yield {
+                "name": f"{quantity}, {tau}",
+                "symbol": own[0]["symbol"],
+                "sensors": sensors,
+                "levels": [levels[sensor] for sensor in sensors],
+                "cells": cells,
+            }
+
+
+_ENDS = (("sensor", "adev"), ("other", "other_adev"))
+_MOST = 40
+"""Sensors of a matrix that can still be read."""
 
 
 def grade_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:

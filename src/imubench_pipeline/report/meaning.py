@@ -29,6 +29,7 @@ _NAMES = {
     "position": "position, one axis",
     "north": "north, found at rest",
 }
+_ERRORS = tuple(_NAMES)
 _QUARTER_TURN = math.pi / 2.0
 
 
@@ -179,6 +180,38 @@ def budget_tables(
             "missing": "; ".join(missing),
             "notes": list(_notes(lines.values())),
         }
+
+
+def budget_bars(rows: Sequence[Row], system: System) -> list[dict[str, Any]]:
+    """Return a bar for each error and time of the worst axes: the parts of its variance.
+
+    Of the rows of the table ``error_budget`` of one recording.
+    """
+    own = [row for row in rows if row["requirement"] is None]
+    worst = [row for row in own if row["axis"] == own[0]["axis"]]
+    groups: dict[tuple[Any, float], list[Row]] = {}
+    for row in worst:
+        groups.setdefault((row["error"], row["time"]), []).append(row)
+    bars = []
+    for (error, time), parts in sorted(
+        groups.items(), key=lambda group: _ERRORS.index(group[0][0])
+    ):
+        (total,) = (row for row in parts if row["source"] == "total")
+        sigma = total["sigma"]
+        if not sigma:
+            continue
+        size = _shown(total, unit_of(DIMENSIONS[error], system, sigma))
+        bars.append(
+            {
+                "label": f"{error} {duration_text(time)}: {size}",
+                "shares": [
+                    [row["source"], float(f"{(row['sigma'] / sigma) ** 2:.3g}")]
+                    for row in parts
+                    if row["source"] != "total" and row["sigma"]
+                ],
+            }
+        )
+    return bars
 
 
 def _notes(lines: Iterable[Mapping[str, Any]]) -> Iterator[str]:

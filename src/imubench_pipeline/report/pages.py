@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.report import (
     boards,
+    compare,
     earth_rate,
     fusion,
     made,
@@ -23,6 +24,7 @@ from imubench_pipeline.report.site import Entry, Page, Site
 
 ENTRIES: Sequence[Entry] = (
     start.START,
+    compare.COMPARE,
     start.RECORDINGS,
     start.DATASHEETS,
     shortlist.SHORTLIST,

@@ -65,14 +65,31 @@ def method_appearance(method: str) -> Appearance:
     return _METHODS[method]
 
 
-def places() -> list[Appearance]:
-    """Return the looks of the recordings of one sensor, by their place; they repeat."""
-    count = len(_COLOURS) * len(_MARKERS)
+def places(own: Appearance) -> list[Appearance]:
+    """Return the looks of the recordings of a sensor, by their place; they repeat.
+
+    The first is that of the sensor; the others are shades of its colour towards the ink of the
+    page, with another marker, and in the end another dash.
+    """
+    first, shades = _MARKERS.index(own.marker), len(_TOWARDS_INK)
+    dashes = [own.dash, *(dash for dash in _DASHES if dash != own.dash)]
     return [
         Appearance(
-            *_COLOURS[place % len(_COLOURS)],
-            _DASHES[(place // len(_COLOURS)) % len(_DASHES)],
-            _MARKERS[place % len(_MARKERS)],
+            _mixed(own.light, _INK[0], _TOWARDS_INK[place % shades]),
+            _mixed(own.dark, _INK[1], _TOWARDS_INK[place % shades]),
+            dashes[place // _ALIKE],
+            _MARKERS[(first + place) % len(_MARKERS)],
         )
-        for place in range(count)
+        for place in range(2 * _ALIKE)
     ]
+
+
+_INK = ("#1b1b1b", "#e8e8e8")
+_TOWARDS_INK = (0.0, 0.5, 0.25, 0.75)
+_ALIKE = len(_TOWARDS_INK) * len(_MARKERS)
+"""Recordings until the dash is another."""
+
+
+def _mixed(colour: str, ink: str, share: float) -> str:
+    pairs = ((int(one[at : at + 2], 16) for one in (colour, ink)) for at in (1, 3, 5))
+    return "#" + "".join(f"{round(a + share * (b - a)):02X}" for a, b in pairs)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import chdtri
 
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.noise import NoiseModel, Term
@@ -218,12 +219,18 @@ def _spectrum(
     smooth = np.geomspace(frequency[0], frequency[-1], _SMOOTH)
     # The bins are denser than what a line between them shows.
     some = np.unique(np.linspace(0, len(frequency) - 1, _SMOOTH).round().astype(int))
+    fitted, freedom = (np.take(spectrum[name], some) for name in ("fitted", "ordinates"))
     return {
         "frequency": arrays.log(frequency),
         "density": arrays.log(np.sqrt(spectrum["density"])),
         "left": np.flatnonzero(spectrum["used"] == 0).tolist(),
         "fit_frequency": arrays.log(np.take(frequency, some)),
-        "fitted": arrays.log(np.sqrt(np.take(spectrum["fitted"], some))),
+        "fitted": arrays.log(np.sqrt(fitted)),
+        # A bin scatters about the fit as chi squared of its degrees of freedom over these.
+        **{
+            name: arrays.log(np.sqrt(fitted * chdtri(freedom, beyond) / freedom))
+            for name, beyond in (("lower", 0.975), ("upper", 0.025))
+        },
         "model": next((row["model"] for row in view.models if row["chosen"]), ""),
         "smooth": arrays.log(smooth),
         "terms": [
@@ -259,7 +266,8 @@ def samples_payload(
 
 
 def _rounded(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.6g}")
+    # As `report.html` writes a number into a page: what is printed of it is the same.
+    return None if value is None else float(f"{value:.7g}")
 
 
 def numbers(rows: Sequence[Row], name: str) -> list[float]:

@@ -162,13 +162,18 @@ def unit_of(dimension: str, system: System, size: float | None = None) -> PageUn
 
     ``size``, SI: of what is shown, for which a prefix is chosen; SI has none.
     """
+    if not size:
+        return _page_unit(_OF_DIMENSION[system][dimension], dimension)
+    units = units_by_size(dimension, system)
+    return next(unit for least, unit in units if abs(size) >= least)
+
+
+def units_by_size(dimension: str, system: System) -> list[tuple[float, PageUnit]]:
+    """Return the units of an angle, a velocity or a length, each from a size in SI on."""
     sign = _OF_DIMENSION[system][dimension]
-    if system == "practical" and dimension in _PREFIXED and size:
-        for least, prefix in _PREFIXES:
-            if abs(size) >= least:
-                sign = prefix + sign
-                break
-    return _page_unit(sign, dimension)
+    prefixed = system == "practical" and dimension in _PREFIXED
+    prefixes = _PREFIXES if prefixed else ((0.0, ""),)
+    return [(least, _page_unit(prefix + sign, dimension)) for least, prefix in prefixes]
 
 
 _PREFIXED = ("velocity", "length")

@@ -15,6 +15,7 @@ from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.practical import units_of_pages
+from imubench_pipeline.report.search import index
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.tables import read, read_json, write_content
 from imubench_pipeline.tables.provenance import source_digest
@@ -27,11 +28,18 @@ _OF_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
 _FOLDERS = ("recordings", "sensors", "devices")
 _STATIC = Path(__file__).with_name("static")
 _SCRIPTS = (
+    "address",
     "numbers",
     "terms",
     "tables",
+    "tools",
     "plot",
     "overlay",
+    "ratios",
+    "comparison",
+    "side_by_side",
+    "tabs",
+    "search",
     "channel",
     "earth_rate",
     "calibration",
@@ -50,7 +58,7 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     ``say`` is told what is being written; returned is what was, below the folder.
     """
     written = []
-    for path, content in _assets().items():
+    for path, content in (_assets() | _search(site)).items():
         written += _put(folder, path, content)
     every = list(pages(site))
     keys = {page.path: page.key for page in every}
@@ -136,6 +144,11 @@ def _assets() -> dict[str, str]:
     }
 
 
+def _search(site: Site) -> dict[str, str]:
+    # A page from disk may not read a file, but a script it may run.
+    return {"assets/search.js": f"imubenchSearch({index(site)});\n"}
+
+
 def _script() -> str:
     """Return the scripts of the pages, with the units that they know, as one."""
     units = {
@@ -169,7 +182,13 @@ def one_file(site: Site) -> str:
     ]
     page = templates.get_template("one_file.html.jinja")
     return page.render(
-        {"pages": shown, "css": assets["assets/report.css"], "scripts": scripts} | common
+        {
+            "pages": shown,
+            "css": assets["assets/report.css"],
+            "scripts": scripts,
+            "search": index(site).replace("<", "\\u003c"),
+            **common,
+        }
     )
 
 

@@ -12,7 +12,7 @@ from imubench_pipeline.report import compared_samples, thermal
 from imubench_pipeline.report.backtest import backtest_lines
 from imubench_pipeline.report.calibration import at_rest
 from imubench_pipeline.report.datasheets import curve_distances, delta_rows
-from imubench_pipeline.report.meaning import budget_tables, budget_words
+from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.parameters import digits_of, methods_table
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks, samples_payload
 from imubench_pipeline.report.practical import (
@@ -107,6 +107,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
             ],
             "samples": samples,
             "of_models": compared_samples.payload(of_models, arrays),
+            "budgets": [budget_bars(view.budget, site.system)] if budgets else [],
             "findings": [
                 {name: row[name] for name in ("number", "finding", "channel", "start", "end")}
                 for row in numbered

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
+from urllib.parse import urlencode
 
 from imubench_pipeline.navigation.drift import LEVEL
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
 from imubench_pipeline.report.evidence import evidence
-from imubench_pipeline.report.meaning import budget_tables, budget_words
+from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.palette import places
 from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.practical import limit_digits, symbol_text
@@ -51,6 +52,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
         "name": site.names[sensor],
         "summary": _about(site, sensor) + summary(own, several=False),
         "verdicts": list(evidence(site, sensor, own)),
+        "beside": urlencode({"a": sensor}) if any(view.static for view in own) else "",
         "devices": list(_devices(own)),
         "forest": FOREST,
         "several": sum(view.static for view in own) > 1,
@@ -69,8 +71,9 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
             "grouped": "recording",
             "recordings": [view.name for view in own],
             "looks": looks({sensor: site.looks[sensor]})
-            | {"places": [asdict(look) for look in places()]},
+            | {"places": [asdict(look) for look in places(site.looks[sensor])]},
             "names": site.names,
+            "budgets": [budget_bars(view.budget, site.system) for view in shown if view.budget],
             **together.page,
         },
     }

@@ -54,12 +54,15 @@ class Entry:
     tables: tuple[str, ...] = ()
     # returns the recordings that it shows: likewise, whatever any table says of them alone
     views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
+    # the files kept with recordings that it shows, where they are there: likewise
+    files: Callable[[Site], Iterable[Path]] = lambda _: ()
     exists: Callable[[Site], bool] = lambda _: True  # tells whether a report has it
 
     def page(self, site: Site) -> Page:
         """Return the page of a report."""
         shown = (site.rows(table) for table in self.tables)
-        key = site.key_of([view.key for view in self.views(site)], *shown)
+        kept = (path.read_bytes() for path in self.files(site) if path.is_file())
+        key = site.key_of([view.key for view in self.views(site)], *shown, *kept)
         return Page(self.file, f"{self.file}.jinja", key, lambda: self.context(site))
 
 

@@ -363,6 +363,7 @@ class Plan:
         return _text(
             {
                 "error_budget": self.run.error_budget.model_dump(mode="json"),
+                "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
                 "requirements": self._requirements(*_OF_RANKING, "title", "note", "example"),
                 "datasheet": declared.datasheet.only(IN_USE) if declared else {},
             }

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
 from imubench_pipeline.navigation.error_budget.printed_errors import in_use
+from imubench_pipeline.navigation.error_growth import growth_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.recordings.kept import kept_static_logs
-from imubench_pipeline.settings.config import ErrorBudgetSettings
+from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
+from imubench_pipeline.navigation.ratios import deviation_rows
+from imubench_pipeline.recordings.kept import Quality, kept_static_logs
+from imubench_pipeline.settings.config import ErrorBudgetSettings, FusionSettings
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import requirements_of
 from imubench_pipeline.tables import read
@@ -22,7 +27,7 @@ from imubench_pipeline.units import quantity_to_si
 def error_tables(
     inputs: dict[str, Path], names: dict[str, str], settings: str
 ) -> dict[str, Iterator[Row]]:
-    """Return the rows of the tables ``error_budget`` and ``backtest``; none of a rejected log."""
+    """Return the rows of the tables that the rule leaves; none of a rejected log."""
     sections = json.loads(settings)
     how = ErrorBudgetSettings.model_validate(sections["error_budget"])
     times = [quantity_to_si(time, "time") for time in how.times]
@@ -34,13 +39,42 @@ def error_tables(
         questions += of_requirement(name, requirement)
     estimates = recommended_estimates(inputs["parameters"], inputs["draws"])
     if not estimates:
-        return {"error_budget": iter(()), "backtest": iter(())}
+        return {name: iter(()) for name in _TABLES}
     drawn = {"draws": how.draws, "seed": how.seed}
     logs = kept_static_logs(inputs["quality"].parent)
     apart = read("deterministic", [inputs["deterministic"]]).to_pylist()
     temperature = read("temperature", [inputs["temperature"]]).to_pylist()
     figures = in_use(Datasheet.model_validate(sections["datasheet"]), estimates, temperature)
-    return {
-        "error_budget": error_rows(names, estimates, questions, figures=figures, **drawn),
-        "backtest": backtest_rows(names, logs, estimates, requirements, apart, **drawn),
-    }
+    tables = (
+        error_rows(names, estimates, questions, figures=figures, **drawn),
+        backtest_rows(names, logs, estimates, requirements, apart, **drawn),
+        growth_rows(names, estimates, times=times, window=window, figures=figures, **drawn),
+        _deviations(names, Quality.read(inputs["quality"]).recording, estimates, sections),
+    )
+    return dict(zip(_TABLES, tables, strict=True))
+
+
+_TABLES = ("error_budget", "backtest", "error_growth", "drawn_deviations")
+
+
+def _deviations(
+    names: Mapping[str, str],
+    recording: Mapping[str, Any],
+    estimates: Mapping[str, Estimate],
+    sections: Mapping[str, Any],
+) -> Iterator[Row]:
+    """Yield the rows of the table ``drawn_deviations``, of the row of its recording."""
+    how = FusionSettings.model_validate(sections["fusion"])
+    for name, estimate in estimates.items():
+        channel = FusionChannel(
+            sensor=names["sensor"],
+            recording=names["recording"],
+            channel=name,
+            simulated=recording["simulated"],
+            duration=recording["duration"],
+            estimate=estimate,
+        )
+        rate = recording["rate"]
+        yield from deviation_rows(
+            channel, rate, longest=how.longest, draws=how.draws, seed=how.seed
+        )

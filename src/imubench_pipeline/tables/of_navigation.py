@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from imubench_pipeline.tables.columns import CHANNEL, KEYS, SENSOR, count, flag, number, text
+from imubench_pipeline.tables.columns import (
+    CHANNEL,
+    KEYS,
+    RECORDING,
+    SENSOR,
+    count,
+    flag,
+    number,
+    text,
+)
 
 IN_USE = (
     text("cause", "of a source: noise, start, turn_on_bias, temperature, ...", required=False),
@@ -20,6 +29,29 @@ CONDITIONS = (
 )
 """What the table ``ranking`` says beside its verdict."""
 
+
+ERROR_GROWTH = (
+    SENSOR,
+    RECORDING,
+    text("gyro", "channel that answers: the worst"),
+    text("accel", "channel that answers: the worst", required=False),
+    number("window", "s", "at rest right before, from which biases and tilt are taken", True),
+    text("error", "attitude, heading, velocity or position"),
+    number("time", "s", "of dead reckoning", required=True),
+    text("source", "total, or what the error comes of"),
+    number("sigma", "as in unit", "standard deviation", required=True),
+    number("lower", "as in unit", "lower 95 % limit of a total"),
+    number("upper", "as in unit", "upper 95 % limit of a total"),
+    text("unit", "SI unit"),
+)
+
+DRAWN_DEVIATIONS = (
+    *KEYS,
+    number("tau", "s", "averaging time", required=True),
+    count("draw", "place of a noise model drawn, the lowest first; null: the estimate itself"),
+    number("adev", "rad/s or m/s^2", "Allan deviation of the noise model", required=True),
+    text("unknown", "parameters that matter and that the log does not tell", required=False),
+)
 
 BACKTEST = (
     *KEYS,

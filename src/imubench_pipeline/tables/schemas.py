@@ -20,6 +20,8 @@ from imubench_pipeline.tables.of_experiments import ALIGNMENT, CALIBRATION_TABLE
 from imubench_pipeline.tables.of_fitness import DOUBTS, JUDGED
 from imubench_pipeline.tables.of_navigation import (
     BACKTEST,
+    DRAWN_DEVIATIONS,
+    ERROR_GROWTH,
     FUSION,
     GRADES,
     IN_USE,
@@ -381,6 +383,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
         text("source", "where the parameters are published"),
     ),
     "backtest": BACKTEST,
+    "error_growth": ERROR_GROWTH,
+    "drawn_deviations": DRAWN_DEVIATIONS,
     "deterministic": DETERMINISTIC,
     "draws": DRAWS,
     "fusion": FUSION,
@@ -397,7 +401,7 @@ PARTS_OF = {"curve": "allan", "estimate_findings": "findings"}
 SAMPLES = ("envelope", "histogram")
 """The tables of the samples themselves, for the pages of the recordings."""
 
-OF_ONE_RECORDING = (*SAMPLES, "samples_of_models", "draws")
+OF_ONE_RECORDING = (*SAMPLES, "samples_of_models", "draws", "error_growth", "drawn_deviations")
 """The tables that are kept with each recording and not joined."""
 
 TURNED = tuple(EARTH_RATE_TABLES)

@@ -1,10 +1,10 @@
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Locator, sync_playwright
 
 from imubench_pipeline.report.publish import one_file, publish
 from tests.report.browser import made
@@ -53,6 +53,18 @@ def read(window: Reader) -> Iterator[Open]:
 
     yield opened
     assert window.end() == []
+
+
+@pytest.fixture
+def download(window: Reader) -> Callable[[Locator], bytes]:
+    """Press a button that saves a file, and return what is in it."""
+
+    def pressed(button: Locator) -> bytes:
+        with window.page.expect_download() as waiting:
+            button.click()
+        return Path(waiting.value.path()).read_bytes()
+
+    return pressed
 
 
 @pytest.fixture(scope="package")

@@ -23,8 +23,11 @@ from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.navigation.drift import drift_rows
+from imubench_pipeline.navigation.error_growth import growth_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.navigation.pooled import pooled_rows
+from imubench_pipeline.navigation.ratios import deviation_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.recordings.overview import overview
@@ -54,6 +57,7 @@ TRUTH = {
 }  # fmt: skip
 BIAS = {"gyro": 0.2 * DEGREE, "accel": GRAVITY}
 RATE, SAMPLES = 10.0, 9000
+BUDGET = {"draws": 20, "seed": 1}
 TAU = np.geomspace(0.1, 400.0, 30)
 METHODS = ("likelihood", "likelihood_gm", "curve", "paper", "weighted")
 TITLE = "Bench <1> & more"
@@ -286,7 +290,7 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
         for name, one in REQUIREMENTS.items():
             questions += of_requirement(name, one)
         estimates = {channel: log.recommended(channel) for channel in log.channels}
-        rows["error_budget"] += error_rows(names, estimates, questions, draws=20, seed=1)
+        rows["error_budget"] += error_rows(names, estimates, questions, **BUDGET)
     for sensor, recording in rejected:
         rows["recordings"].append(rejected_row(sensor, recording))
         rows["findings"].append(Finding("rejected", "fatal", REASON, 1.0).row(sensor, recording))
@@ -326,8 +330,35 @@ def write_samples(log: Log, results: Path) -> None:
              "sources": [{"name": "log.csv", "size": 123456, "sha256": "0f" * 32}]}
         )  # fmt: skip
     seen = overview(folder, log.sensor, log.recording)
+    write_compared(log, folder)
     write("envelope", seen.envelope, folder / "envelope.parquet")
     write("histogram", seen.histogram, folder / "histogram.parquet")
+
+
+DRAWN = {"draws": 60, "seed": 1}
+
+
+def fused(log: Log, channel: str) -> FusionChannel:
+    """Return a channel of a log as it is compared with another."""
+    names = (log.sensor, log.recording, channel, log.simulated)
+    return FusionChannel(*names, SAMPLES / RATE, log.recommended(channel))
+
+
+def growth_of(log: Log) -> list[Mapping[str, Any]]:
+    names = {"sensor": log.sensor, "recording": log.recording}
+    estimates = {channel: log.recommended(channel) for channel in log.channels}
+    return [*growth_rows(names, estimates, times=[10.0, 60.0], window=60.0, **BUDGET)]
+
+
+def write_compared(log: Log, folder: Path) -> None:
+    """Write what a comparison of any two logs needs of this one."""
+    write("error_growth", growth_of(log), folder / "error_growth.parquet")
+    deviations = [
+        row
+        for channel in log.channels
+        for row in deviation_rows(fused(log, channel), RATE, longest=1 / 9, **DRAWN)
+    ]
+    write("drawn_deviations", deviations, folder / "drawn_deviations.parquet")
 
 
 def settings_of(sensors: Mapping[str, Sensor], requirements: Mapping[str, Requirement]) -> str:

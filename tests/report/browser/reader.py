@@ -6,10 +6,13 @@ from typing import Any, Literal
 
 from playwright.sync_api import Browser, Locator
 
+from tests.report.browser.accessibility import UNFOLD
+
 Scheme = Literal["light", "dark"]
 READY = "document.documentElement.dataset.ready === 'yes'"
 SETTLED = """() => [...document.querySelectorAll("figure[data-kind]:not([data-drawn])")]
-  .every((one) => one.getBoundingClientRect().top > innerHeight + 250
+  .every((one) => one.closest("section.channel[hidden]")
+    || one.getBoundingClientRect().top > innerHeight + 250
     || one.getBoundingClientRect().bottom < -250)"""
 _TRACES = """canvas => canvas.data.map(({type, mode, name, x, y, width, fill, fillcolor, text,
   line, marker, error_x, error_y}) =>
@@ -25,6 +28,11 @@ TOO_WIDE = """() => {
     .map((one) => `${one.localName}.${one.className} ${one.textContent.slice(0, 40)}`)];
 }"""
 """What is wider than the window, where one has to scroll sideways."""
+
+OPEN_TAB = """figure => {
+  const panel = figure.closest("section.channel[hidden]");
+  if (panel) document.querySelector(`[role=tab][aria-controls="${panel.id}"]`).click();
+}"""
 
 
 class Reader:
@@ -74,8 +82,14 @@ class Reader:
         return [*self.complaints]
 
     def open(self, path: str, stored: Mapping[str, str] | None = None) -> None:
-        """Open a page; ``stored`` is what the storage of the browser has from an earlier one."""
-        address = (self.folder / path).as_uri()
+        """Open a page; ``stored`` is what the storage of the browser has from an earlier one.
+
+        What is chosen may follow the path, after a ``#``: the page is loaded anew for it.
+        """
+        file, mark, state = path.partition("#")
+        address = (self.folder / file).as_uri() + mark + state
+        if self.page.url.partition("#")[0] == address.partition("#")[0]:
+            self.page.goto("about:blank")
         if stored:
             self.page.goto(address)
             for pair in stored.items():
@@ -93,12 +107,17 @@ class Reader:
     def figure(self, kind: str, **data: str) -> Locator:
         """Return a figure, drawn."""
         chosen = "".join(f"[data-{key}='{value}']" for key, value in data.items())
-        figure = self.show(self.page.locator(f"figure[data-kind={kind}]{chosen}").first)
+        wanted = self.page.locator(f"figure[data-kind={kind}]{chosen}").first
+        wanted.evaluate(OPEN_TAB)
+        figure = self.show(wanted)
         figure.locator("xpath=self::*[@data-drawn]").locator("svg.main-svg").first.wait_for()
         return figure
 
     def draw_all(self) -> int:
         """Bring every figure into view, one after the other; return how many there are."""
+        self.page.evaluate(UNFOLD)
+        for everything in self.page.get_by_role("button", name="all channels").all():
+            everything.click()
         figures = self.page.locator("figure[data-kind]")
         for figure in figures.all():
             figure.scroll_into_view_if_needed()

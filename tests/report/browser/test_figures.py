@@ -206,7 +206,7 @@ def test_the_curve_of_a_channel_with_its_methods(read: Open, bench: Report) -> N
 def test_the_spectrum(read: Open, bench: Report) -> None:
     figure = read(bench.folder, OF_NIGHT).figure("spectrum", channel="gyro_x")
     drawn = traces(figure)
-    (fit,) = [one for one in chosen(drawn, mode="lines") if len(one["x"]) > 2]
+    fit = only(drawn, name="fit N+GM+K")
     marks = chosen(drawn, mode="markers")
     rows = bench.of("spectrum", recording=NIGHT, channel="gyro_x")
     for used, symbol in ((True, "circle"), (False, "x-thin-open")):
@@ -225,10 +225,15 @@ def test_the_spectrum(read: Open, bench: Report) -> None:
 
 def test_samples_over_time_with_findings_and_temperature(read: Open, bench: Report) -> None:
     figure = read(bench.folder, OF_NIGHT).figure("series", channel="gyro_x")
-    low, high, mean, warmth = traces(figure)
+    low, high, mean, drift, warmth = traces(figure)
     bias = 0.2  # °/s
     assert np.mean(mean["y"]) == pytest.approx(bias, rel=0.02)
     assert all(a <= m <= b for a, m, b in zip(low["y"], mean["y"], high["y"], strict=True))
+    # What it is drawn in is a power of ten of the unit.
+    power = np.ptp(drift["y"]) / np.ptp(mean["y"])
+    assert math.log10(power) == pytest.approx(round(math.log10(power)))
+    left = np.subtract(mean["y"], np.mean(mean["y"]))
+    np.testing.assert_allclose(np.divide(drift["y"], power), left, atol=1e-9)
     minutes = made.SAMPLES / made.RATE / 60
     assert (mean["x"][0], mean["x"][-1]) == pytest.approx((0.0, minutes), abs=minutes / 400)
     assert axis_title(figure, "x") == "time (min)"
@@ -244,6 +249,8 @@ def test_samples_over_time_with_findings_and_temperature(read: Open, bench: Repo
     toggle(figure, "findings").uncheck()
     assert canvas.evaluate(shapes) == []
     toggle(figure, "temperature").uncheck()
+    assert len(traces(figure)) == 4 and figure.locator("svg .y3title").count() == 0
+    toggle(figure, "drift: the mean alone, less that of the whole log").uncheck()
     assert len(traces(figure)) == 3 and figure.locator("svg .y2title").count() == 0
 
 

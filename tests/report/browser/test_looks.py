@@ -13,13 +13,14 @@ from tests.report.browser.reader import TOO_WIDE, Open, Reader
 
 OF_NIGHT = f"recordings/alpha/{made.NIGHT.recording}.html"
 KINDS = (
-    "index", "recordings.html", "datasheets", "theory", "made", "sensors/alpha", "sensors/gamma",
-    "devices/", "recordings/alpha/night 1", "recordings/alpha/night 2", "recordings/beta/run_1",
+    "index", "compare", "recordings.html", "datasheets", "theory", "made", "sensors/alpha",
+    "sensors/gamma", "devices/", "recordings/alpha/night 1", "recordings/alpha/night 2",
+    "recordings/beta/run_1",
 )  # fmt: skip
 
 
 INK = """() => document.querySelector("figure[data-kind=allan] .canvas").data
-  .find((one) => one.mode === "lines+markers").line.color"""
+  .find((one) => one.name === "likelihood").line.color"""
 
 
 def luminance(colour: str) -> float:
@@ -33,7 +34,7 @@ def background(reader: Reader) -> float:
 
 
 def ink(reader: Reader) -> str:
-    """Return the colour of the measured curve."""
+    """Return the colour of the model to use."""
     reader.figure("allan", channel="gyro_x")
     return str(reader.page.evaluate(INK))
 

@@ -42,19 +42,20 @@ def test_pages_of_one_file_are_turned(read: Open, alone: Path) -> None:
     assert page.title() == f"Vendor & Sons A-1: {NIGHT}"
     assert "#/recordings/alpha/" in page.url
     assert traces(reader.figure("allan", channel="gyro_x"))
-    page.get_by_role("link", name="Accelerometer x").first.click()
+    page.get_by_role("tab", name="Accelerometer x").click()
     expect(page.locator("h2#accel_x")).to_be_in_viewport()
     page.get_by_role("navigation", name="Pages").get_by_role("link", name="Theory").click()
     expect(page.locator("main h1")).to_contain_text("Theory")
     page.get_by_role("link", name="Densities").click()
     expect(page.locator("#sidedness")).to_be_in_viewport()
-    for expected in (r"#/theory\.html$", r"#accel_x$", r"night.*\.html$", r"report\.html$"):
+    for expected in (r"#/theory\.html$", r"#channel=accel_x$", r"report\.html$"):
         page.go_back()
         expect(page).to_have_url(re.compile(expected))
     assert head(page) == made.TITLE
     page.go_forward()
     expect(page.locator("main h1")).to_contain_text(NIGHT)
     assert page.locator("main h1").count() == 1
+    expect(page.locator("h2#accel_x")).to_be_visible()
 
 
 def test_a_place_in_one_file_has_an_address(read: Open, alone: Path) -> None:
@@ -82,7 +83,8 @@ def test_every_link_of_one_file_leads_somewhere(read: Open, alone: Path) -> None
               const url = new URL(link.getAttribute("href"), `file:///${path}`);
               const page = pages.get(decodeURIComponent(url.pathname.slice(1)));
               const section = decodeURIComponent(url.hash.slice(1));
-              if (page && (!section || page.getElementById(section))) continue;
+              const state = section.includes("=");  // what is chosen on the page
+              if (page && (!section || state || page.getElementById(section))) continue;
               lost.push(`${path}: ${link.outerHTML}`);
             }
           }
@@ -98,3 +100,17 @@ def test_the_choice_of_units_lasts_from_page_to_page(read: Open, alone: Path) ->
     reader.page.get_by_role("link", name=NIGHT).first.click()
     cell = reader.page.locator("tr.recommended data").first
     expect(cell).to_have_text("8.7×10⁻⁵")
+
+
+def test_what_is_chosen_stands_behind_the_page(read: Open, alone: Path) -> None:
+    reader = read(alone.parent, f"{alone.name}#/compare.html#a=alpha&b=beta&axis=gyro_x")
+    page = reader.page
+    chosen = page.locator(".pickers select")
+    assert [one.input_value() for one in chosen.all()] == ["alpha", "beta"]
+    chosen.last.select_option("beta/run_2")
+    assert page.url.endswith("#/compare.html#a=alpha&b=beta%2Frun_2&axis=gyro_x")
+    page.get_by_role("link", name="Theory").first.click()
+    assert page.url.endswith("#/theory.html")
+    page.go_back()
+    page.wait_for_function("document.querySelector('h1').textContent === 'Side by side'")
+    assert chosen.last.input_value() == "beta/run_2"

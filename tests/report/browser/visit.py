@@ -7,7 +7,7 @@ from tests.report.browser.accessibility import hindrances
 from tests.report.browser.made import Report
 from tests.report.browser.reader import TOO_WIDE, Reader
 
-KINDS = ("index", "recordings.html", "datasheets", "theory", "sensors/alpha", "devices/",
+KINDS = ("index", "compare", "recordings.html", "datasheets", "theory", "sensors/alpha", "devices/",
          "recordings/alpha/night 1")  # fmt: skip
 """One page of each kind; accessibility is looked at there, as it takes longer than to draw."""
 

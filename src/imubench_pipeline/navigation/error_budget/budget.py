@@ -55,8 +55,8 @@ from imubench_pipeline.navigation.error_budget.parts import (
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
 
-_GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
-_ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
+GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
+ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
 """Integrations but one, m of `growth`."""
 
 
@@ -241,11 +241,11 @@ def budget(
 def _sources(
     quantity: Quantity, time: float, gyro: NoiseModel, accel: NoiseModel, start: Start
 ) -> list[Contribution]:
-    order = _GYRO_ORDER[quantity]
+    order = GYRO_ORDER[quantity]
     gravity = STANDARD_GRAVITY if order > 0 else 1.0
     contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
-    if quantity in _ACCEL_ORDER:
-        contributions.extend(of_sensor("accel", accel, _ACCEL_ORDER[quantity], time, start.accel))
+    if quantity in ACCEL_ORDER:
+        contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
     if quantity == "heading":
         contributions.append(Contribution("initial heading", start.heading, "start", STATED))
     elif isinstance(start.tilt, Levelled):
@@ -261,12 +261,12 @@ def _levers(
     quantity: Quantity, time: float, start: Start, use: Use
 ) -> Iterator[tuple[Measured, Cause, str, float]]:
     """Yield sensor, cause, source and lever of what figures of the sensors add."""
-    order = _GYRO_ORDER[quantity]
+    order = GYRO_ORDER[quantity]
     gravity = STANDARD_GRAVITY if order > 0 else 1.0
     for cause, lever in levers("gyro", order, time, start.gyro, use, seen=order == 0):
         yield "gyro", cause, f"gyro {NAMES[cause]}", gravity * lever
-    if quantity in _ACCEL_ORDER:
-        of_accel = levers("accel", _ACCEL_ORDER[quantity], time, start.accel, use, seen=True)
+    if quantity in ACCEL_ORDER:
+        of_accel = levers("accel", ACCEL_ORDER[quantity], time, start.accel, use, seen=True)
         for cause, lever in of_accel:
             yield "accel", cause, f"accel {NAMES[cause]}", lever
     if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:

@@ -60,7 +60,7 @@ class Flicker(Term):
 
     def allan_variance(self, tau: Array) -> Array:
         """(2 ln 2 / pi) B^2 at every tau."""
-        return np.full_like(tau, FLOOR**2 * self.B**2)
+        return FLOOR**2 * self.B**2 * np.ones_like(tau)
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
         """2 B^2 / (pi n^2) times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2."""

@@ -10,6 +10,12 @@ const termLook = (place) => {
   return { light, dark: darkened, dash: TERM_DASHES[place % TERM_DASHES.length], width: 1.4 };
 };
 
+// Samples and curves of a recording look as its sensor does everywhere; the model to use is inked.
+function sensorLook(sensor) {
+  const looks = pageData.looks?.sensors ?? {};
+  return looks[sensor] ?? Object.values(looks)[0] ?? { light: "#0072B2", dark: "#4DA3D9", dash: "solid", marker: "circle" };
+}
+
 function channelOf(figure) {
   // A sensor may be on several boards, which one page shows.
   const { channel, sensor, recording } = figure.dataset;
@@ -25,17 +31,18 @@ kinds.allan = (figure) => {
   const [y, low, high] = [view.adev, view.lower, view.upper].map((place) => scaled(place, unit.factor));
   const what = view.simulated ? "simulated log" : "measured";
   const best = view.methods[view.recommended];
-  const look = pageData.looks.methods;
+  const own = { ...sensorLook(view.sensor), dash: "solid" };
+  const look = { ...pageData.looks.methods, [view.recommended]: { ...pageData.looks.methods[view.recommended], ...black() } };
   const traces = [
-    ...band(tau, low, high, black(), 0.2).map((trace) => ({ ...trace, group: "limits" })),
+    ...band(tau, low, high, own, 0.22).map((trace) => ({ ...trace, group: "limits" })),
   ];
   const groups = [
-    { key: "measured", label: what, on: true, look: { ...black(), marker: "circle" } },
-    { key: "limits", label: "95 % limits", on: true, look: { ...black(), filled: true } },
+    { key: "measured", label: what, on: true, look: own },
+    { key: "limits", label: "95 % limits", on: true, look: { ...own, marker: undefined, filled: true } },
   ];
   if (best) {
     const times = array(best.tau);
-    traces.push(...band(times, scaled(best.lower, unit.factor), scaled(best.upper, unit.factor), look[view.recommended], 0.22)
+    traces.push(...band(times, scaled(best.lower, unit.factor), scaled(best.upper, unit.factor), look[view.recommended], 0.12)
       .map((trace) => ({ ...trace, group: "band" })));
     traces.push({
       group: "reconstructed", type: "scatter", mode: "markers", x: times, y: scaled(best.reconstructed, unit.factor), hoverinfo: "skip",
@@ -43,20 +50,22 @@ kinds.allan = (figure) => {
     });
   }
   traces.push({
-    group: "measured", type: "scatter", mode: "lines+markers", x: tau, y, line: { color: inks().ink, width: 1.2 }, marker: { size: 4, color: inks().ink },
+    group: "measured", type: "scatter", mode: "lines+markers", x: tau, y, name: what, meta: { low, high },
+    line: { color: colourOf(own), width: 1.4 }, marker: { color: colourOf(own), symbol: own.marker, size: 5 },
     text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
     hovertemplate: `${what}<br>%{text}<extra></extra>`,
   });
   if ("tau" in view.compensated) {
-    const own = look.compensated;
+    const without = look.compensated;
     const times = array(view.compensated.tau);
     const [left, least, most] = ["adev", "lower", "upper"].map((name) => scaled(view.compensated[name], unit.factor));
     traces.push({
-      group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, line: { color: colourOf(own), width: 1.2 }, marker: { size: 4, color: colourOf(own) },
+      group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, name: "temperature taken out", meta: { low: least, high: most },
+      line: { color: colourOf(without), width: 1.2 }, marker: { size: 4, color: colourOf(without) },
       text: times.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(left[i], 3)} ${unit.sign}</b><br>95 %: ${interval(least[i], most[i])} ${unit.sign}`),
       hovertemplate: "temperature taken out<br>%{text}<extra></extra>",
     });
-    groups.push({ key: "compensated", label: `${what}, temperature taken out`, on: true, look: own });
+    groups.push({ key: "compensated", label: `${what}, temperature taken out`, on: true, look: without });
   }
   for (const [method, curve] of Object.entries(view.methods)) {
     const key = `method ${method}`;
@@ -79,17 +88,20 @@ kinds.allan = (figure) => {
   }
   view.datasheet.forEach((printed, place) => {
     const value = printed.value * unit.factor;
-    const own = { light: "#B3001B", dark: "#FF8F8F", dash: TERM_DASHES[place % 4], width: 1.6 };
-    traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value), own, {
+    const sheet = { light: "#B3001B", dark: "#FF8F8F", dash: TERM_DASHES[place % 4], width: 1.6 };
+    traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value), sheet, {
       group: `datasheet ${place}`, hoverinfo: "name", name: `datasheet: ${printed.label}`,
     }));
-    groups.push({ key: `datasheet ${place}`, label: `datasheet: ${printed.label}`, on: true, look: own });
+    groups.push({ key: `datasheet ${place}`, label: `datasheet: ${printed.label}`, on: true, look: sheet });
   });
+  const ranges = { x: logRange(tau, 0.1), y: logRange(y, 0.7, 0.25) };
+  const slopes = slopeGuides(ranges.x, ranges.y);
+  groups.push({ key: "slopes", label: "slopes", on: true, look: { light: inks().soft, dark: inks().soft } });
   return {
     traces, groups,
     layout: {
-      xaxis: logAxis("averaging time τ (s)", logRange(tau, 0.1)),
-      yaxis: logAxis(`Allan deviation (${unit.sign})`, logRange(y, 0.7, 0.25)),
+      xaxis: logAxis("averaging time τ (s)", ranges.x), yaxis: logAxis(`Allan deviation (${unit.sign})`, ranges.y),
+      ...(shown(figure, "slopes") ? slopes : {}),
     },
   };
 };
@@ -101,23 +113,27 @@ kinds.spectrum = (figure) => {
   const f = array(spectrum.frequency);
   const density = scaled(spectrum.density, unit.factor);
   const left = new Set(spectrum.left);
-  const look = pageData.looks.methods.likelihood;
+  const look = black();
+  const own = sensorLook(view.sensor);
   const points = (keep, key, colour, symbol) => {
     const chosen = f.map((_, i) => i).filter((i) => left.has(i) !== keep);
     return {
-      group: key, type: "scatter", mode: "markers", x: chosen.map((i) => f[i]), y: chosen.map((i) => density[i]),
+      group: key, type: "scatter", mode: "markers", name: keep ? "bins used" : "bins left out", x: chosen.map((i) => f[i]), y: chosen.map((i) => density[i]),
       marker: { color: colour, size: keep ? 4 : 5, symbol },
       text: chosen.map((i) => `${numberText(f[i], 4)} Hz: ${numberText(density[i], 3)} ${unit.sign}`),
       hovertemplate: "%{text}<extra></extra>",
     };
   };
-  const traces = [points(false, "left", inks().soft, "x-thin-open"), points(true, "used", inks().ink, "circle")];
+  const traces = [points(false, "left", inks().soft, "x-thin-open"), points(true, "used", colourOf(own), own.marker)];
   const groups = [
-    { key: "used", label: "bins used", on: true, look: { ...black(), line: false, marker: "circle" } },
+    { key: "used", label: "bins used", on: true, look: { ...own, line: false } },
     { key: "left", label: "bins left out", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: left.size === 0 },
   ];
-  traces.push(line(array(spectrum.fit_frequency), scaled(spectrum.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit" }));
+  const [least, most] = ["lower", "upper"].map((of) => scaled(spectrum[of], unit.factor));
+  traces.unshift(...band(array(spectrum.fit_frequency), least, most, look, 0.2).map((trace) => ({ ...trace, group: "scatter" })));
+  traces.push(line(array(spectrum.fit_frequency), scaled(spectrum.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit", name: `fit ${spectrum.model}`, meta: { low: least, high: most } }));
   groups.push({ key: "fit", label: `fit ${spectrum.model}`, on: true, look: { ...look, marker: undefined } });
+  groups.push({ key: "scatter", label: "scatter of 95 % of the bins, if the fit is right", on: true, look: { ...look, marker: undefined, filled: true } });
   spectrum.terms.forEach((term, place) => {
     traces.push(line(array(spectrum.smooth), scaled(term.density, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
     groups.push({ key: `term ${place}`, label: term.name, on: false, look: termLook(place) });
@@ -157,30 +173,51 @@ kinds.series = (figure) => {
     return array(of.mean).map((_, i) => (of.start + ((i + 0.5) * (of.end - of.start)) / count) / scale.size);
   };
   const x = middle(envelope);
-  const look = { light: "#0072B2", dark: "#4DA3D9" };
+  const look = { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" };
   const low = scaled(envelope.low, unit.factor);
   const high = scaled(envelope.high, unit.factor);
   const mean = scaled(envelope.mean, unit.factor);
   const traces = band(x, low, high, look, 0.35).map((trace) => ({ ...trace, group: "envelope" }));
+  const whole = mean.filter(Number.isFinite).reduce((sum, each, _, all) => sum + each / all.length, 0);
   traces.push({
-    ...line(x, mean, black()), group: "mean", hoverinfo: "text",
+    ...line(x, mean, black()), group: "mean", hoverinfo: "text", name: "mean", meta: { low, high },
     text: x.map((t, i) => `${numberText(t, 4)} ${scale.name}: mean ${numberText(mean[i], 4)} ${unit.sign}<br>${interval(low[i], high[i])} ${unit.sign}`),
   });
   const groups = [
     { key: "envelope", label: "least and largest sample", on: true, look: { ...look, filled: true } },
     { key: "mean", label: "mean", on: true, look: black() },
+    { key: "drift", label: "drift: the mean alone, less that of the whole log", on: true, look: { ...look, width: 2 } },
   ];
   const layout = { xaxis: linearAxis(`time (${scale.name})`), yaxis: linearAxis(`${channel.replace("_", " ")} (${unit.sign})`) };
+  const below = []; // panels below that of the samples
+  const panel = (title) => {
+    const name = `y${below.length + 2}`;
+    below.push(name);
+    layout[name.replace("y", "yaxis")] = { ...linearAxis(title), nticks: 4 };
+    return name;
+  };
+  if (shown(figure, "drift")) {
+    const step = 10 ** Math.floor(Math.log10(Math.max(...mean.map((each) => Math.abs(each - whole)).filter(Number.isFinite), 1e-300)) + 0.3);
+    const [small, power] = step < 1e-2 ? [step, `10${[...String(Math.round(Math.log10(step)))].map((sign) => SUPERSCRIPTS[sign]).join("")} `] : [1, ""];
+    traces.push({
+      ...line(x, mean.map((each) => (each - whole) / small), { ...look, width: 1.4 }), group: "drift", name: "drift", meta: { of: `drift (${power}${unit.sign})` }, yaxis: panel(`drift (${power}${unit.sign})`), hoverinfo: "text",
+      text: x.map((t, i) => `${numberText(t, 4)} ${scale.name}: ${numberText(mean[i] - whole, 3)} ${unit.sign} from the mean`),
+    });
+  }
   if (warmth) {
     const warm = { light: "#D55E00", dark: "#F08A3C", dash: "solid" };
-    traces.push({ ...line(middle(warmth), array(warmth.mean), warm), group: "temperature", yaxis: "y2", hoverinfo: "x+y" });
     groups.push({ key: "temperature", label: "temperature", on: true, look: warm });
     if (shown(figure, "temperature")) {
-      layout.yaxis.domain = [0.36, 1];
-      layout.yaxis2 = { ...linearAxis("°C"), domain: [0, 0.26] };
-      layout.xaxis.anchor = "y2";
+      traces.push({ ...line(middle(warmth), array(warmth.mean), warm), group: "temperature", name: "temperature", meta: { of: "°C" }, yaxis: panel("°C"), hoverinfo: "x+y" });
     }
   }
+  const share = below.length === 0 ? 0 : below.length === 1 ? 0.36 : 0.52;
+  layout.yaxis.domain = [share, 1];
+  below.forEach((name, place) => {
+    const top = share * (1 - place / below.length) - 0.07;
+    layout[name.replace("y", "yaxis")].domain = [top - share / below.length + 0.07 + (place === below.length - 1 ? 0 : 0.03), top].map((end) => Math.max(end, 0));
+  });
+  if (below.length > 0) layout.xaxis.anchor = below.at(-1);
   const marked = pageData.findings.filter((finding) => finding.start !== null && (finding.channel === null || finding.channel === channel));
   if (marked.length > 0) {
     groups.push({ key: "findings", label: "findings", on: true, look: { light: "#B3001B", dark: "#FF8F8F", filled: true } });
@@ -199,36 +236,37 @@ kinds.series = (figure) => {
   return { traces, groups, layout };
 };
 
-const COMPARED = {
-  log: { light: "#0072B2", dark: "#4DA3D9" },
-  before: { light: "#D55E00", dark: "#F08A3C", dash: "dot" },
-  after: { light: "#007A5E", dark: "#3CC4A0", dash: "dash" },
-};
+const comparedLooks = () => ({
+  log: { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" },
+  before: { light: inks().soft, dark: inks().soft, dash: "dot" },
+  after: { ...black(), dash: "dash" },
+});
 
 kinds.compared = (figure) => {
   const channel = figure.dataset.channel;
   const drawn = pageData.of_models[channel];
   const unit = unitOf(quantityOf(channel), "signal");
   const overTime = figure.dataset.over === "envelope";
-  const named = Object.keys(COMPARED).filter((of) => drawn[of]);
+  const looks = comparedLooks();
+  const named = Object.keys(looks).filter((of) => drawn[of]);
   const end = drawn.log[overTime ? "end" : "stretch_end"];
   const scale = timeScale(end);
   const traces = [];
   for (const of of named) {
-    const look = COMPARED[of];
+    const look = looks[of];
     const mean = scaled(overTime ? drawn[of].mean : drawn[of].stretch, unit.factor);
     const x = mean.map((_, i) => ((i + 0.5) * end) / mean.length / scale.size);
     if (overTime) {
       traces.push(...band(x, scaled(drawn[of].low, unit.factor), scaled(drawn[of].high, unit.factor), look, 0.18).map((trace) => ({ ...trace, group: of })));
     }
     traces.push({
-      ...line(x, mean, { ...look, width: 1 }), group: of, hoverinfo: "text",
+      ...line(x, mean, { ...look, width: 1 }), group: of, name: drawn[of].name, hoverinfo: "text",
       text: x.map((t, i) => `${drawn[of].name}<br>${numberText(t, 4)} ${scale.name}: ${numberText(mean[i], 4)} ${unit.sign}`),
     });
   }
   return {
     traces,
-    groups: named.map((of) => ({ key: of, label: drawn[of].name, on: true, look: COMPARED[of] })),
+    groups: named.map((of) => ({ key: of, label: drawn[of].name, on: true, look: looks[of] })),
     layout: { xaxis: linearAxis(`time (${scale.name})`), yaxis: linearAxis(`${channel.replace("_", " ")} (${unit.sign})`) },
   };
 };
@@ -245,9 +283,9 @@ kinds.histogram = (figure) => {
   const middle = lower.map((low, i) => (low + upper[i]) / 2);
   const mean = middle.reduce((sum, each, i) => sum + each * count[i], 0) / total;
   const deviation = Math.sqrt(middle.reduce((sum, each, i) => sum + (each - mean) ** 2 * count[i], 0) / total);
-  const look = { light: "#0072B2", dark: "#4DA3D9" };
+  const look = { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined };
   const traces = [{
-    group: "samples", type: "bar", x: middle, y: height, width: lower.map((low, i) => upper[i] - low),
+    group: "samples", type: "bar", name: "samples", x: middle, y: height, width: lower.map((low, i) => upper[i] - low),
     marker: { color: faint(colourOf(look), 0.6), line: { width: 0 } },
     text: count.map((each, i) => `${numberText(each, 3)} samples, ${interval(lower[i], upper[i])} ${unit.sign}`), textposition: "none",
     hovertemplate: "%{text}<extra></extra>",

@@ -47,7 +47,8 @@ function remember(key, value) {
 
 function startUnits(first) {
   for (const [quantity, choices] of Object.entries(UNITS)) {
-    const before = remembered(`imubench ${quantity}`);
+    const linked = Object.keys(choices)[Number(state.get(quantity) ?? -1)];
+    const before = linked ?? remembered(`imubench ${quantity}`);
     chosenUnits[quantity] = before in choices ? before : first[quantity];
   }
   document.querySelectorAll("select[data-quantity]").forEach((select) => {
@@ -55,6 +56,7 @@ function startUnits(first) {
     select.addEventListener("change", () => {
       chosenUnits[select.dataset.quantity] = select.value;
       remember(`imubench ${select.dataset.quantity}`, select.value);
+      keep(select.dataset.quantity, String(select.selectedIndex));
       showUnits(document);
       redrawAll();
     });

@@ -12,11 +12,13 @@ const quantityOf = (channel) => channel.split("_")[0];
 
 function startChooser(root) {
   const chooser = root.querySelector(".chooser");
-  if (!chooser || !pageData.channels) return;
+  if (!chooser || !pageData.channels || chooser.matches(".pickers")) return;
   const present = Object.keys(CHANNEL_NAMES).filter((name) => pageData.channels.some((view) => view.channel === name));
+  if (state.has("axis")) chosenChannel = state.get("axis");
   if (!present.includes(chosenChannel)) chosenChannel = present[0];
   const most = Math.max(0, ...present.map((name) => pageData.channels.filter((view) => view.channel === name).length));
   everyRecording = most <= MANY || pageData.grouped === "recording";
+  if (state.has("recordings")) everyRecording = state.get("recordings") === "all";
   const set = document.createElement("fieldset");
   set.append(Object.assign(document.createElement("legend"), { textContent: "Axis" }));
   for (const name of present) {
@@ -25,6 +27,7 @@ function startChooser(root) {
     });
     radio.addEventListener("change", () => {
       chosenChannel = name;
+      keep("axis", name);
       redrawAll();
     });
     const label = document.createElement("label");
@@ -35,9 +38,12 @@ function startChooser(root) {
   method.append(new Option("recommended", "recommended"),
     ...Object.entries(pageData.looks.methods)
       .filter(([key]) => pageData.channels.some((view) => key in view.models)).map(([key, look]) => new Option(look.name, key)));
+  if (state.has("method")) chosenMethod = state.get("method");
   method.value = chosenMethod;
+  if (method.selectedIndex < 0) method.value = chosenMethod = "recommended";
   method.addEventListener("change", () => {
     chosenMethod = method.value;
+    keep("method", chosenMethod === "recommended" ? null : chosenMethod);
     redrawAll();
   });
   chooser.append(set, labelled("Model drawn", method));
@@ -47,6 +53,7 @@ function startChooser(root) {
     which.value = everyRecording ? "all" : "last";
     which.addEventListener("change", () => {
       everyRecording = which.value === "all";
+      keep("recordings", which.value);
       redrawAll();
     });
     chooser.append(labelled("Recordings", which));
@@ -105,7 +112,7 @@ kinds.overlay = (figure) => {
     traces.push(...band(tau, low, high, look).map((trace) => ({ ...trace, group: [key, "limits"] })));
     const title = `${nameOf(view.sensor)}${view.simulated ? " (simulated)" : ""}, ${view.recording}`;
     traces.push({
-      group: [key, "measured"], type: "scatter", mode: "lines+markers", x: tau, y, name: title,
+      group: [key, "measured"], type: "scatter", mode: "lines+markers", x: tau, y, name: title, meta: { low, high },
       line: { color: colour, dash: look.dash, width: 1.6 },
       marker: { color: colour, symbol: look.marker, size: tau.map((_, i) => (i % 8 === 4 ? 7 : 0.1)) },
       text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
@@ -117,6 +124,10 @@ kinds.overlay = (figure) => {
       traces.push(line(array(times), scaled(curve, unit.factor), { ...look, width: 1.2 }, { group: [key, "model"], opacity: 0.8 }));
     }
   }
+  const ranges = {
+    x: logRange(here.flatMap((view) => array(view.tau)), 0.1), y: logRange(here.flatMap((view) => scaled(view.adev, unit.factor)), 0.4),
+  };
+  const slopes = slopeGuides(ranges.x, ranges.y);
   const drawnSheets = new Set();
   for (const view of here) {
     if (drawnSheets.has(view.sensor)) continue;
@@ -131,19 +142,28 @@ kinds.overlay = (figure) => {
         }));
     });
   }
-  const { ink } = inks();
+  const { ink, soft } = inks();
   const plain = { light: ink, dark: ink };
+  // Names stand at the ends of the curves, where there is room for them.
+  const named = new Map();
+  for (const view of here) if (shown(figure, groupOf(view)) && shown(figure, "measured")) named.set(groupOf(view), view);
+  const roomy = figure.clientWidth > 700 && named.size <= 12;
+  const labels = roomy ? directLabels([...named].map(([key, view]) => ({
+    y: Math.log10(scaled(view.adev, unit.factor).at(-1)), text: wrapped(nameOf(key)), colour: colourOf(lookOf(view)),
+  })), ranges.y) : [];
   const layers = [
     { key: "measured", layer: true, label: "curves", on: true, look: plain },
     { key: "limits", layer: true, label: "95 % limits", on: here.length <= 12, look: { ...plain, filled: true } },
     { key: "model", layer: true, label: "model", on: false, look: plain },
     { key: "datasheet", layer: true, label: "datasheet", on: false, look: { ...plain, dash: "dot" } },
+    { key: "slopes", layer: true, label: "slopes", on: true, look: { light: soft, dark: soft } },
   ];
   return {
     traces, groups: [...layers, ...groups.values()],
     layout: {
-      xaxis: logAxis("averaging time τ (s)", logRange(here.flatMap((view) => array(view.tau)), 0.1)),
-      yaxis: logAxis(`Allan deviation (${unit.sign})`, logRange(here.flatMap((view) => scaled(view.adev, unit.factor)), 0.4)),
+      ...(roomy ? { margin: { l: 60, r: 150, t: 14, b: 50 } } : {}),
+      xaxis: logAxis("averaging time τ (s)", ranges.x), yaxis: logAxis(`Allan deviation (${unit.sign})`, ranges.y),
+      annotations: [...labels, ...(shown(figure, "slopes") ? slopes.annotations : [])], shapes: shown(figure, "slopes") ? slopes.shapes : [],
     },
   };
 };

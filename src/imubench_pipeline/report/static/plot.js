@@ -131,10 +131,11 @@ function logRange(values, below, above = below) {
 }
 
 // Labels follow when the reader zooms.
-function followZoom(canvas) {
+function followZoom(figure, canvas) {
   canvas.on("plotly_relayout", (changes) => {
     const update = {};
-    for (const name of ["xaxis", "yaxis"]) {
+    noteZoom(figure, canvas, changes);
+    for (const name of axesOf(canvas.layout)) {
       const axis = canvas.layout[name];
       if (axis.type !== "log" || !Object.keys(changes).some((key) => key.startsWith(`${name}.range`))) continue;
       const { tickvals, ticktext } = logTicks(...axis.range);
@@ -166,11 +167,13 @@ function shown(figure, group) {
 function drawFigure(figure) {
   const made = kinds[figure.dataset.kind](figure);
   if (!choices.has(figure)) {
-    choices.set(figure, new Map(made.groups.map((group) => [group.key, group.on])));
+    const other = new Set((state.get(`g${numberOf(figure)}`) ?? "").split("~"));
+    choices.set(figure, new Map(made.groups.map((group) => [group.key, group.on !== other.has(group.key)])));
     drawControls(figure, made.groups);
     return drawFigure(figure);
   }
   syncControls(figure, made.groups);
+  keepChoices(figure, made.groups);
   const traces = made.traces.filter((trace) => [trace.group].flat().every((group) => !group || shown(figure, group)));
   const canvas = figure.querySelector(".canvas");
   canvas.classList.toggle("empty", traces.length === 0);
@@ -179,12 +182,26 @@ function drawFigure(figure) {
   canvas.style.height = height ? `${height}px` : "";
   canvas.style.width = printing() ? `${PRINTED.width}px` : "";
   if (printing()) Object.assign(layout, { width: PRINTED.width, height });
+  wholes.set(figure, Object.fromEntries(axesOf(layout).map((name) => [name, `${layout[name].range}`])));
+  zoomIn(figure, layout);
   const first = !drawn.has(figure);
   drawn.add(figure);
   Plotly.react(canvas, traces.map(({ group, ...trace }) => trace), layout, {
     displayModeBar: false, responsive: true, doubleClick: "reset", showTips: false,
   });
-  if (first) followZoom(canvas);
+  if (first) {
+    followZoom(figure, canvas);
+    kinds[figure.dataset.kind].started?.(figure, canvas);
+  }
+  drawTools(figure);
+  showZoom(figure);
+}
+
+// What is switched otherwise than the page opens with.
+function keepChoices(figure, groups) {
+  const shownGroups = choices.get(figure);
+  const other = groups.filter((group) => shownGroups.get(group.key) !== group.on).map((group) => group.key);
+  keepIfOther(`g${numberOf(figure)}`, other.join("~"));
 }
 
 const DASHES = { solid: "", dash: "6 4", dot: "2 3", dashdot: "7 3 2 3", longdash: "11 4", longdashdot: "11 3 2 3", "7px,3px,2px,3px,2px,3px": "7 3 2 3 2 3" };
@@ -213,7 +230,7 @@ function drawControls(figure, groups) {
     label.dataset.group = group.key;
     const box = document.createElement("input");
     box.type = "checkbox";
-    box.checked = group.on;
+    box.checked = shown(figure, group.key);
     box.addEventListener("change", () => {
       choices.get(figure).set(group.key, box.checked);
       redrawChosen(figure);

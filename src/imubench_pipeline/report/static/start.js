@@ -1,12 +1,16 @@
 // What happens when a page opens; in a report of one file, when a page of it is chosen.
 
 function openPage(main) {
+  readState();
   const data = main.querySelector("script[type='application/json'].page");
   pageData = data ? JSON.parse(data.textContent) : {};
   decoded = [];
   showUnits(main);
   startTables(main);
+  startTabs(main);
+  startMatrices(main);
   startChooser(main);
+  startComparison(main);
   startFigures(main);
 }
 
@@ -17,7 +21,7 @@ function startPages(main) {
   const show = () => {
     const [path, section] = decodeURIComponent(location.hash.slice(2) || "index.html").split("#");
     const page = pageOf(path) ? path : "index.html";
-    if (page !== here) {
+    if (page !== here || stateText(location.hash)) {
       here = page;
       main.replaceChildren(pageOf(page).content.cloneNode(true));
       document.title = main.querySelector("h1").textContent;
@@ -53,8 +57,12 @@ function startPages(main) {
 
 function start() {
   const main = document.querySelector("main");
+  readState();
   startUnits(JSON.parse(document.body.dataset.units));
   startTerms();
+  startSearch();
+  startCopying();
+  startPrintingTabs();
   startPrinting();
   if (document.body.dataset.oneFile === "yes") startPages(main);
   else openPage(main);

@@ -7,7 +7,7 @@ kinds.trend = (figure) => {
   const factor = (values) => values.map((value) => (value === null ? null : value * unit.factor));
   const [value, lower, upper, expectedLow, expectedHigh] =
     [trend.value, trend.lower, trend.upper, trend.expected_lower, trend.expected_upper].map(factor);
-  const look = { light: "#0072B2", dark: "#4DA3D9" };
+  const look = sensorLook();
   const { ink, mark } = inks();
   const changed = trend.verdict.map((word) => word === "changed");
   const traces = [

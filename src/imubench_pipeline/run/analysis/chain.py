@@ -49,7 +49,10 @@ _OF_INGEST = {"quality": "quality.json"} | {
 _OF_ESTIMATE = tuple(
     field.name for field in fields(Estimation) if field.name not in ("estimates", "paths")
 )
-_OF_COMPARISON = ("datasheet", "datasheet_curve", "error_budget", "backtest")
+_OF_COMPARISON = (
+    *("datasheet", "datasheet_curve", "error_budget", "backtest"),
+    *("error_growth", "drawn_deviations"),
+)
 _BEFORE_RECONSTRUCTION = ("allan", "parameters", "allan_compensated")
 _OF_RECONSTRUCTION = ("reconstruction", "scores")
 _OUTPUTS: dict[str, tuple[str, ...]] = {

@@ -1,0 +1,123 @@
+"""How the error of a recording grows, after static windows of several lengths: rows of a table.
+
+The same errors as those of `expected_errors`, at more times and windows, with the same models.
+They are summed over all models drawn at once: a budget of each would take a thousand times as
+long.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
+
+import numpy as np
+
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.navigation.error_budget import Budget, Figures, Uncalibrated, draw_models
+from imubench_pipeline.navigation.error_budget.budget import ACCEL_ORDER, GYRO_ORDER
+from imubench_pipeline.navigation.expected_errors import (
+    NO_FIGURES_OF_CHANNELS,
+    AxisErrors,
+    answering,
+    axes_of,
+    standard,
+)
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.growth import Calibrated
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.noise.stacked import summed
+from imubench_pipeline.settings.requirements import DIMENSIONS
+from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.units import SI_UNITS
+
+_TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+_TAIL = 0.025
+"""Beyond each 95 % limit."""
+
+
+def growth_rows(
+    names: Mapping[str, str],
+    estimates: Mapping[str, Estimate],
+    *,
+    times: Iterable[float],
+    window: float,
+    draws: int,
+    seed: int,
+    figures: Mapping[str, Figures] = NO_FIGURES_OF_CHANNELS,
+) -> Iterator[Row]:
+    """Yield the rows of the table ``error_growth`` of a recording, of its worst axes.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+        ``sensor`` and ``recording``.
+    estimates : mapping of str to Estimate
+        The recommended one of each channel.
+    times : iterable of float
+        s; besides those that every table has.
+    window : float
+        Static window, s, likewise.
+    draws, seed : int
+    figures : mapping of str to mapping
+        All three as `expected_errors.error_rows` takes them.
+    """
+    axes = axes_of(estimates, figures)
+
+    @cache
+    def models(channel: str) -> Sequence[NoiseModel]:
+        stream = channel_rng(seed, *names.values(), channel, "budget")
+        return draw_models(estimates[channel], draws, stream)
+
+    @cache
+    def grown(channel: str, order: int, time: float, start: Calibrated | Uncalibrated) -> Array:
+        return summed(models(channel), lambda term: np.asarray(term.growth(order, time, start)))
+
+    def noise(error: str, time: float, start: Calibrated, gyro: str, accel: str | None) -> Array:
+        """Return the variances of what noise adds to an error, shape (draws,)."""
+        order = GYRO_ORDER[error]  # type: ignore[index]  # north is not asked for
+        gravity = STANDARD_GRAVITY if order else 1.0
+        total = gravity**2 * grown(gyro, order, time, start)
+        if error in ACCEL_ORDER and accel:
+            total = total + grown(accel, ACCEL_ORDER[error], time, start)
+        if error == "attitude" and accel:
+            at_rest = grown(accel, 0, start.window, Uncalibrated(bias=0.0, on_time=0.0))
+            total = total + at_rest / (start.window * STANDARD_GRAVITY) ** 2
+        return total
+
+    for at_rest in sorted({*_WINDOWS, window}):
+        for question in standard(sorted({*_TIMES, *times}), at_rest, 0.0, ["worst"]):
+            if question.error == "north":
+                continue
+            chosen = answering(question, axes)
+            if chosen is None:
+                continue
+            budget = question.answer(*(axes[c] if c else AxisErrors() for c in chosen.values()))
+            gyro, accel = chosen["gyro"], chosen["accel"]
+            assert gyro is not None  # every error needs one
+            drawn = noise(question.error, question.time, Calibrated(at_rest), gyro, accel)
+            asked = {
+                **names,
+                **chosen,
+                "window": at_rest,
+                "error": question.error,
+                "time": question.time,
+                "unit": SI_UNITS[DIMENSIONS[question.error]],
+            }
+            yield asked | {"source": "total", **_limits(budget, drawn)}
+            for part in sorted(budget.contributions, key=lambda one: -one.sigma):
+                yield asked | {"source": part.source, "sigma": part.sigma}
+
+
+def _limits(budget: Budget, drawn: Array) -> dict[str, float]:
+    """Return the total of a budget with its limits, by the variances that noise has drawn."""
+    sure = math.fsum(part.sigma**2 for part in budget.contributions if part.cause != "noise")
+    lower, upper = np.quantile(np.sqrt(drawn + sure), [_TAIL, 1.0 - _TAIL])
+    # The draws of what is absent lie above it: the value itself is inside.
+    return {
+        "sigma": budget.total,
+        "lower": min(float(lower), budget.total),
+        "upper": max(float(upper), budget.total),
+    }

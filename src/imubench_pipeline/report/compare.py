@@ -1,0 +1,226 @@
+"""The page that sets sensors or recordings side by side: what its script draws and judges from.
+
+All that depends on which are chosen is made in the page: a pair has a ratio of each figure, with
+the same calculation as `navigation.ratios`, from what is kept of each recording alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.estimators.estimate import COMPARED
+from imubench_pipeline.report.glossary import term
+from imubench_pipeline.report.payload import Arrays, compared, datasheet_lines, looks
+from imubench_pipeline.report.practical import (
+    duration_text,
+    number_text,
+    unit_of,
+    units_by_size,
+)
+from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.report.view import RecordingView
+from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
+from imubench_pipeline.tables import read
+from imubench_pipeline.units import quantity_to_si
+
+KEPT = ("error_growth", "drawn_deviations")
+"""The tables of each recording that the page is made of, beside the joined ones."""
+
+_ERRORS = ("attitude", "heading", "velocity", "position")
+_MANY = 100
+"""Recordings from which on models drawn are kept of whole decades of tau alone."""
+
+
+def _context(site: Site) -> dict[str, Any]:
+    arrays = Arrays()
+    views = _views(site)
+    budget = site.settings["settings"]["error_budget"]
+    channels: list[dict[str, Any]] = []
+    datasheets: dict[str, dict[str, Any]] = {}
+    recordings = []
+    for view in views:
+        kept = {table: _kept(site, view, table) for table in KEPT}
+        drawn = dict(_drawn(kept["drawn_deviations"], arrays, few=len(views) > _MANY))
+        for channel in view.channels():
+            own = datasheets.setdefault(view.sensor, {})
+            own.setdefault(channel.channel, datasheet_lines(channel))
+            channels.append(compared(channel, arrays) | {"drawn": drawn.get(channel.channel)})
+        growth = _growth(kept["error_growth"], arrays)
+        recordings.append(_recording(view) | {"growth": growth})
+    return {
+        "several": len(views) > 1,
+        "page": {
+            "grouped": "sensor",
+            "looks": looks({view.sensor: site.looks[view.sensor] for view in views}),
+            "names": site.names,
+            "compared": COMPARED,
+            "channels": channels,
+            "datasheets": datasheets,
+            "recordings": recordings,
+            "errors": {error: _units(site, error) for error in _ERRORS},
+            "window": quantity_to_si(budget["static_window"], "time"),
+            "limits": list(_limits(site)),
+            "arrays": arrays.texts,
+        },
+    }
+
+
+def _views(site: Site) -> list[RecordingView]:
+    """Return the recordings that can be compared: those at rest of which a curve is known."""
+    return [view for view in site.views if view.static]
+
+
+def _files(site: Site) -> Iterator[Path]:
+    """Yield the files that are kept of each recording and that the page shows."""
+    for view in _views(site):
+        for table in KEPT:
+            yield _path(site, view, table)
+
+
+def _path(site: Site, view: RecordingView, table: str) -> Path:
+    return site.results / "recordings" / view.sensor / view.name / f"{table}.parquet"
+
+
+def _kept(site: Site, view: RecordingView, table: str) -> Mapping[str, Any]:
+    """Return columns of a table of a recording; none where a report is made without it."""
+    path = _path(site, view, table)
+    if not path.is_file():
+        return {}
+    rows = read(table, [path])
+    return {
+        name: rows[name].to_numpy()
+        for name in rows.column_names
+        if name not in ("sensor", "recording", "unit")
+    }
+
+
+def _recording(view: RecordingView) -> dict[str, Any]:
+    row = view.row
+    temperature = None
+    if row["temperature_min"] is not None:
+        low, high = (number_text(row[f"temperature_{end}"], 3) for end in ("min", "max"))
+        temperature = f"{low} to {high} °C"
+    findings = dict.fromkeys(finding["finding"] for finding in view.warnings)
+    return {
+        "sensor": view.sensor,
+        "recording": view.name,
+        "page": view.page,
+        "device": row["device"],
+        "simulated": view.simulated,
+        "seconds": row["duration"],
+        "duration": duration_text(row["duration"]),
+        "rate": number_text(row["rate"]),
+        "started": row["started"],
+        "temperature": temperature,
+        "decides": row["decides"] is not False,
+        "doubts": [term(name).name for name in findings],
+    }
+
+
+def _units(site: Site, error: str) -> dict[str, Any]:
+    """Return the unit of an axis, and those of a number: from which size in SI, sign and factor."""
+    dimension = DIMENSIONS[error]  # type: ignore[index]  # a key of it
+    axis = unit_of(dimension, site.system)
+    sized = units_by_size(dimension, site.system)
+    return {
+        "axis": [axis.sign, axis.per_si],
+        "sized": [[least, unit.sign, unit.per_si] for least, unit in sized],
+    }
+
+
+def _limits(site: Site) -> Iterator[dict[str, Any]]:
+    """Yield the limits of requirements, as 1 sigma."""
+    for name, declared in site.settings["requirements"].items():
+        requirement = Requirement.model_validate(declared)
+        for limit in requirement.limits:
+            if limit.error in _ERRORS:
+                yield {
+                    "requirement": name,
+                    "title": requirement.title,
+                    "error": limit.error,
+                    "time": limit.seconds,
+                    "limit": limit.size / requirement.sigmas,
+                }
+
+
+def _drawn(
+    kept: Mapping[str, Any], arrays: Arrays, *, few: bool
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield of each channel its Allan deviation at some tau, and those of models drawn, sorted."""
+    if not kept:
+        return
+    of_draw = np.isfinite(np.asarray(kept["draw"], dtype=np.float64))  # null: the estimate itself
+    decade = np.log10(kept["tau"])
+    wanted = np.abs(decade - decade.round()) < 1e-6 if few else np.ones(len(decade), dtype=bool)
+    for channel in dict.fromkeys(kept["channel"].tolist()):
+        own = (kept["channel"] == channel) & wanted
+        best = own & ~of_draw
+        unknown = kept["unknown"][best].tolist()
+        yield (
+            channel,
+            {
+                "tau": arrays.exact(kept["tau"][best]),
+                "adev": arrays.exact(kept["adev"][best]),
+                "drawn": arrays.log(kept["adev"][own & of_draw]),
+                "unknown": {place: text for place, text in enumerate(unknown) if text},
+            },
+        )
+
+
+def _growth(kept: Mapping[str, Any], arrays: Arrays) -> dict[str, Any] | None:
+    """Return how errors grow: totals with their limits, and shares of the variance by source."""
+    if not kept or not len(kept["error"]):
+        return None
+    windows, times = (np.unique(kept[name]) for name in ("window", "time"))
+    errors = {}
+    for error in dict.fromkeys(kept["error"].tolist()):
+        own = kept["error"] == error
+        total = own & (kept["source"] == "total")
+        variance = kept["sigma"][total] ** 2
+        sources = {
+            source: np.zeros(len(variance))
+            for source in dict.fromkeys(kept["source"][own & ~total].tolist())
+        }
+        places = {
+            key: place
+            for place, key in enumerate(
+                zip(kept["window"][total].tolist(), kept["time"][total].tolist(), strict=True)
+            )
+        }
+        rest = own & ~total
+        columns = (kept[name][rest].tolist() for name in ("window", "time", "source", "sigma"))
+        for window, time, source, sigma in zip(*columns, strict=True):
+            place = places[window, time]
+            sources[source][place] = sigma**2 / variance[place] if variance[place] else 0.0
+        errors[error] = {
+            **{name: arrays.log(kept[name][total]) for name in ("sigma", "lower", "upper")},
+            "gyro": _axes(kept["gyro"][total]),
+            "accel": _axes(kept["accel"][total]),
+            "sources": {
+                source: arrays.even(share)
+                for source, share in sources.items()
+                if np.any(share > 0.0)
+            },
+        }
+    return {"windows": arrays.exact(windows), "times": arrays.exact(times), "errors": errors}
+
+
+def _axes(channels: Sequence[str | None]) -> list[str]:
+    """Return the channels that answer: one for all, or one for each window and time."""
+    named = [channel or "" for channel in channels]
+    return named[:1] if len(set(named)) == 1 else named
+
+
+COMPARE = Entry(
+    file="compare.html",
+    title="Side by side",
+    context=_context,
+    views=_views,
+    files=_files,
+    exists=lambda site: bool(_views(site)),
+)
+"""The page that compares two or more sensors or recordings that the reader chooses."""

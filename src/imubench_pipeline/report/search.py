@@ -1,0 +1,45 @@
+"""What the search of the pages finds: everything that has a name, and where it stands."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+from imubench_pipeline.experiments.papers.about import PAPERS
+from imubench_pipeline.report.glossary import glossary, term
+from imubench_pipeline.report.site import Site
+
+Found = tuple[str, str, str, str]
+"""Kind, title, where it stands (page and section), and further words by which it is found."""
+
+
+def index(site: Site) -> str:
+    """Return what is found, as JSON."""
+    return json.dumps(list(_entries(site)), ensure_ascii=False, separators=(",", ":"))
+
+
+def _entries(site: Site) -> Iterator[Found]:
+    for sensor in site.sensors:
+        about = site.settings["sensors"].get(sensor, {}).get("price_class") or ""
+        yield "sensor", site.names[sensor], site.sensor_page(sensor), f"{sensor} {about}"
+    for view in site.views:
+        findings = (term(row["finding"]).name for row in view.findings)
+        state = [*dict.fromkeys(findings), *(["simulated"] if view.simulated else [])]
+        if view.left_out:
+            state += [view.row["status"], view.row["reason"] or ""]
+        words = f"{view.sensor} {view.row['device']} {', '.join(state)}"
+        yield "recording", f"{site.names[view.sensor]}: {view.name}", view.page, words
+    devices = {view.device_page: view for view in site.views if view.device_page}
+    for page, view in devices.items():
+        yield "device", f"{site.names[view.sensor]}: device {view.row['device']}", page, ""
+    for name, requirement in site.settings["requirements"].items():
+        yield "requirement", requirement["title"], f"index.html#requirement-{name}", name
+    for file, title in site.navigation:
+        yield "page", title, file, ""
+    for entry in glossary().values():
+        yield "term", entry.name, f"theory.html#{entry.section}", entry.short
+    sections = {paper.name: paper.key for paper in PAPERS}
+    for row in site.rows("published"):
+        title = f"{row['place']}: {row['quantity']}"
+        words = f"{row['paper']} {row['printed_as']} {row['verdict']}"
+        yield "paper", title, f"papers.html#{sections[row['paper']]}", words

@@ -1,0 +1,52 @@
+// What the reader chose stands in the address, so that a link opens the same: #axis=…&b=…, or
+// #/PATH#axis=… where all pages are in one file. What is as a page opens is left out.
+
+let state = new URLSearchParams();
+
+const inOneFile = () => document.body.dataset.oneFile === "yes";
+
+function stateText(hash) {
+  const last = hash.slice(1).split("#").at(-1);
+  return last.includes("=") ? last : "";
+}
+
+function readState() {
+  state = new URLSearchParams(stateText(location.hash));
+}
+
+function keep(key, value) {
+  if (value === null || value === "") state.delete(key);
+  else state.set(key, value);
+  const place = inOneFile() ? `#/${location.hash.slice(2).split("#")[0] || "index.html"}` : "";
+  const text = state.toString();
+  history.replaceState(null, "", `${location.pathname}${location.search}${place}${text ? `#${text}` : inOneFile() ? "" : "#"}`);
+}
+
+async function copyText(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    const field = Object.assign(document.createElement("textarea"), { value: text });
+    document.body.append(field);
+    field.select();
+    const copied = document.execCommand("copy");
+    field.remove();
+    return copied;
+  }
+}
+
+function startCopying() {
+  const units = document.querySelector("header .units");
+  if (!units) return;
+  const button = Object.assign(document.createElement("button"), { type: "button", className: "copy", textContent: "Copy link" });
+  const said = document.createElement("output");
+  button.addEventListener("click", async () => {
+    said.textContent = (await copyText(location.href)) ? "copied" : location.href;
+    window.setTimeout(() => (said.textContent = ""), 3000);
+  });
+  units.append(button, said);
+  if (!inOneFile()) {
+    window.addEventListener("hashchange", () => stateText(location.hash) && location.reload());
+  }
+}

@@ -1,0 +1,276 @@
+// Which sensors or recordings are side by side, and what is judged of them in words and tables.
+
+const LETTERS = "abcdef";
+let chosen = []; // { letter, key, sensor, recording, row }
+let growthOf = { error: "heading", window: 60, time: 600 };
+let crossed = 10; // s, where the crosshair stands
+
+// A sensor stands for its longest recording; one that decides, and is measured, goes first.
+function recordingOf(key) {
+  const [sensor, ...rest] = key.split("/");
+  const own = pageData.recordings.filter((row) => row.sensor === sensor && (rest.length === 0 || row.recording === rest.join("/")));
+  const order = (row) => [row.decides ? 0 : 1, row.simulated ? 1 : 0, -row.seconds];
+  return own.sort((a, b) => order(a).map((one, i) => one - order(b)[i]).find((one) => one !== 0) ?? 0)[0];
+}
+
+function chosenFrom(keys) {
+  return keys.map((key) => ({ key, row: recordingOf(key) })).filter(({ row }) => row)
+    .map(({ key, row }, place) => ({ letter: LETTERS[place].toUpperCase(), key, row, sensor: row.sensor, recording: row.recording }));
+}
+
+const channelFor = (one, channel) => pageData.channels.find((view) => view.sensor === one.sensor && view.recording === one.recording && view.channel === channel);
+const titleOf = (one) => `${nameOf(one.sensor)}${one.row.simulated ? " (simulated)" : ""}`;
+const shortName = (one) => (chosen.filter((other) => other.sensor === one.sensor).length > 1 ? `${one.letter} ${nameOf(one.sensor)} ${one.recording}` : `${one.letter} ${nameOf(one.sensor)}`);
+
+// Colour and mark are the sensor's; of two recordings of one, the dash and a hollow mark differ.
+function lookOfChosen(one) {
+  const look = pageData.looks.sensors[one.sensor];
+  const before = chosen.slice(0, chosen.indexOf(one)).filter((other) => other.sensor === one.sensor).length;
+  return before === 0 ? look : { ...look, dash: ["dash", "dot", "dashdot", "longdash", "longdashdot"][(before - 1) % 5], marker: `${look.marker}-open`, plain: look.marker };
+}
+
+function startComparison(root) {
+  const pickers = root.querySelector(".pickers");
+  if (!pickers) return;
+  const sensors = [...new Set(pageData.recordings.map((row) => row.sensor))].sort((a, b) => recordingOf(b).decides - recordingOf(a).decides);
+  const stated = [...LETTERS].map((letter) => state.get(letter)).filter(Boolean);
+  const kept = chosenFrom(stated);
+  const others = pageData.recordings.length > sensors.length && sensors.length === 1 ? pageData.recordings.map((row) => `${row.sensor}/${row.recording}`) : sensors;
+  chosen = kept.length > 1 ? kept : chosenFrom([...new Set([...kept.map((one) => one.key), ...others])].slice(0, 2));
+  if (chosen.length < 2 && pageData.recordings.length > 1) {
+    chosen = chosenFrom([...new Set([...chosen.map((one) => `${one.sensor}/${one.recording}`), ...pageData.recordings.map((row) => `${row.sensor}/${row.recording}`)])].slice(0, 2));
+  }
+  if (stated.length !== kept.length) {
+    root.querySelector(".unfound").textContent = `Not in this report, or without a curve: ${stated.filter((key) => !recordingOf(key)).join(", ")}.`;
+  }
+  const axes = Object.keys(CHANNEL_NAMES).filter((name) => pageData.channels.some((view) => view.channel === name));
+  const common = axes.filter((name) => chosen.every((one) => channelFor(one, name)));
+  chosenChannel = state.get("axis") ?? common[0] ?? axes[0];
+  if (!axes.includes(chosenChannel)) chosenChannel = common[0] ?? axes[0];
+  chosenMethod = "recommended";
+  startGrowth(root);
+  crossed = Number(state.get("tau")) || 10;
+  drawPickers(pickers, axes);
+  compareChosen(root);
+}
+
+function drawPickers(pickers, axes) {
+  const root = pickers.closest("main");
+  const again = (focus) => {
+    LETTERS.split("").forEach((letter, place) => keep(letter, chosen[place]?.key ?? null));
+    drawPickers(pickers, axes);
+    pickers.querySelector(focus)?.focus();
+    compareChosen(root);
+    redrawAll();
+  };
+  const selects = chosen.map((one, place) => {
+    const select = document.createElement("select");
+    select.dataset.letter = LETTERS[place];
+    for (const sensor of new Set(pageData.recordings.map((row) => row.sensor))) {
+      const own = pageData.recordings.filter((row) => row.sensor === sensor);
+      const group = Object.assign(document.createElement("optgroup"), { label: nameOf(sensor) });
+      group.append(new Option(nameOf(sensor), sensor));
+      if (own.length > 1) own.forEach((row) => group.append(new Option(`${nameOf(sensor)}: ${row.recording}`, `${sensor}/${row.recording}`)));
+      select.append(group);
+    }
+    select.value = one.key;
+    if (select.selectedIndex < 0) select.value = one.sensor;
+    select.addEventListener("change", () => {
+      const keys = chosen.map((each) => each.key);
+      keys[place] = select.value;
+      chosen = chosenFrom(keys);
+      again(`select[data-letter=${LETTERS[place]}]`);
+    });
+    const label = labelled(one.letter, select);
+    const sign = Object.assign(document.createElement("span"), { className: "sign", innerHTML: swatch({ ...lookOfChosen(one), marker: lookOfChosen(one).plain ?? lookOfChosen(one).marker }) });
+    label.prepend(sign);
+    if (chosen.length < 3) return label;
+    const remove = Object.assign(document.createElement("button"), { type: "button", textContent: "×", className: "remove" });
+    remove.setAttribute("aria-label", `Take ${one.letter} away`);
+    remove.addEventListener("click", () => {
+      chosen = chosenFrom(chosen.filter((other) => other !== one).map((other) => other.key));
+      again("select");
+    });
+    const both = document.createElement("span");
+    both.append(label, remove);
+    return both;
+  });
+  const more = Object.assign(document.createElement("button"), { type: "button", textContent: "+ one more" });
+  more.hidden = chosen.length >= LETTERS.length || chosen.length >= pageData.recordings.length;
+  more.addEventListener("click", () => {
+    const used = new Set(chosen.map((one) => `${one.sensor}/${one.recording}`));
+    const next = pageData.recordings.find((row) => !chosen.some((one) => one.sensor === row.sensor))
+      ?? pageData.recordings.find((row) => !used.has(`${row.sensor}/${row.recording}`));
+    const key = chosen.some((one) => one.sensor === next.sensor) ? `${next.sensor}/${next.recording}` : next.sensor;
+    chosen = chosenFrom([...chosen.map((one) => one.key), key]);
+    again(`select[data-letter=${LETTERS[chosen.length - 1]}]`);
+  });
+  const set = document.createElement("fieldset");
+  set.append(Object.assign(document.createElement("legend"), { textContent: "Axis" }));
+  for (const name of axes) {
+    const radio = Object.assign(document.createElement("input"), { type: "radio", name: "compared", value: name, checked: name === chosenChannel });
+    radio.addEventListener("change", () => {
+      chosenChannel = name;
+      keep("axis", name);
+      compareChosen(root);
+      redrawAll();
+    });
+    const label = document.createElement("label");
+    label.append(radio, ` ${CHANNEL_NAMES[name]}`);
+    set.append(label);
+  }
+  pickers.replaceChildren(...selects, more, set);
+}
+
+// Each figure of the chosen channels: what it is, the value of each, the ratio of the first to each
+// other one.
+function comparedFigures() {
+  const views = chosen.map((one) => channelFor(one, chosenChannel));
+  if (views.some((view) => !view)) return [];
+  const quantity = quantityOf(chosenChannel);
+  const figures = pageData.compared.flatMap((symbol) => {
+    const own = views.map((view) => {
+      const [value, lower, upper, status] = view.parameters[view.recommended]?.[symbol]?.[0] ?? [];
+      return value === undefined ? null : { value, lower, upper, status };
+    });
+    if (own.includes(null)) return [];
+    const ratios = own.slice(1).map((other) => ratioOfParameters(own[0], other));
+    return [{ symbol, label: symbolText(symbol), term: symbol, long: FOREST_NAMES[symbol] ?? symbolText(symbol), unit: unitOf(quantity, symbol), own, ratios, drawn: true }];
+  });
+  const pairs = views.slice(1).map((view) => ratiosOfDeviations(views[0].drawn, view.drawn));
+  const whole = (pairs[0] ?? []).filter(({ tau }) => Number.isInteger(Math.log10(tau)) && tau >= 1)
+    .filter(({ tau }) => pairs.every((ratios) => ratios.some((one) => one.tau === tau)));
+  for (const { tau } of whole) {
+    const at = pairs.map((ratios) => ratios.find((one) => one.tau === tau));
+    const values = [at[0].values[0], ...at.map((one) => one.values[1])];
+    figures.push({
+      symbol: "adev", tau, label: `σ(${numberText(tau, 4)} s)`, term: "allan_deviation", unit: unitOf(quantity, "adev"),
+      own: values.map((value) => ({ value, lower: null, upper: null, status: "ok" })), ratios: at,
+    });
+  }
+  return figures;
+}
+
+// Whichever has less noise is the better one.
+function verdictOf(ratio, first, second) {
+  const better = { lower: first, higher: second }[ratio.verdict];
+  return better ? { text: `${better.letter} better`, letter: better.letter, kind: "told" } : { text: ratio.verdict, kind: ratio.verdict === "not known" ? "unknown" : "even" };
+}
+
+function compareChosen(root) {
+  const figures = comparedFigures();
+  drawVerdicts(root, figures);
+  drawEvidence(root);
+  drawErrors(root);
+}
+
+function cellOf(text, more = {}) {
+  return Object.assign(document.createElement("td"), { textContent: text, ...more });
+}
+
+function verdictCell(ratio, first, second) {
+  const { text, kind, letter } = verdictOf(ratio, first, second);
+  const cell = cellOf("", { className: `judged ${kind}` });
+  const better = chosen.find((one) => one.letter === letter);
+  if (better) cell.append(Object.assign(document.createElement("span"), { className: "sign", innerHTML: swatch({ ...pageData.looks.sensors[better.sensor], line: false }) }));
+  cell.append(text);
+  if (ratio.reason) cell.append(" ", Object.assign(document.createElement("span"), { className: "why", textContent: ratio.reason }));
+  return cell;
+}
+
+function ratioCell(ratio) {
+  const cell = cellOf("", { className: "number ratio" });
+  Object.assign(cell.dataset, { ratio: ratio.value ?? "", lower: ratio.lower ?? "", upper: ratio.upper ?? "" });
+  const digits = digitsOf(ratio.value, ratio.lower, ratio.upper);
+  cell.append(Object.assign(document.createElement("strong"), { textContent: ratio.value === null ? "–" : numberText(ratio.value, digits) }));
+  cell.append(document.createElement("br"), Object.assign(document.createElement("small"), { textContent: ratioText(ratio) }));
+  return cell;
+}
+
+function ownCell(one, unit, digitsFor = digitsOf) {
+  const cell = cellOf("", { className: "number" });
+  const { sign, factor } = typeof unit === "function" ? unit(one.value) : unit;
+  const [value, lower, upper] = [one.value, one.lower, one.upper].map((number) => (number === null ? null : number * factor));
+  const bounded = lower !== null && upper !== null;
+  const digits = digitsFor(value, lower, upper);
+  if (value !== null) cell.append(`${numberText(value, digits)} ${sign}`);
+  else cell.append(one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : one.status.replaceAll("_", " "));
+  if (bounded && value !== null) {
+    cell.append(document.createElement("br"), Object.assign(document.createElement("small"), { textContent: `${numberText(lower, digits)} to ${numberText(upper, digits)}` }));
+  }
+  return cell;
+}
+
+function headOf(...texts) {
+  const row = document.createElement("tr");
+  row.append(...texts.map((text) => Object.assign(document.createElement("th"), { scope: "col", textContent: text })));
+  return row;
+}
+
+function linesOf(figures) {
+  return figures.map((figure) => {
+    const row = document.createElement("tr");
+    row.dataset.figure = figure.tau ? `adev ${figure.tau}` : figure.symbol;
+    const head = Object.assign(document.createElement("th"), { scope: "row" });
+    const name = Object.assign(document.createElement(figure.term ? "i" : "span"), { textContent: figure.label });
+    if (figure.term) name.dataset.term = figure.term;
+    head.append(name);
+    row.append(head);
+    figure.ratios.forEach((ratio, place) => row.append(verdictCell(ratio, chosen[0], chosen[place + 1]), ratioCell(ratio)));
+    row.append(...figure.own.map((one) => ownCell(one, figure.unit, figure.digits)));
+    return row;
+  });
+}
+
+function headsOfPairs() {
+  return chosen.slice(1).flatMap((other) => [chosen.length > 2 ? `${chosen[0].letter} or ${other.letter}` : "Verdict", `${chosen[0].letter} / ${other.letter}, 95 %`]);
+}
+
+function drawVerdicts(root, figures) {
+  const table = root.querySelector("table.verdicts");
+  const missing = chosen.filter((one) => !channelFor(one, chosenChannel));
+  table.tHead.replaceChildren(headOf("Figure", ...headsOfPairs(), ...chosen.map(shortName)));
+  table.tBodies[0].replaceChildren(...linesOf(figures));
+  table.caption.textContent = `${CHANNEL_NAMES[chosenChannel]}: less noise is better, told apart where the 95 % interval of the ratio leaves 1 out`;
+  const words = missing.length > 0
+    ? [`${missing.map(shortName).join(" and ")} ${missing.length > 1 ? "have" : "has"} no ${CHANNEL_NAMES[chosenChannel]}: choose another axis.`]
+    : chosen.slice(1).map((other, place) => sentenceOf(figures, chosen[0], other, place));
+  root.querySelector(".answer").textContent = words.join("\n");
+  const doubted = chosen.filter((one) => doubtsOf(one).length > 0);
+  root.querySelector(".doubts").textContent = doubted.map((one) => `Doubtful: ${shortName(one)}: ${doubtsOf(one).join(", ")}.`).join(" ");
+}
+
+const doubtsOf = ({ row }) => [...row.doubts, ...(row.decides ? [] : ["decides nothing"])];
+
+function sentenceOf(figures, first, second, place) {
+  const groups = new Map();
+  for (const figure of figures) {
+    const ratio = figure.ratios[place];
+    const { text } = verdictOf(ratio, first, second);
+    const times = ratio.value === null ? "" : ` (${numberText(ratio.value < 1 ? 1 / ratio.value : ratio.value, 2)} times)`;
+    if (!groups.has(text)) groups.set(text, []);
+    groups.get(text).push((figure.tau ? `σ(${numberText(figure.tau, 4)} s)` : symbolText(figure.symbol)) + (text.endsWith("better") ? times : ""));
+  }
+  const parts = [...groups].sort(([a], [b]) => b.endsWith("better") - a.endsWith("better")).map(([text, of]) => `${text}: ${of.join(", ")}`);
+  const pair = chosen.length > 2 ? `${first.letter} or ${second.letter}? ` : "";
+  return parts.length > 0 ? `${pair}${parts.join("; ")}.` : "";
+}
+
+function drawEvidence(root) {
+  const table = root.querySelector("table.evidence");
+  table.tHead.replaceChildren(headOf("", "Recording", "Hours", "Specimens of the sensor", "Temperature", "Rate", "Doubts"));
+  table.tBodies[0].replaceChildren(...chosen.map((one) => {
+    const { row } = one;
+    const line = document.createElement("tr");
+    const own = pageData.recordings.filter((other) => other.sensor === one.sensor);
+    const named = cellOf("");
+    named.append(Object.assign(document.createElement("a"), { href: row.page.split("/").map(encodeURIComponent).join("/"), textContent: row.recording }));
+    if (row.simulated) named.append(" ", Object.assign(document.createElement("span"), { className: "badge", textContent: "simulated" }));
+    if (own.length > 1 && !one.key.includes("/")) named.append(` the longest of ${own.length}`);
+    const specimens = new Set(own.map((other) => other.device)).size;
+    line.append(Object.assign(document.createElement("th"), { scope: "row", textContent: shortName(one) }), named,
+      cellOf(numberText(row.seconds / 3600, 3), { className: "number" }), cellOf(`${specimens}, in ${own.length} ${own.length === 1 ? "recording" : "recordings"}`),
+      cellOf(row.temperature ?? "not logged"), cellOf(`${row.rate} Hz`, { className: "number" }), cellOf(doubtsOf(one).join(", ") || "none", { className: "words" }));
+    return line;
+  }));
+}

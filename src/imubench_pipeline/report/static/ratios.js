@@ -1,0 +1,99 @@
+// How many times a figure of one recording is that of another, and how sure that is: the same
+// calculation as `imubench_pipeline.navigation.ratios`, and the same numbers.
+
+const RATIO_TAIL = 0.025;
+
+// Of { value, lower, upper, status }; limits by the distances of each on the logarithm (MOVER).
+function ratioOfParameters(first, second) {
+  const doubts = [["the first", first], ["the second", second]]
+    .filter(([, one]) => one.status !== "ok").map(([which, one]) => `${which} is ${one.status.replaceAll("_", " ")}`);
+  const reason = doubts.join("; ") || null;
+  if (!first.value || !second.value) {
+    let low = over(first.lower ?? 0, second.upper);
+    const high = over(first.upper, second.lower);
+    if (high === null && !low) low = null;
+    return ratioOf(null, low, high, reason);
+  }
+  const middle = Math.log(first.value / second.value);
+  const below = together(distance(first.lower, first.value), distance(second.value, second.upper));
+  const above = together(distance(first.value, first.upper), distance(second.lower, second.value));
+  return ratioOf(
+    first.value / second.value,
+    below === null ? null : Math.exp(middle - below),
+    above === null || above === Infinity ? null : Math.exp(middle + above),
+    reason,
+  );
+}
+
+const over = (numerator, denominator) => (numerator === null || !denominator ? null : numerator / denominator);
+const distance = (low, high) => (low === null || high === null ? null : low > 0 ? Math.log(high / low) : Infinity);
+const together = (...sides) => (sides.includes(null) ? null : Math.hypot(...sides));
+
+function ratioOf(value, lower, upper, reason) {
+  const limited = lower !== null && (upper !== null || lower > 0);
+  let verdict = limited ? "not told apart" : "not known";
+  if (upper !== null && upper < 1) verdict = "lower";
+  else if (lower !== null && lower > 1) verdict = "higher";
+  return { value, lower, upper, reason, verdict };
+}
+
+// Of the Allan deviations of two channels, at each tau that both logs tell: each pair of the models
+// drawn counts.
+function ratiosOfDeviations(first, second) {
+  if (!first || !second) return [];
+  const step = (tau) => Math.round(2 * Math.log10(tau));
+  const places = new Map(array(second.tau).map((tau, place) => [step(tau), place]));
+  return array(first.tau).flatMap((tau, place) => {
+    const other = places.get(step(tau));
+    return other === undefined ? [] : [{ tau: 10 ** (step(tau) / 2), ...deviationRatio(first, place, second, other) }];
+  });
+}
+
+function deviationRatio(first, place, second, other) {
+  const value = array(first.adev)[place] / array(second.adev)[other];
+  const [own, theirs] = [drawnAt(first, place), drawnAt(second, other)];
+  const pairs = new Float64Array(own.length * theirs.length);
+  own.forEach((a, i) => theirs.forEach((b, j) => (pairs[i * theirs.length + j] = a / b)));
+  pairs.sort();
+  const at = (share) => pairs[Math.max(0, Math.ceil(pairs.length * share - 1e-9) - 1)];
+  const unknown = [...new Set([first.unknown[place], second.unknown[other]].filter(Boolean))].join("; ") || null;
+  const limits = [Math.min(at(RATIO_TAIL), value), Math.max(at(1 - RATIO_TAIL), value)];
+  return {
+    ...ratioOf(unknown ? null : value, ...limits, unknown),
+    values: [array(first.adev)[place], array(second.adev)[other]],
+  };
+}
+
+function drawnAt(channel, place) {
+  const every = array(channel.drawn);
+  const draws = every.length / array(channel.tau).length;
+  return every.slice(place * draws, (place + 1) * draws);
+}
+
+// Enough digits that the two limits are seen to differ.
+function limitDigits(lower, upper, least = 2) {
+  if (lower === null || upper === null || !(upper > lower)) return least;
+  return Math.min(Math.max(least, Math.ceil(Math.log10(Math.max(Math.abs(lower), Math.abs(upper)) / (upper - lower))) + 1), 7);
+}
+
+// As many digits as the interval leaves: `imubench_pipeline.estimators.digits` has the same.
+function digitsBy(value, lower, upper, otherwise = 3) {
+  if (lower === null || upper === null || !(upper > lower) || !value) return otherwise;
+  const half = (upper - lower) / 2;
+  if (!Number.isFinite(half)) return 2;
+  let digit = Math.floor(Math.log10(half));
+  if (half < 2 * 10 ** digit) digit -= 1;
+  return Math.min(Math.max(Math.floor(Math.log10(Math.abs(value))) - digit + 1, 2), 7);
+}
+
+function digitsOf(value, lower, upper) {
+  if (value === null || lower === null || upper === null) return limitDigits(lower, upper, 3);
+  return Math.max(digitsBy(value, lower, upper), limitDigits(lower, upper));
+}
+
+function ratioText({ value, lower, upper }) {
+  const digits = digitsOf(value, lower, upper);
+  if (lower === null && upper === null) return "–";
+  if (upper === null) return `above ${numberText(lower, digits)}`;
+  return `${numberText(lower ?? 0, digits)} to ${numberText(upper, digits)}`;
+}

@@ -1,0 +1,197 @@
+"""Sensors side by side: the same numbers as the library's, and an address that opens the same."""
+
+import csv
+import math
+import re
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+from urllib.parse import urlencode
+
+import numpy as np
+import pytest
+from playwright.sync_api import Locator
+
+from imubench_pipeline.estimators.estimate import COMPARED
+from imubench_pipeline.navigation.ratios import Ratio, ratio_of_deviations, ratio_of_parameters
+from imubench_pipeline.report.parameters import digits_of
+from imubench_pipeline.report.practical import page_unit
+from imubench_pipeline.settings.sensor import quantity_of
+from tests.report.browser import made
+from tests.report.browser.factors import ARC
+from tests.report.browser.made import Report
+from tests.report.browser.reader import Open, Reader, traces
+
+NIGHT, SIMULATED, FIRST = made.NIGHT, made.SIMULATED, made.DATED[0]
+DRAWN = 2e-3
+"""Relative error of limits, whose draws are kept in 16 bits of their logarithm."""
+
+ROWS = """table => [...table.tBodies[0].rows].map((row) => ({
+  figure: row.dataset.figure, texts: [...row.cells].map((cell) => cell.textContent),
+  ratios: [...row.querySelectorAll(".ratio")].map(({dataset}) =>
+    [dataset.ratio, dataset.lower, dataset.upper].map((text) => text === "" ? null : Number(text)))
+}))"""
+
+
+def address(*logs: made.Log, **more: str) -> str:
+    chosen = {
+        letter: f"{log.sensor}/{log.recording}" for letter, log in zip("ab", logs, strict=True)
+    }
+    return "compare.html#" + urlencode(chosen | more)
+
+
+def table(reader: Reader, name: str) -> dict[str, dict[str, Any]]:
+    rows = reader.page.locator(f"table.{name}").evaluate(ROWS)
+    return {row["figure"]: row for row in rows}
+
+
+def same(shown: list[float | None], ratio: Ratio, rel: float) -> None:
+    for number, expected in zip(shown, (ratio.value, ratio.lower, ratio.upper), strict=True):
+        assert number == (None if expected is None else pytest.approx(expected, rel=rel))
+
+
+def words(ratio: Ratio) -> str:
+    return {"lower": "A better", "higher": "B better"}.get(ratio.verdict, ratio.verdict)
+
+
+def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    for first, second, channel in (
+        (NIGHT, SIMULATED, "gyro_x"), (NIGHT, SIMULATED, "accel_x"), (FIRST, NIGHT, "gyro_x"),
+    ):  # fmt: skip
+        reader.open(address(first, second, axis=channel))
+        rows = table(reader, "verdicts")
+        a, b = (log.recommended(channel) for log in (first, second))
+        for symbol in COMPARED:
+            own, other = ({**one.parameters, **one.curve}[symbol] for one in (a, b))
+            ratio = ratio_of_parameters(own, other)
+            same(rows[symbol]["ratios"][0], ratio, 1e-5)
+            assert words(ratio) in rows[symbol]["texts"][1]
+            # With the digits that other pages print of it.
+            unit, row = page_unit(quantity_of(channel), symbol, "practical"), asdict(own)
+            kept = (float(f"{row[name]:.7g}") for name in ("value", "lower", "upper"))
+            value, *ends = (unit.text(number, digits_of(row, unit)) for number in kept)
+            assert rows[symbol]["texts"][3] == f"{value} {unit.sign}{' to '.join(ends)}"
+        for tau in (1.0, 10.0, 100.0):
+            pair = (made.fused(log, channel) for log in (first, second))
+            ratio = ratio_of_deviations(*pair, tau, longest=1 / 9, **made.DRAWN)
+            same(rows[f"adev {tau:g}"]["ratios"][0], ratio, DRAWN)
+            assert words(ratio) in rows[f"adev {tau:g}"]["texts"][1]
+    # Three times the noise, and no doubt of it.
+    assert "A better" not in reader.page.locator(".answer").inner_text()
+    assert "N (3 times)" in reader.page.locator(".answer").inner_text()
+
+
+def test_the_curves_and_their_ratio(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, address(NIGHT, FIRST, axis="gyro_x"))
+    figure = reader.figure("pair")
+    drawn = {one["name"]: one for one in traces(figure) if one["name"]}
+    rows = bench.of("allan", recording=NIGHT.recording, channel="gyro_x")
+    curve = drawn["A Vendor & Sons A-1"]
+    np.testing.assert_allclose(curve["y"], [ARC * row["adev"] for row in rows], rtol=3e-4)
+    assert drawn["B Other B"]["line"]["color"] != curve["line"]["color"]
+    ratio = drawn["A / B"]
+    np.testing.assert_allclose(ratio["y"], 1 / 3, rtol=0.02)
+    assert ratio["x"] == pytest.approx([10 ** (step / 2) for step in range(-2, 5)])
+    # 0.42 °/√h is 25.2 °/h at 1 s, and half of it if it is one-sided; and 8 °/h.
+    printed = sorted(one["y"][1] for name, one in drawn.items() if "datasheet" in name)
+    assert printed == pytest.approx([8.0, 25.2 / math.sqrt(2), 25.2], rel=1e-3)
+    slider, said = figure.get_by_label("Crosshair at τ"), figure.locator("output").first
+    slider.focus()
+    before = said.inner_text()
+    for _ in range(5):
+        slider.press("ArrowRight")
+    assert said.inner_text() != before
+    nearest = min(rows, key=lambda row: abs(math.log(row["tau"] / 10**1.5)))
+    assert float(re.search(r"A ([\d.]+) °/h", said.inner_text())[1]) == pytest.approx(
+        ARC * nearest["adev"], rel=1e-2
+    )
+    assert "tau=31.6" in reader.page.url
+
+
+def test_errors_grow_as_the_budget_has_it(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, address(NIGHT, SIMULATED, window="60", time="10"))
+    budget = {
+        (row["recording"], row["error"]): row
+        for row in bench.of("error_budget", time=10.0, requirement=None, axis="worst")
+        if row["source"] == "total"
+    }
+    for error, row in table(reader, "errors").items():
+        own, other = (budget[log.recording, error] for log in (NIGHT, SIMULATED))
+        assert row["ratios"][0][0] == pytest.approx(own["sigma"] / other["sigma"], rel=DRAWN)
+        below, above = row["ratios"][0][1:]
+        spread = math.hypot(
+            math.log(own["sigma"] / own["lower"]), math.log(other["upper"] / other["sigma"])
+        )
+        assert math.log(row["ratios"][0][0] / below) == pytest.approx(spread, abs=DRAWN)
+        assert below < row["ratios"][0][0] < above
+    figure = reader.figure("growth")
+    curve = next(one for one in traces(figure) if one["mode"] == "lines+markers")
+    at = curve["x"].index(10.0)
+    expected = math.degrees(budget[NIGHT.recording, "heading"]["sigma"])
+    assert curve["y"][at] == pytest.approx(expected, rel=DRAWN)
+    (limits,) = (one for one in traces(figure) if one["name"] == "limit of a requirement")
+    # 1° after 60 s and 0.6° after 120 s, in 95 % of cases.
+    assert limits["x"] == [60.0, 120.0]
+    assert limits["y"] == pytest.approx([1.0 / 1.959964, 0.6 / 1.959964], rel=1e-5)
+    reader.page.get_by_label("At rest before").press("End")
+    after = next(one for one in traces(figure) if one["mode"] == "lines+markers")
+    growth = made.growth_of(NIGHT)
+    (rested,) = (
+        row
+        for row in growth
+        if row["source"] == "total"
+        and (row["error"], row["window"], row["time"]) == ("heading", 600.0, 10.0)
+    )
+    assert after["y"][at] == pytest.approx(math.degrees(rested["sigma"]), rel=DRAWN)
+    assert abs(after["y"][at] / curve["y"][at] - 1.0) > 0.1
+    assert "window=600" in reader.page.url
+    bars = traces(reader.figure("sources"))
+    total = np.sum([one["x"] for one in bars], axis=0)
+    np.testing.assert_allclose(total, 100.0, atol=1.0)
+
+
+def test_what_is_chosen_stands_in_the_address(
+    read: Open, bench: Report, download: Callable[[Locator], bytes]
+) -> None:
+    reader = read(bench.folder, "compare.html#a=alpha&b=beta")
+    page = reader.page
+    assert "first" not in page.locator(".unfound").inner_text()
+    page.get_by_role("button", name="+ one more").click()
+    page.locator("select[data-letter=c]").select_option(f"alpha/{SIMULATED.recording}")
+    page.get_by_label("Gyroscopes in").select_option("SI: rad/s")
+    figure = reader.figure("pair")
+    figure.get_by_label("datasheet").uncheck()
+    figure.locator(".canvas").evaluate(
+        "canvas => Plotly.relayout(canvas, {'xaxis.range[0]': 0, 'xaxis.range[1]': 1})"
+    )
+    whole = figure.get_by_role("button", name="Reset the zoom")
+    assert whole.is_visible()
+    link, curves = page.url, traces(figure)
+    reader.open("compare.html#" + link.partition("#")[2])
+    again = reader.figure("pair")
+    assert [one["y"] for one in traces(again)] == [one["y"] for one in curves]
+    assert "(rad/s)" in again.locator(".canvas svg .ytitle").text_content()
+    assert again.locator(".canvas").evaluate("canvas => canvas.layout.xaxis.range") == [0, 1]
+    again.get_by_role("button", name="Reset the zoom").click()
+    assert not again.get_by_role("button", name="Reset the zoom").is_visible()
+    assert "z0=" not in page.url
+    again.get_by_role("button", name="Values of the figure as a table").click()
+    values = again.get_by_role("region", name="Values of")
+    rows = list(
+        csv.DictReader(download(again.get_by_role("button", name="as CSV")).decode().splitlines())
+    )
+    shown = values.locator("tbody tr")
+    assert shown.count() == min(len(rows), 400) > 100
+    own = [row for row in rows if row["series"].startswith("B ") and row["lower 95 %"]]
+    table_rows = bench.of("allan", recording=made.DATED[-1].recording, channel="gyro_x")
+    assert len(own) == len(table_rows)
+    assert download(again.get_by_role("button", name="as PNG")).startswith(b"\x89PNG")
+    assert b"<svg" in download(again.get_by_role("button", name="as SVG"))[:200]
+
+
+def test_what_is_not_there_is_said(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, "compare.html#a=alpha&b=nobody&axis=gyro_y")
+    assert "nobody" in reader.page.locator(".unfound").inner_text()
+    # Beta has no such axis.
+    assert "no gyro y" in reader.page.locator(".answer").inner_text()

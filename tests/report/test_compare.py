@@ -1,0 +1,97 @@
+"""The page of sensors side by side, as it is written."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.report.compare import COMPARE, KEPT
+from imubench_pipeline.report.publish import publish
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.tables import write
+from tests.report.pages import read_pages
+from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site
+
+pytestmark = pytest.mark.usefixtures("small_report")
+
+ROWS = {
+    "drawn_deviations": [
+        {"channel": "gyro_x", "tau": tau, "adev": size / tau, "draw": draw}
+        for tau in (1.0, 10**0.5)
+        for draw, size in enumerate((2e-5, 1e-5, 3e-5), start=-1)
+    ],
+    "error_growth": [
+        {"gyro": "gyro_x", "window": 60.0, "error": "heading", "time": time, "source": source,
+         "sigma": sigma, "lower": 0.9 * sigma, "upper": 1.1 * sigma, "unit": "rad"}
+        for time in (1.0, 10.0)
+        for source, sigma in (("total", 5e-3), ("gyro N", 4e-3), ("gyro K", 3e-3))
+    ],
+}  # fmt: skip
+
+
+def put(results: Path, sensor: str, recording: str) -> None:
+    names = {"sensor": sensor, "recording": recording}
+    for table in KEPT:
+        rows = [names | row for row in ROWS[table]]
+        if table == "drawn_deviations":
+            rows = [row | {"draw": None if row["draw"] < 0 else row["draw"]} for row in rows]
+        folder = results / "recordings" / sensor / recording
+        folder.mkdir(parents=True, exist_ok=True)
+        write(table, rows, folder / f"{table}.parquet")
+
+
+def test_what_is_kept_of_a_recording_is_in_the_page(tmp_path: Path) -> None:
+    asked = {"robot": ROBOT}
+    rows = recording_rows("one", "day1"), recording_rows("two", "day1"), rejected_rows("two", "no")
+    made = site(joined(*rows, requirements=asked), tmp_path, requirements=asked)
+    put(tmp_path, "one", "day1")
+    page = COMPARE.context(made)["page"]
+    first, second = page["recordings"]
+    assert (first["sensor"], second["sensor"]) == ("one", "two")
+    assert second["growth"] is None and first["growth"]["errors"].keys() == {"heading"}
+    growth = first["growth"]["errors"]["heading"]
+    assert growth["sources"].keys() == {"gyro N", "gyro K"} and growth["gyro"] == ["gyro_x"]
+    drawn = {
+        (one["sensor"], one["channel"]): one["drawn"] for one in page["channels"] if one["drawn"]
+    }
+    assert drawn.keys() == {("one", "gyro_x")}
+    assert page["window"] == 60.0
+    limit = next(one for one in page["limits"] if one["requirement"] == "robot")
+    robot = Requirement.model_validate(ROBOT)
+    assert limit["limit"] == pytest.approx(robot.limits[0].size / robot.sigmas)
+
+
+def test_the_page_is_written_again_when_what_is_kept_changes(tmp_path: Path) -> None:
+    tables = joined(recording_rows("one", "day1"), recording_rows("two", "day1"))
+    made = site(tables, tmp_path)
+    publish(made, tmp_path / "report")
+    put(tmp_path, "one", "day1")
+    assert publish(site(tables, tmp_path), tmp_path / "report") == ["compare.html"]
+    assert publish(site(tables, tmp_path), tmp_path / "report") == []
+
+
+def test_of_many_recordings_whole_decades_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tables = joined(recording_rows("one", "day1"), recording_rows("two", "day1"))
+    put(tmp_path, "one", "day1")
+
+    def count() -> int:
+        (channel,) = (
+            one["drawn"]
+            for one in COMPARE.context(site(tables, tmp_path))["page"]["channels"]
+            if one["drawn"]
+        )
+        page = COMPARE.context(site(tables, tmp_path))["page"]
+        return len(page["arrays"][channel["tau"]][3])
+
+    several = count()
+    monkeypatch.setattr("imubench_pipeline.report.compare._MANY", 1)
+    assert count() < several
+
+
+def test_one_recording_is_not_compared(tmp_path: Path) -> None:
+    publish(site(joined(recording_rows("one", "day1")), tmp_path), tmp_path / "report")
+    page = read_pages(tmp_path / "report")["compare.html"]
+    assert "It takes two recordings." in page.text
+    assert np.ndim(page.data["recordings"]) == 1

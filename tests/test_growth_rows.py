@@ -1,0 +1,96 @@
+"""What a comparison of any two recordings needs: equal to what is computed of the pair alone."""
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
+from imubench_pipeline.navigation.error_growth import growth_rows
+from imubench_pipeline.navigation.expected_errors import error_rows, standard
+from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
+from imubench_pipeline.navigation.ratios import deviation_rows, ratio_of_deviations
+
+NAMES = {"sensor": "alpha", "recording": "night"}
+
+
+def estimate(level: float, seed: int) -> Estimate:
+    """Return an estimate with joint draws; a third of them have no walk, others two processes."""
+    sizes = {"Q": 0.0, "N": 1e-4, "B": 2e-5, "T_B": 90.0, "K": 2e-7, "R": 0.0}
+    sizes = {name: v if name == "T_B" else v * level for name, v in sizes.items()}
+    first = np.array(list(sizes.values())) * np.exp(
+        0.1 * np.random.default_rng(seed).standard_normal((200, 6))
+    )
+    first[::3, 4] = 0.0
+    further = np.tile([0.0, np.nan], (200, 1, 1))
+    further[::2, 0] = 1e-5 * level, 1500.0
+    known = {name: Parameter(v, lower=0.8 * v, upper=1.2 * v) for name, v in sizes.items() if v}
+    return Estimate("likelihood", known, draws=JointDraws(first, further))
+
+
+ESTIMATES = {
+    "gyro_x": estimate(1.0, 1),
+    "gyro_y": estimate(2.0, 2),
+    "accel_x": estimate(30.0, 3),
+    "accel_z": Estimate("curve", {"N": Parameter(5e-3, lower=4e-3, upper=6e-3)}),
+}
+HOW = {"draws": 200, "seed": 7}
+
+
+def test_errors_that_grow_are_those_of_the_budget() -> None:
+    questions = list(standard([10.0, 45.0], 90.0, 0.8, ["worst"]))
+    asked = {
+        (row["error"], row["time"], row["source"]): row
+        for row in error_rows(NAMES, ESTIMATES, questions, **HOW)
+        if row["error"] != "north"
+    }
+    grown = [
+        row
+        for row in growth_rows(NAMES, ESTIMATES, times=[10.0, 45.0], window=90.0, **HOW)
+        if row["window"] == 90.0 and row["time"] in (10.0, 45.0)
+    ]
+    assert len(grown) == len(asked) > 40
+    for row in grown:
+        of_budget = asked[row["error"], row["time"], row["source"]]
+        for name in ("gyro", "accel", "unit"):
+            assert row[name] == of_budget[name]
+        for name in {"sigma", "lower", "upper"} & row.keys():
+            assert row[name] == pytest.approx(of_budget[name], rel=1e-12)
+
+
+def test_errors_grow_with_time_and_shrink_with_the_window() -> None:
+    rows = [
+        row
+        for row in growth_rows(NAMES, ESTIMATES, times=(), window=60.0, **HOW)
+        if row["source"] == "total" and row["error"] == "heading"
+    ]
+    by_window = {w: [r["sigma"] for r in rows if r["window"] == w] for w in (10.0, 60.0)}
+    assert by_window[10.0] == sorted(by_window[10.0])
+    assert all(a > b for a, b in zip(*by_window.values(), strict=True))
+    assert {row["time"] for row in rows} >= {1.0, 600.0}
+
+
+def test_a_ratio_follows_from_what_is_kept_of_each_channel() -> None:
+    a, b = (
+        FusionChannel("s", f"r{n}", "gyro_x", True, 3600.0, estimate(1.0 + n / 3, n))
+        for n in (1, 2)
+    )
+    how = {"longest": 1 / 9, "draws": 200, "seed": 3}
+    kept = [list(deviation_rows(one, 100.0, **how)) for one in (a, b)]
+    taus = sorted({row["tau"] for row in kept[0]})
+    np.testing.assert_allclose(np.log10(taus), np.arange(-2.0, 2.6, 0.5), atol=1e-12)
+    for tau in taus:
+        own, other = (
+            np.array([r["adev"] for r in rows if r["tau"] == tau and "draw" in r]) for rows in kept
+        )
+        assert len(own) == 200 and (np.diff(own) >= 0).all()
+        ratio = ratio_of_deviations(a, b, tau, **how)
+        limits = np.quantile(own[:, None] / other, [0.025, 0.975], method="inverted_cdf")
+        np.testing.assert_allclose([ratio.lower, ratio.upper], limits, rtol=1e-12)
+        values = [r["adev"] for rows in kept for r in rows if r["tau"] == tau and "draw" not in r]
+        assert ratio.value == pytest.approx(values[0] / values[1], rel=1e-12)
+
+
+def test_nothing_is_kept_of_a_channel_without_noise() -> None:
+    nothing = Estimate("likelihood", {"N": Parameter(None, "not_identified")})
+    channel = FusionChannel("s", "r", "gyro_x", True, 3600.0, nothing)
+    assert [*deviation_rows(channel, 100.0, longest=1 / 9, draws=9, seed=1)] == []
+    assert [*growth_rows(NAMES, {"gyro_x": nothing}, times=(), window=60.0, **HOW)] == []
