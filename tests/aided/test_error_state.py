@@ -124,7 +124,7 @@ def outcomes() -> dict:
     tunings = {"true": tuned(GYRO, ACCEL, 100.0), "wrong": tuned(far, ACCEL, 100.0)}
 
     def of_run(number: int) -> Signals:
-        return signals(way, axes, SPREADS, 1.0, 7, ("car", str(number)))
+        return signals(way, axes, SPREADS, 100, 7, ("car", str(number)))
 
     assert [outage.length for outage in drive.outages].count(60.0) == 2
     return {"drive": drive, **drive.repeat(tunings, of_run, RUNS, threads=2)}
@@ -165,7 +165,7 @@ def test_runs_are_the_same_again_and_each_is_another(outcomes: dict) -> None:
     way = outcomes["drive"].trajectory
     axes = {c: SensorModel(noise=GYRO if c.startswith("gyro") else ACCEL) for c in CHANNELS}
     first, again, other = (
-        signals(way, axes, SPREADS, 1.0, 7, ("car", number)).rate for number in "001"
+        signals(way, axes, SPREADS, 100, 7, ("car", number)).rate for number in "001"
     )
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 1e-4

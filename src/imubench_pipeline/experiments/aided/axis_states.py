@@ -10,7 +10,6 @@ after it. Both follow exactly from the matrices, by repeating
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -180,20 +179,10 @@ def stack(axes: Sequence[AxisStates], sampling: float, width: int, steps: int) -
     )
 
 
-def steps_of(sampling: float, epoch: float, longest: float) -> tuple[int, int]:
-    """Return the samples of a step and the steps of an epoch, s, none longer than ``longest``, s.
+def steps_of(samples: int, widest: int) -> tuple[int, int]:
+    """Return the samples of a step and the steps between two fixes that are some samples apart.
 
-    Raises
-    ------
-    ValueError
-        If an epoch is no whole number of samples.
+    A step has ``widest`` samples at most, from 1.
     """
-    samples = round(sampling * epoch)
-    longest = max(longest, 1.0 / sampling)
-    if samples < 1 or not math.isclose(samples, sampling * epoch, rel_tol=1e-9):
-        raise ValueError(
-            f"{sampling:g} Hz are {sampling * epoch:g} samples in {epoch:g} s between two fixes of "
-            "GNSS; expected a whole number"
-        )
-    steps = next(n for n in range(1, samples + 1) if samples % n == 0 and epoch / n <= longest)
-    return samples // steps, steps
+    width = next(width for width in range(min(widest, samples), 0, -1) if samples % width == 0)
+    return width, samples // width

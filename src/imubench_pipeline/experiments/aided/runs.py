@@ -18,7 +18,7 @@ from imubench_pipeline.experiments.aided.trajectories import Trajectory
 from imubench_pipeline.typing import Array
 
 EPOCH = 1.0
-"""From fix to fix, s."""
+"""From fix to fix, s, as near as samples allow."""
 
 LONGEST_STEP = 0.1
 """s, over which transition and noise are taken together."""
@@ -75,10 +75,9 @@ class Drive:
     def __init__(self, trajectory: Trajectory, outages: Sequence[Outage]) -> None:
         self.trajectory, self.outages = trajectory, outages
         rate = trajectory.sampling
-        self.width, self.steps = steps_of(rate, EPOCH, LONGEST_STEP)
-        self.at: NDArray[np.int64] = np.arange(
-            round(rate * EPOCH), len(trajectory.rate) + 1, round(rate * EPOCH)
-        )
+        self.every = max(round(rate * EPOCH), 1)
+        self.width, self.steps = steps_of(self.every, math.ceil(rate * LONGEST_STEP))
+        self.at: NDArray[np.int64] = np.arange(self.every, len(trajectory.rate) + 1, self.every)
         self.times = self.at / rate
         self.available = np.ones(len(self.at), dtype=np.bool_)
         for outage in outages:

@@ -61,7 +61,7 @@ def signals(
     trajectory: Trajectory,
     axes: Mapping[str, SensorModel],
     spreads: Spreads,
-    epoch: float,
+    every: int,
     seed: int,
     names: tuple[str, ...],
     temperature: Signal | None = None,
@@ -75,8 +75,8 @@ def signals(
     axes : mapping of str to SensorModel
         Of all six channels.
     spreads : Spreads
-    epoch : float
-        From fix to fix, s.
+    every : int
+        Samples from fix to fix.
     seed : int
     names : tuple of str
         Such as sensor, trajectory and number of the run: with the seed they determine all.
@@ -86,7 +86,6 @@ def signals(
         Errors of channels to take instead of simulated noise: pieces of a log at rest.
     """
     L, rate = len(trajectory.rate), trajectory.sampling
-    every = round(epoch * rate)
     at = np.arange(every, L + 1, every)
     measured, bias = np.empty((6, L)), np.empty((6, len(at)))
     true = np.concatenate([trajectory.rate.T, trajectory.force.T])
