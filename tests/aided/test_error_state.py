@@ -109,7 +109,7 @@ def test_the_covariance_is_that_of_a_filter_of_a_step_a_sample(gyro: NoiseModel)
         np.full((len(drive.at), 6), np.nan),
         np.zeros(9),
     )  # fmt: skip
-    errors, variances, _ = drive.filter(drive.stacked(axes), ideal)
+    errors, variances, *_ = drive.filter(drive.stacked(axes), ideal)
     assert np.abs(errors).max() < 1e-3  # it goes along the trajectory
     # Steps of 0.1 s hold the attitude: measured, 0.03 % at most.
     np.testing.assert_allclose(variances, plain_variances(drive, axes), rtol=1e-3)

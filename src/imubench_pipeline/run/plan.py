@@ -277,6 +277,30 @@ class Plan:
         settings = self.run.earth_rate.model_dump(mode="json")
         return _text({"earth_rate": settings, "datasheet": printed})
 
+    @property
+    def navigated(self) -> list[str]:
+        """The sensors that filters are tuned for: those with static recordings that are asked."""
+        of = self.run.navigate.of
+        return [
+            sensor
+            for sensor, recordings in self._at_rest.items()
+            if of == "all"
+            or (of == "simulated" and all((sensor, r) in self._simulated for r in recordings))
+        ]
+
+    def navigate_settings(self, sensor: str) -> str:
+        """Return what the navigation of a sensor depends on beside its estimates."""
+        declared = self.sensors.get(sensor)
+        return _text(
+            {
+                "navigate": self.run.navigate.model_dump(mode="json", exclude={"of"}),
+                "sensor": declared.model_dump(mode="json", exclude_unset=True)
+                if declared
+                else None,
+                "truths": json.loads(self.truths(sensor)),
+            }
+        )
+
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
         """Return how a log is written, and the notes beside it; ConfigError if it is of no use."""
         if recording.error:

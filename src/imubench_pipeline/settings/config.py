@@ -34,6 +34,8 @@ _OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
 
 _difference = checked("temperature", "a difference, such as 10 K", to_si=difference_to_si)
 
+_AccelerationDensity = Annotated[Text, checked("accel_density", "a density above 0")]
+
 Folders = Path | Annotated[tuple[Path, ...], Field(min_length=1)]
 
 
@@ -227,6 +229,10 @@ class NavigateSettings(Strict):
         "0.1 deg/s", description="standard deviation of the bias that is another at each switch-on"
     )
     accel_bias: AccelerationFromZero = Field("3 mg", description="likewise of accelerometers")
+    accel_noise: _AccelerationDensity = Field(
+        "100 ug/sqrt(Hz)",
+        description="two-sided density of the accelerometers that stand in where a log has none",
+    )
     gyro_scale: float = Field(
         0.0, ge=0, lt=0.1, description="standard deviation of the error of the scale factor"
     )

@@ -86,22 +86,39 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Ro
         if not fitted:
             continue
         names = {"sensor": sensor, "recording": about["recording"]}
+        stand_in = _stand_in(fitted, how)
+        fitted |= stand_in
         if all_axes(fitted) is None:
-            lacking = "the recording tells no white noise of a gyro or of an accelerometer"
+            lacking = "the recording tells no white noise of a gyro"
             for course in how.trajectories:
                 yield names | {"trajectory": course, "tuning": TRUE, "reason": lacking}
             return
         longest = max(quantity_to_si(length, "time") for length in how.outages)
-        tuned, lacking_of = tunings(folder, sensor, declared, longest)
-        for source in _sources(folder, about, fitted, truths.get(about["recording"]), how):
-            yield from _rows(names, how, source, tuned, lacking_of)
+        tuned, lacking_of = tunings(folder, sensor, declared, longest, stand_in)
+        truth = truths.get(about["recording"])
+        methods = [each.method for each in best.values()]
+        chosen = max(sorted(set(methods)), key=methods.count)
+        for source in _sources(folder, about, fitted, stand_in, truth, how):
+            for row in _rows(names, how, source, tuned, lacking_of):
+                yield row | {
+                    "recommended": row["tuning"] == chosen,
+                    "assumed": f"accelerometers: {how.accel_noise}" if stand_in else None,
+                }
         return
+
+
+def _stand_in(fitted: Models, how: NavigateSettings) -> Models:
+    """Return the accelerometers that stand in where a log has none that tells its noise."""
+    if any(quantity_of(name) == "accel" and model.N > 0.0 for name, model in fitted.items()):
+        return {}
+    return {"accel_x": NoiseModel(N=quantity_to_si(how.accel_noise, "accel_density"))}
 
 
 def _sources(
     folder: Path,
     about: Mapping[str, Any],
     fitted: Models,
+    stand_in: Models,
     truth: SimulatedRecording | None,
     how: NavigateSettings,
 ) -> Iterator[_Source]:
@@ -116,6 +133,7 @@ def _sources(
             channel: _in_front(folder, channel, noise, float(about["rate"]))
             for channel, noise in fitted.items()
         }
+    axes |= {channel: SensorModel(noise=noise) for channel, noise in stand_in.items()}
     axes = {channel: replace(model, bias=0.0, scale_error=0.0) for channel, model in axes.items()}
     whole = _all_models(axes)
     true = {
@@ -230,7 +248,7 @@ def _rows(
     source: _Source,
     tuned: Mapping[str, Models],
     lacking: Mapping[str, str],
-) -> Iterator[Row]:
+) -> Iterator[dict[str, Any]]:
     lengths = [quantity_to_si(length, "time") for length in how.outages]
     duration = quantity_to_si(how.duration, "time")
     spreads = _spreads(how)

@@ -53,12 +53,18 @@ def all_axes(models: Mapping[str, NoiseModel]) -> Models | None:
     return whole
 
 
+def stands_in(channel: str, stand_in: Models) -> bool:
+    """Tell whether a model of another sensor stands for the quantity of a channel."""
+    return any(quantity_of(channel) == quantity_of(other) for other in stand_in)
+
+
 def tunings(
-    folder: Path, sensor: str, declared: Sensor | None, horizon: float
+    folder: Path, sensor: str, declared: Sensor | None, horizon: float, stand_in: Models
 ) -> tuple[dict[str, Models], dict[str, str]]:
     """Return the tunings that a recording and the datasheet of its sensor give, by name.
 
-    And, for those that there are not, the reason. ``horizon``, s, is that of the overbound.
+    And, for those that there are not, the reason. ``horizon``, s, is that of the overbound;
+    ``stand_in`` are models of channels of a quantity that the recording does not have.
     """
     every = estimates(folder / "parameters.parquet", folder / "draws.parquet")
     named: dict[str, Models] = {}
@@ -78,7 +84,8 @@ def tunings(
             named[name] = models
     found = {}
     for name, models in named.items():
-        whole = all_axes(models)
+        own = {c: m for c, m in models.items() if not stands_in(c, stand_in)}
+        whole = all_axes(own | stand_in)
         if whole is None:
             lacking[name] = "it tells no white noise of a gyro or of an accelerometer"
         else:

@@ -23,6 +23,7 @@ from imubench_pipeline.tables.of_navigation import (
     FUSION,
     GRADES,
     IN_USE,
+    NAVIGATION,
     NEXT_STEPS,
     RANKING,
     REPEATABILITY,
@@ -348,6 +349,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         text("reason", "what is not known", required=False),
         _DOUBTED,
     ),
+    "navigation": NAVIGATION,
     "ranking": RANKING,
     "next_steps": NEXT_STEPS,
     "shortlist": SHORTLIST,
@@ -434,6 +436,7 @@ BY_RECORDING = (
     *TURNED,
     *CALIBRATED,
     "alignment",
+    "navigation",
 )
 """The joined tables in which a recording has rows of its own."""
 

@@ -94,7 +94,7 @@ def run(
     scale: Array,
     output: Array,
     width: int,
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:
     """Filter one run; p, v and C are changed in place.
 
     Parameters
@@ -129,6 +129,8 @@ def run(
         True less estimated, and what the filter takes for their variances.
     normalised : ndarray, shape (E, 6)
         Normalised errors squared, by `GROUPS`.
+    covariance : ndarray, shape (9 + m + s, 9 + m + s)
+        Of all states after the last epoch.
     """
     E, steps = len(fixes), len(seen)
     m = first[6]
@@ -329,7 +331,7 @@ def run(
                 normalised[epoch, 3 + g] = _of_biases(
                     P, x, output, first, bias[epoch, 3 * g : 3 * g + 3], 3 * g
                 )
-    return errors, variances, normalised
+    return errors, variances, normalised, P
 
 
 @njit(cache=True, nogil=True)

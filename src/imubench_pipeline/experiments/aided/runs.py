@@ -93,7 +93,7 @@ class Drive:
         """Return the states of six axes over the steps of this drive."""
         return stack(axes, self.trajectory.sampling, self.width, self.steps)
 
-    def filter(self, stacked: Stacked, signals: Signals) -> tuple[Array, Array, Array]:
+    def filter(self, stacked: Stacked, signals: Signals) -> tuple[Array, Array, Array, Array]:
         """Run the filter once; see `error_state.run` for what it returns."""
         way = self.trajectory
         off = self._sigmas * signals.start
@@ -140,9 +140,9 @@ class Drive:
         """Run every tuning on the same signals, by the number of the run."""
         stacked = {name: self.stacked(axes) for name, axes in tunings.items()}
 
-        def once(number: int) -> dict[str, tuple[Array, Array, Array]]:
+        def once(number: int) -> dict[str, tuple[Array, ...]]:
             of_run = signals(number)
-            return {name: self.filter(each, of_run) for name, each in stacked.items()}
+            return {name: self.filter(each, of_run)[:3] for name, each in stacked.items()}
 
         with ThreadPoolExecutor(max(1, threads)) as pool:
             done = list(pool.map(once, range(runs)))
