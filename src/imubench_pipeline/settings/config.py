@@ -220,10 +220,10 @@ class NavigateSettings(Strict):
     outages: tuple[Time, ...] = Field(
         ("10 s", "30 s", "60 s"), min_length=1, description="without GNSS, one after the other"
     )
-    duration: Duration = Field("370 s", description="of a run; the first 120 s have GNSS")
+    duration: Duration = Field("310 s", description="of a run; the first 120 s have GNSS")
     rate: Frequency = Field("50 Hz", description="of the samples that a filter is given")
     runs: int = Field(
-        8, ge=4, description="of each trajectory; 100 of 10 min make the errors sure to 5 %"
+        12, ge=4, description="of each trajectory; 100 of 10 min make the errors sure to 5 %"
     )
     gyro_bias: RateFromZero = Field(
         "0.1 deg/s", description="standard deviation of the bias that is another at each switch-on"

@@ -45,9 +45,6 @@ from imubench_pipeline.tables import read
 from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
-_FASTEST = 100.0
-"""Hz; the samples of a faster log are averaged in blocks."""
-
 _FEWEST_PIECES = 4
 """Runs that a log must be long enough for."""
 
@@ -123,21 +120,21 @@ def _sources(
     how: NavigateSettings,
 ) -> Iterator[_Source]:
     """Yield where signals may come from: the simulator, and a log that is no simulation."""
-    sampling = quantity_to_si(how.rate, "frequency")
+    logged = float(about["rate"])
+    block = _block(logged, how)
     spreads = _spreads(how)
     known = truth is not None and truth.specimens is None
     if known and truth is not None:
         axes = {str(name): model for name, model in imu_model(truth.channels, truth).axes.items()}
     else:
         axes = {
-            channel: _in_front(folder, channel, noise, float(about["rate"]))
-            for channel, noise in fitted.items()
+            channel: _in_front(folder, channel, noise, logged) for channel, noise in fitted.items()
         }
     axes |= {channel: SensorModel(noise=noise) for channel, noise in stand_in.items()}
     axes = {channel: replace(model, bias=0.0, scale_error=0.0) for channel, model in axes.items()}
     whole = _all_models(axes)
     true = {
-        channel: replace(model.noise, N=in_the_log(model, sampling))
+        channel: replace(model.noise, N=in_the_log(model, logged))
         for channel, model in whole.items()
     }
     change = (
@@ -145,7 +142,7 @@ def _sources(
     )
 
     def simulated(drive: Drive, course: str, number: int) -> Signals:
-        samples, reference = len(drive.trajectory.rate), _reference(whole)
+        samples, reference = len(drive.trajectory.rate) * block, _reference(whole)
         return signals(
             drive.trajectory,
             whole,
@@ -153,6 +150,7 @@ def _sources(
             drive.every,
             how.seed,
             (about["sensor"], about["recording"], course, str(number)),
+            block=block,
             temperature=(
                 (lambda start, stop: reference + change * np.arange(start, stop) / samples)
                 if change
@@ -160,9 +158,10 @@ def _sources(
             ),
         )
 
+    sampling = logged / block
     yield _Source("truth" if known else "estimate", sampling, how.runs, simulated, true)
     if not about["simulated"]:
-        pieces, rate = _pieces(folder, quantity_to_si(how.duration, "time"), how.runs)
+        pieces = _pieces(folder, block, round(quantity_to_si(how.duration, "time") * sampling))
         if len(pieces) >= _FEWEST_PIECES:
 
             def of_log(drive: Drive, course: str, number: int) -> Signals:
@@ -176,7 +175,7 @@ def _sources(
                     added=pieces[number],
                 )
 
-            yield _Source("log", rate, len(pieces), of_log, None)
+            yield _Source("log", sampling, min(len(pieces), how.runs), of_log, None)
 
 
 def _spreads(how: NavigateSettings) -> Spreads:
@@ -216,30 +215,28 @@ def _in_front(folder: Path, channel: str, noise: NoiseModel, rate: float) -> Sen
     return replace(plain, noise=before_the_filter(plain, noise, rate))
 
 
-def _pieces(folder: Path, duration: float, most: int) -> tuple[list[dict[str, Array]], float]:
-    """Return pieces of a log, s long, less the mean of the log, and their rate in Hz.
+def _block(logged: float, how: NavigateSettings) -> int:
+    """Return how many samples of a log at a rate in Hz make one of a filter."""
+    return max(math.ceil(logged / quantity_to_si(how.rate, "frequency") - 1e-6), 1)
 
-    A sample of them is the mean over a block, where the log is faster than a filter needs.
+
+def _pieces(folder: Path, block: int, size: int) -> list[dict[str, Array]]:
+    """Return pieces of a log of ``size`` means over ``block`` samples, less the mean of the log.
+
+    Those with a hole in a channel lack it.
     """
     pieces: list[dict[str, Array]] = []
-    sampling = 0.0
     for channel, log in kept_static_logs(folder).items():
-        block = math.ceil(log.rate / _FASTEST - 1e-9)
-        sampling = log.rate / block
-        size = round(duration * sampling) * block
         values = np.concatenate([*log.blocks()])
-        values = values - np.nanmean(values)
-        for number in range(min(len(values) // size, most)):
-            piece = values[number * size : (number + 1) * size].reshape(-1, block).mean(axis=1)
+        values -= np.nanmean(values)
+        means = values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
+        for number in range(len(means) // size):
             if number == len(pieces):
                 pieces.append({})
-            pieces[number][channel] = piece
-    whole = []
-    for piece in pieces:
-        names = {name: value for name, value in piece.items() if np.isfinite(value).all()}
-        if {quantity_of(name) for name in names} == {"gyro", "accel"}:
-            whole.append(names)
-    return whole, sampling
+            piece = means[number * size : (number + 1) * size]
+            if np.isfinite(piece).all():
+                pieces[number][channel] = piece
+    return [piece for piece in pieces if {*map(quantity_of, piece)} == {"gyro", "accel"}]
 
 
 def _rows(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -64,6 +65,8 @@ def signals(
     every: int,
     seed: int,
     names: tuple[str, ...],
+    *,
+    block: int = 1,
     temperature: Signal | None = None,
     added: Mapping[str, Array] | None = None,
 ) -> Signals:
@@ -80,41 +83,35 @@ def signals(
     seed : int
     names : tuple of str
         Such as sensor, trajectory and number of the run: with the seed they determine all.
+    block : int
+        Samples of the sensor whose mean is one of the trajectory: it samples faster by that.
     temperature : callable, optional
-        °C, as `simulate.simulation.simulate_blocks` takes it.
+        °C, as `simulate.simulation.simulate_blocks` takes it, at the samples of the sensor.
     added : mapping of str to ndarray, shape (L,)
         Errors of channels to take instead of simulated noise: pieces of a log at rest.
     """
-    L, rate = len(trajectory.rate), trajectory.sampling
+    L, rate = len(trajectory.rate), trajectory.sampling * block
     at = np.arange(every, L + 1, every)
-    measured, bias = np.empty((6, L)), np.empty((6, len(at)))
+    measured, bias = np.empty((6, L)), np.full((6, len(at)), np.nan)
     true = np.concatenate([trajectory.rate.T, trajectory.force.T])
     for i, channel in enumerate(CHANNELS):
         rng = channel_rng(seed, *names, channel)
-        model = axes[channel]
         turned_on = spreads.bias(channel) * rng.standard_normal()
         scale = spreads.scale(channel) * rng.standard_normal()
+        model = replace(axes[channel], bias=axes[channel].bias + turned_on, scale_error=scale)
         if added is not None and channel in added:
             measured[i] = (1.0 + scale) * true[i] + turned_on + added[channel]
-            bias[i] = np.nan
-            continue
-        own = replace(model, bias=model.bias + turned_on, scale_error=scale)
-        slow = _slow(own, rate, L, rng) if _is_plain(own) else None
-        if slow is None:
-            course = np.ascontiguousarray(true[i])
-            measured[i] = simulate(
-                own,
-                rate,
-                L,
-                rng,
-                true=lambda start, stop, course=course: course[start:stop],  # type: ignore[misc]
-                temperature=temperature,
+        elif _is_plain(model):
+            slow = _slow(model, rate, L * block, rng)
+            white = model.noise.N * np.sqrt(trajectory.sampling) * rng.standard_normal(L)
+            measured[i] = (1.0 + scale) * true[i] + _averaged(slow, block) + white
+            bias[i] = slow[at * block - 1]
+        else:
+            course = np.repeat(true[i], block)
+            log = simulate(
+                model, rate, L * block, rng, true=partial(_part, course), temperature=temperature
             )
-            bias[i] = np.nan
-            continue
-        white = model.noise.N * np.sqrt(rate) * rng.standard_normal(L)
-        measured[i] = (1.0 + scale) * true[i] + slow + white
-        bias[i] = slow[at - 1]
+            measured[i] = _averaged(log, block)
     rng = channel_rng(seed, *names, "gnss")
     heading = headings(trajectory.attitude[at])[:, None]
     exact = np.concatenate([trajectory.position[at], trajectory.velocity[at], heading], axis=1)
@@ -122,6 +119,14 @@ def signals(
     fixes = exact + np.where(given, spread, 0.0) * rng.standard_normal(exact.shape)
     start = channel_rng(seed, *names, "start").standard_normal(9)
     return Signals(measured[:3].T.copy(), measured[3:].T.copy(), fixes, bias.T.copy(), start)
+
+
+def _part(course: Array, start: int, stop: int) -> Array:
+    return course[start:stop]
+
+
+def _averaged(log: Array, block: int) -> Array:
+    return log if block == 1 else np.asarray(log.reshape(-1, block).mean(axis=1))
 
 
 def _is_plain(model: SensorModel) -> bool:
