@@ -52,6 +52,10 @@ _TOLERANCE = 0.02
 """How far from 0.95 the share of a consistent filter may be, beside twice its standard error."""
 
 
+_MOST_UNSURE = 0.03
+"""Standard error of the share from which runs are too few to tell."""
+
+
 @dataclass(frozen=True)
 class _Source:
     """What the sensors of a run give, and how they came to it."""
@@ -328,7 +332,9 @@ def _of_tuning(
             row |= {
                 "nees_inside": share.value,
                 "nees_error": share.error,
-                "consistent": off < _TOLERANCE + 2.0 * share.error,
+                "consistent": off < _TOLERANCE + 2.0 * share.error
+                if share.error < _MOST_UNSURE
+                else None,
             }
     return row
 

@@ -173,7 +173,11 @@ NAVIGATION = (
     number("nees_attitude", "-", "of the attitude"),
     number("nees_gyro", "-", "of the biases of the gyros; null: the truth is not known"),
     number("nees_accel", "-", "of the biases of the accelerometers"),
-    flag("consistent", "that share is 0.93 to 0.97, within twice its error", required=False),
+    flag(
+        "consistent",
+        "that share is 0.93 to 0.97, within twice its error; null: the runs do not tell",
+        required=False,
+    ),
     flag("smallest", "of the consistent tunings that with the fewest states", required=False),
     text("reason", "why there is no such tuning", required=False),
 )

@@ -436,7 +436,6 @@ BY_RECORDING = (
     *TURNED,
     *CALIBRATED,
     "alignment",
-    "navigation",
 )
 """The joined tables in which a recording has rows of its own."""
 
