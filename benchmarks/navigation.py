@@ -220,7 +220,7 @@ def claim(results: Path, sensors: list[str], how: NavigateSettings, simulated: s
             if (folder / "parameters.parquet").is_file()
         )
         sections = json.loads(plan.navigate_settings(sensor))
-        sections["navigate"] = how.model_dump(mode="json", exclude={"of"})
+        sections |= {"navigate": how.model_dump(mode="json", exclude={"of"}), "asked": []}
         print(f"\n### {sensor}\n")
         print(
             "| signals | trajectory | outage | tuning | states | position, m | over true | "

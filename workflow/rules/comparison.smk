@@ -30,6 +30,7 @@ rule ranking:
     input:
         error_budget=table("error_budget"),
         backtest=table("backtest"),
+        navigation=table("navigation"),
         recordings=table("recordings"),
         doubts=table("doubts"),
         parameters=table("parameters"),

@@ -294,6 +294,13 @@ class Plan:
         return _text(
             {
                 "navigate": self.run.navigate.model_dump(mode="json", exclude={"of"}),
+                "asked": sorted(
+                    {
+                        (limit.trajectory, limit.outage)
+                        for requirement in self.requirements.values()
+                        for limit in requirement.in_outages
+                    }
+                ),
                 "sensor": declared.model_dump(mode="json", exclude_unset=True)
                 if declared
                 else None,

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, field_validator
 
 from imubench_pipeline.settings.known_rates import AccelerationFromZero, RateFromZero
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.requirements import Axis, Latitude, Time
+from imubench_pipeline.settings.requirements import Axis, Latitude, Time, Trajectory
 from imubench_pipeline.settings.shipped import CATALOGUE
 from imubench_pipeline.settings.two_position import TimeFromZero
 from imubench_pipeline.settings.validation import (
@@ -207,16 +207,13 @@ class EarthRateSettings(Strict):
         return goals
 
 
-TrajectoryName = Literal["field", "car", "drone", "rest"]
-
-
 class NavigateSettings(Strict):
     """Filters tuned by all that is known of a sensor, on simulated drives with outages of GNSS."""
 
     of: Literal["none", "simulated", "all"] = Field(
         "simulated", description="sensors: of simulated recordings alone, all, or none"
     )
-    trajectories: tuple[TrajectoryName, ...] = Field(("field",), min_length=1)
+    trajectories: tuple[Trajectory, ...] = Field(("field",), min_length=1)
     outages: tuple[Time, ...] = Field(
         ("10 s", "30 s", "60 s"), min_length=1, description="without GNSS, one after the other"
     )

@@ -28,13 +28,21 @@ from imubench_pipeline.experiments.aided.measures import (
     root_mean_square,
     squares,
 )
-from imubench_pipeline.experiments.aided.runs import EPOCH, Drive, Outcome, schedule
+from imubench_pipeline.experiments.aided.runs import (
+    EPOCH,
+    RECOVERY,
+    WARM_UP,
+    Drive,
+    Outcome,
+    schedule,
+)
 from imubench_pipeline.experiments.aided.signals import Signals, Spreads, signals
 from imubench_pipeline.experiments.aided.trajectories import trajectory
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.settings.config import NavigateSettings
+from imubench_pipeline.settings.requirements import Trajectory
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.model import SensorModel, before_the_filter, in_the_log
@@ -74,7 +82,7 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Ro
     `imubench_pipeline.run.plan.Plan.navigate_settings`.
     """
     sections = json.loads(settings)
-    how = NavigateSettings.model_validate(sections["navigate"])
+    how = _with(NavigateSettings.model_validate(sections["navigate"]), sections["asked"])
     declared = Sensor.model_validate(sections["sensor"]) if sections["sensor"] else None
     truths = {
         entry.recording: entry
@@ -106,6 +114,23 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Ro
                     "assumed": f"accelerometers: {how.accel_noise}" if stand_in else None,
                 }
         return
+
+
+def _with(how: NavigateSettings, asked: Sequence[tuple[Trajectory, str]]) -> NavigateSettings:
+    """Return settings with what requirements ask for, and runs that are long enough for it."""
+    lengths = {quantity_to_si(length, "time"): length for length in how.outages}
+    for _, length in asked:
+        lengths.setdefault(quantity_to_si(length, "time"), length)
+    courses = dict.fromkeys([*how.trajectories, *(course for course, _ in asked)])
+    least = WARM_UP + sum(lengths) + RECOVERY * (len(lengths) - 1) + EPOCH
+    longer = max(quantity_to_si(how.duration, "time"), least)
+    return how.model_copy(
+        update={
+            "outages": tuple(lengths.values()),
+            "trajectories": tuple(courses),
+            "duration": f"{longer!r} s",
+        }
+    )
 
 
 def _stand_in(fitted: Models, how: NavigateSettings) -> Models:

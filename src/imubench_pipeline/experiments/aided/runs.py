@@ -30,6 +30,10 @@ WARM_UP = 120.0
 """Time with GNSS before anything is measured, s."""
 
 
+RECOVERY = 40.0
+"""Time with GNSS between two outages, s."""
+
+
 @dataclass(frozen=True)
 class Outage:
     """No fix of GNSS after ``begin`` for ``length``, s."""
@@ -38,7 +42,7 @@ class Outage:
     length: float
 
 
-def schedule(duration: float, lengths: Sequence[float], recovery: float = 40.0) -> list[Outage]:
+def schedule(duration: float, lengths: Sequence[float]) -> list[Outage]:
     """Return outages of lengths in s, one after the other until a run, in s, ends."""
     outages: list[Outage] = []
     begin = WARM_UP
@@ -47,7 +51,7 @@ def schedule(duration: float, lengths: Sequence[float], recovery: float = 40.0) 
             if begin + length > duration:
                 return outages
             outages.append(Outage(begin, length))
-            begin += length + recovery
+            begin += length + RECOVERY
 
 
 @dataclass(frozen=True)
