@@ -78,13 +78,13 @@ def predicted(drive: Drive, outcome: Outcome, error: str, length: float | None) 
 
 
 def root_mean_square(of_runs: Array) -> Interval:
-    """Return the root of the mean of mean squares, with limits by their scatter."""
+    """Return the root of the mean of mean squares, shape (R,), with limits by their scatter."""
     mean = float(of_runs.mean())
     return _interval(math.sqrt(mean), of_runs / mean)
 
 
 def ratio(of_runs: Array, others: Array) -> Interval:
-    """Return the ratio of two such roots of the same runs."""
+    """Return the ratio of two such roots of the same runs, shapes (R,)."""
     square = float(of_runs.mean() / others.mean())
     return _interval(math.sqrt(square), (of_runs - square * others) / of_runs.mean())
 
