@@ -101,7 +101,7 @@ def scaled(model: NoiseModel, factor: float) -> NoiseModel:
         B=model.B * factor,
         T_B=model.T_B,
         K=model.K * factor,
-        further=[term.scaled(factor) for term in model.further],
+        further=tuple(term.scaled(factor) for term in model.further),
     )
 
 
