@@ -10,12 +10,13 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.experiments.aided.measures import Share
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.settings.config import NavigateSettings
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
-from imubench_pipeline.steps.navigate import navigate
+from imubench_pipeline.steps.navigate import _consistent, navigate
 from imubench_pipeline.steps.tunings import scaled, tunings
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
@@ -150,6 +151,23 @@ def test_every_tuning_runs_on_the_signals_of_the_estimate_and_of_the_log(folder:
         assert row["position_lower"] < row["position"] < row["position_upper"]
     assert all(row["position_ratio"] is None and row["nees_gyro"] is None for row in of_log)
     assert {row["runs"] for row in of_log} == {4}  # pieces of 201 s of a log of 1000 s
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "verdict"),
+    [
+        (0.95, 0.01, True),
+        (0.92, 0.01, True),
+        (0.89, 0.01, False),
+        (0.94, 0.05, None),  # the runs do not tell
+        (0.18, 0.05, False),  # but of this they do
+        (0.905, 0.01, None),
+    ],
+)
+def test_a_share_is_judged_as_far_as_the_runs_tell(
+    value: float, error: float, verdict: bool | None
+) -> None:
+    assert _consistent(Share(value, error)) is verdict
 
 
 def test_a_gyro_alone_has_accelerometers_that_are_assumed_and_said(tmp_path: Path) -> None:

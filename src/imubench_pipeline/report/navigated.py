@@ -14,7 +14,7 @@ from imubench_pipeline.typing import Row
 TUNINGS = {
     "true": "true model",
     "datasheet": "datasheet",
-    "datasheet_misread": "datasheet, density taken for N",
+    "datasheet_misread": "datasheet misread",
     "times_ten": "ten times the estimate",
     "table_1": "read by the authors",
     "overbound": "overbound",
@@ -22,7 +22,7 @@ TUNINGS = {
     "paper": "weights of the paper",
     "weighted": "weighted",
     "likelihood": "likelihood",
-    "likelihood_gm": "likelihood, papers’ model",
+    "likelihood_gm": "likelihood of the papers’ model",
     "compensated": "temperature taken out",
 }
 """What the page calls each tuning."""
@@ -83,6 +83,7 @@ def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
         smallest = next((row for row in own if row["smallest"]), None)
         yield dict(zip(("sensor", "trajectory", "signals"), key, strict=True)) | {
             "runs": own[0]["runs"],
+            "words": _SIGNALS[key[2]],
             "outage": f"{number_text(longest)} s",
             "matters": _matters(worse, sure, open_ones),
             "smallest": None

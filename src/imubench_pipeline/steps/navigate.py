@@ -22,6 +22,7 @@ from imubench_pipeline.experiments.aided.axis_states import AxisStates, axis_sta
 from imubench_pipeline.experiments.aided.error_state import GROUPS
 from imubench_pipeline.experiments.aided.measures import (
     ERRORS,
+    Share,
     inside,
     predicted,
     ratio,
@@ -57,7 +58,8 @@ _FEWEST_PIECES = 4
 """Runs that a log must be long enough for."""
 
 _TOLERANCE = 0.02
-"""How far from 0.95 the share of a consistent filter may be, beside twice its standard error."""
+"""How far from 0.95 the share of a consistent filter may be, beside twice its standard error; one
+that is off by three times that is not consistent."""
 
 
 _MOST_UNSURE = 0.03
@@ -353,15 +355,20 @@ def _of_tuning(
         if group != "navigation":
             row[f"nees_{group}"] = share and share.value
         elif share is not None:
-            off = abs(share.value - 0.95)
             row |= {
                 "nees_inside": share.value,
                 "nees_error": share.error,
-                "consistent": off < _TOLERANCE + 2.0 * share.error
-                if share.error < _MOST_UNSURE
-                else None,
+                "consistent": _consistent(share),
             }
     return row
+
+
+def _consistent(share: Share) -> bool | None:
+    """Tell whether a share is that of a filter as sure as it may be; None: the runs do not tell."""
+    off = abs(share.value - 0.95)
+    if off > _TOLERANCE + 3.0 * share.error:
+        return False
+    return True if share.error < _MOST_UNSURE and off < _TOLERANCE + 2.0 * share.error else None
 
 
 def _smallest(rows: Sequence[Mapping[str, Any]]) -> str | None:

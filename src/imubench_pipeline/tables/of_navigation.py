@@ -176,7 +176,7 @@ NAVIGATION = (
     number("nees_accel", "-", "of the biases of the accelerometers"),
     flag(
         "consistent",
-        "that share is 0.93 to 0.97, within twice its error; null: the runs do not tell",
+        "that share is 0.93 to 0.97, within its error; null: the runs do not tell",
         required=False,
     ),
     flag("smallest", "of the consistent tunings that with the fewest states", required=False),

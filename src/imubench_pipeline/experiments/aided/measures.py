@@ -36,7 +36,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Share:
-    """A share of the epochs with its standard error, by the scatter of the runs."""
+    """A share of the epochs with its standard error, by the scatter of the runs or more."""
 
     value: float
     error: float
@@ -108,4 +108,8 @@ def inside(drive: Drive, outcome: Outcome, group: str, length: float | None) -> 
         return None
     low, high = (float(chi2.ppf(chance, DEGREES[place])) for chance in (0.025, 0.975))
     of_runs = np.mean((nees > low) & (nees < high), axis=1)
-    return Share(float(of_runs.mean()), float(of_runs.std(ddof=1)) / math.sqrt(len(of_runs)))
+    scatter = float(of_runs.std(ddof=1)) / math.sqrt(len(of_runs))
+    # Few runs may all be inside by chance: an outage, or a minute with fixes, is worth one epoch.
+    stretches = len(at_ends(drive, length)) if length is not None else int(drive.times[-1] // 60)
+    least = math.sqrt(0.95 * 0.05 / (len(of_runs) * max(stretches, 1)))
+    return Share(float(of_runs.mean()), max(scatter, least))
