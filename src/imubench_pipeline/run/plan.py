@@ -58,7 +58,7 @@ _OF_RANKING = ("price_class", "must")
 
 _SHOWN = {
     *("allan", "estimate", "reconstruction", "quality"),
-    *("datasheet", "error_budget", "fusion", "earth_rate"),
+    *("datasheet", "error_budget", "fusion", "earth_rate", "navigate"),
 }
 """Sections of the settings that the report shows."""
 
