@@ -18,6 +18,7 @@ from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import BY_RECORDING
 from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site
 from tests.report.test_boards import BOARD, some
+from tests.report.test_navigated import navigation_row
 
 pytestmark = pytest.mark.usefixtures("small_report")
 
@@ -42,6 +43,7 @@ def whole() -> Site:
         *some(),
         recording_rows("asked", "day1", requirements=asked),
         rejected_rows("turned", "day1", kind="two_position"),
+        {"navigation": [navigation_row("asked")]},
     ]
     tables = joined(*rows, requirements=asked, papers=True)
     return site(tables, requirements=asked, boards={"pair": BOARD})

@@ -66,10 +66,11 @@ def _quick() -> Iterator[None]:
 
 
 def once(made: Site) -> set[str]:
-    """The pages that there is one of: none of boards, the Earth's rate, and papers."""
-    files = {entry.file for entry in ENTRIES} - {"boards.html", "earth_rate.html", "papers.html"}
+    """The pages that there is one of: none of boards, the Earth's rate, navigation and papers."""
+    absent = {"boards.html", "earth_rate.html", "navigation.html", "papers.html"}
     if not any(view.static for view in made.views):
-        files -= {"compare.html"}
+        absent |= {"compare.html"}
+    files = {entry.file for entry in ENTRIES} - absent
     assert files == {path for path, _ in made.navigation} > OF_ALL
     return files
 

@@ -95,9 +95,9 @@ def of_each(recordings, table):
     ]
 
 
-def of_each_sensor(table):
-    """A table of every sensor."""
-    return [f"{JOINED.format(sensor=sensor)}/{table}.parquet" for sensor in FOLDERS]
+def of_each_sensor(table, sensors=FOLDERS):
+    """A table of every sensor, or of some."""
+    return [f"{JOINED.format(sensor=sensor)}/{table}.parquet" for sensor in sensors]
 
 
 def table(name):
@@ -145,7 +145,8 @@ def jobs():
 def jobs_of(step, rule):
     """The sensor and recording of each job of a step, by its rule."""
     if "recording" not in rule.wildcard_names:
-        return [{"sensor": name} for name in FOLDERS] if rule.wildcard_names else [{}]
+        sensors = plan.navigated if step == "navigate" else FOLDERS
+        return [{"sensor": name} for name in sensors] if rule.wildcard_names else [{}]
     chosen = {
         "simulate": [key for key, found in plan.recordings.items() if found.simulated],
         "earth_rotation": plan.turned,

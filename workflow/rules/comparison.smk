@@ -11,8 +11,9 @@ rule tables:
             for name in OUTLOOK
         },
         **{name: of_each(plan.calibrated, name) for name in CALIBRATED},
+        **{name: of_each_sensor(name, plan.navigated) for name in NAVIGATED},
     output:
-        **as_files(*sorted({*OF_SENSOR, *OUTLOOK, *TURNED, *CALIBRATED})),
+        **as_files(*sorted({*OF_SENSOR, *OUTLOOK, *TURNED, *CALIBRATED, *NAVIGATED})),
     log:
         LOGS + "/tables.log",
     group:
@@ -29,6 +30,7 @@ rule ranking:
     input:
         error_budget=table("error_budget"),
         backtest=table("backtest"),
+        navigation=table("navigation"),
         recordings=table("recordings"),
         doubts=table("doubts"),
         parameters=table("parameters"),

@@ -31,6 +31,41 @@ rule outlook:
 
 
 OUTLOOK = tables_of(rules.outlook)
+
+
+# Of the sensors that the setting `navigate` asks for.
+rule navigate:
+    input:
+        quality=at_rest("quality.json"),
+        parameters=at_rest("parameters.parquet"),
+        draws=at_rest("draws.parquet"),
+        allan=at_rest("allan.parquet"),
+        low_pass=at_rest("low_pass.parquet"),
+    output:
+        navigation=JOINED + "/navigation.parquet",
+    log:
+        LOGS + "/sensors/{sensor}/navigate.log",
+    group:
+        "comparison"
+    resources:
+        **cost(
+            OfMany(
+                memory=500,
+                memory_of_each=0.1,
+                time=60,
+                time_of_each=0.005,
+                many_jobs=True,
+            )
+        ),
+    params:
+        settings=lambda w: plan.navigate_settings(w.sensor),
+        code=plan.code("navigate"),
+        attempt=tried("navigate"),
+    script:
+        "../scripts/navigate.py"
+
+
+NAVIGATED = tables_of(rules.navigate)
 # `estimate_findings` becomes a part of `findings`.
 OF_SENSOR = sorted(
     {*PARTS} - {"estimate_findings"}

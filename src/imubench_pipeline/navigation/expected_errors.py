@@ -128,7 +128,7 @@ def standard(
 def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
     """Yield the questions of a requirement."""
     latitude = requirement.latitude and quantity_to_si(requirement.latitude, "angle")
-    for limit in requirement.limits:
+    for limit in requirement.by_dead_reckoning:
         yield Question(
             name,
             limit.error,

@@ -69,6 +69,7 @@ def _limit_row(standing: Standing) -> Row:
     known = standing.known
     return {
         **{key: total[key] for key in ("recording", "error", "time", "limit", "unit")},
+        "trajectory": total.get("trajectory"),
         "sigma": expected.sigma,
         "lower": expected.lower,
         "upper": expected.upper,

@@ -170,7 +170,10 @@ def _hold(number: int) -> str:
 def _column(name: str, declared: Mapping[str, Any], answer: str) -> Column:
     requirement = Requirement.model_validate(declared)
     short = name.replace("_", " ").capitalize()
-    limits = [f"{x.error} {x.at_most} in {x.after}" for x in requirement.limits]
+    limits = [
+        f"{x.error} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
+        for x in requirement.limits
+    ]
     return Column(name, requirement.title, short, limits, answer)
 
 

@@ -51,7 +51,11 @@ def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[
             "spread": spread_words(stands) if stands["spread"] is not None else "",
             "otherwise": list(_otherwise(stands)),
             "window": _window(requirement),
-            "limits": [limit_words(row) for row in own_rows if row["requirement"] == name],
+            "limits": [
+                limit_words(row)
+                for row in own_rows
+                if row["requirement"] == name and row["trajectory"] is None
+            ],
             "recordings": [
                 _recording(site, view, [t for t in totals[view.name] if t["requirement"] == name])
                 for view in own

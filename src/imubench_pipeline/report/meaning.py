@@ -143,7 +143,8 @@ def error_of_recording(total: Row, system: System) -> tuple[str, str]:
 
 def limit_words(row: Row) -> str:
     """Return the error and the time of a limit, of a row of ``ranking`` or ``error_budget``."""
-    return f"{_NAMES[row['error']]}, {duration_text(row['time'])}"
+    drive = f" without GNSS ({row['trajectory']})" if row.get("trajectory") else ""
+    return f"{_NAMES[row['error']]}, {duration_text(row['time'])}{drive}"
 
 
 def budget_tables(

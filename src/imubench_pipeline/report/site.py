@@ -131,6 +131,11 @@ class Site:
         return [view for view in self.views if view.row["kind"] == "two_position"]
 
     @cached_property
+    def navigated(self) -> bool:
+        """Whether filters were tuned for a sensor."""
+        return bool(self.rows("navigation"))
+
+    @cached_property
     def calibrated(self) -> list[RecordingView]:
         """The recordings on a rate table, in positions, or at rest with a direction."""
         named = self._named_in("calibration")

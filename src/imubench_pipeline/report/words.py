@@ -233,7 +233,7 @@ def requirement_words(requirement: Requirement) -> str:
     parts = [
         "An example, made up." if requirement.example else "",
         f"Asked: {limits}, in {100 * requirement.confidence:g} % of runs, by the "
-        f"{requirement.axis} axis; {begin}.",
+        f"{requirement.axis} axis{begin and f'; {begin}'}.",
         _stated("In use", requirement.environment),
         _stated("A sensor must have", requirement.must),
         f"{requirement.note.rstrip('.')}." if requirement.note else "",

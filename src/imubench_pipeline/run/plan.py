@@ -58,7 +58,7 @@ _OF_RANKING = ("price_class", "must")
 
 _SHOWN = {
     *("allan", "estimate", "reconstruction", "quality"),
-    *("datasheet", "error_budget", "fusion", "earth_rate"),
+    *("datasheet", "error_budget", "fusion", "earth_rate", "navigate"),
 }
 """Sections of the settings that the report shows."""
 
@@ -276,6 +276,37 @@ class Plan:
         printed = declared.datasheet.model_dump(mode="json", include=biases) if declared else {}
         settings = self.run.earth_rate.model_dump(mode="json")
         return _text({"earth_rate": settings, "datasheet": printed})
+
+    @property
+    def navigated(self) -> list[str]:
+        """The sensors that filters are tuned for: those with static recordings that are asked."""
+        of = self.run.navigate.of
+        return [
+            sensor
+            for sensor, recordings in self._at_rest.items()
+            if of == "all"
+            or (of == "simulated" and all((sensor, r) in self._simulated for r in recordings))
+        ]
+
+    def navigate_settings(self, sensor: str) -> str:
+        """Return what the navigation of a sensor depends on beside its estimates."""
+        declared = self.sensors.get(sensor)
+        return _text(
+            {
+                "navigate": self.run.navigate.model_dump(mode="json", exclude={"of"}),
+                "asked": sorted(
+                    {
+                        (limit.trajectory, limit.outage)
+                        for requirement in self.requirements.values()
+                        for limit in requirement.in_outages
+                    }
+                ),
+                "sensor": declared.model_dump(mode="json", exclude_unset=True)
+                if declared
+                else None,
+                "truths": json.loads(self.truths(sensor)),
+            }
+        )
 
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
         """Return how a log is written, and the notes beside it; ConfigError if it is of no use."""

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, field_validator
 
 from imubench_pipeline.settings.known_rates import AccelerationFromZero, RateFromZero
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.requirements import Axis, Latitude, Time
+from imubench_pipeline.settings.requirements import Axis, Latitude, Time, Trajectory
 from imubench_pipeline.settings.shipped import CATALOGUE
 from imubench_pipeline.settings.two_position import TimeFromZero
 from imubench_pipeline.settings.validation import (
@@ -22,13 +22,19 @@ from imubench_pipeline.settings.validation import (
     Frequency,
     Strict,
     Text,
+    checked,
     parse,
 )
 from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
+from imubench_pipeline.units import difference_to_si
 
 _SIMULATED = Path("config/simulated.yaml")
 _OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
 
+
+_difference = checked("temperature", "a difference, such as 10 K", to_si=difference_to_si)
+
+_AccelerationDensity = Annotated[Text, checked("accel_density", "a density above 0")]
 
 Folders = Path | Annotated[tuple[Path, ...], Field(min_length=1)]
 
@@ -201,6 +207,39 @@ class EarthRateSettings(Strict):
         return goals
 
 
+class NavigateSettings(Strict):
+    """Filters tuned by all that is known of a sensor, on simulated drives with outages of GNSS."""
+
+    of: Literal["none", "simulated", "all"] = Field(
+        "simulated", description="sensors: of simulated recordings alone, all, or none"
+    )
+    trajectories: tuple[Trajectory, ...] = Field(("field",), min_length=1)
+    outages: tuple[Time, ...] = Field(
+        ("10 s", "30 s", "60 s"), min_length=1, description="without GNSS, one after the other"
+    )
+    duration: Duration = Field("310 s", description="of a run; the first 120 s have GNSS")
+    rate: Frequency = Field("50 Hz", description="of the samples that a filter is given")
+    runs: int = Field(
+        12, ge=4, description="of each trajectory; 100 of 10 min make the errors sure to 5 %"
+    )
+    gyro_bias: RateFromZero = Field(
+        "0.1 deg/s", description="standard deviation of the bias that is another at each switch-on"
+    )
+    accel_bias: AccelerationFromZero = Field("3 mg", description="likewise of accelerometers")
+    accel_noise: _AccelerationDensity = Field(
+        "100 ug/sqrt(Hz)",
+        description="two-sided density of the accelerometers that stand in where a log has none",
+    )
+    gyro_scale: float = Field(
+        0.0, ge=0, lt=0.1, description="standard deviation of the error of the scale factor"
+    )
+    accel_scale: float = Field(0.0, ge=0, lt=0.1, description="likewise of accelerometers")
+    temperature_change: Annotated[Text, _difference] | None = Field(
+        None, examples=["10 K"], description="over a run, where the drift of a sensor is known"
+    )
+    seed: int = Field(20260101, ge=0)
+
+
 class LimitSettings(Strict):
     """What a step may take of one recording or sensor, which is left out beyond."""
 
@@ -271,6 +310,7 @@ class Run(Strict):
     exports: ExportSettings = ExportSettings()
     fusion: FusionSettings = FusionSettings()
     earth_rate: EarthRateSettings = EarthRateSettings()
+    navigate: NavigateSettings = NavigateSettings()
     limits: LimitSettings = LimitSettings()
     report: ReportSettings = ReportSettings()
 

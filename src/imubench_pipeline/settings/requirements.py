@@ -43,11 +43,22 @@ Time = Annotated[Text, checked("time", "a time above zero"), Field(examples=["60
 Latitude = Annotated[Text, AfterValidator(_latitude), Field(examples=["45 deg"])]
 
 
+Trajectory = Literal["field", "car", "drone", "rest"]
+"""The simulated drives on which filters are run."""
+
+IN_OUTAGES = ("position", "velocity", "heading")
+"""The errors that are measured at the end of outages of GNSS."""
+
+
 class Limit(Strict):
-    """The largest error that is allowed after a time."""
+    """The largest error that is allowed after a time, or at the end of an outage of GNSS."""
 
     error: Error
-    after: Time = Field(description="of dead reckoning; of rest, for north")
+    after: Time | None = Field(None, description="of dead reckoning; of rest, for north")
+    outage: Time | None = Field(
+        None, description="instead: of GNSS, on a simulated drive, of a filter that is tuned"
+    )
+    trajectory: Trajectory | None = Field(None, description="of that drive")
     at_most: Text = Field(description="with its unit, such as 1 deg or 5 m")
 
     @model_validator(mode="after")
@@ -56,10 +67,22 @@ class Limit(Strict):
             raise ValueError(f"at_most is {self.at_most}; expected more than zero")
         return self
 
+    @model_validator(mode="after")
+    def _one_time(self) -> Limit:
+        if (self.after is None) == (self.outage is None):
+            raise ValueError("expected either 'after' or 'outage', such as 30 s")
+        if (self.outage is None) != (self.trajectory is None):
+            raise ValueError("expected 'outage' and 'trajectory' together, such as 30 s and field")
+        if self.outage is not None and self.error not in IN_OUTAGES:
+            raise ValueError(
+                f"error is {self.error}; of an outage expected one of {', '.join(IN_OUTAGES)}"
+            )
+        return self
+
     @property
     def seconds(self) -> float:
         """The time in s."""
-        return quantity_to_si(self.after, "time")
+        return quantity_to_si(self.outage or self.after or "", "time")
 
     @property
     def size(self) -> float:
@@ -69,6 +92,11 @@ class Limit(Strict):
     @property
     def text(self) -> str:
         """The limit in words."""
+        if self.outage is not None:
+            return (
+                f"{self.error} within {self.at_most} at the end of {self.outage} without GNSS "
+                f"({self.trajectory})"
+            )
         return f"{self.error} within {self.at_most} after {self.after}"
 
 
@@ -174,11 +202,23 @@ class Requirement(Strict):
 
     @model_validator(mode="after")
     def _whole(self) -> Requirement:
-        if (self.static_window is None) == (self.turn_on is None):
+        if self.static_window is not None and self.turn_on is not None:
+            raise ValueError("expected either 'static_window' or 'turn_on'")
+        if self.by_dead_reckoning and self.static_window is None and self.turn_on is None:
             raise ValueError("expected either 'static_window' or 'turn_on'")
         if self.latitude is None and any(limit.error == "north" for limit in self.limits):
             raise ValueError("a limit of north needs 'latitude', such as 45 deg")
         return self
+
+    @property
+    def by_dead_reckoning(self) -> tuple[Limit, ...]:
+        """The limits that an error budget answers."""
+        return tuple(limit for limit in self.limits if limit.outage is None)
+
+    @property
+    def in_outages(self) -> tuple[Limit, ...]:
+        """The limits that a filter on a simulated drive answers."""
+        return tuple(limit for limit in self.limits if limit.outage is not None)
 
     @property
     def sigmas(self) -> float:

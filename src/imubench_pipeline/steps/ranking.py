@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pyarrow.compute as pc
 
+from imubench_pipeline.navigation.in_outages import outage_rows
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judgements
@@ -21,6 +22,7 @@ def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -
     requirements = requirements_of(sections["requirements"])
     joined = {name: read(name, [path]) for name, path in tables.items()}
     asked = joined.pop("error_budget").filter(pc.field("requirement").is_valid())
+    navigation = joined.pop("navigation")
     columns = ["sensor", "recording", "channel", "recommended", "value"]
     recommended = joined["parameters"].select(columns).filter(pc.field("recommended"))
     basis = Basis.of(
@@ -30,7 +32,8 @@ def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -
         joined["backtest"].to_pylist(),
     )
     sensors = sections["sensors"]
-    of_sensors = [row for row in asked.to_pylist() if row["sensor"] in sensors]
+    outages = outage_rows(navigation.to_pylist(), joined["recordings"].to_pylist(), requirements)
+    of_sensors = [row for row in (*asked.to_pylist(), *outages) if row["sensor"] in sensors]
     judged = list(judgements(of_sensors, requirements, sensors, basis))
     built = {
         "ranking": build("ranking", ranked(judged, basis)),

@@ -132,7 +132,8 @@ RANKING = (
     flag("decides", "the limit with the least margin"),
     text("recording", "that answers: of several, nearest to sigma", required=False),
     text("error", "as in error_budget"),
-    number("time", "s", "as in error_budget", required=True),
+    number("time", "s", "as in error_budget; of an outage with trajectory", required=True),
+    text("trajectory", "of an outage of GNSS; null: an error budget", required=False),
     number("at_most", "as in unit", "the limit as it was asked for"),
     number("confidence", "-", "chance of an error within it that was asked for"),
     number("limit", "as in unit", "the same as a standard deviation: the largest allowed"),
@@ -156,6 +157,64 @@ RANKING = (
     *BACKTESTED,
 )
 """The table ``ranking``."""
+
+_SIZES = (
+    ("position", "m", "in the plane"),
+    ("velocity", "m/s", "in the plane"),
+    ("heading", "rad", "about the vertical"),
+)
+
+NAVIGATION = (
+    SENSOR,
+    text("recording", "whose estimates tune the filter"),
+    text("trajectory", "field, car, drone or rest", required=False),
+    number("outage", "s", "length of the outages of GNSS; null: epochs with GNSS"),
+    text(
+        "tuning",
+        "method of the estimate, datasheet, datasheet_misread, times_ten, table_1, overbound, "
+        "or true: the model of the simulated sensor",
+    ),
+    flag("recommended", "the recommended estimate", required=False),
+    text("model", "terms of gyros and of accelerometers in the filter", required=False),
+    count("states", "of the filter, position, velocity and attitude included"),
+    text(
+        "signals",
+        "errors of the sensor: simulated by the truth of its recording, by its estimate, or "
+        "pieces of its log",
+        required=False,
+    ),
+    text("assumed", "of another sensor, as the recording does not have it", required=False),
+    count("runs", "that a row is of"),
+    count("outages", "of this length in all runs"),
+    *(
+        column
+        for name, unit, where in _SIZES
+        for column in (
+            number(name, unit, f"rms of the error {where}, at the end of outages or at all fixes"),
+            number(f"{name}_lower", unit, "lower 95 % limit, by the scatter of the runs"),
+            number(f"{name}_upper", unit, "upper 95 % limit"),
+            number(f"{name}_predicted", unit, "rms that the filter expects"),
+            number(f"{name}_ratio", "-", "rms over that of the true model on the same signals"),
+            number(f"{name}_ratio_lower", "-", "lower 95 % limit"),
+            number(f"{name}_ratio_upper", "-", "upper 95 % limit"),
+        )
+    ),
+    number("nees_inside", "-", "share of epochs with NEES within its 95 % bounds"),
+    number("nees_error", "-", "standard error of that share"),
+    number("nees_position", "-", "likewise of the position alone"),
+    number("nees_velocity", "-", "of the velocity"),
+    number("nees_attitude", "-", "of the attitude"),
+    number("nees_gyro", "-", "of the biases of the gyros; null: the truth is not known"),
+    number("nees_accel", "-", "of the biases of the accelerometers"),
+    flag(
+        "consistent",
+        "that share is 0.93 to 0.97, within its error; null: the runs do not tell",
+        required=False,
+    ),
+    flag("smallest", "of the consistent tunings that with the fewest states", required=False),
+    text("reason", "why there is no such tuning", required=False),
+)
+"""The table ``navigation``."""
 
 NEXT_STEPS = (
     SENSOR,

@@ -96,7 +96,7 @@ def _of_channel(
     listed = [
         (_about(channel, name, limit), _asked(channel, requirement, limit, estimate))
         for name, requirement in requirements.items()
-        for limit in requirement.limits
+        for limit in requirement.by_dead_reckoning
         if (quantity_of(channel), limit.error) in (*_ORDERS, ("gyro", "north"))
     ]
     cuts = {

@@ -59,6 +59,8 @@ def shortlist_rows(
     }
     for name, requirement in requirements.items():
         questions = list(of_requirement(name, requirement))
+        if not questions:
+            continue  # no datasheet tells how a filter navigates
         rows = []
         for sensor, figures in by_sensor.items():
             row = _judged(requirement, questions, sensors[sensor], figures)
@@ -101,7 +103,7 @@ def _judged(
     row |= {
         "best_margin": best[least],
         "worst_margin": worst,
-        "decides": requirement.limits[least].text,
+        "decides": requirement.by_dead_reckoning[least].text,
         "assumed": "; ".join([*assumed, *(f"{name}: not known" for name in unknown)]) or None,
     }
     if not requirement.admits(price_class):

@@ -98,7 +98,7 @@ def standings(
 
 def limit_of(row: Row) -> tuple[Any, ...]:
     """Return what names the limit of a row."""
-    return row["error"], row["time"], row["limit"]
+    return row["error"], row["time"], row["limit"], row.get("trajectory")
 
 
 def _standing(parts: Sequence[Row], devices: Mapping[str, str], usual: Spread | None) -> Standing:

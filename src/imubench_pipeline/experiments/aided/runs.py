@@ -1,0 +1,159 @@
+"""Many runs of a filter, of several tunings on the same signals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.experiments.aided.axis_states import AxisStates, Stacked, stack, steps_of
+from imubench_pipeline.experiments.aided.error_state import run
+from imubench_pipeline.experiments.aided.signals import Signals
+from imubench_pipeline.experiments.aided.strapdown import rotation
+from imubench_pipeline.experiments.aided.trajectories import Trajectory
+from imubench_pipeline.typing import Array
+
+EPOCH = 1.0
+"""From fix to fix, s, as near as samples allow."""
+
+LONGEST_STEP = 0.1
+"""s, over which transition and noise are taken together."""
+
+TILT, HEADING = math.radians(0.5), math.radians(2.0)
+"""Standard deviations of the attitude at the start."""
+
+WARM_UP = 120.0
+"""Time with GNSS before anything is measured, s."""
+
+
+RECOVERY = 40.0
+"""Time with GNSS between two outages, s."""
+
+
+@dataclass(frozen=True)
+class Outage:
+    """No fix of GNSS after ``begin`` for ``length``, s."""
+
+    begin: float
+    length: float
+
+
+def schedule(duration: float, lengths: Sequence[float]) -> list[Outage]:
+    """Return outages of lengths in s, one after the other until a run, in s, ends."""
+    outages: list[Outage] = []
+    begin = WARM_UP
+    while True:
+        for length in lengths:
+            if begin + length > duration:
+                return outages
+            outages.append(Outage(begin, length))
+            begin += length + RECOVERY
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a tuning did, R runs of E fixes.
+
+    Attributes
+    ----------
+    errors, variances : ndarray, shape (R, E, 9)
+    normalised : ndarray, shape (R, E, 6)
+        See `error_state.run`.
+    states : int
+        Of the filter.
+    """
+
+    errors: Array
+    variances: Array
+    normalised: Array
+    states: int
+
+
+class Drive:
+    """A trajectory with outages, on which tunings are run."""
+
+    def __init__(self, trajectory: Trajectory, outages: Sequence[Outage]) -> None:
+        self.trajectory, self.outages = trajectory, outages
+        rate = trajectory.sampling
+        self.every = max(round(rate * EPOCH), 1)
+        self.width, self.steps = steps_of(self.every, math.ceil(rate * LONGEST_STEP))
+        self.at: NDArray[np.int64] = np.arange(self.every, len(trajectory.rate) + 1, self.every)
+        self.times = self.at / rate
+        self.available = np.ones(len(self.at), dtype=np.bool_)
+        for outage in outages:
+            since = self.times - outage.begin
+            self.available[(since > 1e-9) & (since < outage.length + 1e-9)] = False
+        gnss = trajectory.gnss
+        self._spread = gnss.spread
+        sigmas = np.array([*self._spread[:6], TILT, TILT, min(HEADING, gnss.heading)])
+        self._start = np.diag(sigmas**2)
+        self._sigmas = sigmas
+
+    def stacked(self, axes: Sequence[AxisStates]) -> Stacked:
+        """Return the states of six axes over the steps of this drive."""
+        return stack(axes, self.trajectory.sampling, self.width, self.steps)
+
+    def filter(self, stacked: Stacked, signals: Signals) -> tuple[Array, Array, Array, Array]:
+        """Run the filter once; see `error_state.run` for what it returns."""
+        way = self.trajectory
+        off = self._sigmas * signals.start
+        turn, C = np.empty((3, 3)), way.attitude[0]
+        rotation(-off[6], -off[7], -off[8], turn)
+        return run(
+            signals.rate,
+            signals.force,
+            1.0 / way.sampling,
+            way.earth,
+            signals.fixes,
+            self.available,
+            self._spread,
+            way.position[self.at],
+            way.velocity[self.at],
+            way.attitude[self.at],
+            signals.bias,
+            way.position[0] - off[:3],
+            way.velocity[0] - off[3:6],
+            turn @ C,
+            self._start,
+            stacked.first,
+            stacked.step,
+            stacked.epoch,
+            stacked.noise,
+            stacked.seen,
+            stacked.mixed,
+            stacked.summed,
+            stacked.now,
+            stacked.start,
+            stacked.mean,
+            stacked.scale,
+            stacked.output,
+            self.width,
+        )
+
+    def repeat(
+        self,
+        tunings: Mapping[str, Sequence[AxisStates]],
+        signals: Callable[[int], Signals],
+        runs: int,
+        threads: int = 1,
+    ) -> dict[str, Outcome]:
+        """Run every tuning on the same signals, by the number of the run."""
+        stacked = {name: self.stacked(axes) for name, axes in tunings.items()}
+
+        def once(number: int) -> dict[str, tuple[Array, ...]]:
+            of_run = signals(number)
+            return {name: self.filter(each, of_run)[:3] for name, each in stacked.items()}
+
+        with ThreadPoolExecutor(max(1, threads)) as pool:
+            done = list(pool.map(once, range(runs)))
+        outcomes = {}
+        for name in tunings:
+            errors, variances, normalised = (
+                np.stack([each[name][part] for each in done]) for part in range(3)
+            )
+            outcomes[name] = Outcome(errors, variances, normalised, stacked[name].states)
+        return outcomes

@@ -1,0 +1,197 @@
+"""The strapdown mechanisation, and its inverse: motion from inertial samples, and the other way.
+
+The frame is that of the plane which touches the Earth where a drive begins: x north, y east, z
+down, turning with the Earth. In it
+
+    p' = v,    v' = C f + g(p) - 2 w_ie x v,    C' = C [w x] - [w_ie x] C,
+
+with C from the axes of the sensor to the frame, f the specific force and w the rate that it senses.
+Gravity points to the centre of the Earth and falls off with height, to first order of the way, so
+that there is Schuler feedback; a drive of some 10 km is well within that.
+
+A sample is the mean of w and f over the interval that it ends, as of an integrating sensor. In an
+interval the mechanisation is of second order, and `inverse` is exactly its inverse: what it gives,
+`mechanise` takes back to rounding. So an error of navigation is one of sensors, GNSS or the start.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
+from imubench_pipeline.typing import Array
+
+EARTH_RADIUS = 6371000.0
+"""Mean, m."""
+
+GRADIENT = STANDARD_GRAVITY / EARTH_RADIUS
+"""1/s^2: gravity changes by so much a metre, sideways; twice that downwards."""
+
+
+def earth_rate_at(latitude: float) -> Array:
+    """Return the Earth's rate in the frame, rad/s, shape (3,), at a latitude in rad."""
+    return EARTH_RATE * np.array([math.cos(latitude), 0.0, -math.sin(latitude)])
+
+
+@njit(cache=True, nogil=True)
+def rotation(x: float, y: float, z: float, into: Array) -> None:
+    """Write the matrix of a turn by a vector in rad, shape (3, 3): exp([r x])."""
+    square = x * x + y * y + z * z
+    if square > 1e-8:
+        angle = math.sqrt(square)
+        s, c = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
+    else:
+        s, c = 1.0 - square / 6.0, 0.5 - square / 24.0
+    into[0, 0], into[1, 1], into[2, 2] = (
+        1.0 - c * (y * y + z * z),
+        1.0 - c * (x * x + z * z),
+        1.0 - c * (x * x + y * y),
+    )
+    into[0, 1], into[1, 0] = c * x * y - s * z, c * x * y + s * z
+    into[0, 2], into[2, 0] = c * x * z + s * y, c * x * z - s * y
+    into[1, 2], into[2, 1] = c * y * z - s * x, c * y * z + s * x
+
+
+@njit(cache=True, nogil=True)
+def multiply(a: Array, b: Array, into: Array) -> None:
+    """Write the product of two matrices, shapes (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            into[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
+
+
+@njit(cache=True, nogil=True)
+def step(
+    p: Array, v: Array, C: Array, w: Array, f: Array, T: float, earth: Array, room: Array
+) -> None:
+    """Go on by a sampling interval; p, v, C are changed in place.
+
+    Parameters
+    ----------
+    p, v, w, f : ndarray, shape (3,)
+        m, m/s, rad/s, m/s^2.
+    C : ndarray, shape (3, 3)
+    T : float
+        s.
+    earth : ndarray, shape (3,)
+        w_ie, rad/s.
+    room : ndarray, shape (4, 3, 3)
+        Room to work in; [3, 0] is left with the specific force in the frame.
+    """
+    middle, half, other = room[0], room[1], room[2]
+    force, back = room[3, 0], -0.5 * T
+    rotation(0.5 * T * w[0], 0.5 * T * w[1], 0.5 * T * w[2], half)
+    multiply(C, half, other)
+    rotation(back * earth[0], back * earth[1], back * earth[2], C)
+    multiply(C, other, middle)
+    multiply(middle, half, other)
+    half[:] = C
+    multiply(half, other, C)
+    for i in range(3):
+        force[i] = middle[i, 0] * f[0] + middle[i, 1] * f[1] + middle[i, 2] * f[2]
+    ax = force[0] - GRADIENT * p[0] - 2.0 * (earth[1] * v[2] - earth[2] * v[1])
+    ay = force[1] - GRADIENT * p[1] - 2.0 * (earth[2] * v[0] - earth[0] * v[2])
+    az = force[2] + (STANDARD_GRAVITY + 2.0 * GRADIENT * p[2])
+    az -= 2.0 * (earth[0] * v[1] - earth[1] * v[0])
+    p[0] += T * (v[0] + 0.5 * T * ax)
+    p[1] += T * (v[1] + 0.5 * T * ay)
+    p[2] += T * (v[2] + 0.5 * T * az)
+    v[0] += T * ax
+    v[1] += T * ay
+    v[2] += T * az
+
+
+@njit(cache=True, nogil=True)
+def mechanise(
+    p: Array, v: Array, C: Array, rate: Array, force: Array, T: float, earth: Array
+) -> tuple[Array, Array, Array]:
+    """Return position, velocity and attitude from samples, the first being the start.
+
+    Parameters
+    ----------
+    p, v : ndarray, shape (3,)
+    C : ndarray, shape (3, 3)
+        The start.
+    rate, force : ndarray, shape (L, 3)
+        rad/s and m/s^2.
+    T : float
+        s.
+    earth : ndarray, shape (3,)
+
+    Returns
+    -------
+    tuple of ndarray, shapes (L + 1, 3), (L + 1, 3), (L + 1, 3, 3)
+    """
+    L = len(rate)
+    ps, vs, Cs = np.empty((L + 1, 3)), np.empty((L + 1, 3)), np.empty((L + 1, 3, 3))
+    ps[0], vs[0], Cs[0] = p, v, C
+    here, speed, attitude = p.copy(), v.copy(), C.copy()
+    room = np.empty((4, 3, 3))
+    for k in range(L):
+        step(here, speed, attitude, rate[k], force[k], T, earth, room)
+        ps[k + 1], vs[k + 1], Cs[k + 1] = here, speed, attitude
+    return ps, vs, Cs
+
+
+@njit(cache=True, nogil=True)
+def turn_between(C: Array, after: Array, into: Array) -> None:
+    """Write the vector in rad by which a matrix is turned to another one: log(C^T after)."""
+    trace = x = y = z = 0.0
+    for i in range(3):
+        trace += C[i, 0] * after[i, 0] + C[i, 1] * after[i, 1] + C[i, 2] * after[i, 2]
+        x += C[i, 2] * after[i, 1] - C[i, 1] * after[i, 2]
+        y += C[i, 0] * after[i, 2] - C[i, 2] * after[i, 0]
+        z += C[i, 1] * after[i, 0] - C[i, 0] * after[i, 1]
+    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
+    angle = math.atan2(sine, 0.5 * (trace - 1.0))
+    scale = 0.5 * (angle / sine if sine > 1e-12 else 1.0)
+    into[0], into[1], into[2] = scale * x, scale * y, scale * z
+
+
+@njit(cache=True, nogil=True)
+def inverse(
+    start: Array, velocity: Array, attitude: Array, T: float, earth: Array
+) -> tuple[Array, Array, Array]:
+    """Return the positions, and the samples of ideal sensors that lead through them.
+
+    Parameters
+    ----------
+    start : ndarray, shape (3,)
+        m.
+    velocity : ndarray, shape (L + 1, 3)
+    attitude : ndarray, shape (L + 1, 3, 3)
+    T : float
+        s.
+    earth : ndarray, shape (3,)
+
+    Returns
+    -------
+    position, rate, force : ndarray, shapes (L + 1, 3), (L, 3), (L, 3)
+    """
+    L = len(velocity) - 1
+    position, rate, force = np.empty((L + 1, 3)), np.empty((L, 3)), np.empty((L, 3))
+    position[0] = start
+    back, on, half, middle, lifted = np.empty((5, 3, 3))
+    rotation(T * earth[0], T * earth[1], T * earth[2], back)
+    rotation(-0.5 * T * earth[0], -0.5 * T * earth[1], -0.5 * T * earth[2], on)
+    for k in range(L):
+        multiply(back, attitude[k + 1], lifted)  # without the turn of the Earth
+        turn_between(attitude[k], lifted, rate[k])
+        x, y, z = rate[k] * 0.5
+        rotation(x, y, z, half)
+        multiply(attitude[k], half, lifted)
+        multiply(on, lifted, middle)
+        v, p = velocity[k], position[k]
+        a = (velocity[k + 1] - v) / T
+        a[0] += GRADIENT * p[0] + 2.0 * (earth[1] * v[2] - earth[2] * v[1])
+        a[1] += GRADIENT * p[1] + 2.0 * (earth[2] * v[0] - earth[0] * v[2])
+        a[2] += 2.0 * (earth[0] * v[1] - earth[1] * v[0])
+        a[2] -= STANDARD_GRAVITY + 2.0 * GRADIENT * p[2]
+        for i in range(3):
+            force[k, i] = middle[0, i] * a[0] + middle[1, i] * a[1] + middle[2, i] * a[2]
+        position[k + 1] = p + 0.5 * T * (v + velocity[k + 1])
+        rate[k] /= T
+    return position, rate, force

@@ -1,0 +1,202 @@
+"""True motion: a robot on rows and headlands, a car, a drone, and a vehicle at rest.
+
+Speed, course and climb are sequences of stretches, rounded by a window of a second and more, so
+that specific force and rates are smooth. A wheeled vehicle rolls and pitches with the ground, a
+drone leans into its turns. From velocity and attitude the samples of ideal sensors follow by the
+inverse mechanisation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.experiments.aided.strapdown import earth_rate_at, inverse
+from imubench_pipeline.typing import Array
+
+LATITUDE = math.radians(45.0)
+
+
+@dataclass(frozen=True)
+class Gnss:
+    """What a receiver gives each second: standard deviations of white errors.
+
+    Attributes
+    ----------
+    position, velocity : float
+        Of one axis, m and m/s.
+    heading : float
+        rad; infinite: it has one antenna, and gives none.
+    """
+
+    position: float
+    velocity: float
+    heading: float = math.inf
+
+    @property
+    def spread(self) -> Array:
+        """Those of position, velocity and heading, shape (7,)."""
+        return np.array([*[self.position] * 3, *[self.velocity] * 3, self.heading])
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """True motion at a rate in Hz, and the samples of ideal sensors.
+
+    Attributes
+    ----------
+    position, velocity : ndarray, shape (L + 1, 3)
+        North, east, down; m and m/s.
+    attitude : ndarray, shape (L + 1, 3, 3)
+        From the axes of the sensor (ahead, right, down) to north, east, down.
+    rate, force : ndarray, shape (L, 3)
+        rad/s and m/s^2: means over the intervals between.
+    sampling : float
+        Hz.
+    earth : ndarray, shape (3,)
+        The Earth's rate, rad/s.
+    gnss : Gnss
+    """
+
+    position: Array
+    velocity: Array
+    attitude: Array
+    rate: Array
+    force: Array
+    sampling: float
+    earth: Array
+    gnss: Gnss
+
+
+_RTK = Gnss(0.02, 0.03)
+_STANDALONE = Gnss(1.5, 0.1)
+_TWO_ANTENNAS = Gnss(1.5, 0.1, math.radians(0.5))
+"""At rest nothing else tells the heading. Without it a filter that is linearised on its estimate
+takes the drift of its heading for a turn, by which biases could be told from tilt: it is far too
+sure."""
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Speed, course, climb, roll and pitch at each sample."""
+
+    speed: Array
+    course: Array
+    climb: Array
+    roll: Array
+    pitch: Array
+
+
+def _sequence(
+    time: Array, stretches: Sequence[tuple[float, float]], window: float, sampling: float
+) -> Array:
+    """Return values held for a time in s each, over and over, rounded by a window in s."""
+    ends = np.cumsum([length for length, _ in stretches])
+    values = np.array([value for _, value in stretches])
+    held = values[np.minimum(np.searchsorted(ends, time % ends[-1], "right"), len(values) - 1)]
+    shape = np.hanning(max(round(window * sampling), 1) + 2)[1:-1]
+    padded = np.concatenate([np.full(len(shape), held[0]), held, np.full(len(shape), held[-1])])
+    return np.convolve(padded, shape / shape.sum(), "same")[len(shape) : -len(shape)]
+
+
+def _ground(time: Array, size: float, moving: Array) -> tuple[Array, Array]:
+    """Return roll and pitch of rough ground, rad, as far as the vehicle moves."""
+    roll = np.sin(2.0 * math.pi * 0.37 * time) + 0.6 * np.sin(2.0 * math.pi * 0.83 * time + 1.0)
+    pitch = np.sin(2.0 * math.pi * 0.29 * time + 2.0) + 0.6 * np.sin(2.0 * math.pi * 0.71 * time)
+    return size * moving * roll, size * moving * pitch
+
+
+def _field(time: Array, sampling: float) -> _Motion:
+    """1.5 m/s along rows of 45 m, half a turn of 2 m radius on each headland, left and right."""
+    turn = math.pi / 6.0
+    rate = _sequence(time, [(30.0, 0.0), (6.0, turn), (30.0, 0.0), (6.0, -turn)], 2.0, sampling)
+    speed = _sequence(time, [(29.0, 1.5), (8.0, 1.0), (28.0, 1.5), (7.0, 1.0)], 2.0, sampling)
+    rolled, pitched = _ground(time, math.radians(1.5), speed / 1.5)
+    return _Motion(speed, np.cumsum(rate) / sampling, np.zeros_like(time), rolled, pitched)
+
+
+def _car(time: Array, sampling: float) -> _Motion:
+    """Streets: up to 14 m/s, turns by 90 degrees, stops at lights."""
+    quarter = math.pi / 2.0 / 5.0
+    speed = _sequence(
+        time,
+        [(18.0, 12.0), (7.0, 5.0), (22.0, 14.0), (8.0, 0.0), (20.0, 13.0), (7.0, 5.0), (10.0, 9.0)],
+        4.0,
+        sampling,
+    )
+    turns = [(19.0, 0.0), (5.0, quarter), (45.0, 0.0), (6.5, 0.0), (5.0, -quarter), (11.5, 0.0)]
+    rate = _sequence(time, turns, 2.0, sampling) * np.minimum(speed / 4.0, 1.0)
+    rolled, pitched = _ground(time, math.radians(0.4), np.minimum(speed / 5.0, 1.0))
+    return _Motion(speed, np.cumsum(rate) / sampling, np.zeros_like(time), rolled, pitched)
+
+
+def _drone(time: Array, sampling: float) -> _Motion:
+    """Eights of 8 m/s with climbs and descents, leaning into the turns."""
+    speed = _sequence(time, [(40.0, 8.0), (10.0, 4.0)], 4.0, sampling)
+    rate = _sequence(time, [(12.0, 0.5), (5.0, 0.0), (12.0, -0.5), (5.0, 0.0)], 3.0, sampling)
+    climb = _sequence(time, [(20.0, 0.0), (8.0, 1.5), (20.0, 0.0), (8.0, -1.5)], 3.0, sampling)
+    roll = np.arctan(speed * rate / STANDARD_GRAVITY)
+    pitch = -np.arctan(np.gradient(speed, 1.0 / sampling) / STANDARD_GRAVITY)
+    return _Motion(speed, np.cumsum(rate) / sampling, climb, roll, pitch)
+
+
+def _rest(time: Array, sampling: float) -> _Motion:
+    """Nothing moves."""
+    none = np.zeros_like(time)
+    return _Motion(none, none, none, none, none)
+
+
+_MOTIONS: Mapping[str, tuple[Callable[[Array, float], _Motion], Gnss]] = {
+    "field": (_field, _RTK),
+    "car": (_car, _STANDALONE),
+    "drone": (_drone, _STANDALONE),
+    "rest": (_rest, _TWO_ANTENNAS),
+}
+
+NAMES = tuple(_MOTIONS)
+"""What a trajectory may be called."""
+
+
+def trajectory(
+    name: str, duration: float, sampling: float, latitude: float = LATITUDE
+) -> Trajectory:
+    """Return a trajectory of a length in s at a rate in Hz, at a latitude in rad.
+
+    Raises
+    ------
+    ValueError
+        If there is none of that name.
+    """
+    if name not in _MOTIONS:
+        raise ValueError(f"trajectory {name!r}, expected one of {', '.join(NAMES)}")
+    moves, gnss = _MOTIONS[name]
+    time = np.arange(round(duration * sampling) + 1) / sampling
+    motion = moves(time, sampling)
+    velocity = np.column_stack(
+        [motion.speed * np.cos(motion.course), motion.speed * np.sin(motion.course), -motion.climb]
+    )
+    attitude = attitudes(motion.roll, motion.pitch, motion.course)
+    earth = earth_rate_at(latitude)
+    position, rate, force = inverse(np.zeros(3), velocity, attitude, 1.0 / sampling, earth)
+    return Trajectory(position, velocity, attitude, rate, force, sampling, earth, gnss)
+
+
+def attitudes(roll: Array, pitch: Array, heading: Array) -> Array:
+    """Return the matrices of angles in rad, shape (L, 3, 3): heading, then pitch, then roll."""
+    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    sh, ch = np.sin(heading), np.cos(heading)
+    rows = [
+        [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
+        [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0))
+
+
+def headings(attitude: Array) -> Array:
+    """Return the headings of matrices in rad, shape (L,)."""
+    return np.arctan2(attitude[:, 1, 0], attitude[:, 0, 0])

@@ -1,0 +1,182 @@
+"""The page that says how sensors navigate, and whether it matters how a filter is tuned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.report.words import counted
+from imubench_pipeline.typing import Row
+
+TUNINGS = {
+    "true": "true model",
+    "datasheet": "datasheet",
+    "datasheet_misread": "datasheet misread",
+    "times_ten": "ten times the estimate",
+    "table_1": "read by the authors",
+    "overbound": "overbound",
+    "curve": "curve",
+    "paper": "weights of the paper",
+    "weighted": "weighted",
+    "likelihood": "likelihood",
+    "likelihood_gm": "likelihood of the papers’ model",
+    "compensated": "temperature taken out",
+}
+"""What the page calls each tuning."""
+
+_SIGNALS = {
+    "truth": "simulated from the truth",
+    "estimate": "simulated from the estimate",
+    "log": "pieces of the log",
+}
+
+_MATTERS = 1.1
+"""Times the error of the true model from which a tuning matters, surely so."""
+
+
+def _context(site: Site) -> dict[str, Any]:
+    rows = site.rows("navigation")
+    shown = [row for row in rows if row["position"] is not None]
+    return {
+        "answers": list(answers(shown)),
+        "ranking": list(ranking(shown)),
+        "lines": [line_of(row) for row in shown],
+        "lacking": [
+            dict(row) | {"tuning": TUNINGS[row["tuning"]]} for row in rows if row["reason"]
+        ],
+        "filters": {
+            "trajectory": list(dict.fromkeys(row["trajectory"] for row in shown)),
+            "outage": list(dict.fromkeys(_outage(row) for row in shown)),
+            "tuning": list(dict.fromkeys(TUNINGS[row["tuning"]] for row in shown)),
+            "sensor": list(dict.fromkeys(site.names[row["sensor"]] for row in shown)),
+        },
+    }
+
+
+NAVIGATION = Entry(
+    file="navigation.html",
+    title="Navigation",
+    context=_context,
+    tables=("navigation",),
+    exists=lambda site: site.navigated,
+)
+"""The page of filters that were tuned by what is known of the sensors."""
+
+
+def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield, for each sensor, trajectory and kind of signals, whether the tuning matters.
+
+    By the position after the longest outage, over that of the true model on the same signals.
+    """
+    for key, own in _grouped(rows, "sensor", "trajectory", "signals"):
+        longest = max(row["outage"] or 0.0 for row in own)
+        last = [row for row in own if row["outage"] == longest and row["tuning"] != "true"]
+        told = [row for row in last if row["position_ratio"] is not None]
+        if not told:
+            continue
+        worse = [row for row in told if row["position_ratio_lower"] > _MATTERS]
+        sure = [row for row in told if row["position_ratio_upper"] < _MATTERS]
+        open_ones = [row for row in told if row not in worse and row not in sure]
+        smallest = next((row for row in own if row["smallest"]), None)
+        yield dict(zip(("sensor", "trajectory", "signals"), key, strict=True)) | {
+            "runs": own[0]["runs"],
+            "words": _SIGNALS[key[2]],
+            "outage": f"{number_text(longest)} s",
+            "matters": _matters(worse, sure, open_ones),
+            "smallest": None
+            if smallest is None
+            else f"{TUNINGS[smallest['tuning']]}, {smallest['states']} states",
+            "dishonest": _dishonest(own),
+        }
+
+
+def _matters(worse: Sequence[Row], sure: Sequence[Row], open_ones: Sequence[Row]) -> str:
+    parts = []
+    if worse:
+        by = ", ".join(
+            f"{TUNINGS[row['tuning']]} {number_text(row['position_ratio'], 3)} times"
+            for row in worse
+        )
+        parts.append(f"It matters: {by} the error of the true model")
+    if sure:
+        names = ", ".join(TUNINGS[row["tuning"]] for row in sure)
+        parts.append(f"no difference of a tenth: {names}")
+    if open_ones:
+        names = ", ".join(TUNINGS[row["tuning"]] for row in open_ones)
+        parts.append(f"these runs do not tell of {names}")
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _dishonest(rows: Sequence[Row]) -> str | None:
+    """Return which tunings are surely not as sure as they claim."""
+    names = dict.fromkeys(TUNINGS[row["tuning"]] for row in rows if row["consistent"] is False)
+    return ", ".join(names) or None
+
+
+def ranking(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield the sensors by the position after the longest outage, tuned as is recommended."""
+    for (trajectory,), own in _grouped(rows, "trajectory"):
+        chosen = [row for row in own if row["recommended"] and row["signals"] != "log"]
+        longest = max((row["outage"] or 0.0 for row in chosen), default=0.0)
+        last = sorted(
+            (row for row in chosen if row["outage"] == longest), key=lambda row: row["position"]
+        )
+        for place, row in enumerate(last, start=1):
+            ties = [
+                other["sensor"]
+                for other in last
+                if other is not row
+                and other["position_lower"] <= row["position_upper"]
+                and row["position_lower"] <= other["position_upper"]
+            ]
+            yield line_of(row) | {"place": place, "ties": ties, "trajectory": trajectory}
+
+
+def line_of(row: Row) -> dict[str, Any]:
+    """Return a row as the page shows it."""
+    inside, error = row["nees_inside"], row["nees_error"]
+    return {
+        **{name: row[name] for name in ("sensor", "trajectory", "states", "model", "assumed")},
+        "outage": _outage(row),
+        "seconds": row["outage"] or 0.0,
+        "signals": _SIGNALS[row["signals"]],
+        "tuning": TUNINGS[row["tuning"]],
+        "recommended": row["recommended"],
+        "position": row["position"],
+        "position_text": _figure(row, "position", 1.0),
+        "ratio": row["position_ratio"],
+        "ratio_text": _figure(row, "position_ratio", 1.0),
+        "velocity_text": _figure(row, "velocity", 1.0),
+        "heading_text": _figure(row, "heading", 180.0 / math.pi),
+        "expected": number_text(row["position_predicted"], 3),
+        "inside": None if inside is None else 100.0 * inside,
+        "inside_text": ""
+        if inside is None or error is None
+        else f"{number_text(100.0 * inside, 3)} ± {number_text(100.0 * error, 2)} %",
+        "consistent": row["consistent"],
+        "of": counted(row["outages"], "outage", "outages") if row["outage"] else "",
+    }
+
+
+def _outage(row: Row) -> str:
+    return "none" if row["outage"] is None else f"{number_text(row['outage'])} s"
+
+
+def _figure(row: Row, name: str, factor: float) -> str:
+    if row[name] is None:
+        return "–"
+    value, low, high = (
+        number_text(factor * row[f"{name}{end}"], 3) for end in ("", "_lower", "_upper")
+    )
+    return value if low == high else f"{value} ({low} to {high})"
+
+
+def _grouped(rows: Sequence[Row], *names: str) -> Iterator[tuple[tuple[str, ...], list[Row]]]:
+    groups: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[name] for name in names), []).append(row)
+    yield from groups.items()

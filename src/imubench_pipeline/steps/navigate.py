@@ -1,0 +1,387 @@
+"""Run filters tuned by all that is known of a sensor on simulated drives, with outages of GNSS.
+
+Their signals are simulated with the true model of a simulated recording, low-pass and register
+included, or, of a measured one, with the model that was found of it; or they are pieces of the log
+itself, where it is long enough.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.experiments.aided.axis_states import AxisStates, axis_states
+from imubench_pipeline.experiments.aided.error_state import GROUPS
+from imubench_pipeline.experiments.aided.measures import (
+    ERRORS,
+    Share,
+    inside,
+    predicted,
+    ratio,
+    root_mean_square,
+    squares,
+)
+from imubench_pipeline.experiments.aided.runs import (
+    EPOCH,
+    RECOVERY,
+    WARM_UP,
+    Drive,
+    Outcome,
+    schedule,
+)
+from imubench_pipeline.experiments.aided.signals import Signals, Spreads, signals
+from imubench_pipeline.experiments.aided.trajectories import trajectory
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.recordings.kept import kept_static_logs
+from imubench_pipeline.settings.config import NavigateSettings
+from imubench_pipeline.settings.requirements import Trajectory
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.simulate.model import SensorModel, before_the_filter, in_the_log
+from imubench_pipeline.simulate.models import imu_model
+from imubench_pipeline.steps.noise_source import static_recordings
+from imubench_pipeline.steps.tunings import TRUE, Models, all_axes, scaled, tunings
+from imubench_pipeline.tables import read
+from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.units import difference_to_si, quantity_to_si
+
+_FEWEST_PIECES = 4
+"""Runs that a log must be long enough for."""
+
+_TOLERANCE = 0.02
+"""How far from 0.95 the share of a consistent filter may be, beside twice its standard error; one
+that is off by three times that is not consistent."""
+
+
+_MOST_UNSURE = 0.03
+"""Standard error of the share from which runs are too few to tell."""
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What the sensors of a run give, and how they came to it."""
+
+    words: str  # truth, estimate or log
+    sampling: float  # Hz
+    runs: int
+    of_run: Callable[[Drive, str, int], Signals]
+    true: Models | None
+
+
+def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Row]:
+    """Yield the rows of the table ``navigation`` of a sensor.
+
+    Of the longest of its static recordings that can be used, in ``folders``; `settings`: of
+    `imubench_pipeline.run.plan.Plan.navigate_settings`.
+    """
+    sections = json.loads(settings)
+    how = _with(NavigateSettings.model_validate(sections["navigate"]), sections["asked"])
+    declared = Sensor.model_validate(sections["sensor"]) if sections["sensor"] else None
+    truths = {
+        entry.recording: entry
+        for entry in map(SimulatedRecording.model_validate, sections["truths"])
+    }
+    # A measured recording before a simulated one, the longest of several.
+    for about, folder in static_recordings(folders, lambda row: (row["simulated"],)):
+        best = recommended_estimates(folder / "parameters.parquet")
+        fitted = {name: scaled(each.model, 1.0) for name, each in best.items()}
+        if not fitted:
+            continue
+        names = {"sensor": sensor, "recording": about["recording"]}
+        stand_in = _stand_in(fitted, how)
+        fitted |= stand_in
+        if all_axes(fitted) is None:
+            lacking = "the recording tells no white noise of a gyro"
+            for course in how.trajectories:
+                yield names | {"trajectory": course, "tuning": TRUE, "reason": lacking}
+            return
+        longest = max(quantity_to_si(length, "time") for length in how.outages)
+        tuned, lacking_of = tunings(folder, sensor, declared, longest, stand_in)
+        truth = truths.get(about["recording"])
+        methods = [each.method for each in best.values()]
+        chosen = max(sorted(set(methods)), key=methods.count)
+        for source in _sources(folder, about, fitted, stand_in, truth, how):
+            for row in _rows(names, how, source, tuned, lacking_of):
+                yield row | {
+                    "recommended": row["tuning"] == chosen,
+                    "assumed": f"accelerometers: {how.accel_noise}" if stand_in else None,
+                }
+        return
+
+
+def _with(how: NavigateSettings, asked: Sequence[tuple[Trajectory, str]]) -> NavigateSettings:
+    """Return settings with what requirements ask for, and runs that are long enough for it."""
+    lengths = {quantity_to_si(length, "time"): length for length in how.outages}
+    for _, length in asked:
+        lengths.setdefault(quantity_to_si(length, "time"), length)
+    courses = dict.fromkeys([*how.trajectories, *(course for course, _ in asked)])
+    least = WARM_UP + sum(lengths) + RECOVERY * (len(lengths) - 1) + EPOCH
+    longer = max(quantity_to_si(how.duration, "time"), least)
+    return how.model_copy(
+        update={
+            "outages": tuple(lengths.values()),
+            "trajectories": tuple(courses),
+            "duration": f"{longer!r} s",
+        }
+    )
+
+
+def _stand_in(fitted: Models, how: NavigateSettings) -> Models:
+    """Return the accelerometers that stand in where a log has none that tells its noise."""
+    if any(quantity_of(name) == "accel" and model.N > 0.0 for name, model in fitted.items()):
+        return {}
+    return {"accel_x": NoiseModel(N=quantity_to_si(how.accel_noise, "accel_density"))}
+
+
+def _sources(
+    folder: Path,
+    about: Mapping[str, Any],
+    fitted: Models,
+    stand_in: Models,
+    truth: SimulatedRecording | None,
+    how: NavigateSettings,
+) -> Iterator[_Source]:
+    """Yield where signals may come from: the simulator, and a log that is no simulation."""
+    logged = float(about["rate"])
+    block = _block(logged, how)
+    spreads = _spreads(how)
+    known = truth is not None and truth.specimens is None
+    if known and truth is not None:
+        axes = {str(name): model for name, model in imu_model(truth.channels, truth).axes.items()}
+    else:
+        axes = {
+            channel: _in_front(folder, channel, noise, logged) for channel, noise in fitted.items()
+        }
+    axes |= {channel: SensorModel(noise=noise) for channel, noise in stand_in.items()}
+    axes = {channel: replace(model, bias=0.0, scale_error=0.0) for channel, model in axes.items()}
+    whole = _all_models(axes)
+    true = {
+        channel: replace(model.noise, N=in_the_log(model, logged))
+        for channel, model in whole.items()
+    }
+    change = (
+        difference_to_si(how.temperature_change, "temperature") if how.temperature_change else 0.0
+    )
+
+    def simulated(drive: Drive, course: str, number: int) -> Signals:
+        samples, reference = len(drive.trajectory.rate) * block, _reference(whole)
+        return signals(
+            drive.trajectory,
+            whole,
+            spreads,
+            drive.every,
+            how.seed,
+            (about["sensor"], about["recording"], course, str(number)),
+            block=block,
+            temperature=(
+                (lambda start, stop: reference + change * np.arange(start, stop) / samples)
+                if change
+                else None
+            ),
+        )
+
+    sampling = logged / block
+    yield _Source("truth" if known else "estimate", sampling, how.runs, simulated, true)
+    if not about["simulated"]:
+        pieces = _pieces(folder, block, round(quantity_to_si(how.duration, "time") * sampling))
+        if len(pieces) >= _FEWEST_PIECES:
+
+            def of_log(drive: Drive, course: str, number: int) -> Signals:
+                return signals(
+                    drive.trajectory,
+                    whole,
+                    spreads,
+                    drive.every,
+                    how.seed,
+                    (about["sensor"], about["recording"], course, f"log {number}"),
+                    added=pieces[number],
+                )
+
+            yield _Source("log", sampling, min(len(pieces), how.runs), of_log, None)
+
+
+def _spreads(how: NavigateSettings) -> Spreads:
+    return Spreads(
+        quantity_to_si(how.gyro_bias, "angular_rate"),
+        quantity_to_si(how.accel_bias, "acceleration"),
+        how.gyro_scale,
+        how.accel_scale,
+    )
+
+
+def _all_models(axes: Mapping[str, SensorModel]) -> dict[str, SensorModel]:
+    """Return models of all six channels, as `all_axes`."""
+    whole = {}
+    for channel in CHANNELS:
+        own = [name for name in axes if quantity_of(name) == quantity_of(channel)]
+        whole[channel] = axes[
+            channel if channel in own else own["xyz".index(channel[-1]) % len(own)]
+        ]
+    return whole
+
+
+def _reference(axes: Mapping[str, SensorModel]) -> float:
+    return next((m.drift.reference for m in axes.values() if m.drift is not None), 25.0)
+
+
+def _in_front(folder: Path, channel: str, noise: NoiseModel, rate: float) -> SensorModel:
+    """Return the model of an axis that was found of a log at a rate in Hz, with its low-pass."""
+    rows = {
+        row["parameter"]: row
+        for row in read("low_pass", [folder / "low_pass.parquet"]).to_pylist()
+        if row["channel"] == channel
+    }
+    cutoff = rows.get("cutoff") or {"value": None, "order": None}
+    told = cutoff["value"] is not None
+    plain = SensorModel(low_pass=LowPass(cutoff["value"], cutoff["order"]) if told else None)
+    return replace(plain, noise=before_the_filter(plain, noise, rate))
+
+
+def _block(logged: float, how: NavigateSettings) -> int:
+    """Return how many samples of a log at a rate in Hz make one of a filter."""
+    return max(math.ceil(logged / quantity_to_si(how.rate, "frequency") - 1e-6), 1)
+
+
+def _pieces(folder: Path, block: int, size: int) -> list[dict[str, Array]]:
+    """Return pieces of a log of ``size`` means over ``block`` samples, less the mean of the log.
+
+    Those with a hole in a channel lack it.
+    """
+    pieces: list[dict[str, Array]] = []
+    for channel, log in kept_static_logs(folder).items():
+        values = np.concatenate([*log.blocks()])
+        values -= np.nanmean(values)
+        means = values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
+        for number in range(len(means) // size):
+            if number == len(pieces):
+                pieces.append({})
+            piece = means[number * size : (number + 1) * size]
+            if np.isfinite(piece).all():
+                pieces[number][channel] = piece
+    return [piece for piece in pieces if {*map(quantity_of, piece)} == {"gyro", "accel"}]
+
+
+def _rows(
+    names: Mapping[str, str],
+    how: NavigateSettings,
+    source: _Source,
+    tuned: Mapping[str, Models],
+    lacking: Mapping[str, str],
+) -> Iterator[dict[str, Any]]:
+    lengths = [quantity_to_si(length, "time") for length in how.outages]
+    duration = quantity_to_si(how.duration, "time")
+    spreads = _spreads(how)
+    models = dict(tuned) | ({TRUE: source.true} if source.true is not None else {})
+    for course in how.trajectories:
+        drive = Drive(trajectory(course, duration, source.sampling), schedule(duration, lengths))
+        outcomes = drive.repeat(
+            {
+                name: _states(model, source.sampling, spreads, duration)
+                for name, model in models.items()
+            },
+            partial(source.of_run, drive, course),
+            source.runs,
+        )
+        about = dict(names) | {"trajectory": course, "signals": source.words, "runs": source.runs}
+        told = [
+            about | _of_tuning(drive, outcomes, name, length) | {"model": _named(models[name])}
+            for name in models
+            for length in (None, *lengths)
+        ]
+        smallest = _smallest(told)
+        for row in told:
+            yield row | {"smallest": row["tuning"] == smallest}
+        for name, reason in lacking.items():
+            yield about | {"tuning": name, "reason": reason}
+
+
+def _states(models: Models, sampling: float, spreads: Spreads, duration: float) -> list[AxisStates]:
+    return [
+        axis_states(
+            models[channel],
+            sampling,
+            turn_on=spreads.bias(channel),
+            shortest=EPOCH,
+            longest=duration,
+            scale=spreads.scale(channel),
+        )
+        for channel in CHANNELS
+    ]
+
+
+def _named(models: Models) -> str:
+    """Return the terms of the models, of gyros and accelerometers."""
+    return "; ".join(
+        f"{quantity} {', '.join(dict.fromkeys(models[c].name for c in own))}"
+        for quantity in ("gyro", "accel")
+        if (own := [c for c in CHANNELS if quantity_of(c) == quantity])
+    )
+
+
+def _of_tuning(
+    drive: Drive, outcomes: Mapping[str, Outcome], name: str, length: float | None
+) -> dict[str, Any]:
+    """Return what a row says of a tuning, at the end of outages of a length, s, or with fixes."""
+    outcome = outcomes[name]
+    row: dict[str, Any] = {
+        "tuning": name,
+        "outage": length,
+        "outages": sum(o.length == length for o in drive.outages) * len(outcome.errors),
+        "states": outcome.states,
+    }
+    for error in ERRORS:
+        of_runs = squares(drive, outcome, error, length)
+        size = root_mean_square(of_runs)
+        row |= {error: size.value, f"{error}_lower": size.lower, f"{error}_upper": size.upper}
+        row[f"{error}_predicted"] = predicted(drive, outcome, error, length)
+        if TRUE in outcomes:
+            against = ratio(of_runs, squares(drive, outcomes[TRUE], error, length))
+            row |= {
+                f"{error}_ratio": against.value,
+                f"{error}_ratio_lower": against.lower,
+                f"{error}_ratio_upper": against.upper,
+            }
+    for group in GROUPS:
+        share = inside(drive, outcome, group, length)
+        if group != "navigation":
+            row[f"nees_{group}"] = share and share.value
+        elif share is not None:
+            row |= {
+                "nees_inside": share.value,
+                "nees_error": share.error,
+                "consistent": _consistent(share),
+            }
+    return row
+
+
+def _consistent(share: Share) -> bool | None:
+    """Tell whether a share is that of a filter as sure as it may be; None: the runs do not tell."""
+    off = abs(share.value - 0.95)
+    if off > _TOLERANCE + 3.0 * share.error:
+        return False
+    return True if share.error < _MOST_UNSURE and off < _TOLERANCE + 2.0 * share.error else None
+
+
+def _smallest(rows: Sequence[Mapping[str, Any]]) -> str | None:
+    """Return the tuning of the fewest states of those that are consistent in all their rows.
+
+    Of several that one whose position is best after the longest outage. The true model is none.
+    """
+    by_tuning: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        by_tuning.setdefault(row["tuning"], []).append(row)
+    consistent = {
+        name: (own[0]["states"], own[-1]["position"])
+        for name, own in by_tuning.items()
+        if name != TRUE and all(row.get("consistent") for row in own)
+    }
+    return min(consistent, key=lambda name: consistent[name], default=None)

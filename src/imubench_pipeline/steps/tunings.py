@@ -1,0 +1,170 @@
+"""Noise models that a filter may be tuned with, each from what a run knows of a sensor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pyarrow.compute as pc
+
+from imubench_pipeline.datasheets.comparable import comparables
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.export.overbound import overbound
+from imubench_pipeline.export.request import curve_of
+from imubench_pipeline.noise import FLOOR, NoiseModel
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.simulate.from_datasheet import from_datasheet
+from imubench_pipeline.tables import read
+
+Models = dict[str, NoiseModel]
+"""By channel."""
+
+DATASHEET, MISREAD, TENFOLD, TABLE_1, OVERBOUND, TRUE = (
+    "datasheet",
+    "datasheet_misread",
+    "times_ten",
+    "table_1",
+    "overbound",
+    "true",
+)
+"""Tunings beside those that have the name of a method."""
+
+_METHODS = ("curve", "paper", "weighted", "likelihood", "likelihood_gm", "compensated")
+_TEN = 10.0
+
+
+def all_axes(models: Mapping[str, NoiseModel]) -> Models | None:
+    """Return models of all six channels; an axis that is not there has that of the next one.
+
+    None where there are no gyros, no accelerometers, or one of them has no white noise.
+    """
+    usable = {name: model for name, model in models.items() if model.N > 0.0}
+    whole = {}
+    for channel in CHANNELS:
+        own = [name for name in usable if quantity_of(name) == quantity_of(channel)]
+        if not own:
+            return None
+        here = channel if channel in own else own["xyz".index(channel[-1]) % len(own)]
+        whole[channel] = usable[here]
+    return whole
+
+
+def stands_in(channel: str, stand_in: Models) -> bool:
+    """Tell whether a model of another sensor stands for the quantity of a channel."""
+    return any(quantity_of(channel) == quantity_of(other) for other in stand_in)
+
+
+def tunings(
+    folder: Path, sensor: str, declared: Sensor | None, horizon: float, stand_in: Models
+) -> tuple[dict[str, Models], dict[str, str]]:
+    """Return the tunings that a recording and the datasheet of its sensor give, by name.
+
+    And, for those that there are not, the reason. ``horizon``, s, is that of the overbound;
+    ``stand_in`` are models of channels of a quantity that the recording does not have.
+    """
+    every = estimates(folder / "parameters.parquet", folder / "draws.parquet")
+    named: dict[str, Models] = {}
+    lacking: dict[str, str] = {}
+    for name, models in _printed(sensor, declared).items():
+        named[name] = models
+    best = _recommended(folder, every)
+    ten = {channel: scaled(estimate.model, _TEN) for channel, estimate in best.items()}
+    candidates = {TENFOLD: ten, TABLE_1: _by_method(every, "authors")}
+    candidates |= {method: _by_method(every, method) for method in _METHODS}
+    try:
+        candidates[OVERBOUND] = _bounded(folder, best, horizon)
+    except ValueError as error:
+        lacking[OVERBOUND] = str(error)
+    for name, models in candidates.items():
+        if models:
+            named[name] = models
+    found = {}
+    for name, models in named.items():
+        own = {c: m for c, m in models.items() if not stands_in(c, stand_in)}
+        whole = all_axes(own | stand_in)
+        if whole is None:
+            lacking[name] = "it tells no white noise of a gyro or of an accelerometer"
+        else:
+            found[name] = whole
+    return found, lacking
+
+
+def scaled(model: NoiseModel, factor: float) -> NoiseModel:
+    """Return the model of a signal that is a factor larger; a ramp and lines are left out."""
+    return NoiseModel(
+        Q=model.Q * factor,
+        N=model.N * factor,
+        B=model.B * factor,
+        T_B=model.T_B,
+        K=model.K * factor,
+        further=tuple(term.scaled(factor) for term in model.further),
+    )
+
+
+def _recommended(folder: Path, every: Mapping[str, Sequence[Estimate]]) -> dict[str, Estimate]:
+    table = read("parameters", [folder / "parameters.parquet"])
+    rows = table.filter(pc.field("recommended")).select(["channel", "method"]).to_pylist()
+    method = {row["channel"]: row["method"] for row in rows}
+    return {
+        channel: next(each for each in own if each.method == method[channel])
+        for channel, own in every.items()
+        if channel in method
+    }
+
+
+def _by_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Models:
+    """Return what a method tells, without a ramp and lines: no filter expects them to go on."""
+    return {
+        channel: scaled(estimate.model, 1.0)
+        for channel, own in every.items()
+        for estimate in own
+        if estimate.method == method
+    }
+
+
+def _bounded(folder: Path, best: Mapping[str, Estimate], horizon: float) -> Models:
+    """Return the smallest models of white noise and a walk above the curves.
+
+    Raises
+    ------
+    ValueError
+        If there is none for a channel.
+    """
+    table = read("allan", [folder / "allan.parquet"])
+    models = {}
+    for channel, estimate in best.items():
+        curve = curve_of(table.filter(pc.field("channel") == channel).to_pylist())
+        rate = float(curve.cluster_size[0] / curve.tau[0])
+        drawn = estimate.draws
+        many = [drawn.model(number) for number in range(len(drawn))] if drawn is not None else []
+        bound = overbound(
+            curve, estimate.model, rate, horizon=horizon, drawn=many, most_excess=_TEN
+        )
+        models[channel] = bound.model
+    return models
+
+
+def _printed(sensor: str, declared: Sensor | None) -> dict[str, Models]:
+    """Return what the datasheet says, read right, and as 000 reads it."""
+    if declared is None:
+        return {}
+    try:
+        axes = from_datasheet(sensor, declared, 0).imu.axes
+    except ConfigError:
+        return {}
+    right = {channel: model.noise for channel, model in axes.items()}
+    wrong = {}
+    for channel, noise in right.items():
+        halved = any(
+            row.statistic == "N" and row.sidedness == "one-sided" and row.quantity == "N"
+            for row in comparables(declared.datasheet, channel)
+            if row.value == noise.N
+        )
+        # A one-sided density for N, and the lowest point of the curve for B.
+        factor = math.sqrt(2.0) if halved else 1.0
+        wrong[channel] = replace(noise, N=noise.N * factor, B=noise.B * FLOOR)
+    return {DATASHEET: right, MISREAD: wrong}

@@ -1,0 +1,103 @@
+"""What the page of navigation says of tunings and sensors."""
+
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.report.navigated import NAVIGATION, TUNINGS, answers, ranking
+from imubench_pipeline.settings.config import Method
+from imubench_pipeline.tables import build
+from tests.report.tables import joined, recording_rows, site
+
+
+def navigation_row(sensor: str = "imu", **changes: Any) -> dict[str, Any]:
+    """A row of the table, of a tuning that is as good as the true model."""
+    row: dict[str, Any] = {
+        "sensor": sensor, "recording": "day1", "trajectory": "field", "outage": 30.0,
+        "tuning": "likelihood", "recommended": True, "model": "gyro N; accel N", "states": 15,
+        "signals": "truth", "runs": 100, "outages": 200, "nees_inside": 0.95, "nees_error": 0.004,
+        "consistent": True, "smallest": False,
+    }  # fmt: skip
+    for name, size in {"position": 2.0, "velocity": 0.2, "heading": 0.01}.items():
+        row |= {name: size, f"{name}_lower": 0.9 * size, f"{name}_upper": 1.1 * size}
+        row |= {f"{name}_predicted": size}
+        row |= {f"{name}_ratio": 1.0, f"{name}_ratio_lower": 0.98, f"{name}_ratio_upper": 1.02}
+    return row | changes
+
+
+def ratio(value: float, lower: float, upper: float) -> dict[str, float]:
+    return {
+        "position_ratio": value,
+        "position_ratio_lower": lower,
+        "position_ratio_upper": upper,
+    }
+
+
+def rows(*changes: dict[str, Any]) -> list[Any]:
+    return build("navigation", [navigation_row(**one) for one in changes]).to_pylist()
+
+
+def test_a_tuning_matters_where_it_surely_costs_a_tenth() -> None:
+    (answer,) = answers(
+        rows(
+            {"tuning": "true", "recommended": False},
+            {"smallest": True},
+            {"tuning": "times_ten", "recommended": False, **ratio(1.8, 1.5, 2.1)},
+            {"tuning": "curve", "recommended": False, **ratio(1.2, 0.9, 1.5)},
+        )
+    )
+    assert answer["matters"] == (
+        "It matters: ten times the estimate 1.8 times the error of the true model; "
+        "no difference of a tenth: likelihood; these runs do not tell of curve."
+    )
+    assert answer["smallest"] == "likelihood, 15 states"
+    assert answer["dishonest"] is None
+
+
+def test_the_longest_outage_answers_and_a_filter_that_is_wrong_of_itself_is_named() -> None:
+    (answer,) = answers(
+        rows(
+            ratio(3.0, 2.5, 3.5),
+            {"outage": 60.0, "consistent": False, **ratio(1.0, 0.98, 1.05)},
+        )
+    )
+    assert answer["outage"] == "60 s"
+    assert answer["matters"] == "No difference of a tenth: likelihood."
+    assert answer["dishonest"] == "likelihood"
+
+
+def test_sensors_are_ranked_by_the_recommended_tuning_and_overlaps_are_said() -> None:
+    far = {"position": 9.0, "position_lower": 8.0, "position_upper": 10.0}
+    near = {"position": 2.1, "position_lower": 1.9, "position_upper": 2.3}
+    better = {"position": 1.0, "position_lower": 0.9, "position_upper": 1.1}
+    places = list(
+        ranking(
+            rows(
+                {"sensor": "a", **far},
+                {"sensor": "b"},
+                {"sensor": "c", **near},
+                {"sensor": "a", "tuning": "true", "recommended": False, **better},
+                {"sensor": "a", "signals": "log", **better},
+            )
+        )
+    )
+    assert [(one["place"], one["sensor"], one["ties"]) for one in places] == [
+        (1, "b", ["c"]),
+        (2, "c", ["b"]),
+        (3, "a", []),
+    ]
+
+
+def test_every_tuning_has_a_name() -> None:
+    assert set(Method.__args__) <= set(TUNINGS)
+
+
+def test_the_page_is_there_where_something_was_run(tmp_path: Path) -> None:
+    without = site(joined(recording_rows("imu")))
+    assert not NAVIGATION.exists(without)
+    lacking = navigation_row(
+        "imu", tuning="overbound", position=None, reason="no model lies above the curve"
+    )
+    made = site(joined(recording_rows("imu"), {"navigation": [navigation_row("imu"), lacking]}))
+    context = NAVIGATION.page(made).context()
+    assert [line["tuning"] for line in context["lines"]] == ["likelihood"]
+    assert [line["reason"] for line in context["lacking"]] == ["no model lies above the curve"]
