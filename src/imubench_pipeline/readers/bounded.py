@@ -115,8 +115,8 @@ class Bounded(Generic[T]):
         Raises
         ------
         BoundError
-            If that takes more than ``seconds`` from now on, or more memory than it may, or the
-            process is ended by the system.
+            If that takes more than ``seconds`` from now on, or as `bounded` counts them where the
+            machine is busy, or more memory than it may, or the process is ended by the system.
         """
         try:
             answer = _received(self._pipe, seconds, psutil.Process(self._process))

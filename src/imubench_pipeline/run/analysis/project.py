@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -196,5 +197,6 @@ def _what_is_missing(log: Path, inspected: Inspection, keys: Sequence[str]) -> s
         lines.append("or write a sensor file once, for all logs of this sensor:")
     else:
         lines.append("its columns have no names that tell; write a sensor file:")
-    lines.append("  imubench inspect LOG --output mine.yaml, fill it in, then --sensor mine.yaml")
+    command = shlex.join(["imubench", "inspect", str(log), "--output", "mine.yaml"])
+    lines.append(f"  {command}, fill it in, then --sensor mine.yaml")
     return "\n".join(lines)
