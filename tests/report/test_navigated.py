@@ -87,6 +87,17 @@ def test_sensors_are_ranked_by_the_recommended_tuning_and_overlaps_are_said() ->
     ]
 
 
+def test_what_decides_nothing_has_no_place_and_says_why() -> None:
+    sold, apart = (
+        recording_rows(name, decides=not doubts, doubts=doubts)
+        for name, doubts in (("sold", ""), ("fused", "not sold"))
+    )
+    run = {"navigation": [navigation_row("sold"), navigation_row("fused")]}
+    context = NAVIGATION.page(site(joined(sold, apart, run))).context()
+    assert [line["sensor"] for line in context["ranking"]] == ["sold"]
+    assert context["apart"] == {"fused": "day1 does not decide: not sold"}
+
+
 def test_every_tuning_has_a_name() -> None:
     assert set(Method.__args__) <= set(TUNINGS)
 

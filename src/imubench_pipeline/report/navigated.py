@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.words import counted
@@ -40,9 +41,21 @@ _MATTERS = 1.1
 def _context(site: Site) -> dict[str, Any]:
     rows = site.rows("navigation")
     shown = [row for row in rows if row["position"] is not None]
+    recordings = [view.row for view in site.views]
+    apart = left_out(recordings)
+    doubts = {(row["sensor"], row["recording"]): row["doubts"] for row in recordings}
+    deciding = [row for row in shown if (row["sensor"], row["recording"]) not in apart]
     return {
-        "answers": list(answers(shown)),
-        "ranking": list(ranking(shown)),
+        "answers": [
+            answer | {"doubts": doubts.get((answer["sensor"], answer["recording"]))}
+            for answer in answers(shown)
+        ],
+        "ranking": list(ranking(deciding)),
+        "apart": {
+            row["sensor"]: apart[key]
+            for row in shown
+            if (key := (row["sensor"], row["recording"])) in apart
+        },
         "lines": [line_of(row) for row in shown],
         "lacking": [
             dict(row) | {"tuning": TUNINGS[row["tuning"]]} for row in rows if row["reason"]
@@ -82,6 +95,7 @@ def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
         open_ones = [row for row in told if row not in worse and row not in sure]
         smallest = next((row for row in own if row["smallest"]), None)
         yield dict(zip(("sensor", "trajectory", "signals"), key, strict=True)) | {
+            "recording": own[0]["recording"],
             "runs": own[0]["runs"],
             "words": _SIGNALS[key[2]],
             "outage": f"{number_text(longest)} s",
