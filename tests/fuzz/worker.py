@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import os
 import random
 import resource
 import sys
@@ -181,6 +182,10 @@ def main(arguments: list[str]) -> None:
     inputs = [Input.kept(folder) for folder in sorted(given.seeds.iterdir())]
     rng = random.Random(given.seed)
     _Worker(target_of(given.target), given.work, inputs, rng).run(given.seconds)
+    # A reader that stopped half-way leaves threads of Arrow, which may abort while the interpreter
+    # ends: that is the fault of no input.
+    sys.stdout.flush()
+    os._exit(0)
 
 
 if __name__ == "__main__":

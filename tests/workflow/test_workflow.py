@@ -117,6 +117,7 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
     assert "10 recordings of 3 sensors" in page and "4 analysed, 6 rejected" in page
     assert set(project.pages()) == {
         "index.html",
+        "compare.html",
         "recordings.html",
         "datasheets.html",
         "shortlist.html",

@@ -51,7 +51,7 @@ rule navigate:
         **cost(
             OfMany(
                 memory=500,
-                memory_of_each=0.1,
+                memory_of_each=0.2,
                 time=60,
                 time_of_each=0.005,
                 many_jobs=True,
