@@ -15,13 +15,15 @@ HOSTILE = "a <b> & c"
 LINE: dict[str, Any] = {
     "paper": "Maia et al.", "place": "Table 3", "quantity": "RMS of one draw",
     "printed_as": "2,0 °/s", "printed": 0.0349, "found": 0.0698, "lower": 0.0524,
-    "upper": 0.0873, "found_words": HOSTILE, "ratio": 2.0, "unit": "rad/s",
+    "upper": 0.0873, "found_words": HOSTILE, "ratio": 2.0, "tolerance": 0.05,
+    "unit": "rad/s",
     "printed_unit": "°/s", "scale": 0.01745, "basis": "simulated", "verdict": "differs",
     "reason": "one draw ranks nothing", "page": "recordings/mti_7/sim_published.html#gyro_x",
     "check": "tests/test_score.py",
 }  # fmt: skip
 OTHER = LINE | {"place": "Equation 26", "quantity": "sign", "found": None, "ratio": None,
-                "lower": None, "upper": None, "verdict": "misprint", "basis": "checked",
+                "tolerance": None, "lower": None, "upper": None, "verdict": "misprint",
+                "basis": "checked",
                 "reason": "it grows", "page": "nowhere.html"}  # fmt: skip
 PANEL = [
     {"method": "curve", "parameter": "N", "logs": 100, "given": 100, "rmse": 0.002, "bias": 0.0,
@@ -49,7 +51,7 @@ def test_printed_and_found_stand_side_by_side_in_the_unit_of_the_paper(
     page = read["papers.html"]
     (line,) = page.naming("Table 3", "tr")
     for text in ("2,0 °/s", "4 °/s (3 to 5)", HOSTILE, "differs", "one draw ranks nothing",
-                 "tests/test_score.py", "simulated"):  # fmt: skip
+                 "tests/test_score.py", "simulated", "±5 %"):  # fmt: skip
         assert text in line.text
     assert 'href="recordings/mti_7/sim_published.html#gyro_x">Table 3' in page.source
     (line,) = page.naming("Equation 26", "tr")
@@ -84,7 +86,8 @@ def test_the_command_prints_the_table(tmp_path: Path, capsys: Any) -> None:
     write("published", [LINE, OTHER], tmp_path / "tables/published.parquet")
     assert main(["papers", str(tmp_path), "--paper", "maia"]) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    for text in ("Maia et al.", "Table 3", "2,0 °/s", "misprint", "[1] one draw ranks nothing"):
+    for text in ("Maia et al.", "Table 3", "2,0 °/s", "misprint", "[1] one draw ranks nothing",
+                 "2 ±5 %", "± how far from 1 still agrees"):  # fmt: skip
         assert text in printed
     assert main(["papers", str(tmp_path), "--place", "Table 3"]) == 0
     assert "Equation" not in capsys.readouterr().out

@@ -14,7 +14,7 @@ import numpy as np
 
 from imubench_pipeline.typing import Array
 
-_SUREST = 0.02
+SUREST = 0.02
 """Relative error below which a tau counts no more than others: figures are printed with two digits,
 and what counts by its error alone counts at the shortest tau alone."""
 
@@ -61,7 +61,7 @@ def weights(error: Array) -> Array:
     error : ndarray, shape (m,)
         Relative standard error of the measured Allan deviation.
     """
-    weight = 1.0 / (error**2 + _SUREST**2)
+    weight = 1.0 / (error**2 + SUREST**2)
     return np.asarray(weight / weight.sum())
 
 

@@ -148,7 +148,7 @@ def _paper(paper: About, rows: Sequence[Row], there: set[str]) -> dict[str, Any]
 
 
 def cells(row: Row) -> dict[str, str]:
-    """Return what is found and the ratio of a row of ``published``, as texts.
+    """Return what is found, the ratio and its tolerance of a row of ``published``, as texts.
 
     What is found is in the unit of the paper, so that it can be held beside what is printed.
     """
@@ -164,5 +164,8 @@ def cells(row: Row) -> dict[str, str]:
         if lower is not None and upper is not None:
             found += f" ({lower} to {upper})"
     words = "; ".join(filter(None, (found, row["found_words"])))
-    ratio = "–" if row["ratio"] is None else number_text(row["ratio"], 3)
-    return {"found_text": words or "–", "ratio_text": ratio}
+    ratio, tolerance = "–", ""
+    if row["ratio"] is not None:
+        ratio = number_text(row["ratio"], 3)
+        tolerance = f"±{number_text(100.0 * row['tolerance'], 2)} %"
+    return {"found_text": words or "–", "ratio_text": ratio, "tolerance_text": tolerance}

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 _KEYS = ("maia", "silva", "engers")
+_LEGEND = (
+    "Ratio: found over printed; ± how far from 1 still agrees, as does what is printed inside the "
+    "interval of what is found. Derived: is not printed, but follows from what is."
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -91,13 +95,14 @@ def _parts(title: str, rows: Sequence[Row], width: int) -> Iterator[RenderableTy
                 row["quantity"],
                 row["printed_as"],
                 shown["found_text"],
-                shown["ratio_text"],
+                f"{shown['ratio_text']} {shown['tolerance_text']}".strip(),
                 row["verdict"] + note,
             ]
         )
     heads = ["Place", "Quantity", "Printed", "Found", "Ratio", "Verdict"]
     yield fitting(title, heads, lines, width, names=1)
     yield Text()
+    yield Text(_LEGEND)
     for number, reason in enumerate(reasons, start=1):
         yield Text(f"  [{number}] {reason}")
     yield Text()

@@ -12,7 +12,8 @@ BASES: dict[Basis, str] = {
     "come back": "the log is simulated from this very figure: it comes back, which says that the "
     "estimate works, and nothing of the sensor",
     "simulated": "found in logs that are simulated from other figures of the paper",
-    "computed": "follows from printed figures alone, without a log",
+    "computed": "follows from printed figures alone: by a formula, or by many simulated draws of "
+    "them, but without the log of a run",
     "checked": "an equation, held against independent truth",
 }
 
@@ -61,6 +62,9 @@ MAIA = About(
         "recommends.",
         "The logs are simulated from Table 2, so the ratios to Table 2 say how well an estimate "
         "finds what was put in, and nothing of the sensors.",
+        "At which τ Table 3 compares two curves is not printed. Two grids are shown: nine τ a "
+        "decade up to half of the log, as the program that the paper names plots them, and every n "
+        "of its equation 10.",
         "Tables 1, 3 and 4 are typed from the paper; the curves of its figures are not in its "
         "text, so that figures are compared by the curves of the printed parameters.",
     ),

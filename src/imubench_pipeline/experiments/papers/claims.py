@@ -32,13 +32,17 @@ def nothing(reason: str) -> Found:
     return Found(verdict="not to be had", reason=reason)
 
 
+DERIVED = "derived:"
+"""Begins what stands in the place of the printed, where that follows from it alone."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Claim:
     """One line of a paper."""
 
     place: str  # "Table 3", "Figure 5", "Equation 26" or "Section 6", as numbered there
     quantity: str  # of what, in words
-    printed: str  # as printed, with its unit
+    printed: str  # as printed, with its unit; or `DERIVED` and what follows from it
     value: float | None = None  # the same in SI; None: it is no number
     unit: str = "-"  # SI
     found: Callable[[Evidence], Found]
@@ -91,6 +95,7 @@ def rows_of(paper: Paper, evidence: Evidence) -> Iterator[Row]:
             "upper": found.upper,
             "found_words": found.words or None,
             "ratio": ratio,
+            "tolerance": claim.tolerance if ratio is not None else None,
             "unit": claim.unit,
             "printed_unit": claim.printed_unit or claim.unit,
             "scale": claim.scale,

@@ -26,6 +26,9 @@ _RATE = MTI_GYRO.rate
 _TEST = "tests/papers/test_maia.py"
 _TAU = 100.0
 
+WEIGHED_AT = (10.0, 100.0, 1000.0)
+"""s; where the weight of equation 25 is held against the spread."""
+
 
 def _process() -> GaussMarkov:
     assert _MODEL.T_B is not None
@@ -58,14 +61,14 @@ def as_printed(model: NoiseModel, tau: float) -> float:
     return model.N**2 / tau + driven + model.K**2 * tau / 3.0
 
 
-def spread_over_weight() -> tuple[float, float]:
+def spread_over_weight(tau: float = _TAU) -> tuple[float, float]:
     """Return the standard deviation of an Allan variance over what a weight takes it for.
 
     First the weight meant, 2 √(n/2L) σ̂²; then that printed, 2 √(n/2L) σ̂, which has another
-    dimension, so that the ratio is another number in each unit. Of the MTi-7 gyro at 100 s.
+    dimension, so that the ratio is another number in each unit. Of the MTi-7 gyro at a tau, s.
     """
-    samples, n = round(DURATION * _RATE), round(_TAU * _RATE)
-    variance = float(_MODEL.allan_variance(_TAU, _RATE))
+    samples, n = round(DURATION * _RATE), round(tau * _RATE)
+    variance = float(_MODEL.allan_variance(tau, _RATE))
     spread = math.sqrt(variance_covariance(_MODEL, _RATE, samples, np.array([n]))[0, 0])
     meant = 2.0 * math.sqrt(n / (2.0 * samples)) * variance
     return spread / meant, spread / (meant / math.sqrt(variance))
@@ -91,10 +94,9 @@ def _sign(_: Evidence) -> Found:
 
 
 def _weight(_: Evidence) -> Found:
-    meant, _printed = spread_over_weight()
+    at = ", ".join(f"{spread_over_weight(tau)[0]:.2f} at {tau:,.0f} s" for tau in WEIGHED_AT)
     return Found(
-        words=f"w = 1/(2 √(n/2L) σ̂²)²: the spread of σ̂² at 100 s is {meant:.2g} of what it is "
-        "taken for",
+        words=f"w = 1/(2 √(n/2L) σ̂²)²; the spread of σ̂², over 2 √(n/2L) σ̂²: {at}",
         verdict="misprint",
     )
 

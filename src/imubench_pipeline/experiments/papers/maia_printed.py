@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.score import beats, rms
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, ensemble
 from imubench_pipeline.typing import Array
 
@@ -20,9 +21,14 @@ DURATION = 36_000.0
 MEMBERS = 200
 """Reconstructions of each set of parameters, and logs that they are held against."""
 
-_POINTS = 100
-"""Averaging times, even in log tau from a sample to half of the log: the grid of the program that
-the paper used."""
+Grid = Literal["steps", "every"]
+
+GRIDS: dict[Grid, str] = {"steps": "nine τ a decade", "every": "every n of equation 10"}
+"""The paper does not print at which tau it compares two curves: the program that it names plots
+1, 2, ... 9, 10, 20, ... samples; its equation 10 has every n up to half of the log."""
+
+_STRIPS = 100
+"""Every n is too many: the middle of each of so many equal parts stands for it."""
 
 
 @dataclass(frozen=True)
@@ -74,37 +80,40 @@ TABLE_4 = {
 """What the manufacturer says of the MTi-7, as the paper prints it."""
 
 
+Range = tuple[float, float, float]
+"""The quantiles of 5, 50 and 95 %, SI."""
+
+
 @dataclass(frozen=True)
 class Lottery:
-    """How single reconstructions score against single logs of Table 2: medians, 90 % ranges."""
+    """How single reconstructions score against single logs of Table 2, by one grid of tau."""
 
-    state_space: tuple[float, float, float]  # reconstructed by Table 1: 5 %, 50 %, 95 %; SI
-    optimised: tuple[float, float, float]  # by Table 2 itself, likewise
+    state_space: Range  # reconstructed by Table 1
+    optimised: Range  # by Table 2 itself
     beats: float  # chance that a reconstruction by Table 1 has the lower RMS of two
     beyond: tuple[float, float]  # shares of them at least as large as the printed figures
     slow: float  # share of the mean square that comes of tau beyond 300 s, by Table 2
 
 
-def sizes(channel: Channel) -> NDArray[np.int64]:
-    """Return the cluster sizes of the paper's program, shape (m,)."""
-    samples = round(DURATION * channel.rate)
-    grid = np.logspace(0.0, math.log10((samples - 1) / 2.0), _POINTS)
-    return np.unique(np.ceil(grid)).astype(np.int64)
+def sizes(channel: Channel, grid: Grid) -> NDArray[np.int64]:
+    """Return the cluster sizes of a grid up to half of the log, shape (m,)."""
+    longest = round(DURATION * channel.rate) // 2
+    if grid == "every":
+        return np.rint((np.arange(_STRIPS) + 0.5) * longest / _STRIPS).astype(np.int64)
+    decades = 10 ** np.arange(len(str(longest)))
+    steps = np.outer(decades, np.arange(1, 10)).ravel()
+    return steps[steps <= longest]
 
 
-@lru_cache(maxsize=len(CHANNELS))
-def lottery(channel: Channel) -> Lottery:
+@lru_cache(maxsize=len(CHANNELS) * len(GRIDS))
+def lottery(channel: Channel, grid: Grid) -> Lottery:
     """Return how Table 3 would spread, had the logs been the model of Table 2.
 
     Each of `MEMBERS` logs stands for the measured one, and is held against as many reconstructions
     by Table 1 and, of other draws, by Table 2.
     """
-    n = sizes(channel)
-    measured = _draws(channel, channel.table_2, "measured", n)
-    drawn = [
-        _draws(channel, model, use, n)
-        for model, use in ((channel.table_1, "table 1"), (channel.table_2, "table 2"))
-    ]
+    n = sizes(channel, grid)
+    measured, *drawn = (curves[grid] for curves in _draws(channel))
     of_each = [rms(one[:, None, :], measured[None, :, :]) for one in drawn]
     chances = [
         beats(first, second) for first, second in zip(of_each[0].T, of_each[1].T, strict=True)
@@ -123,13 +132,48 @@ def lottery(channel: Channel) -> Lottery:
     )
 
 
-def _draws(channel: Channel, model: NoiseModel, use: str, n: NDArray[np.int64]) -> Array:
-    rng = channel_rng(1, channel.sensor, channel.channel, use)
+@lru_cache(maxsize=len(CHANNELS))
+def readings(channel: Channel) -> dict[str, Range]:
+    """Return what reading the curves of single logs of Table 2 gives of N, B, K and T_B.
+
+    N is read at 1 s, K at a ninth of the log, B and T_B at the lowest point between them.
+    """
+    tau = _read_at(channel) / channel.rate
+    curves = _draws(channel)[0]["read"]
+    return {
+        "N": _range(curves[:, 0] * math.sqrt(tau[0])),
+        "B": _range(curves.min(axis=1) / FLOOR),
+        "K": _range(curves[:, -1] * math.sqrt(3.0 / tau[-1])),
+        "T_B": _range(tau[curves.argmin(axis=1)] / PEAK_TAU),
+    }
+
+
+def _read_at(channel: Channel) -> NDArray[np.int64]:
+    """Return the cluster sizes at which a curve is read, shape (m,)."""
+    return np.rint(np.geomspace(1.0, DURATION / 9.0, _STRIPS) * channel.rate).astype(np.int64)
+
+
+@lru_cache(maxsize=len(CHANNELS))
+def _draws(channel: Channel) -> tuple[dict[str, Array], ...]:
+    """Return Allan deviations: of logs of Table 2, of draws by Table 1, of others by Table 2."""
+    grids: dict[str, NDArray[np.int64]] = {grid: sizes(channel, grid) for grid in GRIDS}
+    grids["read"] = _read_at(channel)
+    together = np.unique(np.concatenate(list(grids.values())))
     samples = round(DURATION * channel.rate)
-    return np.sqrt(ensemble(model, channel.rate, samples, n, MEMBERS, rng))
+
+    def of(model: NoiseModel, use: str) -> dict[str, Array]:
+        rng = channel_rng(1, channel.sensor, channel.channel, use)
+        curves = np.sqrt(ensemble(model, channel.rate, samples, together, MEMBERS, rng))
+        return {grid: curves[:, np.searchsorted(together, n)] for grid, n in grids.items()}
+
+    return (
+        of(channel.table_2, "measured"),
+        of(channel.table_1, "table 1"),
+        of(channel.table_2, "table 2"),
+    )
 
 
-def _range(values: Array) -> tuple[float, float, float]:
+def _range(values: Array) -> Range:
     lower, median, upper = np.quantile(values, [0.05, 0.5, 0.95]).tolist()
     return lower, median, upper
 
