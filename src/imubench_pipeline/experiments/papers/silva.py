@@ -179,14 +179,16 @@ def _noise() -> Iterator[Claim]:
     )  # fmt: skip
     tau, level = minimum_of_the_curve()
     yield Claim(
-        place="Figure 2", quantity="cluster time of the floor", printed="T_b = 238.1 s, so 1.89 T_b = 450 s",
+        place="Figure 2", quantity="cluster time of the floor",
+        printed="T_b = 238.1 s, so 1.89 T_b = 450 s",
         value=PAPER_MODEL.T_B * 1.89 if PAPER_MODEL.T_B else None, unit="s", found=number(tau),
         basis="computed", page=page, check=f"{_TEST}::test_the_four_numbers_do_not_fit_each_other",
         reason="the four printed numbers have their lowest point elsewhere: they are not of one "
         "curve, as B and T_B are read where N and K add to it",
     )  # fmt: skip
     yield Claim(
-        place="Figure 2", quantity="deviation at the floor", printed="B = 0.0027 °/s, so 0.664 B = 0.00179 °/s",
+        place="Figure 2", quantity="deviation at the floor",
+        printed="B = 0.0027 °/s, so 0.664 B = 0.00179 °/s",
         value=FLOOR * PAPER_MODEL.B, unit="rad/s", printed_unit="°/s", scale=DEGREE,
         found=number(level), basis="computed", page=page,
         check=f"{_TEST}::test_the_four_numbers_do_not_fit_each_other",

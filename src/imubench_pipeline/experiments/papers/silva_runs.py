@@ -82,8 +82,8 @@ def turned() -> Iterator[Claim]:
         yield Claim(
             place=f"Figure {figure}", quantity=f"turns of run {run}",
             printed=f"{PAPER_MINUTES[run]:g} min, turned every 30 s: so {turns} turns",
-            value=float(turns), found=_turns(run), basis="come back", page=page_of(run), tolerance=0.0,
-            check="benchmarks/dwell_detection.py", reason="turns that do not show",
+            value=float(turns), found=_turns(run), basis="come back", page=page_of(run),
+            tolerance=0.0, check="benchmarks/dwell_detection.py", reason="turns that do not show",
         )  # fmt: skip
     for run, value in PRINTED.items():
         yield Claim(
@@ -164,9 +164,9 @@ def _hypotheses() -> Iterator[Claim]:
         "possible",
         "it can explain all of them, and alone that the last 13 min of run 4 are "
         f"{causes.apart(last, first):.1f} σ nearer to the truth than the rest; but it asks as "
-        "steep a drift of run 2, of which no warm-up is told, and a course that Figure 8 would show: "
-        f"{warmed.total / PAPER_MODEL.N / math.sqrt(PAPER_RATE):.0f} times the deviation of a "
-        "sample. A-B-A differences of the same samples would take it out",
+        "steep a drift of run 2, of which no warm-up is told, and a course that Figure 8 would "
+        f"show: {warmed.total / PAPER_MODEL.N / math.sqrt(PAPER_RATE):.0f} times the deviation of "
+        "a sample. A-B-A differences of the same samples would take it out",
     )
     alone = causes.one_miscount(runs["4"], last, EARTH_RATE)
     yield cause(
@@ -205,8 +205,7 @@ def _hypotheses() -> Iterator[Claim]:
         "–",
         "off by " + asks(lambda run: f"{(_heading(run) or 0.0) / DEGREE:.0f}°"),
         "refuted",
-        "nobody lays an axis that far off, on a support for alignment, and another way in "
-        "each run",
+        "nobody lays an axis that far off, on a support for alignment, and another way in each run",
     )
     least = math.cos(ASSUMED_LATITUDE)
     yield cause(
