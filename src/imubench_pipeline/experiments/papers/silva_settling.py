@@ -25,7 +25,7 @@ from imubench_pipeline.experiments.papers.evidence import Evidence
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.simulate.model import SensorModel
 
-RUNS = 60
+RUNS = 100
 """Simulated of each of the four."""
 
 _BIAS = math.radians(0.05)  # rad/s; assumed
