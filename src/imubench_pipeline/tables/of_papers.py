@@ -15,6 +15,9 @@ PUBLISHED = (
     number("upper", "as in unit", "upper limit of it"),
     text("found_words", "beside the number, or in its place", required=False),
     number("ratio", "-", "found over printed"),
+    number(
+        "tolerance", "-", "difference over printed that still agrees; null: no number is printed"
+    ),
     text("unit", "SI unit of the numbers"),
     text("printed_unit", "unit in which the paper prints it"),
     number("scale", "as in unit", "one printed unit", required=True),

@@ -21,7 +21,8 @@ Verdict = Literal[
 ]
 
 VERDICTS: dict[Verdict, str] = {
-    "agrees": "within the tolerance of the line, or inside the interval of what is found",
+    "agrees": "within the tolerance of the line, which the table published has, or inside the "
+    "interval of what is found; of words, they say the same",
     "differs": "what is found is another number, or says another thing, for the reason beside it",
     "possible": "may be so: what is printed neither proves it nor rules it out",
     "refuted": "cannot be so, by what is printed or what follows from it",

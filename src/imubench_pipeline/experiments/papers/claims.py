@@ -96,6 +96,7 @@ def rows_of(paper: Paper, evidence: Evidence) -> Iterator[Row]:
             "upper": found.upper,
             "found_words": found.words or None,
             "ratio": ratio,
+            "tolerance": None if claim.value is None else claim.tolerance,
             "unit": claim.unit,
             "printed_unit": claim.printed_unit or claim.unit,
             "scale": claim.scale,
