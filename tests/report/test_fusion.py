@@ -7,7 +7,9 @@ from imubench_pipeline.report.fusion import (
     grade_lines,
     matrices,
     shared_words,
+    unprinted_grades,
 )
+from imubench_pipeline.report.publish import publish
 from imubench_pipeline.tables import build
 from tests.report.tables import joined, recording_rows, site
 
@@ -100,7 +102,23 @@ def test_how_many_reach_a_class_stands_in_a_line_of_both_figures() -> None:
 
 def test_a_class_of_which_nothing_is_printed_has_no_line() -> None:
     nothing = GRADE | {"printed": None, "n": None, "n_lower": None, "n_upper": None}
-    assert list(grade_lines(build("grades", [nothing]).to_pylist())) == []
+    rows = build(
+        "grades", [GRADE, nothing | {"grade": "d", "grade_name": "V D", "reason": "it prints none"}]
+    )
+    (found,) = grade_lines(rows.to_pylist())
+    assert found["grade"] == "V B"
+    assert unprinted_grades(rows.to_pylist()) == {"V D, gyroscope": "it prints none"}
+
+
+def test_what_is_not_printed_of_a_class_is_said_on_the_page(tmp_path: Path) -> None:
+    other = GRADE | {"sensor": "one", "printed": None, "n": None, "n_lower": None,
+                     "n_upper": None, "grade": "d", "grade_name": "V D",
+                     "reason": "it prints none"}  # fmt: skip
+    rows = build("grades", [GRADE | {"sensor": "one"}, other])
+    tables = joined(*(recording_rows(name) for name in ("one", "two"))) | {"grades": rows}
+    publish(site(tables), tmp_path)
+    page = (tmp_path / "fusion.html").read_text(encoding="utf-8")
+    assert "can be compared: V D, gyroscope (it prints none)." in page
 
 
 def test_a_matrix_has_the_quietest_first_and_a_number_where_one_is_not_enough() -> None:

@@ -72,6 +72,12 @@ def _row(
     }
     if run is None:
         return row
+    if run["consistent"] is False:
+        inside = 100.0 * run["nees_inside"]
+        reason = (
+            f"the filter of this sensor goes astray: NEES is inside in {inside:.0f} % instead of 95"
+        )
+        return row | {"reason": reason}
     sigma, lower, upper = (
         run[f"{limit.error}{end}"] / _AXES[limit.error] for end in ("", "_lower", "_upper")
     )

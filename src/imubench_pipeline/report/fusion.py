@@ -29,6 +29,7 @@ def _context(site: Site) -> dict[str, Any]:
         "lines": lines,
         "matrices": list(matrices(lines)),
         "grades": list(grade_lines(site.rows("grades"))),
+        "unprinted": unprinted_grades(site.rows("grades")),
         "filters": filters,
         "shared": shared_words(site.settings["settings"]["fusion"]["common"]),
         "price_classes": price_classes,
@@ -147,6 +148,18 @@ def grade_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
                 for row in (by.get(name),)
             ],
         }
+
+
+def unprinted_grades(rows: Sequence[Row]) -> dict[str, str]:
+    """Return the sensors of the class of which nothing is printed of a quantity, and why."""
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        groups.setdefault((row["quantity"], row["grade_name"]), []).append(row)
+    return {
+        f"{name}, {QUANTITY_NAMES[quantity].lower()}": own[0]["reason"]
+        for (quantity, name), own in groups.items()
+        if not any(row["printed"] for row in own)
+    }
 
 
 def _number_limits(row: Row) -> str:

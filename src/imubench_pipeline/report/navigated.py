@@ -34,6 +34,8 @@ _SIGNALS = {
     "log": "pieces of the log",
 }
 
+_AS_SURE = {True: "yes", False: "no: it goes astray from what it expects", None: "not told"}
+
 _MATTERS = 1.1
 """Times the error of the true model from which a tuning matters, surely so."""
 
@@ -91,15 +93,17 @@ def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
         if not told:
             continue
         worse = [row for row in told if row["position_ratio_lower"] > _MATTERS]
-        sure = [row for row in told if row["position_ratio_upper"] < _MATTERS]
-        open_ones = [row for row in told if row not in worse and row not in sure]
+        no_worse = [row for row in told if row["position_ratio_upper"] < _MATTERS]
+        sure = [row for row in no_worse if row["position_ratio_lower"] > 1.0 / _MATTERS]
+        no_worse = [row for row in no_worse if row not in sure]
+        open_ones = [row for row in told if row not in worse + sure + no_worse]
         smallest = next((row for row in own if row["smallest"]), None)
         yield dict(zip(("sensor", "trajectory", "signals"), key, strict=True)) | {
             "recording": own[0]["recording"],
             "runs": own[0]["runs"],
             "words": _SIGNALS[key[2]],
             "outage": f"{number_text(longest)} s",
-            "matters": _matters(worse, sure, open_ones),
+            "matters": _matters(worse, sure, no_worse, open_ones),
             "smallest": None
             if smallest is None
             else f"{TUNINGS[smallest['tuning']]}, {smallest['states']} states",
@@ -107,7 +111,9 @@ def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
         }
 
 
-def _matters(worse: Sequence[Row], sure: Sequence[Row], open_ones: Sequence[Row]) -> str:
+def _matters(
+    worse: Sequence[Row], sure: Sequence[Row], no_worse: Sequence[Row], open_ones: Sequence[Row]
+) -> str:
     parts = []
     if worse:
         by = ", ".join(
@@ -118,6 +124,9 @@ def _matters(worse: Sequence[Row], sure: Sequence[Row], open_ones: Sequence[Row]
     if sure:
         names = ", ".join(TUNINGS[row["tuning"]] for row in sure)
         parts.append(f"no difference of a tenth: {names}")
+    if no_worse:
+        names = ", ".join(TUNINGS[row["tuning"]] for row in no_worse)
+        parts.append(f"no worse by a tenth: {names}")
     if open_ones:
         names = ", ".join(TUNINGS[row["tuning"]] for row in open_ones)
         parts.append(f"these runs do not tell of {names}")
@@ -172,6 +181,7 @@ def line_of(row: Row) -> dict[str, Any]:
         if inside is None or error is None
         else f"{number_text(100.0 * inside, 3)} ± {number_text(100.0 * error, 2)} %",
         "consistent": row["consistent"],
+        "as_sure": _AS_SURE[row["consistent"]],
         "of": counted(row["outages"], "outage", "outages") if row["outage"] else "",
     }
 

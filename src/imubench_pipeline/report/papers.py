@@ -117,7 +117,10 @@ def _pages(site: Site) -> set[str]:
 _COUNTED: dict[Verdict, tuple[str, str]] = {
     "agrees": ("agrees", "agree"),
     "differs": ("differs", "differ"),
+    "possible": ("is possible", "are possible"),
+    "refuted": ("is refuted", "are refuted"),
     "misprint": ("is a misprint", "are misprints"),
+    "done here": ("is done here", "are done here"),
     "not to be had": ("is not to be had", "are not to be had"),
 }
 

@@ -81,6 +81,7 @@ def _parts(title: str, rows: Sequence[Row], width: int) -> Iterator[RenderableTy
     """Yield the table of a paper, and why lines differ."""
     from rich.text import Text
 
+    from imubench_pipeline.experiments.papers.about import VERDICTS
     from imubench_pipeline.report.papers import cells
     from imubench_pipeline.report.terminal_table import fitting
 
@@ -105,4 +106,6 @@ def _parts(title: str, rows: Sequence[Row], width: int) -> Iterator[RenderableTy
     yield Text(_LEGEND)
     for number, reason in enumerate(reasons, start=1):
         yield Text(f"  [{number}] {reason}")
+    for verdict in dict.fromkeys(row["verdict"] for row in rows):
+        yield Text(f"  {verdict}: {VERDICTS[verdict]}")
     yield Text()

@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
 from imubench_pipeline.settings.known_rates import AccelerationFromZero, RateFromZero
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.requirements import Axis, Latitude, Time, Trajectory
+from imubench_pipeline.settings.requirements import Axis, Latitude, Outage, Time, Trajectory
 from imubench_pipeline.settings.shipped import CATALOGUE
 from imubench_pipeline.settings.two_position import TimeFromZero
 from imubench_pipeline.settings.validation import (
@@ -26,7 +26,7 @@ from imubench_pipeline.settings.validation import (
     parse,
 )
 from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
-from imubench_pipeline.units import difference_to_si
+from imubench_pipeline.units import difference_to_si, quantity_to_si
 
 _SIMULATED = Path("config/simulated.yaml")
 _OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
@@ -207,6 +207,18 @@ class EarthRateSettings(Strict):
         return goals
 
 
+def _of_drive(text: str) -> str:
+    if quantity_to_si(text, "time") > 36_000.0:
+        raise ValueError(f"found {text}; expected a drive of at most 10 h")
+    return text
+
+
+def _of_filter(text: str) -> str:
+    if not 10.0 <= quantity_to_si(text, "frequency") <= 1000.0:
+        raise ValueError(f"found {text}; expected 10 Hz to 1 kHz")
+    return text
+
+
 class NavigateSettings(Strict):
     """Filters tuned by all that is known of a sensor, on simulated drives with outages of GNSS."""
 
@@ -214,13 +226,20 @@ class NavigateSettings(Strict):
         "simulated", description="sensors: of simulated recordings alone, all, or none"
     )
     trajectories: tuple[Trajectory, ...] = Field(("field",), min_length=1)
-    outages: tuple[Time, ...] = Field(
+    outages: tuple[Outage, ...] = Field(
         ("10 s", "30 s", "60 s"), min_length=1, description="without GNSS, one after the other"
     )
-    duration: Duration = Field("310 s", description="of a run; the first 120 s have GNSS")
-    rate: Frequency = Field("50 Hz", description="of the samples that a filter is given")
+    duration: Annotated[Duration, AfterValidator(_of_drive)] = Field(
+        "310 s", description="of a run; the first 120 s have GNSS; at least what its outages take"
+    )
+    rate: Annotated[Frequency, AfterValidator(_of_filter)] = Field(
+        "50 Hz", description="of the samples that a filter is given"
+    )
     runs: int = Field(
-        12, ge=4, description="of each trajectory; 100 of 10 min make the errors sure to 5 %"
+        12,
+        ge=4,
+        le=10_000,
+        description="of each trajectory; 100 of 10 min make the errors sure to 5 %",
     )
     gyro_bias: RateFromZero = Field(
         "0.1 deg/s", description="standard deviation of the bias that is another at each switch-on"

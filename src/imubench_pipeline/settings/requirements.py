@@ -40,6 +40,16 @@ def _latitude(text: str) -> str:
 
 
 Time = Annotated[Text, checked("time", "a time above zero"), Field(examples=["60 s"])]
+
+
+def _of_outage(text: str) -> str:
+    if not 2.0 <= quantity_to_si(text, "time") <= 3600.0:
+        raise ValueError(f"found {text}; expected an outage of 2 s to 1 h")
+    return text
+
+
+Outage = Annotated[Time, AfterValidator(_of_outage)]
+"""How long there is no GNSS: a few fixes at least."""
 Latitude = Annotated[Text, AfterValidator(_latitude), Field(examples=["45 deg"])]
 
 
@@ -55,7 +65,7 @@ class Limit(Strict):
 
     error: Error
     after: Time | None = Field(None, description="of dead reckoning; of rest, for north")
-    outage: Time | None = Field(
+    outage: Outage | None = Field(
         None, description="instead: of GNSS, on a simulated drive, of a filter that is tuned"
     )
     trajectory: Trajectory | None = Field(None, description="of that drive")

@@ -62,8 +62,11 @@ _TOLERANCE = 0.02
 that is off by three times that is not consistent."""
 
 
-_MOST_UNSURE = 0.03
-"""Standard error of the share from which runs are too few to tell."""
+_WIDEST = 0.05
+"""How far from 0.95 a share of a consistent filter is at most, twice its standard error beside."""
+
+_SLOWEST = 10.0
+"""Hz; samples that come slower are no log to navigate by."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,11 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Ro
         if not fitted:
             continue
         names = {"sensor": sensor, "recording": about["recording"]}
+        if about["rate"] < _SLOWEST:
+            slow = f"samples of {about['rate']:.3g} Hz; expected {_SLOWEST:g} Hz or more"
+            for course in how.trajectories:
+                yield names | {"trajectory": course, "tuning": TRUE, "reason": slow}
+            return
         stand_in = _stand_in(fitted, how)
         fitted |= stand_in
         if all_axes(fitted) is None:
@@ -293,7 +301,10 @@ def _rows(
         )
         about = dict(names) | {"trajectory": course, "signals": source.words, "runs": source.runs}
         told = [
-            about | _of_tuning(drive, outcomes, name, length) | {"model": _named(models[name])}
+            about
+            | _of_tuning(drive, outcomes, name, length)
+            | _banks(models[name])
+            | {"model": _named(models[name])}
             for name in models
             for length in (None, *lengths)
         ]
@@ -363,12 +374,21 @@ def _of_tuning(
     return row
 
 
+def _banks(models: Models) -> dict[str, None]:
+    """Return the shares that are null: those of biases that a bank of processes only stands for.
+
+    It has no process shorter than an epoch, so that its states are no truth to hold a filter to.
+    """
+    flickering = [name for name, model in models.items() if "F" in model.name.split("+")]
+    return {f"nees_{quantity_of(name)}": None for name in flickering}
+
+
 def _consistent(share: Share) -> bool | None:
     """Tell whether a share is that of a filter as sure as it may be; None: the runs do not tell."""
     off = abs(share.value - 0.95)
     if off > _TOLERANCE + 3.0 * share.error:
         return False
-    return True if share.error < _MOST_UNSURE and off < _TOLERANCE + 2.0 * share.error else None
+    return True if off + 2.0 * share.error <= _WIDEST + 1e-9 else None
 
 
 def _smallest(rows: Sequence[Mapping[str, Any]]) -> str | None:

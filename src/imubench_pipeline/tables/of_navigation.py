@@ -204,11 +204,15 @@ NAVIGATION = (
     number("nees_position", "-", "likewise of the position alone"),
     number("nees_velocity", "-", "of the velocity"),
     number("nees_attitude", "-", "of the attitude"),
-    number("nees_gyro", "-", "of the biases of the gyros; null: the truth is not known"),
+    number(
+        "nees_gyro",
+        "-",
+        "of the biases of the gyros; null: not known, or flicker",
+    ),
     number("nees_accel", "-", "of the biases of the accelerometers"),
     flag(
         "consistent",
-        "that share is 0.93 to 0.97, within its error; null: the runs do not tell",
+        "that share, with twice its error, is 0.9 to 1; null: the runs do not tell",
         required=False,
     ),
     flag("smallest", "of the consistent tunings that with the fewest states", required=False),

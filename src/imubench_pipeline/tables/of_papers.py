@@ -20,7 +20,7 @@ PUBLISHED = (
     text("printed_unit", "unit in which the paper prints it"),
     number("scale", "as in unit", "one printed unit", required=True),
     text("basis", "come back, simulated, computed or checked: what is found rests on that"),
-    text("verdict", "agrees, differs, misprint or not to be had"),
+    text("verdict", "agrees, differs, possible, refuted, misprint, done here or not to be had"),
     text("reason", "why they differ", required=False),
     text("page", "of the report, where its counterpart is", required=False),
     text("check", "test or benchmark that stands behind the line"),

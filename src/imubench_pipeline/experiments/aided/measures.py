@@ -42,21 +42,12 @@ class Share:
     error: float
 
 
-def at_ends(drive: Drive, length: float) -> NDArray[np.int64]:
-    """Return the last epoch of each outage of a length in s."""
-    ends = [o.begin + o.length for o in drive.outages if o.length == length]
-    return np.searchsorted(drive.times, np.array(ends) + 1e-9) - 1
-
-
 def within(drive: Drive, length: float | None) -> NDArray[np.bool_]:
     """Return which epochs are in outages of a length in s; None: those with fixes, once warm."""
     if length is None:
         return np.asarray(drive.available & (drive.times > WARM_UP))
     chosen = np.zeros(len(drive.times), dtype=np.bool_)
-    for outage in drive.outages:
-        if outage.length == length:
-            since = drive.times - outage.begin
-            chosen |= (since > 1e-9) & (since < length + 1e-9)
+    chosen[drive.of_outages(length)] = True
     return chosen
 
 
@@ -65,16 +56,25 @@ def squares(drive: Drive, outcome: Outcome, error: str, length: float | None) ->
 
     At the end of outages of a length in s, or, None, at all fixes.
     """
-    chosen = at_ends(drive, length) if length is not None else np.flatnonzero(within(drive, None))
-    errors = outcome.errors[:, chosen][:, :, _COLUMNS[error]]
-    return np.asarray(np.mean(np.sum(errors**2, axis=2), axis=1))
+    return _means(drive, outcome.errors[:, :, _COLUMNS[error]] ** 2, length)
 
 
 def predicted(drive: Drive, outcome: Outcome, error: str, length: float | None) -> float:
     """Return the root mean square of an error that the filter expects, likewise."""
-    chosen = at_ends(drive, length) if length is not None else np.flatnonzero(within(drive, None))
-    variances = outcome.variances[:, chosen][:, :, _COLUMNS[error]]
-    return math.sqrt(float(np.mean(np.sum(variances, axis=2))))
+    return math.sqrt(_means(drive, outcome.variances[:, :, _COLUMNS[error]], length).mean())
+
+
+def _means(drive: Drive, parts: Array, length: float | None) -> Array:
+    """Return the mean over epochs of the sum of parts, shape (R, E, parts), of each run.
+
+    At the very end of outages, which may lie between two epochs: squares are taken as linear there.
+    """
+    total = parts.sum(axis=2)
+    if length is None:
+        return np.asarray(total[:, within(drive, None)].mean(axis=1))
+    last = drive.of_outages(length)[:, -1]
+    beyond = (last[0] - drive.of_outages(length)[0, 0] + 1) - length / drive.period
+    return np.asarray(((1.0 - beyond) * total[:, last] + beyond * total[:, last - 1]).mean(axis=1))
 
 
 def root_mean_square(of_runs: Array) -> Interval:
@@ -110,6 +110,6 @@ def inside(drive: Drive, outcome: Outcome, group: str, length: float | None) -> 
     of_runs = np.mean((nees > low) & (nees < high), axis=1)
     scatter = float(of_runs.std(ddof=1)) / math.sqrt(len(of_runs))
     # Few runs may all be inside by chance: an outage, or a minute with fixes, is worth one epoch.
-    stretches = len(at_ends(drive, length)) if length is not None else int(drive.times[-1] // 60)
+    stretches = len(drive.of_outages(length)) if length is not None else int(drive.times[-1] // 60)
     least = math.sqrt(0.95 * 0.05 / (len(of_runs) * max(stretches, 1)))
     return Share(float(of_runs.mean()), max(scatter, least))

@@ -77,21 +77,42 @@ class Drive:
     """A trajectory with outages, on which tunings are run."""
 
     def __init__(self, trajectory: Trajectory, outages: Sequence[Outage]) -> None:
-        self.trajectory, self.outages = trajectory, outages
+        self.trajectory = trajectory
         rate = trajectory.sampling
         self.every = max(round(rate * EPOCH), 1)
         self.width, self.steps = steps_of(self.every, math.ceil(rate * LONGEST_STEP))
         self.at: NDArray[np.int64] = np.arange(self.every, len(trajectory.rate) + 1, self.every)
         self.times = self.at / rate
         self.available = np.ones(len(self.at), dtype=np.bool_)
-        for outage in outages:
-            since = self.times - outage.begin
-            self.available[(since > 1e-9) & (since < outage.length + 1e-9)] = False
+        # An outage begins at a fix, and lasts until the first after its end: what a filter errs by
+        # after its very length lies between two epochs where these are no whole seconds.
+        self.period = self.every / rate
+        begun = [(o, int(np.searchsorted(self.times, o.begin + 1e-9)) - 1) for o in outages]
+        fitting = [
+            (o, last) for o, last in begun if last + self._epochs(o.length) < len(self.times)
+        ]
+        self.outages = [outage for outage, _ in fitting]
+        self.last_fixes = [last for _, last in fitting]
+        for outage, last in fitting:
+            self.available[last + 1 : last + 1 + self._epochs(outage.length)] = False
         gnss = trajectory.gnss
         self._spread = gnss.spread
         sigmas = np.array([*self._spread[:6], TILT, TILT, min(HEADING, gnss.heading)])
         self._start = np.diag(sigmas**2)
         self._sigmas = sigmas
+
+    def _epochs(self, length: float) -> int:
+        """Return how many epochs an outage of a length, s, takes."""
+        return math.ceil(length / self.period - 1e-6)
+
+    def of_outages(self, length: float) -> NDArray[np.int64]:
+        """Return the epochs of each outage of a length, s, shape (outages, epochs)."""
+        lasts = [
+            last
+            for outage, last in zip(self.outages, self.last_fixes, strict=True)
+            if outage.length == length
+        ]
+        return np.add.outer(np.array(lasts, dtype=np.int64), 1 + np.arange(self._epochs(length)))
 
     def stacked(self, axes: Sequence[AxisStates]) -> Stacked:
         """Return the states of six axes over the steps of this drive."""

@@ -17,12 +17,18 @@ BASES: dict[Basis, str] = {
     "checked": "an equation, held against independent truth",
 }
 
-Verdict = Literal["agrees", "differs", "misprint", "not to be had"]
+Verdict = Literal[
+    "agrees", "differs", "possible", "refuted", "misprint", "done here", "not to be had"
+]
 
 VERDICTS: dict[Verdict, str] = {
-    "agrees": "within the tolerance of the line, or inside the interval of what is found",
+    "agrees": "within the tolerance of the line, which the table published has, or inside the "
+    "interval of what is found; of words, they say the same",
     "differs": "what is found is another number, or says another thing, for the reason beside it",
+    "possible": "may be so: what is printed neither proves it nor rules it out",
+    "refuted": "cannot be so, by what is printed or what follows from it",
     "misprint": "as printed it cannot be right, and what is meant is known",
+    "done here": "left for later there: what is found here has nothing to be held against",
     "not to be had": "it takes the authors' own logs, or a run with the demonstration",
 }
 
@@ -112,8 +118,11 @@ ENGERS = About(
         "that he could not simulate are assumed; so are the sensitivities, as in datasheets.",
         "The tables are typed from the text, in which the figures are not: figures are compared by "
         "what is said of them, and by their counterparts here.",
-        "Before the fit is what the curve of the simulated log reads; after it, the estimate. He "
-        "turned gains by hand until the curves looked alike.",
+        "Before the fit is what the curve of the simulated log reads, where he put his tables into "
+        "his simulator; after it, the estimate, where he turned gains by hand until the curves "
+        "looked alike.",
+        "That N is 60 times what Tables 5 to 7 print under PSD is a reading of section 3.8.1, with "
+        "a line for and against it for each axis.",
     ),
 )
 

@@ -27,6 +27,11 @@ def number(value: float, words: str = "") -> Callable[[Evidence], Found]:
     return lambda _: Found(value=value, words=words)
 
 
+def said(words: str, verdict: Verdict = "agrees") -> Callable[[Evidence], Found]:
+    """Return what finds words that hang on no run."""
+    return lambda _: Found(words=words, verdict=verdict)
+
+
 def nothing(reason: str) -> Found:
     """Return what is found where there is nothing to be had."""
     return Found(verdict="not to be had", reason=reason)

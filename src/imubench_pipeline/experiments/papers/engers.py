@@ -4,75 +4,41 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
+import numpy as np
+
 from imubench_pipeline.experiments.papers.about import ENGERS, Verdict
-from imubench_pipeline.experiments.papers.claims import Claim, Found, Paper, nothing
-from imubench_pipeline.experiments.papers.evidence import Evidence, Log
+from imubench_pipeline.experiments.papers.claims import (
+    Claim,
+    Found,
+    Paper,
+    nothing,
+    number,
+    said,
+)
+from imubench_pipeline.experiments.papers.engers_aim import aim
+from imubench_pipeline.experiments.papers.engers_axes import (
+    AXES,
+    DATASHEETS,
+    DEGREE,
+    NAMES,
+    NO_LOG,
+    OF_BIAS,
+    OF_NOISE,
+    RATES,
+    READ_AT,
+    Axis,
+    in_unit,
+    page_of,
+)
+from imubench_pipeline.experiments.papers.engers_figures import figures
+from imubench_pipeline.experiments.papers.evidence import Evidence
 from imubench_pipeline.noise import FLOOR
 
-DEGREE = math.pi / 180.0
-READ_AT = 3600.0
-"""Cluster time at which the figures under "PSD" were read, s (section 2.2.4)."""
-
-_RECORDING = "sim_engers"
-_PASSED = 0.1
-"""Cluster time above which the low-passes of these sensors no longer show, s."""
-
-_MOSTLY = 80.0
-"""Per cent of a curve in the band that is much: its points are not independent."""
-
 _TEST = "tests/papers/test_engers.py"
-_NO_LOG = "it takes the simulated log of this sensor"
-_UNITS = {
-    "density": ("rad/s/sqrt(Hz)", "(°/s)/√Hz"),
-    "rate": ("rad/s", "°/s"),
-    "coefficient": ("rad/s/K", "(°/s)/K"),
-}
-
-
-@dataclass(frozen=True)
-class Axis:
-    """What tables 2 to 7 print of an axis, as printed."""
-
-    sensor: str
-    axis: str
-    psd: float  # read at 1 h, deg/s
-    bias: float  # deg/s
-    floor: float  # of the curve, deg/s; printed per kelvin
-
-    @property
-    def name(self) -> str:
-        """Sensor and axis in words."""
-        return f"{NAMES[self.sensor]} {self.axis}"
-
-    @property
-    def log(self) -> Log:
-        """The channel that is simulated of it."""
-        return Log(self.sensor, _RECORDING, f"gyro_{self.axis}")
-
-    def meeting(self, scaled: bool) -> float:
-        """Return the cluster time at which the -1/2 line meets the floor, s.
-
-        Scaled: of N as read at 1 h; else of the figure as if it were N.
-        """
-        density = self.psd * math.sqrt(READ_AT) if scaled else self.psd
-        return (density / self.floor) ** 2
-
-
-NAMES = {"scc2130": "SCC2130", "mpu9250": "MPU-9250", "bno055": "BNO055"}
-AXES = (
-    Axis("scc2130", "x", 0.000075, 0.0981, 0.00041),
-    Axis("mpu9250", "x", 0.00086, 5.1740, 0.0164),
-    Axis("mpu9250", "y", 0.00080, -3.3396, 0.015),
-    Axis("mpu9250", "z", 0.00255, -6.0934, 0.039),
-    Axis("bno055", "x", 0.0032, -5.3726, 0.02),
-    Axis("bno055", "y", 0.0035, -5.0823, 0.0225),
-    Axis("bno055", "z", 0.00165, -6.3640, 0.0065),
-)
-OF_NOISE = {"scc2130": "Table 5", "mpu9250": "Table 6", "bno055": "Table 7"}
-OF_BIAS = {"scc2130": "Table 2", "mpu9250": "Table 3", "bno055": "Table 4"}
+_OF_BOARD = "tests/test_published_figures.py"
 
 
 def first_order_of_noise_bandwidth(bandwidth: float) -> float:
@@ -84,47 +50,40 @@ def first_order_of_noise_bandwidth(bandwidth: float) -> float:
     return 2.0 / math.pi * bandwidth
 
 
-def _in(quantity: str, claim: Claim) -> Claim:
-    """Return a claim with the unit of a quantity of `_UNITS`, printed in degrees."""
-    unit, printed = _UNITS[quantity]
-    return replace(claim, unit=unit, printed_unit=printed, scale=DEGREE)
+def _published(axis: Axis, place: str, parameter: str, times: float) -> Callable[[Evidence], Found]:
+    """Return what the run finds of a figure that is printed of an axis.
 
-
-def _said(words: str, verdict: Verdict = "agrees") -> Callable[[Evidence], Found]:
-    return lambda _: Found(words=words, verdict=verdict)
-
-
-def _number(value: float, words: str = "") -> Callable[[Evidence], Found]:
-    return lambda _: Found(value=value, words=words)
-
-
-def _published(axis: Axis, place: str, parameter: str) -> Callable[[Evidence], Found]:
-    """Return what the run finds of a figure that is printed of an axis."""
+    In the terms of what is printed, which is so many times the parameter.
+    """
 
     def found(run: Evidence) -> Found:
         of_axis = run.of_log("published_figures", axis.log, place=place, parameter=parameter)
         row = next((row for row in of_axis if row["of"] == "log"), None)
         if row is None or row["value"] is None:
-            return nothing(_NO_LOG)
+            return nothing(NO_LOG)
+        value, lower, upper = (
+            None if row[end] is None else times * row[end] for end in ("value", "lower", "upper")
+        )
         curve = None if parameter == "bias" else row["curve"]
-        words = "" if curve is None else f"{curve / DEGREE:.4g} read from its curve, before the fit"
-        return Found(value=row["value"], lower=row["lower"], upper=row["upper"], words=words)
+        words = ""
+        if curve is not None:
+            shown = np.format_float_positional(
+                times * curve / DEGREE, precision=3, fractional=False, trim="-"
+            )
+            words = f"{shown} read from its curve, before the fit"
+        return Found(value=value, lower=lower, upper=upper, words=words)
 
     return found
-
-
-def _page(sensor: str, axis: str = "x") -> str:
-    return f"boards.html#engers-{sensor}-gyro_{axis}"
 
 
 def _datasheets() -> Iterator[Claim]:
     def line(sensor: str, quantity: str, printed: str, value: float, found: float | None,
              reason: str, unit: str) -> Claim:  # fmt: skip
         known = Found(value=found * DEGREE) if found is not None else nothing(reason)
-        return _in(unit, Claim(
+        return in_unit(unit, Claim(
             place="Table 1", quantity=f"{NAMES[sensor]}: {quantity}", printed=printed,
             value=value * DEGREE, found=lambda _: known, basis="computed", reason=reason,
-            page=_page(sensor), check="tests/test_printed.py",
+            page=page_of(sensor), check="tests/test_printed.py",
         ))  # fmt: skip
 
     secondary = "the document is not at hand: what is known of it is what this paper quotes"
@@ -152,80 +111,108 @@ def _datasheets() -> Iterator[Claim]:
 
 def _of_axes() -> Iterator[Claim]:
     for axis in AXES:
-        page = _page(axis.sensor, axis.axis)
-        yield _in("rate", Claim(
-            place=OF_BIAS[axis.sensor], quantity=f"fixed drift, {axis.name}",
-            printed=f"{axis.bias:.4f} °/s", value=axis.bias * DEGREE,
-            found=_published(axis, OF_BIAS[axis.sensor], "bias"), basis="come back", page=page,
-            check="tests/test_published_figures.py", tolerance=0.03,
+        place = OF_BIAS[axis.sensor]
+        yield in_unit("rate", Claim(
+            place=place, quantity=f"fixed drift, {axis.name}", printed=f"{axis.bias_as} °/s",
+            value=axis.bias * DEGREE, found=_published(axis, place, "bias", 1.0),
+            basis="come back", page=axis.page, check=_OF_BOARD, tolerance=0.0,
             reason="temperature moves the mean; ours is that at the mean temperature"
         ))  # fmt: skip
     for axis in AXES:
-        page, place = _page(axis.sensor, axis.axis), OF_NOISE[axis.sensor]
-        yield _in("density", Claim(
-            place=place, quantity=f"PSD, {axis.name}: N is 60 times the figure",
-            printed=f"{axis.psd:g} (°/s)/√Hz", value=math.sqrt(READ_AT) * axis.psd * DEGREE,
-            found=_published(axis, place, "N"), basis="come back", page=page,
-            check="tests/test_published_figures.py",
-            reason="the log is one draw of the noise", ))  # fmt: skip
-        yield Claim(
-            place=place, quantity=f"PSD, {axis.name}: where the −½ line meets the floor",
-            printed="decades below the floor (Figures 29 to 32)", unit="s",
-            found=_said(
-                f"at {axis.meeting(True):.3g} s with the 60, at {axis.meeting(False):.2g} s "
-                "without",
-                "misprint",
-            ),
-            basis="computed", page=page, check=f"{_TEST}::test_the_factor_of_60_has_its_check",
-            reason="read at 1 h the line is at N/60: without the factor the curve would be flat "
-            "from its first samples on",
-        )  # fmt: skip
-        yield _in("rate", Claim(
-            place=place, quantity=f"dynamic drift, {axis.name}: B is the floor over 0.664",
-            printed=f"{axis.floor:g} (°/s)/K", value=axis.floor / FLOOR * DEGREE,
-            found=_published(axis, place, "B"), basis="come back", page=page,
-            check="tests/test_published_figures.py",
-            reason="a floor in °/s, printed as a coefficient of temperature; read from the curve B "
-            "holds what N and temperature add to the floor", ))  # fmt: skip
+        place = OF_NOISE[axis.sensor]
+        yield in_unit("rate", Claim(
+            place=place, quantity=f"PSD, {axis.name}: N/60, the −½ line at 1 h",
+            printed=f"{axis.psd_as} (°/s)/√Hz", value=axis.psd * DEGREE,
+            found=_published(axis, place, "N", 1.0 / math.sqrt(READ_AT)), basis="come back",
+            page=axis.page, check=_OF_BOARD, reason="the log is one draw of the noise",
+        ))  # fmt: skip
+        yield _factor(axis, place)
+        yield in_unit("rate", Claim(
+            place=place, quantity=f"fixed drift, {axis.name}", printed=f"{axis.bias_as} °/s",
+            value=axis.bias * DEGREE,
+            found=number(axis.bias * DEGREE, f"as in {OF_BIAS[axis.sensor]}"),
+            basis="checked", page=axis.page, tolerance=0.0,
+            check=f"{_TEST}::test_what_is_typed_here_is_what_the_board_is_simulated_from",
+        ))  # fmt: skip
+        yield in_unit("rate", Claim(
+            place=place, quantity=f"dynamic drift, {axis.name}: the floor, 0.664 B",
+            printed=f"{axis.floor_as} (°/s)/K", value=axis.floor * DEGREE,
+            found=_published(axis, place, "B", FLOOR), basis="come back", page=axis.page,
+            check=_OF_BOARD,
+            reason="a floor in °/s, printed as a coefficient of temperature; read from the curve "
+            "it holds what N and temperature add", ))  # fmt: skip
+    yield Claim(
+        place="Table 8", quantity="SCC2130: fixed drift by the datasheet", printed="0 °/s",
+        found=said("left out: the Allan deviation does not see it"), basis="checked",
+        page=page_of("scc2130"), check=f"{_TEST}::test_a_fixed_drift_does_not_move_the_curve",
+    )  # fmt: skip
     yield Claim(
         place="Table 8", quantity="SCC2130: ARW by the datasheet", printed="0.0002861 °/√Hz",
-        found=_said("0.0002236 by his own rule, 0.005/√500; 0.0002861 °/s is the bias instability, "
+        found=said("0.0002236 by his own rule, 0.005/√500; 0.0002861 °/s is the bias instability, "
                     "1.03 °/h", "misprint"),
-        basis="checked", page=_page("scc2130"),
+        basis="checked", page=page_of("scc2130"),
         check=f"{_TEST}::test_table_8_has_its_columns_mixed",
         reason="the columns are mixed",
     )  # fmt: skip
     yield Claim(
         place="Table 8", quantity="SCC2130: dynamic drift by the datasheet", printed="0.00041 °/K",
-        found=_said("the floor that Table 5 measured, not the datasheet's 0.0002861 °/s",
+        found=said("the floor that Table 5 measured, not the datasheet's 0.0002861 °/s",
                     "misprint"),
-        basis="checked", page=_page("scc2130"),
+        basis="checked", page=page_of("scc2130"),
         check=f"{_TEST}::test_table_8_has_its_columns_mixed",
         reason="the columns are mixed, and the floor is no coefficient of temperature",
     )  # fmt: skip
     yield Claim(
         place="Section 4.1.1", quantity="deviation of a sample from a density",
         printed="0.005 (°/s)/√Hz divided by √500",
-        found=_said("σ = N √f: 0.005/√2 × √500 = 0.079 °/s before the low-pass", "misprint"),
+        found=said("σ = N √f: 0.005/√2 × √500 = 0.079 °/s before the low-pass", "misprint"),
         basis="checked", page="theory.html#units", check="tests/test_conversions.py",
         reason="a density is multiplied by the root of the rate, and its one side is √2 too much",
     )  # fmt: skip
-    yield _in("density", Claim(
+    two_sided = AXES[0].density / DATASHEETS["scc2130"]
+    yield Claim(
         place="Section 4.1.1", quantity="SCC2130: noise beside its datasheet",
-        printed="lower, above all the ARW", value=0.005 / math.sqrt(2.0) * DEGREE,
-        found=_number(AXES[0].psd * math.sqrt(READ_AT) * DEGREE),
-        basis="computed", page=_page("scc2130"),
+        printed="lower, above all the ARW",
+        found=said(f"N by Table 5 is {two_sided:.2f} times the datasheet’s density if that is "
+                   f"two-sided, {math.sqrt(2.0) * two_sided:.2f} times if one-sided", "possible"),
+        basis="computed", page=page_of("scc2130"),
         check=f"{_TEST}::test_the_factor_of_60_has_its_check",
-        reason="higher: N is 60 times the figure of Table 5, and the datasheet's density one-sided",
-    ))  # fmt: skip
+        reason="lower or higher by the side of a density whose document is not at hand; most "
+        "vendors print one-sided ones",
+    )  # fmt: skip
     yield Claim(
         place="Section 4.1.2", quantity="MPU-9250: cut-off in the simulation",
         printed="120 Hz in place of 188 Hz, as more alike", value=120.0, unit="Hz",
-        found=_number(first_order_of_noise_bandwidth(188.0),
+        found=number(first_order_of_noise_bandwidth(188.0),
                       "first order, noise bandwidth 188 Hz"),
-        basis="computed", page=_page("mpu9250"), tolerance=0.01,
+        basis="computed", page=page_of("mpu9250"), tolerance=0.01,
         check=f"{_TEST}::test_a_first_order_of_120_hz_passes_the_noise_of_188_hz",
     )  # fmt: skip
+
+
+def _factor(axis: Axis, place: str) -> Claim:
+    """Return the line for and against N as 60 times what is printed of an axis."""
+    samples = axis.meeting(False) * RATES[axis.sensor]
+    sheet = DATASHEETS[axis.sensor]
+    return Claim(
+        place=place, quantity=f"PSD, {axis.name}: is N 60 times the figure?",
+        printed="the −½ line, read at 1 h (section 3.8.1)",
+        found=said(
+            f"the −½ line meets the floor at {axis.meeting(True):.3g} s with the 60, at "
+            f"{axis.meeting(False):.2g} s without", "possible"),
+        basis="computed", page=axis.page, check=f"{_TEST}::test_the_factor_of_60_has_its_check",
+        reason=f"for it: without the 60 the floor would begin after {_sample(samples)}, and hardly "
+        f"a −½ line could be drawn; {_AGAINST[axis.density > 2.0 * sheet]}N is then "
+        f"{axis.density / sheet:.2g} times the datasheet’s as Table 1 quotes it "
+        f"({math.sqrt(2.0) * axis.density / sheet:.2g} times, of a one-sided density)",
+    )  # fmt: skip
+
+
+_AGAINST = {True: "against it: ", False: ""}
+
+
+def _sample(number: float) -> str:
+    return f"{number:.0f} samples" if number >= 1.5 else "one sample"
 
 
 @dataclass(frozen=True)
@@ -251,7 +238,7 @@ _EQUATIONS = (
     _Equation(1, "a spinning top", "ΣM = −I φ′² sin θ cos θ + …", "", "not to be had",
               "of spinning gyroscopes; these vibrate", "", _TEST),
     _Equation(2, "reading of a gyro", "Ω_g = Ω + s_g + n_g", "rate, bias and noise",
-              page="", check=_SIMULATOR),
+              check=_SIMULATOR),
     _Equation(3, "density of the bias instability", "(R²/2π)/f for f ≤ f₀, 0 for f > 0",
               "B² in place of R², f > f₀", "misprint",
               "R is the rate ramp; the second case is f > f₀"),
@@ -295,7 +282,7 @@ _EQUATIONS = (
               "theory.html#intervals", "tests/test_confidence.py"),
     _Equation(25, "model of the simulator", "ω_g = ω + β_g + b_g + η_g",
               "the same, with correlated noise, lines, lag, register and range",
-              page="", check=_SIMULATOR),
+              check=_SIMULATOR),
 )  # fmt: skip
 
 
@@ -303,180 +290,14 @@ def _equations() -> Iterator[Claim]:
     for one in _EQUATIONS:
         yield Claim(
             place=f"Equation {one.number}", quantity=one.quantity, printed=one.printed,
-            found=_said(one.words, one.verdict), basis="checked", reason=one.reason,
+            found=said(one.words, one.verdict), basis="checked", reason=one.reason,
             page=one.page, check=one.check,
         )  # fmt: skip
 
 
-_PICTURES = {
-    1: "a photograph of a BNO055", 2: "classes of gyroscopes, by another author",
-    3: "the acceleration of Coriolis", 4: "a package", 5: "a chip",
-    11: "the blocks of the simulator", 12: "a dialogue", 13: "a dialogue", 14: "a dialogue",
-    15: "a dialogue", 16: "the blocks of a sensor", 17: "the blocks of a sensor",
-    18: "the blocks of three sensors", 19: "the blocks of the board", 20: "a dialogue",
-    21: "photographs of the boards", 22: "a photograph", 33: "a dialogue", 37: "a dialogue",
-    43: "a dialogue", 49: "a dialogue",
-}  # fmt: skip
-_GRADES: dict[str, str | None] = {"stim300": None, "hg4930": "C", "ln_200": None}
-"""The sensors that are to be reached, and which grade of them."""
-
-_DRAWN = {
-    6: "slopes of the bias instability", 7: "slope of white noise",
-    8: "correlation and density of white noise", 9: "normal distribution",
-    10: "slopes of five noise terms",
-}  # fmt: skip
-_CURVES = {
-    29: ("scc2130", "x"), 30: ("scc2130", "x"), 31: ("mpu9250", "x"), 32: ("bno055", "x"),
-    36: ("scc2130", "x"), 40: ("scc2130", "x"), 41: ("scc2130", "x"), 42: ("scc2130", "x"),
-    45: ("mpu9250", "x"), 46: ("mpu9250", "y"), 47: ("mpu9250", "z"), 48: ("mpu9250", "x"),
-    51: ("bno055", "x"), 52: ("bno055", "y"), 53: ("bno055", "z"), 54: ("bno055", "x"),
-}  # fmt: skip
-_SAMPLES = {
-    23: "scc2130", 24: "scc2130", 25: "mpu9250", 26: "mpu9250", 27: "bno055", 28: "bno055",
-}  # fmt: skip
-_COMPARED = {
-    34: "scc2130",
-    35: "scc2130",
-    38: "scc2130",
-    39: "scc2130",
-    44: "mpu9250",
-    50: "bno055",
-}
-_SAID = {
-    31: "Allan deviation, all axes; z has more noise", 32: "correlated noise, and a sinusoid",
-    42: "noise lower than the datasheet’s", 54: "captioned MPU9250, of the BNO055",
-}  # fmt: skip
-
-
-def _figures() -> Iterator[Claim]:
-    for number in range(1, 55):
-        place = f"Figure {number}"
-        if number in _PICTURES:
-            yield Claim(
-                place=place, quantity=_PICTURES[number], printed="–", basis="checked",
-                found=lambda _: nothing("a picture, or a window of his program"), check=_TEST,
-            )  # fmt: skip
-        elif number in _DRAWN:
-            yield Claim(
-                place=place, quantity=_DRAWN[number], printed="–", basis="checked",
-                found=_said("drawn from the terms themselves"), page="theory.html#terms",
-                check="tests/noise/test_terms.py",
-            )  # fmt: skip
-        elif number in _CURVES:
-            sensor, axis = _CURVES[number]
-            yield Claim(
-                place=place, quantity=_SAID.get(number, f"Allan deviation, {NAMES[sensor]} {axis}"),
-                printed="a curve", found=_inside(sensor, axis), basis="simulated",
-                page=_page(sensor, axis), check="tests/test_reconstruction.py",
-                reason="the simulated curve leaves the band of the reconstructions",
-            )  # fmt: skip
-        elif number in _SAMPLES:
-            sensor = _SAMPLES[number]
-            what = "temperature" if number % 2 == 0 else "samples"
-            yield Claim(
-                place=place, quantity=f"{what} over time, {NAMES[sensor]}", printed="a figure",
-                found=_there(sensor, "a simulated log"), basis="simulated",
-                page=f"recordings/{sensor}/{_RECORDING}.html", check=_SIMULATOR,
-            )  # fmt: skip
-        else:
-            sensor = _COMPARED[number]
-            yield Claim(
-                place=place, quantity=f"samples measured and simulated, {NAMES[sensor]}",
-                printed="alike, by eye", found=_deviations(sensor), basis="simulated",
-                page=f"recordings/{sensor}/{_RECORDING}.html#gyro_x",
-                check="tests/test_samples_of_models.py",
-                reason="the simulation before the fit has another deviation of samples",
-            )  # fmt: skip
-
-
-def _there(sensor: str, words: str) -> Callable[[Evidence], Found]:
-    def found(run: Evidence) -> Found:
-        there = run.has(sensor, _RECORDING)
-        return Found(words=words, verdict="agrees") if there else nothing(_NO_LOG)
-
-    return found
-
-
-def _inside(sensor: str, axis: str) -> Callable[[Evidence], Found]:
-    """Return how much of the curve is in the band of the logs that the estimate makes."""
-
-    def found(run: Evidence) -> Found:
-        log = Log(sensor, _RECORDING, f"gyro_{axis}")
-        for method in ("compensated", "likelihood"):
-            bands = run.of_log("reconstruction", log, method=method)
-            if bands:
-                break
-        else:
-            return nothing(_NO_LOG)
-        table = "allan_compensated" if method == "compensated" else "allan"
-        measured = {row["tau"]: row["adev"] for row in run.of_log(table, log)}
-        seen = [row for row in bands if row["tau"] >= _PASSED and row["tau"] in measured]
-        inside = sum(row["lower"] <= measured[row["tau"]] <= row["upper"] for row in seen)
-        share = 100.0 * inside / len(seen)
-        return Found(
-            words=f"above {_PASSED:g} s {share:.0f} % of the curve is in the 95 % band of logs of "
-            f"the estimate ({method})",
-            verdict="agrees" if share > _MOSTLY else "differs",
-        )
-
-    return found
-
-
-def _deviations(sensor: str) -> Callable[[Evidence], Found]:
-    """Return the deviation of the samples of the models over that of the log."""
-
-    def found(run: Evidence) -> Found:
-        rows = run.rows("samples_of_models", sensor=sensor, recording=_RECORDING, what="deviation")
-        by = {(row["channel"], row["of"]): row["mean"] for row in rows}
-        ratios = {
-            of: [value / by[channel, "log"] for (channel, own), value in by.items() if own == of]
-            for of in ("before", "after")
-        }
-        if not all(ratios.values()):
-            return nothing(_NO_LOG)
-        words = "; ".join(
-            f"deviation of the samples {of} the fit "
-            + ", ".join(f"{ratio:.3g}" for ratio in ratios[of])
-            + " times the log’s"
-            for of in ratios
-        )
-        alike = all(abs(ratio - 1.0) < 0.05 for ratio in ratios["after"])
-        return Found(words=words, verdict="agrees" if alike else "differs")
-
-    return found
-
-
-def _reached(run: Evidence) -> Found:
-    """Return how many SCC2130 reach the tactical class, and what 25 of them, fused, leave."""
-    words = []
-    for sensor, name in (("scc2130", "of one SCC2130 it takes"), ("scc2130_x25", "of 25 fused")):
-        numbers = []
-        for row in run.rows("grades", sensor=sensor, quantity="gyro"):
-            if row["grade"] not in _GRADES or row["option"] not in (None, _GRADES[row["grade"]]):
-                continue
-            figure = "white noise" if row["statistic"] == "N" else "lowest point"
-            if row["n"] is not None:
-                numbers.append(f"{row['n']:.2g} for the {figure} of {row['grade']}")
-            elif row["n_upper"] is not None:
-                numbers.append(f"at most {row['n_upper']:.2g} for the {figure} of {row['grade']}")
-        if numbers:
-            words.append(f"{name} {', '.join(numbers)}")
-    if not words:
-        return nothing("it takes the simulated logs of both")
-    return Found(words="; ".join(words), verdict="agrees")
-
-
-def _aim() -> Iterator[Claim]:
-    yield Claim(
-        place="Section 1.0.1.1", quantity="several cheap gyros in place of a better one: how many",
-        printed="left for later", found=_reached, basis="simulated", page="fusion.html#grades",
-        check="tests/test_specimens.py",
-    )  # fmt: skip
-
-
 @cache
 def _claims() -> tuple[Claim, ...]:
-    return (*_datasheets(), *_of_axes(), *_equations(), *_figures(), *_aim())
+    return (*_datasheets(), *_of_axes(), *_equations(), *figures(), *aim())
 
 
 PAPER = Paper(about=ENGERS, claims=lambda _: _claims())

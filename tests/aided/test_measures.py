@@ -1,0 +1,25 @@
+"""What is measured at the end of an outage is of its very length, whatever the rate of the log."""
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.experiments.aided.measures import predicted, squares, within
+from imubench_pipeline.experiments.aided.runs import Drive, Outcome, schedule
+from imubench_pipeline.experiments.aided.trajectories import trajectory
+
+
+@pytest.mark.parametrize("rate", [10.0, 12.5, 125.0 / 3.0, 119.0 / 3.0, 50.0, 104.0 / 3.0])
+@pytest.mark.parametrize("length", [10.0, 10.7, 30.0])
+def test_an_outage_is_as_long_as_it_says(rate: float, length: float) -> None:
+    drive = Drive(trajectory("rest", 400.0, rate), schedule(400.0, (length,)))
+    # What errs by the time since the last fix, and expects to.
+    since = np.zeros(len(drive.times))
+    for place in range(1, len(since)):
+        since[place] = 0.0 if drive.available[place] else since[place - 1] + drive.period
+    errors = np.zeros((2, len(since), 9))
+    errors[:, :, 0] = since
+    outcome = Outcome(errors, errors**2, np.ones((2, len(since), 6)), 15)
+    assert np.sqrt(squares(drive, outcome, "position", length)) == pytest.approx(length, rel=2e-3)
+    assert predicted(drive, outcome, "position", length) == pytest.approx(length, rel=2e-3)
+    assert (within(drive, length) == ~drive.available).all()
+    assert len(drive.outages) >= 3
