@@ -24,7 +24,7 @@ def test_a_figure_of_many_models_is_that_of_each() -> None:
         for order in (0, 1, 2):
             for time in (1.0, 600.0):
                 alone = [math.fsum(t.growth(order, time, start) for t in m.terms) for m in MODELS]
-                at_once = summed(MODELS, lambda t: np.asarray(t.growth(order, time, start)))  # noqa: B023
+                at_once = summed(MODELS, lambda t: np.asarray(t.growth(order, time, start)))  # noqa: B023  # called at once
                 np.testing.assert_allclose(at_once, alone, rtol=1e-12)
     taus = np.array([0.1, 3.0, 700.0])
     at_once = summed(MODELS, lambda term: term.allan_variance(taus[:, None]), len(taus))

@@ -175,7 +175,7 @@ def test_the_answer_is_on_the_first_screen(
     assert page.locator(".strip li").count() == 5
     for name in ("verdict", "next-steps"):
         if page.locator(f"#{name}").count():
-            assert page.locator(f"#{name}").bounding_box()["y"] < height  # type: ignore[index]
+            assert page.locator(f"#{name}").bounding_box()["y"] < height  # type: ignore[index]  # drawn
     answers = page.locator(".answers li").all_inner_texts()
     assert len(answers) == len(made.REQUIREMENTS)
     assert "A-1 passes" in answers[0] and "A-1 is nearest" in answers[1]
