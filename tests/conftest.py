@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import gc
 import os
+import subprocess
+import sys
 
 # A worker of pytest-xdist has one processor: the threads of the linear algebra would wait for each
 # other on it, which takes half as long again.
@@ -48,6 +50,40 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.freeze()
         gc.enable()
+
+
+_KERNELS = """
+import tempfile
+from pathlib import Path
+import numpy as np
+from imubench_pipeline.run.cli import main
+with tempfile.TemporaryDirectory() as folder:
+    log = Path(folder, "log.csv")
+    walk = np.cumsum(np.random.default_rng(1).normal(0.0, 1e-3, 20_000))
+    rows = "".join(f"{k / 100},{value:.6f}\\n" for k, value in enumerate(walk))
+    log.write_text("t [s],gz [deg/s]\\n" + rows)
+    main(["analyse", str(log), "--output", folder])
+"""
+"""Compiles what an analysis needs, where nothing has yet."""
+
+_COMPILING = pytest.StashKey[subprocess.Popen[bytes]]()
+
+
+def pytest_xdist_setupnodes(config: pytest.Config) -> None:
+    """Compile once, on a fresh checkout, what each worker would compile at the same time."""
+    if config.args_source is not pytest.Config.ArgsSource.TESTPATHS:
+        return
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": PROJECT}
+    if not any(PROJECT.glob("src/**/*.nbi")):
+        config.stash[_COMPILING] = subprocess.Popen([sys.executable, "-c", _KERNELS], **quiet)
+    if not any(PROJECT.glob("tests/workflow/__pycache__/test_*")):
+        collect = ["-m", "pytest", "--collect-only", "-qq", "-n0"]
+        subprocess.run([sys.executable, *collect], check=False, **quiet)
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    if compiling := config.stash.get(_COMPILING, None):
+        compiling.wait()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:

@@ -43,7 +43,7 @@ def replace(path: Path) -> None:
         (vanish, ROWS, ROWS),  # what is open stays as it was
         (replace, ROWS, ROWS),
         (grow, ROWS, ROWS + 1000),
-        (shrink, 1, ROWS - 1),
+        (shrink, 1, ROWS),  # all of them, where they were read ahead of the change
     ],
 )
 def test_a_log_that_changes_while_it_is_read_is_read_or_rejected(

@@ -29,10 +29,10 @@ from imubench_pipeline.navigation.error_budget import (
     interval,
     time_until,
 )
-from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.error_budget.parts import Largest, source_row
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.settings.requirements import (
     DIMENSIONS,
     Axis,

@@ -242,6 +242,12 @@ FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """Dimensions that each datasheet figure may have, the usual one first, by quantity."""
 
+Measured = Literal["gyro", "accel"]
+"""What a sensor measures."""
+
+SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}
+"""What measures it."""
+
 IN_USE = (
     "offset",
     "bias_repeatability",

@@ -36,11 +36,9 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     NAMES,
     NO_FIGURES,
     NO_USE,
-    SENSORS,
     STATED,
     Cause,
     Figures,
-    Measured,
     Use,
     check_not_negative,
     levers,
@@ -54,6 +52,7 @@ from imubench_pipeline.navigation.error_budget.parts import (
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
+from imubench_pipeline.settings.printed import SENSORS, Measured
 
 GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
 ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}

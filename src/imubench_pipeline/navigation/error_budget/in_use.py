@@ -30,12 +30,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
-
-Measured = Literal["gyro", "accel"]
-"""What a sensor measures."""
-
-SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}
-"""What measures it."""
+from imubench_pipeline.settings.printed import Measured
 
 Cause = Literal[
     "turn_on_bias",

@@ -14,11 +14,10 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     Cause,
     Figure,
     Figures,
-    Measured,
     needed,
 )
 from imubench_pipeline.navigation.error_budget.printed_errors import PRINTED
-from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Measured
 from imubench_pipeline.units import SI_UNITS
 
 Quantity = Literal["attitude", "heading", "velocity", "position"]

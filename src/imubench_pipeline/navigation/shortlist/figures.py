@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
-from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges, Span
 from imubench_pipeline.noise import FLOOR, NoiseModel
-from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
+from imubench_pipeline.settings.printed import SENSORS, Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import Sensor
 
 End = Literal["best", "worst"]

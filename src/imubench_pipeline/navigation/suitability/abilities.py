@@ -8,8 +8,13 @@ from typing import get_args
 
 from pydantic import Field
 
-from imubench_pipeline.navigation.error_budget.in_use import SENSORS, Measured
-from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, PrintedFigure
+from imubench_pipeline.settings.printed import (
+    FIGURE_DIMENSIONS,
+    SENSORS,
+    Datasheet,
+    Measured,
+    PrintedFigure,
+)
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import Strict

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
 
-from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.suitability.abilities import Abilities, judge
+from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import from_si

@@ -9,12 +9,12 @@ from typing import Any, Literal, get_args
 
 from scipy.special import stdtrit
 
-from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
 from imubench_pipeline.navigation.verdicts.evidence import LONGEST_PART, REASONS, longest_asked
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.specimens import Expected
 from imubench_pipeline.navigation.verdicts.standing import Standing
+from imubench_pipeline.settings.printed import SENSORS
 
 Action = Literal[
     "check_unit", "find_figures", "add_channels", "record_again", "log_longer", "add_specimens"
