@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.told import Told, margin, margin_limits, of_ranking
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import counted, evidence_words
+from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.typing import Row
 

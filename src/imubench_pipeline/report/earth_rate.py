@@ -9,6 +9,7 @@ from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.report.alignment import alignments
 from imubench_pipeline.report.calibration import of_all
 from imubench_pipeline.report.payload import Arrays
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.turned import (
@@ -22,7 +23,6 @@ from imubench_pipeline.report.turned import (
     published_lines,
 )
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import counted
 from imubench_pipeline.typing import Row
 
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.recordings.fitness import left_out
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
-from imubench_pipeline.report.words import counted
 from imubench_pipeline.typing import Row
 
 TUNINGS = {

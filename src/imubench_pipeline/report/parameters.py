@@ -10,6 +10,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
 from imubench_pipeline.estimators.model_choice import LEAST_SHARE, relative
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
     PageUnit,
     System,
@@ -17,7 +18,7 @@ from imubench_pipeline.report.practical import (
     page_unit,
 )
 from imubench_pipeline.report.view import ChannelView
-from imubench_pipeline.report.words import counted, model_text, untold
+from imubench_pipeline.report.words import model_text, untold
 from imubench_pipeline.typing import Row
 
 

@@ -15,11 +15,12 @@ from imubench_pipeline.report.calibration import (
     scatter_words,
 )
 from imubench_pipeline.report.payload import Arrays
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.recording import about_of, summary_words
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import counted, noise_words
+from imubench_pipeline.report.words import noise_words
 from imubench_pipeline.typing import Row
 
 

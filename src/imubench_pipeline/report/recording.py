@@ -15,6 +15,7 @@ from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.parameters import digits_of, methods_table
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks, samples_payload
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
     System,
     duration_text,
@@ -25,7 +26,7 @@ from imubench_pipeline.report.practical import (
 from imubench_pipeline.report.shell import imubench
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
-from imubench_pipeline.report.words import counted, model_text, precision, sentence, started_text
+from imubench_pipeline.report.words import model_text, precision, sentence, started_text
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.typing import Row

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from imubench_pipeline.navigation.suitability.conditions import in_words
-from imubench_pipeline.report.words import counted
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.typing import Row

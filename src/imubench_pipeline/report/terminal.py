@@ -12,6 +12,7 @@ from rich.text import Text
 from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.parameters import shown_symbols
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
     PageUnit,
     System,
@@ -22,7 +23,6 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.report.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.report.terminal_table import fitting
-from imubench_pipeline.report.words import counted
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.typing import Row

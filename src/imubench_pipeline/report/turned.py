@@ -9,6 +9,7 @@ from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
     System,
     duration_text,
@@ -19,7 +20,7 @@ from imubench_pipeline.report.practical import (
 from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import counted, noise_words, sentence
+from imubench_pipeline.report.words import noise_words, sentence
 from imubench_pipeline.typing import Row
 
 METHOD_TERMS = {

@@ -9,6 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED, in_words
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
     PageUnit,
     duration_text,
@@ -266,11 +267,6 @@ def model_text(name: str) -> str:
 def sentence(text: str) -> str:
     """Return a text as a sentence: a capital first, a full stop at the end."""
     return text[:1].upper() + text[1:].rstrip(".") + "." if text else ""
-
-
-def counted(number: int, singular: str, plural: str | None = None) -> str:
-    """Return a number with its noun: ``1 recording``, ``3 recordings``."""
-    return f"{number} {singular if number == 1 else plural or singular + 's'}"
 
 
 def started_text(started: str | None) -> str:
