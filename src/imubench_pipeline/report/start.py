@@ -11,11 +11,11 @@ from imubench_pipeline.report.decisions import matrix, strip
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.payload import FOREST, looks
+from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import duration_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import (
-    counted,
     listed_names,
     requirement_verdict,
     requirement_words,
