@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 PROGRAM = """
 import numpy as np
 from numba.core import event
@@ -29,6 +31,7 @@ print([name for name in Compiled.names if "imubench" in name and "estimators" in
 """
 
 
+@pytest.mark.release  # it compiles all of it again, and says how fast a first use is
 def test_an_estimate_leaves_nothing_to_compile(tmp_path: Path) -> None:
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     said = subprocess.run(
