@@ -12,7 +12,6 @@ from typing import Any
 
 import pyarrow.compute as pc
 import pytest
-from plotly.offline import get_plotlyjs
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.report import made as made_page
@@ -20,7 +19,7 @@ from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import site as site_module
 from imubench_pipeline.report import theory
 from imubench_pipeline.report.pages import ENTRIES, pages
-from imubench_pipeline.report.publish import one_file, plotting_script, publish, published
+from imubench_pipeline.report.publish import one_file, publish, published
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.start import START
 from imubench_pipeline.tables import build
@@ -936,11 +935,3 @@ def test_settings_are_kept_beside_the_pages(report: Report) -> None:
 def test_tables_without_rows_are_tables() -> None:
     assert run().views == []
     assert list(pages(site({name: build(name, []) for name in TABLES})))[-1].path == "index.html"
-
-
-def test_the_plotting_script_is_that_of_plotly_in_brackets_without_the_styles_of_maps() -> None:
-    script, whole = plotting_script(), get_plotlyjs()
-    assert ": this, (() => {" in script and ": this, () => {" not in script
-    assert ".maplibregl-map{" in whole and ".maplibregl-map{" not in script
-    assert script.endswith("return Plotly;\n})));")
-    assert len(whole) - len(script) < 100_000
