@@ -40,7 +40,10 @@ def decoded(arrays: Arrays, place: int) -> NDArray[np.float64]:
     data = base64.b64decode(text, validate=True)
     if kind == "f":
         return np.frombuffer(data, "<f4").astype(np.float64)
-    levels = np.frombuffer(data, {"e": "<u1", "l": "<u2"}[kind]).astype(np.float64)
+    levels = np.frombuffer(data, "u1").astype(np.float64)
+    if kind == "l":
+        low_bytes, high_bytes = levels.reshape(2, -1)
+        levels = np.cumsum(low_bytes + 256.0 * high_bytes) % 65536.0
     values = np.where(levels == 0, np.nan, low + (levels - 1) * step)
     return 10.0**values if kind == "l" else values
 

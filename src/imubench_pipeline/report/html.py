@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import zlib
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -60,6 +62,7 @@ def environment(system: System) -> jinja2.Environment:
     templates.filters |= {"duration": duration_text, "number": number_text, "json": _json}
     templates.filters |= {"started": started_text, "symbol_text": symbol_text}
     templates.filters["attribute"] = _compact
+    templates.filters["packed"] = packed
     return templates
 
 
@@ -97,6 +100,11 @@ def _action(key: str) -> str:
 def _json(value: Any) -> Markup:
     """Return JSON that can stand inside a script element."""
     return Markup(_compact(value).replace("<", "\\u003c"))
+
+
+def packed(text: str) -> Markup:
+    """Return a text that is written in a page compressed, and unfolded when the page opens."""
+    return Markup(base64.b64encode(zlib.compress(text.encode(), 6)).decode())
 
 
 def _compact(value: Any) -> str:

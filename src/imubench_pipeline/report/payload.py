@@ -30,7 +30,8 @@ _FEW = 24
 class Arrays:
     """Arrays of a page: each stands in it once, as base64 with no more digits than are seen.
 
-    ``levels``: 0 stands for no value, the others divide the range evenly, or its logarithm.
+    ``levels``: 0 stands for no value, the others divide the range evenly, or its logarithm. Those
+    of a logarithm are kept as differences modulo 65536, all low bytes before all high ones.
     """
 
     def __init__(self) -> None:
@@ -64,6 +65,10 @@ class Arrays:
         return self._place(kind, low, step, codes.astype("<u2" if levels > 255 else "<u1"))
 
     def _place(self, kind: str, low: float, step: float, data: NDArray[Any]) -> int:
+        if kind == "l":
+            # Neighbours of a curve are near each other: their differences pack best, byte by byte.
+            steps = np.diff(data, prepend=data.dtype.type(0))
+            data = steps.view("<u1").reshape(-1, 2).T
         key = (kind, low, step, data.tobytes())
         return self._places.setdefault(key, len(self._places))
 

@@ -24,7 +24,9 @@ from imubench_pipeline.typing import Row
 
 _CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 _FIRST_ROWS = 100
-"""Rows of a long table that stand in the page; the others are made when they are asked for."""
+"""Rows of a long table that are shown; the others are made when they are asked for."""
+_PLAIN_ROWS = 30
+"""Rows of a long table that stand in the page as they are, for a reader without JavaScript."""
 _NOT_IN_NAMES = re.compile(r"[^\w .+()-]")
 
 
@@ -252,6 +254,7 @@ class Site:
             "alone": alone,
             "version": self.version,
             "first_rows": _FIRST_ROWS,
+            "plain_rows": _PLAIN_ROWS,
         }
 
 

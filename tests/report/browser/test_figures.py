@@ -351,3 +351,10 @@ def test_the_units_of_the_figures_follow_the_reader(read: Open, bench: Report) -
         np.testing.assert_allclose(measured["y"], expected, rtol=LEVELS)
         # The unit of the other quantity stays.
         assert "(µg)" in axis_title(reader.figure("allan", channel="accel_x"), "y")
+
+
+def test_the_plotting_script_is_compiled_once_and_has_no_styles_of_maps(bench: Report) -> None:
+    # Where plotly is bundled otherwise, `plotting_script` must be looked at again.
+    script = (bench.folder / "assets/plotly.min.js").read_text(encoding="utf-8")
+    assert ": this, (() => {" in script and script.endswith("return Plotly;\n})));")
+    assert ".maplibregl-map{" not in script

@@ -6,6 +6,7 @@ from tests.report.browser import made
 from tests.report.browser.factors import FACTORS
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader, axis_title
+from tests.report.pages import unfolded
 
 OF_NIGHT = f"recordings/alpha/{made.NIGHT.recording}.html"
 PAGES = ("index.html", "sensors/alpha.html", OF_NIGHT)
@@ -50,7 +51,7 @@ def test_the_script_prints_what_the_page_was_written_with(
 ) -> None:
     reader = read(bench.folder, path)
     show_every_row(reader)
-    text = (bench.folder / path).read_text(encoding="utf-8")
+    text = unfolded((bench.folder / path).read_text(encoding="utf-8"))
     written = reader.page.evaluate(
         f"text => {{ const page = ({AS_WRITTEN})(text);"
         f" return [({NUMBERS})(page), ({SIGNS})(page)]; }}",

@@ -8,6 +8,7 @@ from playwright.sync_api import Page, expect
 from imubench_pipeline.report.payload import FOREST
 from tests.report.browser import made
 from tests.report.browser.reader import Open, Reader, toggle, traces
+from tests.report.pages import unfolded
 
 NIGHT = made.NIGHT.recording
 OF_NIGHT = f"recordings/alpha/{NIGHT}.html"
@@ -74,8 +75,9 @@ def test_a_place_in_one_file_has_an_address(read: Open, alone: Path) -> None:
 def test_every_link_of_one_file_leads_somewhere(read: Open, alone: Path) -> None:
     reader = read(alone.parent, alone.name)
     lost = reader.page.evaluate(
-        """() => {
-          const templates = [...document.querySelectorAll("template[id^='page:']")];
+        """text => {
+          const whole = new DOMParser().parseFromString(text, "text/html");
+          const templates = [...whole.querySelectorAll("template[id^='page:']")];
           const pages = new Map(templates.map(one => [one.id.slice(5), one.content]));
           const lost = [];
           for (const [path, content] of pages) {
@@ -89,7 +91,8 @@ def test_every_link_of_one_file_leads_somewhere(read: Open, alone: Path) -> None
             }
           }
           return pages.size ? lost : ["no pages"];
-        }"""
+        }""",
+        unfolded(alone.read_text(encoding="utf-8")),
     )
     assert lost == []
 

@@ -17,7 +17,7 @@ function array(place) {
     if (kind === "f") {
       decoded[place] = [...new Float32Array(bytes.buffer)];
     } else {
-      const levels = kind === "e" ? bytes : new Uint16Array(bytes.buffer);
+      const levels = kind === "e" ? bytes : summed(bytes);
       decoded[place] = Array.from(levels, (level) => {
         if (level === 0) return NaN;
         const value = low + (level - 1) * step;
@@ -26,6 +26,17 @@ function array(place) {
     }
   }
   return decoded[place];
+}
+
+// Differences modulo 65536, all low bytes before all high ones.
+function summed(bytes) {
+  const levels = new Uint16Array(bytes.length / 2);
+  let level = 0;
+  for (let i = 0; i < levels.length; i += 1) {
+    level += bytes[i] + 256 * bytes[i + levels.length];
+    levels[i] = level;
+  }
+  return levels;
 }
 
 function scaled(place, factor) {

@@ -1,7 +1,8 @@
 // What happens when a page opens; in a report of one file, when a page of it is chosen.
 
-function openPage(main) {
+async function openPage(main) {
   readState();
+  await unfold(main);
   const data = main.querySelector("script[type='application/json'].page");
   pageData = data ? JSON.parse(data.textContent) : {};
   decoded = [];
@@ -14,20 +15,36 @@ function openPage(main) {
   startFigures(main);
 }
 
+// What a page has packed (`html.packed`): its data, further rows of tables, and what stands for its
+// own markup.
+async function unfold(root) {
+  await Promise.all([...root.querySelectorAll("script[data-packed]")].map(async (script) => {
+    const bytes = Uint8Array.from(atob(script.textContent), (sign) => sign.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const text = await new Response(stream).text();
+    script.removeAttribute("data-packed");
+    if (script.matches(".later")) script.outerHTML = text;
+    else script.textContent = text;
+  }));
+}
+
 // One file: the pages lie in <template id="page:PATH">, and #/PATH or #/PATH#SECTION shows one.
-function startPages(main) {
+async function startPages(main) {
   const pageOf = (path) => document.getElementById(`page:${path}`);
   let here = null;
-  const show = () => {
+  const show = async () => {
     const [path, section] = decodeURIComponent(location.hash.slice(2) || "index.html").split("#");
     const page = pageOf(path) ? path : "index.html";
     if (page !== here || stateText(location.hash)) {
       here = page;
-      main.replaceChildren(pageOf(page).content.cloneNode(true));
+      const content = pageOf(page).content.cloneNode(true);
+      await unfold(content);
+      if (page !== here) return; // another was chosen meanwhile
+      main.replaceChildren(content);
       document.title = main.querySelector("h1").textContent;
       document.querySelectorAll("header nav a").forEach((link) =>
         link.toggleAttribute("aria-current", resolved(link.getAttribute("href"), "") === page));
-      openPage(main);
+      await openPage(main);
     }
     (section && document.getElementById(section) ? document.getElementById(section) : document.body).scrollIntoView();
   };
@@ -52,11 +69,12 @@ function startPages(main) {
   // do so after this.
   history.scrollRestoration = "manual";
   window.addEventListener("hashchange", show);
-  show();
+  await show();
 }
 
-function start() {
+async function start() {
   const main = document.querySelector("main");
+  if (main.querySelector("figure[data-kind]")) loadPlotting(); // while the rest begins
   readState();
   startUnits(JSON.parse(document.body.dataset.units));
   startTerms();
@@ -64,9 +82,9 @@ function start() {
   startCopying();
   startPrintingTabs();
   startPrinting();
-  if (document.body.dataset.oneFile === "yes") startPages(main);
-  else openPage(main);
+  if (document.body.dataset.oneFile === "yes") await startPages(main);
+  else await openPage(main);
+  document.documentElement.dataset.ready = "yes";
 }
 
 start();
-document.documentElement.dataset.ready = "yes";
