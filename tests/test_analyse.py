@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from imubench_pipeline.run.analysis import compilation
 from imubench_pipeline.run.analysis.project import Stated, UnfilledError, lay_out
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.validation import ConfigError
@@ -140,3 +141,16 @@ def test_parameters_doubts_and_rejections_are_printed(
     assert "rejected: bad.csv, line 3, column 'ax': found 'x'" in said
     assert "Gyroscopes" in said and "°/√h" in said and " to " in said
     assert "short recording: the recording lasts 50 s" in said
+
+
+@pytest.mark.parametrize("expected", [False, True])
+def test_who_is_told_of_an_error_at_once_is_told_of_no_compilation(
+    expected: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compilation, "_SLOW", 0.0)
+    said: list[str] = []
+    with compilation.Compilation(said.append) as compiling:
+        if expected:
+            compiling.expected()
+        compiling.finish()
+    assert len(said) == expected

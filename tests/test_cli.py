@@ -136,3 +136,18 @@ def test_the_command_has_a_version(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--version"])
     assert ended.value.code == 0
     assert capsys.readouterr().out == f"imubench {version('imubench_pipeline')}\n"
+
+
+def test_a_command_computes_with_one_thread() -> None:
+    """Each fork of `imubench analyse` had threads of OpenBLAS that took two thirds of its time."""
+    code = (
+        "import os; from imubench_pipeline.run.start import main; main(); "
+        "import scipy.linalg; print(len(os.listdir('/proc/self/task')))"
+    )
+    unset = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
+    command = [sys.executable, "-c", code, "formats"]
+    threads = [
+        subprocess.run(command, env=unset | of_blas, capture_output=True, text=True, check=True)
+        for of_blas in ({}, {"OPENBLAS_NUM_THREADS": "1"})
+    ]
+    assert len({ran.stdout.splitlines()[-1] for ran in threads}) == 1

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.run.start import ONE_THREAD
 from imubench_pipeline.tables.failures import Cause
 
 BEGUN, DONE, FAILED, KILLED = b"b", b"d", b"f", b"k"
@@ -35,12 +36,6 @@ LENGTH = 4
 COSTS = "IMUBENCH_COSTS"
 """The environment variable with the file to which what each step has cost is appended, a line of
 JSON each: CPU time in s, peak of memory in MB."""
-
-_ONE_THREAD = {
-    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
-}
-"""A job has one core; and what has threads should not fork."""
-
 
 _PATIENCE = 60.0
 """s; for the system to end a step."""
@@ -226,6 +221,6 @@ def _started() -> tuple[subprocess.Popen[bytes], socket.socket]:
         process = subprocess.Popen(
             [sys.executable, "-m", "imubench_pipeline.run.step_server", str(theirs.fileno())],
             pass_fds=[theirs.fileno()],
-            env=_ONE_THREAD | os.environ,
+            env=ONE_THREAD | os.environ,
         )
     return process, ours

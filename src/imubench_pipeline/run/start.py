@@ -5,6 +5,13 @@ from __future__ import annotations
 import os
 import sys
 
+ONE_THREAD = {
+    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
+}
+"""The environment of a process that computes with one core, and forks for the others: threads of a
+library that spin for work in each fork take more of a core than what they wait for. NumPy asks for
+it when it is imported, and never again."""
+
 
 def main() -> int:
     """Run the command that is given; return its exit status."""
@@ -16,6 +23,7 @@ def main() -> int:
             file=sys.stderr,
         )
         return 2
+    os.environ |= ONE_THREAD | os.environ
     from imubench_pipeline.run.cli import main as run
 
     return run()

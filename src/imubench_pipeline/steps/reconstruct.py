@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -101,18 +101,27 @@ def _keep(
         log.finish({"simulated": True, "rate": rate, "rows": samples, "model": asdict(model)})
 
 
-def write_reconstruction(
-    inputs: list[Path], outputs: list[Path], settings: ReconstructionSettings
-) -> None:
-    """Write the tables ``reconstruction`` and ``scores`` of a recording."""
+@dataclass(frozen=True)
+class ReconstructionRows:
+    """Rows of the tables ``reconstruction`` and ``scores``."""
+
+    reconstruction: list[Mapping[str, Any]] = field(default_factory=list)
+    scores: list[Mapping[str, Any]] = field(default_factory=list)
+
+
+def reconstruction_rows(
+    inputs: list[Path], settings: ReconstructionSettings, channels: Collection[str] | None = None
+) -> ReconstructionRows:
+    """Return the rows of a recording, of all channels that have estimates or of some of them."""
     quality, allan, parameters, compensated = inputs
     about = Quality.read(quality)
     measured = curves(allan, about.grids)
     left = compensated_curves(compensated, measured)
     best = recommended_estimates(parameters)
-    curve_rows: list[Mapping[str, Any]] = []
-    score_rows: list[Mapping[str, Any]] = []
+    rows = ReconstructionRows()
     for channel, by_method in estimates(parameters).items():
+        if channels is not None and channel not in channels:
+            continue
         key = Key(about.recording["sensor"], about.recording["recording"], channel)
         rate = about.channels[channel]["rate"]
         results = {}
@@ -125,7 +134,15 @@ def write_reconstruction(
             # Of the log without what temperature adds the curve is another.
             same = method != "compensated" and result.differences.size and recommended.size
             chance = beats(result.differences, recommended) if same else None
-            score_rows.append({**result.score_row, "beats": chance})
-            curve_rows += result.curve_rows
-    write("reconstruction", curve_rows, outputs[0])
-    write("scores", score_rows, outputs[1])
+            rows.scores.append({**result.score_row, "beats": chance})
+            rows.reconstruction.extend(result.curve_rows)
+    return rows
+
+
+def write_reconstruction(
+    inputs: list[Path], outputs: list[Path], settings: ReconstructionSettings
+) -> None:
+    """Write the tables ``reconstruction`` and ``scores`` of a recording."""
+    rows = reconstruction_rows(inputs, settings)
+    write("reconstruction", rows.reconstruction, outputs[0])
+    write("scores", rows.scores, outputs[1])

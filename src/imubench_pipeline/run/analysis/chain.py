@@ -2,13 +2,13 @@
 
 The same functions as the rules call, with the same settings, so that the numbers are the same. The
 work is shared among forks of one process, as in a run, but of one recording the channels are
-estimated side by side.
+estimated and reconstructed side by side.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from itertools import chain
@@ -32,7 +32,7 @@ from imubench_pipeline.steps import datasheet as datasheet_step
 from imubench_pipeline.steps.error_budget import error_tables
 from imubench_pipeline.steps.estimate import Estimation, estimation
 from imubench_pipeline.steps.ingest import write_recording
-from imubench_pipeline.steps.reconstruct import write_reconstruction
+from imubench_pipeline.steps.reconstruct import ReconstructionRows, reconstruction_rows
 from imubench_pipeline.steps.sensor_tables import joined_tables
 from imubench_pipeline.steps.tables import tables_of_all
 from imubench_pipeline.tables import build, write, write_arrow
@@ -57,9 +57,9 @@ _BEFORE_RECONSTRUCTION = ("allan", "parameters", "allan_compensated")
 _OF_RECONSTRUCTION = ("reconstruction", "scores")
 _OUTPUTS: dict[str, tuple[str, ...]] = {
     "ingest": ("envelope", "histogram"),
-    "estimate": (),  # they are written together
+    "estimate": (),  # they are written together, and so are those of the reconstruction
     "datasheet": _OF_COMPARISON,
-    "reconstruct": _OF_RECONSTRUCTION,
+    "reconstruct": (),
 }
 """The tables that a step leaves."""
 _SLOW = 3.0
@@ -108,17 +108,14 @@ class _Chain:
 
     def run(self) -> dict[str, pa.Table]:
         recordings = list(self._plan.recordings)
+        self._compiling.expected()
         channels = self._each("ingest", recordings, self._read)
         self._compiling.finish()
-        estimated = self._each(
-            "estimate",
-            [(*key, channel) for key in recordings for channel in channels.get(key, ())],
-            self._estimate,
-        )
-        for key in recordings:
-            self._write_estimates(key, [estimated[each] for each in estimated if each[:2] == key])
+        series = [(*key, channel) for key in recordings for channel in channels.get(key, ())]
+        self._write_parts(_OF_ESTIMATE, self._each("estimate", series, self._estimate))
         if self._pages:
-            self._each("reconstruct", recordings, self._reconstruct)
+            parts = self._each("reconstruct", series, self._reconstruct)
+            self._write_parts(_OF_RECONSTRUCTION, parts)
             self._each("datasheet", recordings, self._compare)
         return self._joined()
 
@@ -149,15 +146,21 @@ class _Chain:
         rows.paths.clear()
         return rows
 
-    def _write_estimates(self, key: tuple[str, str], parts: Sequence[Estimation]) -> None:
-        folder = self._folder(*key)
-        failure = self._failed.get(key)
-        for table in _OF_ESTIMATE:
-            path = folder / f"{table}.parquet"
-            if failure is not None:
-                write_empty([path], failure)
-            else:
-                write(table, chain.from_iterable(getattr(part, table) for part in parts), path)
+    def _write_parts(
+        self,
+        tables: Sequence[str],
+        parts: Mapping[tuple[str, str, str], Estimation | ReconstructionRows],
+    ) -> None:
+        """Write the tables of each recording, of what its channels have."""
+        for key in self._plan.recordings:
+            own = [part for (*of, _), part in parts.items() if tuple(of) == key]
+            failure = self._failed.get(key)
+            for table in tables:
+                path = self._folder(*key) / f"{table}.parquet"
+                if failure is not None:
+                    write_empty([path], failure)
+                else:
+                    write(table, chain.from_iterable(getattr(part, table) for part in own), path)
 
     def _compare(self, sensor: str, recording: str) -> None:
         """Hold a recording against its datasheet, and say what its noise means in use."""
@@ -177,7 +180,7 @@ class _Chain:
         for table, rows in error_tables(inputs, names, plan.error_budget_settings(sensor)).items():
             write(table, rows, folder / f"{table}.parquet")
 
-    def _reconstruct(self, sensor: str, recording: str) -> None:
+    def _reconstruct(self, sensor: str, recording: str, channel: str) -> ReconstructionRows:
         folder = self._folder(sensor, recording)
         settings = ReconstructionSettings.model_validate_json(self._plan.settings("reconstruction"))
         inputs = (
@@ -186,11 +189,7 @@ class _Chain:
             "parameters.parquet",
             "allan_compensated.parquet",
         )
-        write_reconstruction(
-            [folder / name for name in inputs],
-            [folder / f"{name}.parquet" for name in _OF_RECONSTRUCTION],
-            settings,
-        )
+        return reconstruction_rows([folder / name for name in inputs], settings, {channel})
 
     # ---------------------------------------------------------------------------- all together
 

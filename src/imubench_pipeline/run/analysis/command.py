@@ -67,9 +67,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse logs, print the parameters and write what is asked for; return the exit status."""
-    # A process computes with one core, and forks for the others.
-    for library in ("OMP", "OPENBLAS", "MKL"):
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     from imubench_pipeline.run.analysis.compilation import Compilation
 
     with Compilation(_say) as compiling:  # while this process imports all else

@@ -25,6 +25,9 @@ class Compilation:
         self._say = say
         self._process = Bounded(_MEMORY, compile_kernels)
         self._told = threading.Timer(_SLOW, self._tell)
+
+    def expected(self) -> None:
+        """Tell of it from now on, where it takes long: there will be somebody who waits for it."""
         self._told.start()
 
     def finish(self) -> None:
