@@ -148,7 +148,7 @@ def checked(place: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize(("every", "bombs"), few([(80, ["gzip bomb"])], [(1, BOMBS)]))
+@pytest.mark.parametrize(("every", "bombs"), few([(160, ["gzip bomb"])], [(1, BOMBS)]))
 def test_entries_beside_a_good_recording(tmp_path: Path, every: int, bombs: list[str]) -> None:
     others = [name for name in ENTRIES if name not in BOMBS]
     chosen = dict.fromkeys([GOOD, *others[::every], *bombs])

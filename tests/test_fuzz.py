@@ -22,7 +22,7 @@ from tests.fuzz.supervision import HANG_S, Fuzzing
 from tests.readers.test_ubx import raw, samples, truth
 
 SECONDS, MOMENT = 1.0, 0.3
-QUICK = ("csv",)
+QUICK = ("numpy",)
 """Readers that are fuzzed for a moment in every run of the tests, and the others in `release`."""
 
 _read: Counter[str] = Counter()

@@ -10,7 +10,7 @@ from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader
 
-SENSORS, EACH, AXES = 20, 15, 3
+SENSORS, EACH, AXES = 20, 8, 3
 PAGES = (
     "index.html", "recordings.html", "datasheets.html", "sensors/sensor_00.html",
     "recordings/sensor_00/run_00.html",
@@ -19,7 +19,7 @@ PAGES = (
 
 @pytest.fixture(scope="module")
 def many(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A report of 300 recordings of six channels each."""
+    """A report of more recordings of six channels each than a table shows at first."""
     results = tmp_path_factory.mktemp("many")
     made.publish_some(made.many(results, SENSORS, EACH), results / "report", PAGES)
     return results / "report"
