@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
+from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -44,8 +45,9 @@ def environment(system: System) -> jinja2.Environment:
             return Markup("–")
         rounded = f"{value:.7g}"
         text = _unit(unit, system).text(float(rounded), digits)
-        of = "" if inside else Markup(' data-unit="{}" data-digits="{}"').format(unit, digits)
-        return Markup('<data value="{}"{}>{}</data>').format(rounded, of, text)
+        of = "" if inside else f' data-unit="{unit}" data-digits="{digits}"'
+        # Numbers and names of our own: nothing to escape, and there are many of them.
+        return Markup(f'<data value="{rounded}"{of}>{text}</data>')
 
     def sign(unit: str) -> Markup:
         """Return the sign of a unit that the reader can switch."""
@@ -86,6 +88,7 @@ def _term(context: Context, key: str, text: str | None = None) -> Markup:
     )
 
 
+@cache
 def _hint(key: str, text: str | None = None) -> Markup:
     """Return a term with its explanation alone, for tables of many rows."""
     entry = term(key)
