@@ -35,6 +35,7 @@ _SCRIPTS = (
     "tables",
     "tools",
     "plot",
+    "sketch",
     "overlay",
     "ratios",
     "comparison",
@@ -154,7 +155,7 @@ def _assets() -> dict[str, str]:
 
 
 def plotting_script() -> str:
-    """Return plotly so that a browser is done with it sooner, in three fifths of the time.
+    """Return plotly so that a browser evaluates it in about three fifths of the time.
 
     Its one large function is put in brackets, by which V8 compiles it as a whole and beside the
     page, not twice and before it; the styles of maps, which no page has, are left out.

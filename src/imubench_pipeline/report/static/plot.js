@@ -197,6 +197,8 @@ function drawFigure(figure) {
   zoomIn(figure, layout);
   const first = !drawn.has(figure);
   drawn.add(figure);
+  if (figure.dataset.sketched) canvas.replaceChildren();
+  delete figure.dataset.sketched;
   Plotly.react(canvas, traces.map(({ group, ...trace }) => trace), layout, {
     displayModeBar: false, responsive: true, doubleClick: "reset", showTips: false,
   });
@@ -316,8 +318,21 @@ function loadPlotting() {
 function startFigures(root) {
   drawn.clear();
   watcher.disconnect();
-  const figures = root.querySelectorAll("figure[data-kind]");
-  if (figures.length > 0) loadPlotting().then(() => figures.forEach((figure) => watcher.observe(figure)));
+  const figures = [...root.querySelectorAll("figure[data-kind]")];
+  if (figures.length === 0) return;
+  if (!window.Plotly) sketchFigures(figures);
+  afterPaint(() => loadPlotting().then(() => figures.forEach((figure) => watcher.observe(figure))));
+}
+
+// A page that lies behind others is not painted: there it does not wait for that.
+function afterPaint(act) {
+  let done = false;
+  const once = () => {
+    if (!done) act();
+    done = true;
+  };
+  window.requestAnimationFrame(() => window.setTimeout(once));
+  window.setTimeout(once, 300);
 }
 
 function redrawAll() {

@@ -74,7 +74,6 @@ async function startPages(main) {
 
 async function start() {
   const main = document.querySelector("main");
-  if (main.querySelector("figure[data-kind]")) loadPlotting(); // while the rest begins
   readState();
   startUnits(JSON.parse(document.body.dataset.units));
   startTerms();
