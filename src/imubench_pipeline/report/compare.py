@@ -117,6 +117,7 @@ def _recording(view: RecordingView) -> dict[str, Any]:
         "started": row["started"],
         "temperature": temperature,
         "decides": row["decides"] is not False,
+        "sold": "not sold" not in (row["doubts"] or ""),
         "doubts": [term(name).name for name in findings],
     }
 

@@ -157,6 +157,9 @@ def test_what_is_chosen_stands_in_the_address(
     reader = read(bench.folder, "compare.html#a=alpha&b=beta")
     page = reader.page
     assert "first" not in page.locator(".unfound").inner_text()
+    # A sensor stands for its longest measured recording that decides; the others can be chosen.
+    said = page.locator(".stands").inner_text()
+    assert f"{NIGHT.recording} stands for it" in said and "1 more to choose" in said
     page.get_by_role("button", name="+ one more").click()
     page.locator("select[data-letter=c]").select_option(f"alpha/{SIMULATED.recording}")
     page.get_by_label("Gyroscopes in").select_option("SI: rad/s")
