@@ -2,7 +2,7 @@
 
 const LETTERS = "abcdef";
 let chosen = []; // { letter, key, sensor, recording, row }
-let growthOf = { error: "heading", window: 60, time: 600 };
+let growthOf = { axes: "worst", error: "heading", window: 60, time: 600 };
 let crossed = 10; // s, where the crosshair stands
 
 // A sensor stands for its longest recording; one that decides, and is measured, goes first.
@@ -113,6 +113,7 @@ function drawPickers(pickers, axes) {
     radio.addEventListener("change", () => {
       chosenChannel = name;
       keep("axis", name);
+      startGrowth(root);
       compareChosen(root);
       redrawAll();
     });
