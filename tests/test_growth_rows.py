@@ -45,7 +45,7 @@ def test_errors_that_grow_are_those_of_the_budget() -> None:
     grown = [
         row
         for row in growth_rows(NAMES, ESTIMATES, times=[10.0, 45.0], window=90.0, **HOW)
-        if row["window"] == 90.0 and row["time"] in (10.0, 45.0)
+        if row["axis"] == "worst" and row["window"] == 90.0 and row["time"] in (10.0, 45.0)
     ]
     assert len(grown) == len(asked) > 40
     for row in grown:
@@ -56,11 +56,21 @@ def test_errors_that_grow_are_those_of_the_budget() -> None:
             assert row[name] == pytest.approx(of_budget[name], rel=1e-12)
 
 
+def test_an_axis_alone_is_as_if_its_log_had_no_other() -> None:
+    how = HOW | {"times": (), "window": 60.0}
+    rows = list(growth_rows(NAMES, ESTIMATES, **how))
+    assert {row["axis"] for row in rows} == {"worst", "x", "y"}  # z has no gyro
+    for letter in "xy":
+        alone = {channel: one for channel, one in ESTIMATES.items() if channel.endswith(letter)}
+        expected = [row | {"axis": letter} for row in growth_rows(NAMES, alone, **how)]
+        assert [row for row in rows if row["axis"] == letter] == expected
+
+
 def test_errors_grow_with_time_and_shrink_with_the_window() -> None:
     rows = [
         row
         for row in growth_rows(NAMES, ESTIMATES, times=(), window=60.0, **HOW)
-        if row["source"] == "total" and row["error"] == "heading"
+        if row["axis"] == "worst" and row["source"] == "total" and row["error"] == "heading"
     ]
     by_window = {w: [r["sigma"] for r in rows if r["window"] == w] for w in (10.0, 60.0)}
     assert by_window[10.0] == sorted(by_window[10.0])

@@ -21,8 +21,8 @@ ROWS = {
         for draw, size in enumerate((2e-5, 1e-5, 3e-5), start=-1)
     ],
     "error_growth": [
-        {"gyro": "gyro_x", "window": 60.0, "error": "heading", "time": time, "source": source,
-         "sigma": sigma, "lower": 0.9 * sigma, "upper": 1.1 * sigma, "unit": "rad"}
+        {"axis": "worst", "gyro": "gyro_x", "window": 60.0, "error": "heading", "time": time,
+         "source": source, "sigma": sigma, "lower": 0.9 * sigma, "upper": 1.1 * sigma, "unit": "rad"}
         for time in (1.0, 10.0)
         for source, sigma in (("total", 5e-3), ("gyro N", 4e-3), ("gyro K", 3e-3))
     ],
@@ -51,6 +51,7 @@ def test_what_is_kept_of_a_recording_is_in_the_page(tmp_path: Path) -> None:
     assert second["growth"] is None and first["growth"]["errors"].keys() == {"heading"}
     growth = first["growth"]["errors"]["heading"]
     assert growth["sources"].keys() == {"gyro N", "gyro K"} and growth["gyro"] == ["gyro_x"]
+    assert first["growth"]["axes"] == {"x": "worst"}  # the only one
     drawn = {
         (one["sensor"], one["channel"]): one["drawn"] for one in page["channels"] if one["drawn"]
     }

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -48,7 +49,10 @@ def growth_rows(
     seed: int,
     figures: Mapping[str, Figures] = NO_FIGURES_OF_CHANNELS,
 ) -> Iterator[Row]:
-    """Yield the rows of the table ``error_growth`` of a recording, of its worst axes.
+    """Yield the rows of the table ``error_growth`` of a recording.
+
+    They are of its worst axes, and where it has several, of each alone: of the gyro and the
+    accelerometer of one letter.
 
     Parameters
     ----------
@@ -87,11 +91,11 @@ def growth_rows(
             total = total + at_rest / (start.window * STANDARD_GRAVITY) ** 2
         return total
 
-    for at_rest in sorted({*_WINDOWS, window}):
+    for axis, at_rest in product(answerers := _answerers(axes), sorted({*_WINDOWS, window})):
         for question in standard(sorted({*_TIMES, *times}), at_rest, 0.0, ["worst"]):
             if question.error == "north":
                 continue
-            chosen = answering(question, axes)
+            chosen = answering(question, answerers[axis])
             if chosen is None:
                 continue
             budget = question.answer(*(axes[c] if c else AxisErrors() for c in chosen.values()))
@@ -101,6 +105,7 @@ def growth_rows(
             asked = {
                 **names,
                 **chosen,
+                "axis": axis,
                 "window": at_rest,
                 "error": question.error,
                 "time": question.time,
@@ -109,6 +114,17 @@ def growth_rows(
             yield asked | {"source": "total", **_limits(budget, drawn)}
             for part in sorted(budget.contributions, key=lambda one: -one.sigma):
                 yield asked | {"source": part.source, "sigma": part.sigma}
+
+
+def _answerers(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, AxisErrors]]:
+    """Return the channels that may answer for the worst axes, and for each axis alone."""
+    letters = sorted({channel[-1] for channel in axes})
+    alone = {
+        letter: {channel: errors for channel, errors in axes.items() if channel[-1] == letter}
+        for letter in letters
+        if len(letters) > 1
+    }
+    return {"worst": dict(axes), **alone}
 
 
 def _limits(budget: Budget, drawn: Array) -> dict[str, float]:

@@ -32,7 +32,7 @@ KEPT = ("error_growth", "drawn_deviations")
 
 _ERRORS = ("attitude", "heading", "velocity", "position")
 _MANY = 100
-"""Recordings from which on models drawn are kept of whole decades of tau alone."""
+"""Recordings from which on models drawn are of whole decades of tau alone, errors of worst axes."""
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def _context(site: Site) -> dict[str, Any]:
             own = datasheets.setdefault(view.sensor, {})
             own.setdefault(channel.channel, datasheet_lines(channel))
             channels.append(compared(channel, arrays) | {"drawn": drawn.get(channel.channel)})
-        growth = _growth(kept["error_growth"], arrays)
+        growth = _growth(kept["error_growth"], arrays, few=len(views) > _MANY)
         recordings.append(_recording(view) | {"growth": growth})
     return {
         "several": len(views) > 1,
@@ -117,6 +117,7 @@ def _recording(view: RecordingView) -> dict[str, Any]:
         "started": row["started"],
         "temperature": temperature,
         "decides": row["decides"] is not False,
+        "sold": "not sold" not in (row["doubts"] or ""),
         "doubts": [term(name).name for name in findings],
     }
 
@@ -171,14 +172,31 @@ def _drawn(
         )
 
 
-def _growth(kept: Mapping[str, Any], arrays: Arrays) -> dict[str, Any] | None:
-    """Return how errors grow: totals with their limits, and shares of the variance by source."""
+def _growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> dict[str, Any] | None:
+    """Return how errors grow, of the worst axes and of each alone; the only one is the worst."""
     if not kept or not len(kept["error"]):
         return None
     windows, times = (np.unique(kept[name]) for name in ("window", "time"))
+    by_axis = {
+        axis: _errors(kept, kept["axis"] == axis, arrays)
+        for axis in dict.fromkeys(kept["axis"].tolist())
+        if axis == "worst" or not few
+    }
+    worst = by_axis.pop("worst")
+    only = {} if by_axis or few else dict.fromkeys({name[-1] for name in kept["gyro"]}, "worst")
+    return {
+        "windows": arrays.exact(windows),
+        "times": arrays.exact(times),
+        "errors": worst,
+        "axes": by_axis or only,
+    }
+
+
+def _errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> dict[str, Any]:
+    """Return by error its totals with their limits, and shares of the variance by source."""
     errors = {}
-    for error in dict.fromkeys(kept["error"].tolist()):
-        own = kept["error"] == error
+    for error in dict.fromkeys(kept["error"][of_axis].tolist()):
+        own = of_axis & (kept["error"] == error)
         total = own & (kept["source"] == "total")
         variance = kept["sigma"][total] ** 2
         sources = {
@@ -206,7 +224,7 @@ def _growth(kept: Mapping[str, Any], arrays: Arrays) -> dict[str, Any] | None:
                 if np.any(share > 0.0)
             },
         }
-    return {"windows": arrays.exact(windows), "times": arrays.exact(times), "errors": errors}
+    return errors
 
 
 def _axes(channels: Sequence[str | None]) -> list[str]:

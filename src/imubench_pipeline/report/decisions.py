@@ -38,6 +38,9 @@ _WORD_OF = {
     "surely fails": "fails",
 }
 
+_NOT_SOLD = "not sold"
+"""What the doubts of a recording say of a sensor that cannot be bought."""
+
 _LOGS = 4.0
 """Decades to either side of 1 beyond which margins are sorted alike."""
 
@@ -121,6 +124,11 @@ def matrix(site: Site) -> dict[str, Any] | None:
         ]
         for sensor in site.sensors
     }
+    # What nobody can buy is no row among what can be bought.
+    apart = {
+        sensor: reason for sensor in site.sensors if _NOT_SOLD in (reason := _why(site, sensor))
+    }
+    lines = {sensor: cells for sensor, cells in lines.items() if sensor not in apart}
     order = sorted(lines, key=lambda sensor: (_merit(lines[sensor]), site.names[sensor]))
     return {
         "columns": [
@@ -128,6 +136,7 @@ def matrix(site: Site) -> dict[str, Any] | None:
             for place, (name, declared) in enumerate(requirements.items())
         ],
         "lines": [(sensor, lines[sensor]) for sensor in order],
+        "apart": apart,
         "scale": scale,
         "words": WORDS,
     }
@@ -199,9 +208,14 @@ def unranked(own: Iterable[RecordingView]) -> str:
     return "; ".join(dict.fromkeys(view.row["doubts"] for view in at_rest if view.row["doubts"]))
 
 
+def _why(site: Site, sensor: str) -> str:
+    """Return in a few words why a sensor would be in no ranking."""
+    return unranked(view for view in site.views if view.sensor == sensor)
+
+
 def _empty(site: Site, requirement: str, sensor: str) -> Cell:
     """Return the cell of a sensor that is in no ranking."""
-    reason = unranked(view for view in site.views if view.sensor == sensor)
+    reason = _why(site, sensor)
     word = "not judged"
     return Cell(requirement, sensor, word, 0, None, None, "", "", reason, (), -math.inf)
 

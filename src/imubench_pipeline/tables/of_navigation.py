@@ -33,8 +33,9 @@ CONDITIONS = (
 ERROR_GROWTH = (
     SENSOR,
     RECORDING,
-    text("gyro", "channel that answers: the worst"),
-    text("accel", "channel that answers: the worst", required=False),
+    text("axis", "worst: of all axes; or x, y or z alone, where there are several"),
+    text("gyro", "channel that answers"),
+    text("accel", "channel that answers", required=False),
     number("window", "s", "at rest right before, from which biases and tilt are taken", True),
     text("error", "attitude, heading, velocity or position"),
     number("time", "s", "of dead reckoning", required=True),

@@ -141,6 +141,7 @@ def test_errors_grow_as_the_budget_has_it(read: Open, bench: Report) -> None:
         row
         for row in growth
         if row["source"] == "total"
+        and row["axis"] == "worst"
         and (row["error"], row["window"], row["time"]) == ("heading", 600.0, 10.0)
     )
     assert after["y"][at] == pytest.approx(math.degrees(rested["sigma"]), rel=DRAWN)
@@ -151,12 +152,45 @@ def test_errors_grow_as_the_budget_has_it(read: Open, bench: Report) -> None:
     np.testing.assert_allclose(total, 100.0, atol=1.0)
 
 
+def test_errors_of_the_chosen_axis_are_those_of_their_table(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, address(NIGHT, SIMULATED, axis="gyro_x", window="60", time="10"))
+    kept = {
+        (row["axis"], row["error"]): row
+        for row in made.growth_of(NIGHT)
+        if (row["source"], row["window"], row["time"]) == ("total", 60.0, 10.0)
+    }
+    (other,) = (
+        row
+        for row in made.growth_of(SIMULATED)
+        if (row["source"], row["window"], row["time"], row["error"])
+        == ("total", 60.0, 10.0, "heading")
+    )
+    assert kept["x", "heading"]["sigma"] < kept["worst", "heading"]["sigma"]
+    caption = reader.page.locator("table.errors caption")
+    for axis, words in (("x", "1σ of axis x"), ("worst", "1σ of the worst of the axes")):
+        if axis == "worst":
+            reader.page.locator("form.growth select").last.select_option("worst")
+            assert "of=worst" in reader.page.url
+        assert words in caption.inner_text()
+        expected = kept[axis, "heading"]["sigma"]
+        shown = table(reader, "errors")["heading"]["ratios"][0][0]
+        assert shown == pytest.approx(expected / other["sigma"], rel=DRAWN)
+        curve = next(
+            one for one in traces(reader.figure("growth")) if one["mode"] == "lines+markers"
+        )
+        at = curve["x"].index(10.0)
+        assert curve["y"][at] == pytest.approx(math.degrees(expected), rel=DRAWN)
+
+
 def test_what_is_chosen_stands_in_the_address(
     read: Open, bench: Report, download: Callable[[Locator], bytes]
 ) -> None:
     reader = read(bench.folder, "compare.html#a=alpha&b=beta")
     page = reader.page
     assert "first" not in page.locator(".unfound").inner_text()
+    # A sensor stands for its longest measured recording that decides; the others can be chosen.
+    said = page.locator(".stands").inner_text()
+    assert f"{NIGHT.recording} stands for it" in said and "1 more to choose" in said
     page.get_by_role("button", name="+ one more").click()
     page.locator("select[data-letter=c]").select_option(f"alpha/{SIMULATED.recording}")
     page.get_by_label("Gyroscopes in").select_option("SI: rad/s")

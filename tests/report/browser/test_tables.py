@@ -119,6 +119,35 @@ def test_rows_are_found_and_counted(read: Open, bench: Report) -> None:
     assert count(table) == f"{rows} rows" and len(cells(table, 2)) == rows
 
 
+def test_what_is_asked_of_tables_stands_in_the_address(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    tables = [
+        table_of(reader, name) for name in ("Gyroscope: parameters", "Accelerometer: parameters")
+    ]
+    bars = [bar_of(table) for table in tables]
+    bars[0].get_by_label("Method").select_option("all")
+    bars[0].get_by_role("searchbox").fill("a-1 & more")
+    bars[0].get_by_role("searchbox").fill("A-1")
+    tables[0].get_by_role("button", name="Sort by K").click()
+    tables[0].get_by_role("button", name="Sort by K").click()
+    bars[1].get_by_label("Method").select_option("papers' model")
+    before, link = [cells(table, 2) for table in tables], reader.page.url
+    assert "gyroscope-parameters.find=A-1" in link
+    reader.open("recordings.html")
+    reader.page.go_back()
+    reader.page.wait_for_function("document.documentElement.dataset.ready === 'yes'")
+    assert reader.page.url == link
+    reader.open("index.html#" + link.partition("#")[2])
+    assert [cells(table, 2) for table in tables] == before
+    assert tables[0].locator("th[aria-sort=descending]").count() == 1
+    # What there is not is told, and hides no row.
+    reader.open("recordings.html#recordings.status=lost&recordings.colour=red&no-table.find=x")
+    said = " ".join(reader.page.locator(".unfound").all_inner_texts())
+    assert "status “lost”" in said and "colour “red”" in said and "no-table.find" in said
+    table = table_of(reader, "All recordings")
+    assert len(cells(table, 1)) == len(bench.rows["recordings"])
+
+
 def test_the_other_method_is_asked_for(read: Open, bench: Report) -> None:
     table = table_of(read(bench.folder), "Gyroscope: parameters")
     best = len(bench.of("fixed_bias", channel="gyro_x")) + 1

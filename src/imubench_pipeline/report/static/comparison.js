@@ -2,7 +2,7 @@
 
 const LETTERS = "abcdef";
 let chosen = []; // { letter, key, sensor, recording, row }
-let growthOf = { error: "heading", window: 60, time: 600 };
+let growthOf = { axes: "worst", error: "heading", window: 60, time: 600 };
 let crossed = 10; // s, where the crosshair stands
 
 // A sensor stands for its longest recording; one that decides, and is measured, goes first.
@@ -68,9 +68,10 @@ function drawPickers(pickers, axes) {
     select.dataset.letter = LETTERS[place];
     for (const sensor of new Set(pageData.recordings.map((row) => row.sensor))) {
       const own = pageData.recordings.filter((row) => row.sensor === sensor);
-      const group = Object.assign(document.createElement("optgroup"), { label: nameOf(sensor) });
-      group.append(new Option(nameOf(sensor), sensor));
-      if (own.length > 1) own.forEach((row) => group.append(new Option(`${nameOf(sensor)}: ${row.recording}`, `${sensor}/${row.recording}`)));
+      const name = `${nameOf(sensor)}${own.every((row) => row.sold) ? "" : " (not sold)"}`;
+      const group = Object.assign(document.createElement("optgroup"), { label: name });
+      group.append(new Option(own.length > 1 ? `${name}: ${recordingOf(sensor).recording}, which stands for it` : name, sensor));
+      if (own.length > 1) own.filter((row) => row !== recordingOf(sensor)).forEach((row) => group.append(new Option(`${name}: ${row.recording}`, `${sensor}/${row.recording}`)));
       select.append(group);
     }
     select.value = one.key;
@@ -112,6 +113,7 @@ function drawPickers(pickers, axes) {
     radio.addEventListener("change", () => {
       chosenChannel = name;
       keep("axis", name);
+      startGrowth(root);
       compareChosen(root);
       redrawAll();
     });
@@ -236,6 +238,9 @@ function drawVerdicts(root, figures) {
     ? [`${missing.map(shortName).join(" and ")} ${missing.length > 1 ? "have" : "has"} no ${CHANNEL_NAMES[chosenChannel]}: choose another axis.`]
     : chosen.slice(1).map((other, place) => sentenceOf(figures, chosen[0], other, place));
   root.querySelector(".answer").textContent = words.join("\n");
+  root.querySelector(".stands").textContent = chosen.filter((one) => !one.key.includes("/"))
+    .map((one) => ({ one, others: pageData.recordings.filter((row) => row.sensor === one.sensor).length - 1 })).filter(({ others }) => others > 0)
+    .map(({ one, others }) => `${shortName(one)}: ${one.recording} stands for it, ${one.row.decides ? "the longest that decides" : "the longest, though it decides nothing"}${one.row.simulated ? " (simulated)" : ""}; ${others} more to choose above.`).join(" ");
   const doubted = chosen.filter((one) => doubtsOf(one).length > 0);
   root.querySelector(".doubts").textContent = doubted.map((one) => `Doubtful: ${shortName(one)}: ${doubtsOf(one).join(", ")}.`).join(" ");
 }

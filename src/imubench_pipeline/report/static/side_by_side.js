@@ -199,7 +199,15 @@ kinds.dumbbells = (figure) => {
   };
 };
 
-const grownOf = (one) => one.row.growth?.errors[growthOf.error] ?? null;
+// Of the worst axes of a recording, or of that which is chosen; of a single axis both are one.
+function errorsOf(one) {
+  const { growth } = one.row;
+  if (!growth) return {};
+  const own = growthOf.axes === "worst" ? "worst" : growth.axes[chosenChannel.at(-1)];
+  return own === "worst" ? growth.errors : own ?? {};
+}
+const grownOf = (one) => errorsOf(one)[growthOf.error] ?? null;
+const axesText = () => (growthOf.axes === "worst" ? "the worst of the axes" : `axis ${chosenChannel.at(-1)}`);
 const place = (values, wanted) => values.reduce((best, value, i) => (Math.abs(Math.log(value / wanted)) < Math.abs(Math.log(values[best] / wanted)) ? i : best), 0);
 
 // The window and the time that are chosen, as far as a recording has them.
@@ -216,7 +224,9 @@ function startGrowth(root) {
   if (!any) return;
   const [windows, times] = [array(any.growth.windows), array(any.growth.times)];
   const stated = (key, otherwise) => Number(state.get(key)) || otherwise;
-  growthOf = { error: state.get("error") in pageData.errors ? state.get("error") : "heading", window: stated("window", pageData.window), time: stated("time", times.at(-1)) };
+  const alone = pageData.recordings.some((row) => row.growth && Object.keys(row.growth.axes).length > 0);
+  const of = ["worst", "axis"].includes(state.get("of")) ? state.get("of") : state.has("axis") ? "axis" : "worst";
+  growthOf = { axes: alone ? of : "worst", error: state.get("error") in pageData.errors ? state.get("error") : "heading", window: stated("window", pageData.window), time: stated("time", times.at(-1)) };
   const select = document.createElement("select");
   select.append(...Object.keys(pageData.errors).map((error) => new Option(error, error)));
   select.value = growthOf.error;
@@ -246,7 +256,17 @@ function startGrowth(root) {
     drawErrors(root);
     redrawAll();
   });
-  form.replaceChildren(labelled("Error", select), slider("window", windows, "At rest before"), slider("time", times, "After"));
+  const axes = document.createElement("select");
+  axes.append(new Option("the worst of the axes", "worst"));
+  if (alone) axes.append(new Option(`axis ${chosenChannel.at(-1)} alone`, "axis"));
+  axes.value = growthOf.axes;
+  axes.addEventListener("change", () => {
+    growthOf.axes = axes.value;
+    keep("of", axes.value);
+    drawErrors(root);
+    redrawAll();
+  });
+  form.replaceChildren(labelled("Error", select), labelled("Of", axes), slider("window", windows, "At rest before"), slider("time", times, "After"));
 }
 
 function errorUnit(error, size) {
@@ -267,7 +287,7 @@ function drawErrors(root) {
   if (chosen.every((one) => one.row.growth)) {
     for (const error of Object.keys(pageData.errors)) {
       const own = chosen.map((one) => {
-        const grown = one.row.growth.errors[error];
+        const grown = errorsOf(one)[error];
         if (!grown) return null;
         const { times, window, time } = chosenPlace(one);
         const at = window * times.length + time;
@@ -281,7 +301,7 @@ function drawErrors(root) {
   table.tHead.replaceChildren(headOf(`After ${timeText(growthOf.time)}`, ...headsOfPairs(), ...chosen.map(shortName)));
   table.tBodies[0].replaceChildren(...linesOf(figures));
   const without = chosen.filter((one) => !grownOf(one)).map(shortName);
-  table.caption.textContent = `1σ after ${timeText(growthOf.time)} of dead reckoning and ${timeText(growthOf.window)} at rest${without.length ? `; no ${growthOf.error} is known of ${without.join(", ")}` : ""}`;
+  table.caption.textContent = `1σ of ${axesText()} after ${timeText(growthOf.time)} of dead reckoning and ${timeText(growthOf.window)} at rest${without.length ? `; no ${growthOf.error} is known of ${without.join(", ")}` : ""}`;
 }
 
 kinds.growth = () => {

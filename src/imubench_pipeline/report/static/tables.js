@@ -1,15 +1,33 @@
 // Tables that can be sorted by a column and filtered by their rows' data. Of a long one the first
 // rows stand in the page; the others lie beside it as text, and become rows when they are needed.
+// What is asked of a table stands in the address by its name: #recordings.status=rejected.
 
 const FEW = 100;
 
 function startTables(root) {
-  root.querySelectorAll("table.sortable").forEach((table) => new LongTable(table));
+  const names = new Set();
+  root.querySelectorAll("table.sortable").forEach((table) => {
+    const name = unused(slug(table.closest(".scroll").getAttribute("aria-label")), names);
+    new LongTable(table, name);
+  });
+  const lost = [...state.keys()].filter((key) => key.includes(".") && !names.has(key.split(".")[0]));
+  if (lost.length > 0) root.prepend(warned(`The address asks for a table that is not on this page: ${lost.join(", ")}.`));
 }
 
+function unused(name, names) {
+  let free = name || "unnamed";
+  for (let n = 2; names.has(free); n++) free = `${name}-${n}`;
+  names.add(free);
+  return free;
+}
+
+const warned = (text) => Object.assign(document.createElement("p"), { className: "unfound", textContent: text });
+
 class LongTable {
-  constructor(table) {
+  constructor(table, name) {
     this.table = table;
+    this.name = name;
+    this.unknown = [];
     this.body = table.tBodies[0];
     this.further = table.closest(".scroll").nextElementSibling;
     if (!this.further?.matches("script.rows")) this.further = null;
@@ -18,7 +36,9 @@ class LongTable {
     this.selects = new Map();
     this.all = false;
     this.order = null;
-    [...table.tHead.rows[0].cells].forEach((head, column) => this.addSort(head, column));
+    const columns = new Set();
+    this.sorts = new Map();
+    [...table.tHead.rows[0].cells].forEach((head, column) => this.addSort(head, column, columns));
     this.bar = document.createElement("form");
     this.bar.className = "filters";
     this.bar.addEventListener("submit", (event) => event.preventDefault());
@@ -26,6 +46,7 @@ class LongTable {
     this.more = Object.assign(document.createElement("button"), { type: "button", hidden: true });
     this.more.addEventListener("click", () => {
       this.all = true;
+      this.note("rows", "all");
       this.show();
     });
     if (table.dataset.filters !== undefined) this.addFilters(JSON.parse(table.dataset.filters));
@@ -36,7 +57,37 @@ class LongTable {
       this.bar.append(this.count, this.more);
     }
     if (this.bar.childElementCount > 0) table.closest(".scroll").before(this.bar);
-    if (Object.values(this.asked).some(Boolean) && !this.further) this.show();
+    const stated = this.restore();
+    if (stated || (Object.values(this.asked).some(Boolean) && !this.further)) this.show();
+    if (this.unknown.length > 0) table.closest(".scroll").before(warned(`The address asks for what this table has not, and it is left out: ${this.unknown.join(", ")}.`));
+  }
+
+  note(key, value) {
+    keep(`${this.name}.${key}`, value);
+  }
+
+  // What the address asks of this table; what there is not is told.
+  restore() {
+    let stated = false;
+    for (const [whole, value] of [...state]) {
+      if (!whole.startsWith(`${this.name}.`)) continue;
+      const key = whole.slice(this.name.length + 1);
+      const select = this.selects.get(key);
+      const sort = key === "sort" ? this.sorts.get(value.replace(/^-/, "")) : null;
+      if (key === "find" && this.search) {
+        this.search.value = value;
+        this.asked.text = value.trim().toLowerCase();
+      } else if (select && (value === "all" || [...select.options].some((option) => option.value === value))) {
+        select.value = this.asked[key] = value === "all" ? "" : value;
+      } else if (sort) sort(value.startsWith("-") ? -1 : 1);
+      else if (key === "rows" && value === "all") this.all = true;
+      else {
+        this.unknown.push(`${key} “${value}”`);
+        continue;
+      }
+      stated = true;
+    }
+    return stated;
   }
 
   // All rows, those too that were not in the page yet.
@@ -52,8 +103,15 @@ class LongTable {
     return this.rows;
   }
 
-  addSort(head, column) {
+  addSort(head, column, columns) {
     if (head.dataset.sort === undefined) return;
+    const name = unused(slug(head.dataset.name ?? head.textContent), columns);
+    const sort = (direction) => {
+      this.table.querySelectorAll("thead th[aria-sort]").forEach((other) => other.removeAttribute("aria-sort"));
+      head.setAttribute("aria-sort", direction === 1 ? "ascending" : "descending");
+      this.order = { column, direction, kind: head.dataset.sort };
+    };
+    this.sorts.set(name, sort);
     const button = document.createElement("button");
     button.type = "button";
     button.className = "sort";
@@ -63,9 +121,8 @@ class LongTable {
       const [first, second] = head.dataset.first === "descending" ? [-1, 1] : [1, -1];
       const before = head.getAttribute("aria-sort");
       const direction = before === (first === 1 ? "ascending" : "descending") ? second : first;
-      this.table.querySelectorAll("thead th[aria-sort]").forEach((other) => other.removeAttribute("aria-sort"));
-      head.setAttribute("aria-sort", direction === 1 ? "ascending" : "descending");
-      this.order = { column, direction, kind: head.dataset.sort };
+      sort(direction);
+      this.note("sort", direction === 1 ? name : `-${name}`);
       this.show();
     });
     head.append(button);
@@ -74,8 +131,10 @@ class LongTable {
   addFilters(filters) {
     const search = document.createElement("input");
     search.type = "search";
+    this.search = search;
     search.addEventListener("input", () => {
       this.asked.text = search.value.trim().toLowerCase();
+      this.note("find", search.value.trim());
       this.show();
     });
     this.bar.append(labelled("Find", search));
@@ -88,6 +147,7 @@ class LongTable {
       this.asked[key] = first;
       select.addEventListener("change", () => {
         this.asked[key] = select.value;
+        this.note(key, select.value === first ? null : select.value || "all");
         this.show();
       });
       this.selects.set(key, select);
@@ -97,7 +157,11 @@ class LongTable {
     this.clear.addEventListener("click", () => {
       for (const key of Object.keys(this.asked)) this.asked[key] = "";
       search.value = "";
-      this.selects.forEach((each) => (each.value = ""));
+      this.note("find", null);
+      this.selects.forEach((each, key) => {
+        each.value = "";
+        this.note(key, this.table.dataset[`first${capital(key)}`] ? "all" : null);
+      });
       this.show();
     });
     this.bar.append(this.count, this.more, this.clear);
@@ -115,12 +179,21 @@ class LongTable {
     shown.forEach((row) => (row.hidden = false));
     this.body.replaceChildren(...shown);
     showUnits(this.body);
-    const those = fitting.length === this.rows.length ? `${fitting.length} rows` : `${fitting.length} of ${this.rows.length} rows${fitting.length ? "" : ": none has all that is asked for"}`;
+    const those = fitting.length === this.rows.length ? `${fitting.length} rows` : `${fitting.length} of ${this.rows.length} rows${fitting.length ? "" : this.why()}`;
     this.count.textContent = shown.length < fitting.length ? `the first ${shown.length} of ${those}` : those;
     this.more.hidden = shown.length === fitting.length;
     this.more.textContent = `show all ${fitting.length}`;
     if (this.clear) this.clear.hidden = fitting.length > 0;
     this.offer();
+  }
+
+  // Which filters leave no row, and how many there were without each.
+  why() {
+    const asked = Object.entries(this.asked).filter(([, value]) => value);
+    const word = (key) => (key === "text" ? "Find" : capital(key));
+    const without = asked.map(([key]) => [word(key), this.rows.filter((row) => this.fits(row, key)).length]).filter(([, left]) => left > 0);
+    const parts = [`none has ${asked.map(([key, value]) => `${word(key)} “${value}”`).join(" and ")}`, ...without.map(([name, left]) => `${left} without ${name}`)];
+    return `: ${parts.join("; ")}`;
   }
 
   // A filter offers what is left by the others.
