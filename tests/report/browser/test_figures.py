@@ -19,6 +19,19 @@ NAMES = {name: f"{one.vendor} {one.model}" for name, one in made.SENSORS.items()
 A, B = NAMES["alpha"], NAMES["beta"]
 NIGHT = made.NIGHT.recording
 MODEL = re.compile("Model")
+PLACES = """sketch => {
+  const number = (one, name) => Number(one.getAttribute(name));
+  const ticks = [...sketch.querySelectorAll(":scope > line")].map((tick) => {
+    const upright = number(tick, "x1") === number(tick, "x2");
+    const text = tick.nextElementSibling.textContent;
+    return upright ? ["x", [text, number(tick, "x1")]] : ["y", [text, number(tick, "y1")]];
+  });
+  const of = (axis) => ticks.filter(([name]) => name === axis).map(([, tick]) => tick);
+  const dots = [...sketch.querySelectorAll("svg circle")];
+  const at = (name) => dots.map((dot) => number(dot, name));
+  return { x: of("x"), y: of("y"), "curve x": at("cx"), "curve y": at("cy") };
+}"""
+"""Where a sketch has its ticks, with their texts, and the dots of the measured curve."""
 OF_NIGHT = f"recordings/alpha/{NIGHT}.html"
 CURVE = {"mode": "lines+markers"}
 
@@ -134,6 +147,32 @@ def test_the_recordings_of_one_sensor(read: Open, bench: Report) -> None:
     assert len(names(traces(figure))) == len(made.DATED) - 1
     # What is chosen among the curves holds for the parameters.
     assert len(traces(reader.figure("forest", symbol="B"))) == len(made.DATED) - 1
+
+
+def test_a_first_look_shows_the_same_curve_before_what_draws_is_there(
+    read: Open, bench: Report
+) -> None:
+    reader, held = read(bench.folder), []
+    reader.page.route("**/plotly.min.js", lambda route: held.append(route))
+    reader.open(OF_NIGHT)
+    sketch = reader.page.locator("figure[data-sketched] .canvas > svg.sketch").first
+    sketch.wait_for()
+    places = sketch.evaluate(PLACES)
+    rows = bench.of("allan", recording=NIGHT, channel="gyro_x")
+    for axis, values in (
+        ("x", column(rows, "tau")),
+        ("y", np.multiply(column(rows, "adev"), ARC)),
+    ):
+        ticks = {float(text): at for text, at in places[axis] if re.fullmatch(r"[\d.]+", text)}
+        assert len(ticks) >= 2
+        slope, begin = np.polyfit(np.log10([*ticks]), [*ticks.values()], 1)
+        expected = begin + slope * np.log10(values)
+        np.testing.assert_allclose(places[f"curve {axis}"], expected, atol=0.6)  # pixels
+    (script,) = held
+    script.continue_()
+    reader.page.locator("figure[data-drawn] svg.main-svg").first.wait_for()
+    assert sketch.count() == 0
+    reader.page.unroute("**/plotly.min.js")
 
 
 def test_ticks_follow_the_zoom(read: Open, bench: Report) -> None:

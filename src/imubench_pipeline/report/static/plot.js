@@ -328,8 +328,10 @@ function startFigures(root) {
 function afterPaint(act) {
   let done = false;
   const once = () => {
-    if (!done) act();
+    if (done) return;
     done = true;
+    performance.mark("painted");
+    act();
   };
   window.requestAnimationFrame(() => window.setTimeout(once));
   window.setTimeout(once, 300);

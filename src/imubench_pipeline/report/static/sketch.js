@@ -37,6 +37,9 @@ class Sketch {
     this.svg = svg("svg", { class: "sketch", width, height, "aria-hidden": "true" });
     this.axes = Object.fromEntries(axesOf(layout).map((name) => [name, this.axis(name, layout[name], traces)]));
     for (const [name, axis] of Object.entries(this.axes)) this.ticks(name, axis);
+    const { left, top, width: wide, height: high } = this.box;
+    this.inside = svg("svg", { x: left, y: top, width: wide, height: high, viewBox: [left, top, wide, high].join(" ") });
+    this.svg.append(this.inside);
     for (const shape of layout.shapes ?? []) this.shape(shape);
     let before = null;
     for (const trace of traces) before = this.trace(trace, before);
@@ -88,14 +91,14 @@ class Sketch {
       const zero = y.place(y.log ? 10 ** y.low : 0);
       points.forEach(([at, high], i) => {
         const wide = Math.abs(x.place(trace.x[i] + (trace.width?.[i] ?? 1) / 2) - at) * 2;
-        if (Number.isFinite(at + high)) this.svg.append(svg("rect", { x: at - wide / 2, y: Math.min(high, zero), width: wide, height: Math.abs(zero - high), fill: trace.marker.color }));
+        if (Number.isFinite(at + high)) this.inside.append(svg("rect", { x: at - wide / 2, y: Math.min(high, zero), width: wide, height: Math.abs(zero - high), fill: trace.marker.color }));
       });
       return points;
     }
     if (trace.fill === "tonexty" && before) this.area([...before, ...[...points].reverse()], trace.fillcolor);
     if (trace.fill === "toself") this.area(points, trace.fillcolor);
     if (trace.mode.includes("lines") && trace.line?.width !== 0) {
-      this.svg.append(svg("path", {
+      this.inside.append(svg("path", {
         d: pathOf(points), fill: "none", stroke: trace.line?.color, "stroke-width": trace.line?.width ?? 2, "stroke-dasharray": DASHES[trace.line?.dash] ?? "", opacity: trace.opacity,
       }));
     }
@@ -105,7 +108,7 @@ class Sketch {
         const [size, colour, symbol] = [of(trace.marker.size) ?? 6, of(trace.marker.color), String(of(trace.marker.symbol) ?? "")];
         if (size < 1 || !Number.isFinite(cx + cy)) return;
         const edge = of(trace.marker.line?.color) ?? colour;
-        this.svg.append(svg("circle", { cx, cy, r: size / 2, fill: /open|thin/.test(symbol) ? "none" : colour, stroke: edge }));
+        this.inside.append(svg("circle", { cx, cy, r: size / 2, fill: /open|thin/.test(symbol) ? "none" : colour, stroke: edge }));
       });
     }
     return points;
@@ -113,8 +116,8 @@ class Sketch {
 
   area(points, fill) {
     const known = points.filter(([x, y]) => Number.isFinite(x + y));
-    if (known.length === points.length) this.svg.append(svg("path", { d: `${pathOf(points)}Z`, fill }));
-    else this.svg.append(svg("path", { d: pathOf(points).replaceAll("M", "ZM").replace("Z", ""), fill }));
+    if (known.length === points.length) this.inside.append(svg("path", { d: `${pathOf(points)}Z`, fill }));
+    else this.inside.append(svg("path", { d: pathOf(points).replaceAll("M", "ZM").replace("Z", ""), fill }));
   }
 
   // Of a shape on a logarithmic axis the ends are values, of a note their logarithms.
@@ -130,7 +133,7 @@ class Sketch {
     const [low, high] = [y0, y1].map((value) => this.at("y", yref, value));
     if (![left, right, low, high].every(Number.isFinite)) return;
     const look = { stroke: edge.color, "stroke-width": edge.width ?? 1, "stroke-dasharray": DASHES[edge.dash] ?? "" };
-    this.svg.append(type === "line"
+    this.inside.append(type === "line"
       ? svg("line", { x1: left, x2: right, y1: low, y2: high, ...look })
       : svg("rect", { x: Math.min(left, right), y: Math.min(low, high), width: Math.abs(right - left), height: Math.abs(high - low), fill: fillcolor ?? "none", ...look }));
   }
