@@ -547,7 +547,8 @@ def test_what_is_not_sold_is_not_said_to_lack_a_recording(tmp_path: Path) -> Non
     made.tables["ranking"] = ranking.filter(pc.field("sensor") != "board")  # type: ignore[index]  # made so
     publish(made, tmp_path)
     read = sound(tmp_path)
-    (line,) = read["index.html"].naming("not judged", "tr")
+    assert not read["index.html"].naming("not judged", "tr")
+    (line,) = read["index.html"].naming("Not among them", "p")
     assert "board" in line.text and "not sold" in line.text
     assert "It is in no ranking: not sold." in read["sensors/board.html"].text
 

@@ -126,7 +126,7 @@ def matrix(site: Site) -> dict[str, Any] | None:
     }
     # What nobody can buy is no row among what can be bought.
     apart = {
-        sensor: reason for sensor in site.sensors if _NOT_SOLD in (reason := _why(site, sensor))
+        view.sensor: _NOT_SOLD for view in site.views if _NOT_SOLD in (view.row["doubts"] or "")
     }
     lines = {sensor: cells for sensor, cells in lines.items() if sensor not in apart}
     order = sorted(lines, key=lambda sensor: (_merit(lines[sensor]), site.names[sensor]))
