@@ -46,8 +46,9 @@ ELSEWHERE = {
     "docs/_build/html": INSTALLS,
     ".venv/bin/pip install -r requirements/docs.txt && .venv/bin/sphinx-build -W -q docs "
     "docs/_build/html": INSTALLS,
-    "python3 -m venv .venv && .venv/bin/pip install -r requirements/run.txt && .venv/bin/pip "
-    "install --no-deps --no-build-isolation -e .": INSTALLS,
+    "python3 -m venv .venv && .venv/bin/pip install imubench_pipeline-*.whl": "installs from an "
+    "index: benchmarks/installed.py",
+    ". .venv/bin/activate": "of a shell that is typed into: what it puts on the path is tested",
     ".venv/bin/ruff check . && .venv/bin/ruff format .": "of the whole project: .ci/run",
     ".venv/bin/snakefmt Snakefile workflow": "of the whole project: .ci/run",
     ".venv/bin/mypy": "of the whole project: .ci/run",
@@ -59,8 +60,8 @@ ELSEWHERE = {
     ".venv/bin/snakemake --workflow-profile profiles/slurm --config logs=/data/logs "
     "results=/data/results": "needs Slurm: tests/slurm",
     ".venv/bin/imubench nightly -- --workflow-profile profiles/slurm": "needs Slurm: tests/slurm",
-    "pip wheel --no-deps -w dist . && pip install dist/imubench_pipeline-*.whl": "installs from an "
-    "index: tests/workflow/test_deployed.py builds it",
+    "pip wheel --no-deps -w dist .": "asks an index for what builds it: "
+    "tests/workflow/test_deployed.py builds it without",
     'eval "$(imubench completion bash)"': "of a shell that is typed into: tests/test_shipped.py",
     "imubench completion zsh > ~/.zfunc/_imubench": "of a shell that is typed into: "
     "tests/test_shipped.py",
