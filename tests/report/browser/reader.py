@@ -119,6 +119,8 @@ class Reader:
         for everything in self.page.get_by_role("button", name="all channels").all():
             everything.click()
         figures = self.page.locator("figure[data-kind]")
+        if figures.count():  # else a figure is out of view again before anything draws
+            self.page.wait_for_function("window.Plotly !== undefined")
         for figure in figures.all():
             figure.scroll_into_view_if_needed()
         self.page.wait_for_function(
