@@ -58,11 +58,15 @@ class Reader:
         self.page.on("console", lambda said: self._complain(said.type, said.text))
         self.page.on("pageerror", lambda error: self._complain("error", str(error)))
         self.page.on("request", lambda asked: self._request(asked.url))
-        self.page.on("requestfailed", lambda asked: self._complain("error", f"no {asked.url}"))
+        self.page.on("requestfailed", lambda asked: self._failed(asked.url, asked.failure))
 
     def _complain(self, kind: str, text: str) -> None:
         if kind in ("error", "warning"):
             self.complaints.append(f"{self.page.url}: {kind}: {text}")
+
+    def _failed(self, url: str, reason: str | None) -> None:
+        if reason != "net::ERR_ABORTED":  # the reader left before it was there
+            self._complain("error", f"no {url}: {reason}")
 
     def _request(self, url: str) -> None:
         if not url.startswith(("file:", "data:", "blob:")):
