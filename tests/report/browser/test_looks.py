@@ -92,3 +92,14 @@ def test_a_page_is_printed_light_and_whole(scheme: str, read: Open, bench: Repor
     assert all(canvas.locator("svg.main-svg").count() for canvas in canvases)
     reader.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert luminance(ink(reader)) < 0.2
+
+
+def test_no_figure_is_cut_off_on_paper(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, "compare.html", width=718)  # of a sheet of A4 between its margins
+    reader.draw_all()
+    reader.page.emulate_media(media="print")
+    reader.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    ends = "figures => figures.map(one => one.getBoundingClientRect().right)"
+    drawn = reader.page.locator("figure[data-kind] svg.main-svg").evaluate_all(ends)
+    assert len(drawn) >= 4
+    assert max(drawn) <= 718

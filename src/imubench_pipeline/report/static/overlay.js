@@ -147,7 +147,7 @@ kinds.overlay = (figure) => {
   // Names stand at the ends of the curves, where there is room for them.
   const named = new Map();
   for (const view of here) if (shown(figure, groupOf(view)) && shown(figure, "measured")) named.set(groupOf(view), view);
-  const roomy = figure.clientWidth > 700 && named.size <= 12;
+  const roomy = !printing() && figure.clientWidth > 700 && named.size <= 12;
   const labels = roomy ? directLabels([...named].map(([key, view]) => ({
     y: Math.log10(scaled(view.adev, unit.factor).at(-1)), text: wrapped(nameOf(key)), colour: colourOf(lookOf(view)),
   })), ranges.y) : [];

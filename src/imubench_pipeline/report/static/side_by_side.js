@@ -258,7 +258,7 @@ function startGrowth(root) {
   });
   const axes = document.createElement("select");
   axes.append(new Option("the worst of the axes", "worst"));
-  if (alone) axes.append(new Option(`axis ${chosenChannel.at(-1)} alone`, "axis"));
+  if (alone) axes.append(new Option(`axis ${chosenChannel.at(-1)} alone: its gyro, its accelerometer`, "axis"));
   axes.value = growthOf.axes;
   axes.addEventListener("change", () => {
     growthOf.axes = axes.value;
