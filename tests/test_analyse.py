@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -148,9 +150,16 @@ def test_who_is_told_of_an_error_at_once_is_told_of_no_compilation(
     expected: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(compilation, "_SLOW", 0.0)
+    monkeypatch.setattr(compilation, "compile_kernels", lambda: time.sleep(600.0))
     said: list[str] = []
-    with compilation.Compilation(said.append) as compiling:
+    told = threading.Event()
+
+    def tell(text: str) -> None:
+        said.append(text)
+        told.set()
+
+    with compilation.Compilation(tell) as compiling:
         if expected:
             compiling.expected()
-        compiling.finish()
+            assert told.wait(60.0)
     assert len(said) == expected
