@@ -14,7 +14,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.report.glossary import term
-from imubench_pipeline.report.payload import Arrays, compared, datasheet_lines, looks
+from imubench_pipeline.report.payload import Arrays, looks
 from imubench_pipeline.report.practical import (
     duration_text,
     number_text,
@@ -42,13 +42,17 @@ def _context(site: Site) -> dict[str, Any]:
     channels: list[dict[str, Any]] = []
     datasheets: dict[str, dict[str, Any]] = {}
     recordings = []
-    for view in views:
+    for recording in site.compared(views):
+        view = recording.view
         kept = {table: _kept(site, view, table) for table in KEPT}
         drawn = dict(_drawn(kept["drawn_deviations"], arrays, few=len(views) > _MANY))
-        for channel in view.channels():
-            own = datasheets.setdefault(view.sensor, {})
-            own.setdefault(channel.channel, datasheet_lines(channel))
-            channels.append(compared(channel, arrays) | {"drawn": drawn.get(channel.channel)})
+        for channel in recording.channels:
+            channels.append(
+                channel.among(arrays) | {"drawn": drawn.get(channel.about["channel"])}
+            )
+        own = datasheets.setdefault(view.sensor, {})
+        for name, lines in recording.datasheet.items():
+            own.setdefault(name, lines)
         growth = _growth(kept["error_growth"], arrays, few=len(views) > _MANY)
         recordings.append(_recording(view) | {"growth": growth})
     return {

@@ -2,73 +2,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import SHOWN
 from imubench_pipeline.report.parameters import cell, model_words, shown_symbols
-from imubench_pipeline.report.payload import Arrays, compared, datasheet_lines
+from imubench_pipeline.report.payload import Arrays, ComparedChannel, compared, datasheet_lines
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
 
 _PAPERS = "likelihood_gm"
 
 
+@dataclass(frozen=True)
+class ComparedRecording:
+    """What pages compare of a recording: gathered once, whatever the number of pages."""
+
+    view: RecordingView
+    channels: list[ComparedChannel]
+    datasheet: Mapping[str, list[dict[str, Any]]]  # its lines, by channel
+    lines: Mapping[str, list[dict[str, Any]]]  # of the tables of parameters, by quantity
+    symbols: Mapping[str, set[str]]  # that the lines have, by quantity
+
+
+def compared_recording(view: RecordingView, system: System) -> ComparedRecording:
+    """Gather what pages compare of a recording; ``system`` is that of its numbers."""
+    channels = view.channels()
+    lines: dict[str, list[dict[str, Any]]] = {name: [] for name in QUANTITY_NAMES}
+    symbols: dict[str, set[str]] = {name: set() for name in QUANTITY_NAMES}
+    for channel in channels:
+        shown = shown_symbols(chain(*channel.parameters.values()))
+        symbols[channel.quantity].update(shown)
+        methods = {channel.recommended: "recommended"}
+        if _PAPERS in channel.parameters:
+            methods.setdefault(_PAPERS, "papers' model")
+        lines[channel.quantity] += [
+            {
+                "view": view,
+                "axis": channel.axis,
+                "channel": channel.channel,
+                "warnings": channel.warnings,
+                "asked": asked,
+                "model": model_words(channel, method),
+                "cells": {
+                    symbol: cell(channel, method, symbol, view.row["duration"], system)
+                    for symbol in shown
+                },
+            }
+            for method, asked in methods.items()
+        ]
+    return ComparedRecording(
+        view,
+        [compared(channel) for channel in channels],
+        {channel.channel: datasheet_lines(channel) for channel in channels},
+        lines,
+        symbols,
+    )
+
+
 class Comparison:
-    """What is compared of recordings: one after the other is gathered, and let go.
+    """What is compared of recordings.
 
     Parameters
     ----------
-    views : sequence of RecordingView
+    recordings : iterable of ComparedRecording
     names : mapping
         Of the sensors, as they are shown.
-    system : str
-        Units in which the pages open.
     """
 
-    def __init__(
-        self, views: Sequence[RecordingView], names: Mapping[str, str], system: System
-    ) -> None:
+    def __init__(self, recordings: Iterable[ComparedRecording], names: Mapping[str, str]) -> None:
         self._names = names
-        self._system = system
         self._arrays = Arrays()
         self._curves: list[dict[str, Any]] = []
         self._datasheets: dict[str, dict[str, Any]] = {}
         self._lines: dict[str, list[dict[str, Any]]] = {name: [] for name in QUANTITY_NAMES}
         self._symbols: dict[str, set[str]] = {name: set() for name in QUANTITY_NAMES}
-        for view in views:
-            for channel in view.channels():
-                self._add(view, channel)
-
-    def _add(self, view: RecordingView, channel: ChannelView) -> None:
-        self._curves.append(compared(channel, self._arrays))
-        own = self._datasheets.setdefault(view.sensor, {})
-        if channel.channel not in own:
-            own[channel.channel] = datasheet_lines(channel)
-        symbols = shown_symbols(chain(*channel.parameters.values()))
-        self._symbols[channel.quantity].update(symbols)
-        lines = self._lines[channel.quantity]
-        lines.append(self._line(view, channel, channel.recommended, "recommended"))
-        if _PAPERS in channel.parameters and channel.recommended != _PAPERS:
-            lines.append(self._line(view, channel, _PAPERS, "papers' model"))
-
-    def _line(
-        self, view: RecordingView, channel: ChannelView, method: str, asked: str
-    ) -> dict[str, Any]:
-        duration = view.row["duration"]
-        return {
-            "view": view,
-            "axis": channel.axis,
-            "channel": channel.channel,
-            "warnings": channel.warnings,
-            "asked": asked,
-            "model": model_words(channel, method),
-            "cells": {
-                symbol: cell(channel, method, symbol, duration, self._system)
-                for symbol in shown_symbols(chain(*channel.parameters.values()))
-            },
-        }
+        for recording in recordings:
+            self._curves += [channel.among(self._arrays) for channel in recording.channels]
+            own = self._datasheets.setdefault(recording.view.sensor, {})
+            for channel, lines in recording.datasheet.items():
+                own.setdefault(channel, lines)
+            for quantity in QUANTITY_NAMES:
+                self._lines[quantity] += recording.lines[quantity]
+                self._symbols[quantity] |= recording.symbols[quantity]
 
     @property
     def page(self) -> dict[str, Any]:

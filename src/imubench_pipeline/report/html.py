@@ -68,6 +68,7 @@ def environment(system: System) -> jinja2.Environment:
     return templates
 
 
+@cache
 def _unit(reference: str, system: System) -> PageUnit:
     quantity, symbol = reference.split(".")
     return page_unit(quantity, symbol, system)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -27,50 +27,63 @@ _FEW = 24
 """Points of a model's curve among those of other channels."""
 
 
+Packed = tuple[str, float, float, bytes]
+"""An array with no more digits than are seen: kind, begin, step and codes."""
+
+
+def packed_log(values: ArrayLike) -> Packed:
+    """Return positive numbers packed, right to a few parts in 10,000."""
+    numbers = np.asarray(values, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithms = np.where(numbers > 0.0, np.log10(numbers), np.nan)
+    low, step, codes = _levels(logarithms, 65534)
+    # Neighbours of a curve are near each other: their differences pack best, byte by byte.
+    differences = codes.astype("<u2")
+    differences[1:] -= differences[:-1].copy()
+    return "l", low, step, differences.view("<u1").reshape(-1, 2).T.tobytes()
+
+
+def _levels(
+    values: NDArray[np.float64], levels: int
+) -> tuple[float, float, NDArray[np.float64]]:
+    """Return begin and step of the codes of numbers, and the codes; 0 stands for none."""
+    finite = np.isfinite(values)
+    if finite.all():
+        low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+        step = (high - low) / levels or 1.0
+        return low, step, 1.0 + np.rint((values - low) / step)
+    present = values[finite]
+    low, high = (float(present.min()), float(present.max())) if len(present) else (0.0, 0.0)
+    step = (high - low) / levels or 1.0
+    return low, step, np.where(finite, 1.0 + np.rint((values - low) / step), 0.0)
+
+
 class Arrays:
-    """Arrays of a page: each stands in it once, as base64 with no more digits than are seen.
+    """Arrays of a page: each stands in it once, as base64 of its codes.
 
     ``levels``: 0 stands for no value, the others divide the range evenly, or its logarithm. Those
     of a logarithm are kept as differences modulo 65536, all low bytes before all high ones.
     """
 
     def __init__(self) -> None:
-        self._places: dict[tuple[Any, ...], int] = {}
+        self._places: dict[Packed, int] = {}
 
     def exact(self, values: ArrayLike) -> int:
         """Return the place of an array that is kept as float32."""
-        return self._place("f", 0.0, 0.0, np.asarray(values, dtype="<f4"))
+        return self.place(("f", 0.0, 0.0, np.asarray(values, dtype="<f4").tobytes()))
 
     def log(self, values: ArrayLike) -> int:
         """Return the place of an array of positive numbers, right to a few parts in 10,000."""
-        numbers = np.asarray(values, dtype=np.float64)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            logarithms = np.where(numbers > 0.0, np.log10(numbers), np.nan)
-        return self._levels("l", logarithms, 65534)
+        return self.place(packed_log(values))
 
     def even(self, values: ArrayLike) -> int:
         """Return the place of an array that is drawn on an even axis, in 254 steps."""
-        return self._levels("e", np.asarray(values, dtype=np.float64), 254)
+        low, step, codes = _levels(np.asarray(values, dtype=np.float64), 254)
+        return self.place(("e", low, step, codes.astype("<u1").tobytes()))
 
-    def _levels(self, kind: str, values: NDArray[np.float64], levels: int) -> int:
-        finite = np.isfinite(values)
-        low, high = (
-            (float(values[finite].min()), float(values[finite].max()))
-            if finite.any()
-            else (0.0, 0.0)
-        )
-        step = (high - low) / levels or 1.0
-        filled = np.where(finite, values, low)
-        codes = np.where(finite, 1.0 + np.rint((filled - low) / step), 0.0)
-        return self._place(kind, low, step, codes.astype("<u2" if levels > 255 else "<u1"))
-
-    def _place(self, kind: str, low: float, step: float, data: NDArray[Any]) -> int:
-        if kind == "l":
-            # Neighbours of a curve are near each other: their differences pack best, byte by byte.
-            steps = np.diff(data, prepend=data.dtype.type(0))
-            data = steps.view("<u1").reshape(-1, 2).T
-        key = (kind, low, step, data.tobytes())
-        return self._places.setdefault(key, len(self._places))
+    def place(self, packed: Packed) -> int:
+        """Return the place of an array that is packed."""
+        return self._places.setdefault(packed, len(self._places))
 
     @property
     def texts(self) -> list[list[Any]]:
@@ -92,33 +105,56 @@ def looks(sensors: Mapping[str, Appearance]) -> dict[str, Any]:
     }
 
 
-def compared(view: ChannelView, arrays: Arrays) -> dict[str, Any]:
+@dataclass(frozen=True)
+class ComparedChannel:
+    """A channel as it is drawn among others, small enough that those of all recordings are kept."""
+
+    about: Mapping[str, Any]  # names, recommended method, parameters by method
+    curve: Mapping[str, Packed]
+    models: Mapping[str, tuple[Packed, Packed]]  # tau and deviation, by method
+
+    def among(self, arrays: Arrays) -> dict[str, Any]:
+        """Return it with the places of its arrays in those of a page."""
+        return {
+            **self.about,
+            **{name: arrays.place(packed) for name, packed in self.curve.items()},
+            "models": {
+                method: [arrays.place(packed) for packed in curve]
+                for method, curve in self.models.items()
+            },
+        }
+
+
+def compared(view: ChannelView) -> ComparedChannel:
     """Return a channel as it is drawn among others: curve, models, datasheet, parameters."""
-    tau = view.tau
-    return {
-        "sensor": view.sensor,
-        "recording": view.recording,
-        "channel": view.channel,
-        "simulated": view.simulated,
-        "recommended": view.recommended,
-        "tau": arrays.log(tau),
-        "adev": arrays.log(view.adev),
-        "lower": arrays.log(view.lower),
-        "upper": arrays.log(view.upper),
-        "models": {method: _model(view.model(method), tau, arrays) for method in view.parameters},
-        "parameters": {
-            method: _estimates(view, method)
-            for method in dict.fromkeys((view.recommended, "likelihood_gm"))
-            if method in view.parameters
+    return ComparedChannel(
+        about={
+            "sensor": view.sensor,
+            "recording": view.recording,
+            "channel": view.channel,
+            "simulated": view.simulated,
+            "recommended": view.recommended,
+            "parameters": {
+                method: _estimates(view, method)
+                for method in dict.fromkeys((view.recommended, "likelihood_gm"))
+                if method in view.parameters
+            },
         },
-    }
+        curve={
+            "tau": packed_log(view.tau),
+            "adev": packed_log(view.adev),
+            "lower": packed_log(view.lower),
+            "upper": packed_log(view.upper),
+        },
+        models={method: _model(view.model(method), view.tau) for method in view.parameters},
+    )
 
 
-def _model(model: NoiseModel, tau: NDArray[np.float64], arrays: Arrays) -> list[int]:
+def _model(model: NoiseModel, tau: NDArray[np.float64]) -> tuple[Packed, Packed]:
     """Return the curve of a model, on few points where it is smooth."""
     if not model.sinusoids:
         tau = np.geomspace(tau[0], tau[-1], _FEW)
-    return [arrays.log(tau), arrays.log(_curve(model, tau))]
+    return packed_log(tau), packed_log(_curve(model, tau))
 
 
 def channel_payload(view: ChannelView, rate: float, arrays: Arrays) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
+from functools import cache
 from typing import Any, Literal
 
 from imubench_pipeline.estimators.digits import digits_by
@@ -144,6 +145,7 @@ def _chosen(quantity: str, system: System) -> str:
     return names[0] if system == "practical" else names[-1]
 
 
+@cache
 def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
     dimensions = DIMENSIONS[quantity]
     dimension = dimensions.get(symbol) or {

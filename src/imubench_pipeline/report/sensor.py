@@ -43,7 +43,7 @@ def sensor_page(site: Site, sensor: str) -> Page:
 
 
 def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, Any]:
-    together = Comparison(own, site.names, site.system)
+    together = Comparison(site.compared(own), site.names)
     pooled = [_pooled(row) for row in site.rows("pooled") if row["sensor"] == sensor]
     shown = own if len(own) <= _MANY else []
     simulated = {view.full_name: view.simulated for view in own}

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
@@ -15,6 +15,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from imubench_pipeline.report.comparison import ComparedRecording, compared_recording
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, first_choices, units_of_pages
 from imubench_pipeline.report.shell import made_again
@@ -78,6 +79,7 @@ class Site:
     entries: Sequence[Entry]  # the pages that there is one of, in the order of the navigation
     code: str = ""  # digest of the code that makes the pages
     _rows: dict[str, list[Row]] = field(default_factory=dict, init=False)
+    _compared: dict[Name, ComparedRecording] = field(default_factory=dict, init=False)
 
     @property
     def title(self) -> str:
@@ -126,6 +128,13 @@ class Site:
             if together[device] > 1 or view.row["device"] != view.name:
                 view.device_page = _device_page(*device)
         return views
+
+    def compared(self, views: Iterable[RecordingView]) -> Iterator[ComparedRecording]:
+        """Yield what pages compare of recordings."""
+        for view in views:
+            if view.full_name not in self._compared:
+                self._compared[view.full_name] = compared_recording(view, self.system)
+            yield self._compared[view.full_name]
 
     @cached_property
     def turned(self) -> list[RecordingView]:

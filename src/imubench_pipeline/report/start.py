@@ -31,7 +31,7 @@ _STEPS = 3
 def _start(site: Site) -> dict[str, Any]:
     views = site.views
     ranked = list(_rankings(site))
-    together = Comparison(views, site.names, site.system)
+    together = Comparison(site.compared(views), site.names)
     warned = [view for view in views if view.warnings]
     return {
         "strip": strip(site),

@@ -183,7 +183,8 @@ class RecordingView:
 
     def rows(self, table: str) -> list[Row]:
         """Return its rows of a table."""
-        rows: list[Row] = self.parts[table].to_pylist()
+        part = self.parts[table]
+        rows: list[Row] = part.to_pylist() if part.num_rows else []
         return rows
 
     def recommended(self) -> dict[str, str]:
