@@ -1,9 +1,10 @@
+from collections.abc import Iterable
 from typing import Any
 
 import pytest
 
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.report.comparison import Comparison
+from imubench_pipeline.report.comparison import Comparison, compared_recording
 from imubench_pipeline.report.view import RecordingView, recording_views
 from tests.report.tables import HOUR, KNOWN, MODEL, WITHOUT_K, joined, recording_rows, rejected_rows
 
@@ -14,8 +15,12 @@ def views(*several: Any) -> list[RecordingView]:
     return recording_views(joined(*several))
 
 
+def together(recordings: Iterable[RecordingView]) -> Comparison:
+    return Comparison([compared_recording(one, "practical") for one in recordings], NAMES)
+
+
 def lines(*several: Any) -> list[dict[str, Any]]:
-    (table,) = Comparison(views(*several), NAMES, "practical").tables()
+    (table,) = together(views(*several)).tables()
     return table["lines"]
 
 
@@ -25,7 +30,7 @@ def test_each_quantity_has_a_table_with_the_channels_of_all_sensors() -> None:
         recording_rows("b", "r", ("gyro_y",), simulated=True),
         rejected_rows("b", "bad"),
     )
-    gyro, accel = Comparison(found, NAMES, "practical").tables()
+    gyro, accel = together(found).tables()
     assert (gyro["title"], accel["title"]) == ("Gyroscope", "Accelerometer")
     assert gyro["filters"] == {
         "axis": ["x", "y"],
@@ -54,10 +59,10 @@ def test_a_table_has_the_parameters_that_any_of_its_channels_has() -> None:
     ramp = KNOWN | {"R": Parameter(1e-9, lower=5e-10, upper=2e-9)}
     none = KNOWN | {"Q": Parameter(None, "absent")}
     found = views(recording_rows("a", "r", parameters=none), recording_rows("b", "r"))
-    (table,) = Comparison(found, NAMES, "practical").tables()
+    (table,) = together(found).tables()
     assert table["symbols"] == ["N", "B", "T_B", "K"]
     found = views(recording_rows("a", "r", parameters=ramp), recording_rows("b", "r"))
-    (table,) = Comparison(found, NAMES, "practical").tables()
+    (table,) = together(found).tables()
     assert table["symbols"] == ["N", "B", "T_B", "K", "R"]
     assert [("R" in line["cells"]) for line in table["lines"]] == [True, True, False, False]
 
@@ -85,7 +90,7 @@ def test_the_doubts_of_a_channel_stand_beside_its_parameters() -> None:
 
 def test_curves_stand_by_channel_and_datasheets_once_a_sensor() -> None:
     found = views(recording_rows("a", "r"), recording_rows("a", "q"), recording_rows("b", "r"))
-    page = Comparison(found, NAMES, "practical").page
+    page = together(found).page
     named = [(one["sensor"], one["recording"], one["channel"]) for one in page["channels"]]
     assert named == [("a", "r", "gyro_x"), ("a", "q", "gyro_x"), ("b", "r", "gyro_x")]
     assert {name: list(own) for name, own in page["datasheets"].items()} == {
@@ -99,6 +104,6 @@ def test_curves_stand_by_channel_and_datasheets_once_a_sensor() -> None:
 
 
 def test_nothing_to_compare_is_no_table() -> None:
-    together = Comparison(views(rejected_rows("b", "bad")), NAMES, "si")
-    assert list(together.tables()) == []
-    assert together.page == {"channels": [], "datasheets": {}, "arrays": []}
+    nothing = together(views(rejected_rows("b", "bad")))
+    assert list(nothing.tables()) == []
+    assert nothing.page == {"channels": [], "datasheets": {}, "arrays": []}

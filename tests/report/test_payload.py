@@ -140,7 +140,7 @@ def channel(**given_: Any) -> ChannelView:
 def test_a_channel_among_others_has_its_curve_and_the_curves_of_its_models() -> None:
     arrays = Arrays()
     view = channel(simulated=True)
-    found = compared(view, arrays)
+    found = compared(view).among(arrays)
     assert found["simulated"] is True
     adev = np.sqrt(MODEL.allan_variance(TAU))
     for name, factor in (("adev", 1.0), ("lower", 1 / 1.2), ("upper", 1.2)):
@@ -154,7 +154,7 @@ def test_a_channel_among_others_has_its_curve_and_the_curves_of_its_models() -> 
 
 
 def test_parameters_are_drawn_by_the_recommended_method_and_the_papers() -> None:
-    found = compared(channel(parameters=WITHOUT_K), Arrays())
+    found = compared(channel(parameters=WITHOUT_K)).among(Arrays())
     assert set(found["parameters"]) == {"likelihood", "likelihood_gm"}
     ((*numbers, status),) = found["parameters"]["likelihood"]["B"]
     assert numbers == pytest.approx([10 * HOUR, 8 * HOUR, 13 * HOUR], rel=1e-4)
@@ -171,7 +171,7 @@ def test_all_components_of_a_parameter_are_drawn() -> None:
     (time,) = (r for r in rows["parameters"] if r["recommended"] and r["parameter"] == "T_B")
     rows["parameters"].append(time | {"component": 2, "value": 5.0})
     (view,) = recording_views(joined(rows))
-    found = compared(view.channels()[0], Arrays())["parameters"]["likelihood"]
+    found = compared(view.channels()[0]).among(Arrays())["parameters"]["likelihood"]
     assert [value for value, *_ in found["B"]] == pytest.approx([10 * HOUR, 3 * HOUR], rel=1e-4)
     assert [value for value, *_ in found["T_B"]] == [100.0, 5.0]
 
@@ -257,5 +257,5 @@ def test_a_page_can_hold_what_is_drawn_as_json() -> None:
     unknown = {"N": Parameter(None, "not_identified", lower=1e-5, upper=2e-5, fitted=1.4e-5)}
     arrays = Arrays()
     view = channel(parameters=unknown)
-    found = [compared(view, arrays), channel_payload(view, RATE, arrays), arrays.texts]
+    found = [compared(view).among(arrays), channel_payload(view, RATE, arrays), arrays.texts]
     assert json.loads(json.dumps(found, allow_nan=False)) == found

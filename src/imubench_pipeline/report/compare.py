@@ -47,9 +47,7 @@ def _context(site: Site) -> dict[str, Any]:
         kept = {table: _kept(site, view, table) for table in KEPT}
         drawn = dict(_drawn(kept["drawn_deviations"], arrays, few=len(views) > _MANY))
         for channel in recording.channels:
-            channels.append(
-                channel.among(arrays) | {"drawn": drawn.get(channel.about["channel"])}
-            )
+            channels.append(channel.among(arrays) | {"drawn": drawn.get(channel.about["channel"])})
         own = datasheets.setdefault(view.sensor, {})
         for name, lines in recording.datasheet.items():
             own.setdefault(name, lines)

@@ -11,7 +11,7 @@ from imubench_pipeline.estimators.estimate import SHOWN
 from imubench_pipeline.report.parameters import cell, model_words, shown_symbols
 from imubench_pipeline.report.payload import Arrays, ComparedChannel, compared, datasheet_lines
 from imubench_pipeline.report.practical import System
-from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
+from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 
 _PAPERS = "likelihood_gm"
 

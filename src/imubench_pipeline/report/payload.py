@@ -43,9 +43,7 @@ def packed_log(values: ArrayLike) -> Packed:
     return "l", low, step, differences.view("<u1").reshape(-1, 2).T.tobytes()
 
 
-def _levels(
-    values: NDArray[np.float64], levels: int
-) -> tuple[float, float, NDArray[np.float64]]:
+def _levels(values: NDArray[np.float64], levels: int) -> tuple[float, float, NDArray[np.float64]]:
     """Return begin and step of the codes of numbers, and the codes; 0 stands for none."""
     finite = np.isfinite(values)
     if finite.all():
@@ -290,20 +288,25 @@ def samples_payload(
 ) -> dict[str, Any]:
     """Return the envelope of the samples of a recording and their histogram, by channel."""
     payload: dict[str, Any] = {"envelope": {}, "histogram": {}}
-    for channel in dict.fromkeys(row["channel"] for row in envelope):
-        rows = [row for row in envelope if row["channel"] == channel]
+    for channel, rows in _by_channel(envelope).items():
         payload["envelope"][channel] = {
             "start": rows[0]["start"],
             "end": rows[-1]["end"],
             **{name: arrays.even(numbers(rows, name)) for name in ("low", "high", "mean")},
         }
-    for channel in dict.fromkeys(row["channel"] for row in histogram):
-        rows = [row for row in histogram if row["channel"] == channel]
+    for channel, rows in _by_channel(histogram).items():
         payload["histogram"][channel] = {
             "edges": arrays.exact([rows[0]["lower"], *(row["upper"] for row in rows)]),
             "count": arrays.log([row["count"] for row in rows]),
         }
     return payload
+
+
+def _by_channel(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    channels: dict[str, list[Row]] = {}
+    for row in rows:
+        channels.setdefault(row["channel"], []).append(row)
+    return channels
 
 
 def _rounded(value: float | None) -> float | None:

@@ -33,7 +33,7 @@ def number_text(value: float, digits: int = 4) -> str:
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
     exact = Decimal(value)
-    rounded = Context(prec=digits, rounding=ROUND_HALF_UP).create_decimal(exact)
+    rounded = _rounding(digits).create_decimal(exact)
     if rounded == 0 or _LEAST_PLAIN <= abs(rounded) < _MOST_PLAIN:
         text = _without_zeros(format(abs(rounded), "f"))
     else:
@@ -41,6 +41,11 @@ def number_text(value: float, digits: int = 4) -> str:
         power = str(int(exponent)).translate(_SUPERSCRIPTS)
         text = f"{_without_zeros(mantissa)}×10{power}"
     return "−" + text if rounded < 0 else text
+
+
+@cache
+def _rounding(digits: int) -> Context:
+    return Context(prec=digits, rounding=ROUND_HALF_UP)
 
 
 def _without_zeros(text: str) -> str:
