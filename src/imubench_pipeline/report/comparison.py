@@ -81,8 +81,8 @@ class Comparison:
         self._symbols: dict[str, set[str]] = {name: set() for name in QUANTITY_NAMES}
         for recording in recordings:
             self._curves += [channel.among(self._arrays) for channel in recording.channels]
-            own = self._datasheets.setdefault(recording.view.sensor, {})
             for channel, lines in recording.datasheet.items():
+                own = self._datasheets.setdefault(recording.view.sensor, {})
                 own.setdefault(channel, lines)
             for quantity in QUANTITY_NAMES:
                 self._lines[quantity] += recording.lines[quantity]

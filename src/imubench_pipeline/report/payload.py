@@ -32,7 +32,7 @@ Packed = tuple[str, float, float, bytes]
 
 
 def packed_log(values: ArrayLike) -> Packed:
-    """Return positive numbers packed, right to a few parts in 10,000."""
+    """Return positive numbers, array of shape (n,), packed: right to a few parts in 10,000."""
     numbers = np.asarray(values, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         logarithms = np.where(numbers > 0.0, np.log10(numbers), np.nan)
