@@ -5,7 +5,8 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from functools import cache
+from collections.abc import Mapping
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -49,6 +50,29 @@ def environment(system: System) -> jinja2.Environment:
         # Numbers and names of our own: nothing to escape, and there are many of them.
         return Markup(f'<data value="{rounded}"{of}>{text}</data>')
 
+    def parameter_cell(cell: Mapping[str, Any], unit: str) -> Markup:
+        """Return a cell of `report.parameters` with its intervals; there are many of them."""
+        digits = cell["digits"]
+        number = partial(si, unit=unit, digits=digits, inside=True)
+        parts = []
+        for part in cell["parts"]:
+            value, status, lower, upper = (part[k] for k in ("value", "status", "lower", "upper"))
+            if value is None:
+                text = f"{_hint(status)}" if status else "–"
+            else:
+                shown = status.replace("_", " ")
+                text = f"{number(value)}" + (
+                    f' <span class="status">{shown}</span>' if status else ""
+                )
+            if upper is not None:
+                limits = f"{number(lower)} to" if lower is not None else "below"
+                text += f"<br><small>{limits} {number(upper)}</small>"
+            parts.append(text)
+        none = " none" if cell["value"] is None else ""
+        of_digits = f' data-digits="{digits}"' if digits != 3 else ""
+        # Numbers and words of our own: nothing to escape.
+        return Markup(f'<td class="number{none}"{of_digits}>{"<br>".join(parts) or "–"}</td>')
+
     def sign(unit: str) -> Markup:
         """Return the sign of a unit that the reader can switch."""
         return Markup('<span data-sign="{}">{}</span>').format(unit, _unit(unit, system).sign)
@@ -57,6 +81,7 @@ def environment(system: System) -> jinja2.Environment:
         "action": _action,
         "si": si,
         "sign": sign,
+        "parameter_cell": parameter_cell,
         "term": _term,
         "hint": _hint,
         "to": _to,
