@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import zstandard
+from backports import zstd
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -53,7 +53,7 @@ def streamed_zip(files: dict[str, bytes]) -> bytes:
 
 PACKED: dict[str, Callable[[bytes], bytes]] = {
     "gz": gzip.compress,
-    "zst": zstandard.compress,
+    "zst": zstd.compress,
     "xz": lambda text: lzma.compress(text, preset=0),
     "bz2": lambda text: bz2.compress(text, 1),
     "zip": zipped,

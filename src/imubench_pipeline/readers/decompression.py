@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import bz2
 import lzma
+import sys
 import zlib
 from collections.abc import Callable, Mapping
 from typing import IO, Any
 
 from imubench_pipeline.readers.bounds import LARGEST_WINDOW, LEAST_IN_PART, MOST_PARTS
 
-_FED = 1 << 11
-"""Bytes of zstd data decompressed at a time: they may stand for 32768 times as many."""
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
 
 _READ = 1 << 16
 
@@ -95,47 +98,32 @@ class _Gunzip:
         return self._inflate.decompress(self._inflate.unconsumed_tail + packed, most)
 
 
-class _Zstd:
-    """The decompressed bytes of zstd frames; unlike the library's, it tells an early end."""
+class _Unzstd:
+    """One frame of zstd; what is wrong with it is an `OSError`, as with the others."""
 
-    def __init__(self, file: IO[bytes]) -> None:
-        import zstandard  # only a log that is compressed so needs it
+    def __init__(self) -> None:
+        largest: dict[int, int] = {
+            zstd.DecompressionParameter.window_log_max: LARGEST_WINDOW.bit_length() - 1
+        }
+        self._frame = zstd.ZstdDecompressor(options=largest)
 
-        self._new: Callable[[], Any] = zstandard.ZstdDecompressor(
-            max_window_size=LARGEST_WINDOW
-        ).decompressobj
-        self._error = zstandard.ZstdError
-        self._file = file
-        self._frame: Any = None
-        self._fed = b""
-        self._ready = memoryview(b"")
-        self._frames = 0
-        self._size = 0
+    @property
+    def eof(self) -> bool:
+        return self._frame.eof
 
-    def read1(self, size: int) -> bytes:
-        while not self._ready:
-            self._fed = self._fed or self._file.read(_FED)
-            if not self._fed:
-                if self._frame is not None:
-                    raise EOFError
-                return b""
-            if self._frame is None:
-                self._frame = self._new()
-                self._frames = _counted(self._frames, self._size)
-            try:
-                self._ready = memoryview(self._frame.decompress(self._fed))
-            except self._error as error:
-                raise OSError(str(error)) from None
-            self._size += len(self._ready)
-            self._fed = b""
-            if self._frame.eof:
-                self._fed, self._frame = self._frame.unused_data, None
-        # Views, for to copy the rest each time would take the square of its size.
-        block, self._ready = self._ready[:size], self._ready[size:]
-        return bytes(block)
+    @property
+    def unused_data(self) -> bytes:
+        return self._frame.unused_data
 
-    def close(self) -> None:
-        self._file.close()
+    @property
+    def needs_input(self) -> bool:
+        return self._frame.needs_input
+
+    def decompress(self, packed: bytes, most: int) -> bytes:
+        try:
+            return self._frame.decompress(packed, most)
+        except zstd.ZstdError as error:
+            raise OSError(str(error)) from None
 
 
 def unpacked_zstd(data: bytes, most: int) -> bytes:
@@ -148,14 +136,9 @@ def unpacked_zstd(data: bytes, most: int) -> bytes:
     ValueError
         If the data are corrupt.
     """
-    import zstandard  # only a log that is compressed so needs it
-
     try:
-        with zstandard.ZstdDecompressor(max_window_size=LARGEST_WINDOW).stream_reader(
-            data
-        ) as frame:
-            return frame.read(most)
-    except zstandard.ZstdError as error:
+        return _Unzstd().decompress(data, most)
+    except OSError as error:
         raise ValueError(str(error)) from None
 
 
@@ -166,7 +149,7 @@ def _unxz() -> lzma.LZMADecompressor:
 
 OPENED: Mapping[bytes, tuple[str, Callable[[IO[bytes]], Any]]] = {
     b"\x1f\x8b": ("gzip", lambda file: _Parts(file, _Gunzip, padded=True)),
-    b"\x28\xb5\x2f\xfd": ("zstd", _Zstd),
+    b"\x28\xb5\x2f\xfd": ("zstd", lambda file: _Parts(file, _Unzstd, padded=True)),
     b"\xfd7zXZ\0": ("xz", lambda file: _Parts(file, _unxz, padded=False)),
     b"BZh": ("bzip2", lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False)),
 }

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import lz4.frame
-import zstandard
+from backports import zstd
 
 from tests.readers.hostile.attack import MIB, Attack, file
 
@@ -136,12 +136,12 @@ def indexed(size: int, times: Sequence[int]) -> bytes:
 
 def packed_zeros(count: int) -> bytes:
     """Return so many MiB of zeros."""
-    return zstandard.ZstdCompressor(level=1).compress(bytes(64 * MIB)) * (count // 64)
+    return zstd.compress(bytes(64 * MIB), level=1) * (count // 64)
 
 
 def one_frame(count: int) -> bytes:
     """Return so many MiB of zeros in one frame."""
-    compress = zstandard.ZstdCompressor(level=1).compressobj()
+    compress = zstd.ZstdCompressor(level=1)
     return b"".join(compress.compress(bytes(MIB)) for _ in range(count)) + compress.flush()
 
 
@@ -226,7 +226,7 @@ BAGS = {
             "a.mcap",
             lambda: mcap(
                 mcap_channel(),
-                mcap_chunk(zstandard.compress(mcap_message(bytes(128 * MIB - 31))), 128 * MIB),
+                mcap_chunk(zstd.compress(mcap_message(bytes(128 * MIB - 31))), 128 * MIB),
             ),
         ),
         NOT_READ,

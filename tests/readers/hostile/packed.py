@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-import zstandard
+from backports import zstd
 
 from tests.readers.hostile.attack import MIB, RECORDS, Attack, file
 
@@ -83,9 +83,7 @@ PACKED = {
         channels={"gyro_x": {"column": "gyro_x"}},
     ),
     "empty gzip members": Attack(file("log.csv.gz", lambda: gzip.compress(b"") * 1_000_000), PARTS),
-    "empty zstd frames": Attack(
-        file("log.csv.zst", lambda: zstandard.compress(b"") * 1_000_000), PARTS
-    ),
+    "empty zstd frames": Attack(file("log.csv.zst", lambda: zstd.compress(b"") * 1_000_000), PARTS),
     "empty bzip2 streams": Attack(
         file("log.csv.bz2", lambda: bz2.compress(b"") * 1_000_000), PARTS
     ),
