@@ -2,8 +2,8 @@
 
 python benchmarks/installed.py [--wheel FILE]
 
-Makes an environment of a wheel and one with all of its extras, adds up their files, and times what
-a new user does first, in processes of their own: the import of the package, a command that answers
+Makes an environment of a wheel, one with the workflow and one with all extras, adds up their files,
+says which packages are large, and times what a new user does first, in processes of their own: the import of the package, a command that answers
 at once, and ``imubench analyse`` of six axes of an hour at 100 Hz, with no compiled cache and with
 one. Times are of a whole process, and of this machine: compare them on a quiet one.
 """
@@ -33,7 +33,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         wheel = wheel or built(folder)
-        for extras in ("", "[all]"):
+        for extras in ("", "[workflow]", "[all]"):
             environment = folder / f"venv{len(extras)}"
             begun = time.monotonic()
             install(environment, f"{wheel}{extras}")

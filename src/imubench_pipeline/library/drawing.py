@@ -13,6 +13,7 @@ from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.palette import sensor_appearances
 from imubench_pipeline.report.practical import PageUnit, page_unit
+from imubench_pipeline.settings.extras import extra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,8 +22,15 @@ _OWN = PageUnit("unit of the samples", 1.0)
 
 
 def panels(count: int, wide: int = 3) -> Any:
-    """Return new axes, shape (count,), at most so many in a row."""
-    from matplotlib import pyplot as plt
+    """Return new axes, shape (count,), at most so many in a row.
+
+    Raises
+    ------
+    ExtraError
+        If matplotlib is not installed.
+    """
+    with extra("workflow", "draw"):
+        from matplotlib import pyplot as plt
 
     columns = min(count, wide)
     rows = math.ceil(count / columns)

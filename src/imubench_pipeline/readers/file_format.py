@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import LogFile
+from imubench_pipeline.settings.extras import Extra, ExtraError, extra
 from imubench_pipeline.settings.sensor import LogFormat, Reader
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -81,7 +82,7 @@ class FileFormat:
     measured_by_name: bool = False
     """The format has names for what is measured alone: its linear acceleration has gravity in it.
     """
-    extra: str | None = None
+    extra: Extra | None = None
     """The extra of the package with the library that the code takes; None: it takes none."""
 
     def load(self) -> Code:
@@ -92,15 +93,13 @@ class FileFormat:
         RecordingError
             If the library that it takes is not installed.
         """
-        try:
+        if self.extra is None:
             return self.code()
-        except ModuleNotFoundError as error:
-            if self.extra is None:
-                raise
-            raise RecordingError(
-                f"to read a {self.title}, {error.name} is needed, which is not installed: "
-                f"pip install 'imubench_pipeline[{self.extra}]'"
-            ) from None
+        try:
+            with extra(self.extra, f"read a {self.title}"):
+                return self.code()
+        except ExtraError as error:
+            raise RecordingError(str(error)) from None
 
     def tables(self, path: Path) -> list[LogTable]:
         """Return what a log holds, told from its beginning.

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from imubench_pipeline.settings.extras import extra
+
 if TYPE_CHECKING:
     from imubench_pipeline.report.site import Site
 
@@ -28,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the report; return the exit status: 2 where there are no results."""
     # Templates and figures cost half a second, which the other commands need not wait for.
-    from imubench_pipeline.report.publish import published
+    with extra("workflow", "write the report"):
+        from imubench_pipeline.report.publish import published
     from imubench_pipeline.tables.findings import RecordingError
     from imubench_pipeline.tables.seals import lost_inputs
 

@@ -29,6 +29,7 @@ from imubench_pipeline.run.analysis import command as analysis
 from imubench_pipeline.run.nightly import command as nightly
 from imubench_pipeline.run.verification import command as verification
 from imubench_pipeline.settings.config import Run, read_config
+from imubench_pipeline.settings.extras import ExtraError
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.simulated_recordings import Board, Simulated
 from imubench_pipeline.settings.validation import ConfigError
@@ -81,6 +82,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = COMMANDS[options.command].run(options)
         sys.stdout.flush()
         return status
+    except ExtraError as error:
+        print(f"imubench {options.command}: {error}", file=sys.stderr)
+        return 2
     except BrokenPipeError:
         # Who reads has seen enough, as `head` has; what is left must not be written at the exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -17,7 +17,6 @@ from typing import TypedDict
 
 from imubench_pipeline.recordings.drop_zone import COMPRESSED, Recording
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.run.scripts import Limit, Limits
 from imubench_pipeline.units import quantity_to_si
 
 _BESIDE = 900
@@ -38,6 +37,22 @@ _AS_TEXT = {"text": 1, "binary": 3, "compressed": 6}
 
 _BYTES_OF_A_VALUE = 7
 """Of text. Nine digits take eleven, small counts three: for these the margin is there."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a step may take: time in s, and memory in bytes beside what the process that forks has.
+
+    ``words``: where that is set.
+    """
+
+    seconds: float
+    words: str
+    memory: int
+
+
+Limits = Callable[[str, str | None], Limit]
+"""Takes the sensor and the recording of a job; None: a step of the whole sensor."""
 
 
 class Resources(TypedDict):

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from importlib import import_module
 from pathlib import Path
 
 from imubench_pipeline.run.project import snakefile_of
+from imubench_pipeline.settings.extras import extra
 from imubench_pipeline.settings.validation import ConfigError
 
 
@@ -29,6 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Become Snakemake, whose exit status is that of the command."""
+    with extra("workflow", "run the workflow"):
+        import_module("snakemake")
     folder: Path = options.folder
     try:
         snakefile = snakefile_of(folder)

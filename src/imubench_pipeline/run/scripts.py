@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,24 +12,9 @@ from snakemake.sourcecache import LocalSourceFile, SourceCache, infer_source_fil
 from imubench_pipeline.run.faults import Faults, Of
 from imubench_pipeline.run.nightly.recovery import remove_unfinished
 from imubench_pipeline.run.processes import Job, Processes, StepError
+from imubench_pipeline.run.resources import Limit, Limits
 from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import QUALITY, Failure, failure_of, write_empty
-
-
-@dataclass(frozen=True)
-class Limit:
-    """What a step may take: time in s, and memory in bytes beside what the process that forks has.
-
-    ``words``: where that is set.
-    """
-
-    seconds: float
-    words: str
-    memory: int
-
-
-Limits = Callable[[str, str | None], Limit]
-"""Takes the sensor and the recording of a job; None: a step of the whole sensor."""
 
 
 class Scripts:

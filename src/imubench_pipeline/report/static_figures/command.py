@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from imubench_pipeline.settings.extras import extra
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
 from imubench_pipeline.tables.schemas import TABLES
 
@@ -157,7 +158,8 @@ def _write(
 ) -> int:
     """Write the figures, and say which; return how many files."""
     # Matplotlib is loaded when it is sure that there is something to draw.
-    from imubench_pipeline.report.static_figures.files import save
+    with extra("workflow", "draw figures"):
+        from imubench_pipeline.report.static_figures.files import save
 
     output: Path = arguments.output or arguments.results / "figures"
     # The order of the pages of the report, so that a sensor looks the same in both.

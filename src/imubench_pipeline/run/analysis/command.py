@@ -8,8 +8,11 @@ import os
 import shlex
 import sys
 import tempfile
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from imubench_pipeline.settings.extras import extra
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -69,6 +72,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Analyse logs, print the parameters and write what is asked for; return the exit status."""
     from imubench_pipeline.run.analysis.compilation import Compilation
 
+    if arguments.output is not None:
+        with extra("workflow", "write pages and figures (--output)"):
+            import_module("imubench_pipeline.report.publish")
     with Compilation(_say) as compiling:  # while this process imports all else
         return _run(arguments, compiling)
 

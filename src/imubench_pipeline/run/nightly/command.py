@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
+from importlib import import_module
 from pathlib import Path
 
+from imubench_pipeline.settings.extras import extra
 from imubench_pipeline.units import UnitError, quantity_to_si
 
 
@@ -44,6 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the workflow on the logs that are complete; return the exit status."""
+    with extra("workflow", "run the workflow"):
+        import_module("snakemake")
     try:
         from imubench_pipeline.run.nightly.night import Night, TakenError
     except ModuleNotFoundError as error:

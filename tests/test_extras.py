@@ -1,0 +1,145 @@
+"""What the package does where its extras are not installed, and what it says of the rest."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import sysconfig
+import venv
+from importlib.metadata import distribution
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from tests.conftest import PROJECT
+from tests.test_pins import project
+from tests.workflow.project import put_log
+
+WORKFLOW = "which is not installed: pip install 'imubench_pipeline[workflow]'"
+
+
+def needed(entries: list[str]) -> set[str]:
+    """The packages of some requirements, with all that they need themselves."""
+    names: set[str] = set()
+    pending = entries
+    while pending:
+        ones = [Requirement(entry) for entry in pending]
+        here = {one.name for one in ones if not one.marker or one.marker.evaluate({"extra": ""})}
+        new = {canonicalize_name(name) for name in here} - names
+        names |= new
+        pending = [entry for name in new for entry in distribution(name).requires or ()]
+    return names
+
+
+@pytest.fixture(scope="module")
+def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A Python with what ``pip install imubench_pipeline`` brings, and no more."""
+    folder = tmp_path_factory.mktemp("base") / "venv"
+    venv.create(folder, symlinks=True)
+    (packages,) = folder.glob("lib/python*/site-packages")
+    for name in needed(project()["project"]["dependencies"]):
+        for top in {path.parts[0] for path in distribution(name).files or ()} - {
+            "..",
+            "__pycache__",
+        }:
+            (packages / top).symlink_to(Path(sysconfig.get_path("purelib")) / top)
+    own = distribution("imubench_pipeline").locate_file("")
+    (about,) = Path(str(own)).glob("imubench_pipeline-*.dist-info")
+    (packages / about.name).symlink_to(about)
+    (packages / "own.pth").write_text(f"{PROJECT / 'src'}\n")
+    return folder / "bin/python"
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/config.yaml").touch()
+    put_log(tmp_path / "logs/mine/run.csv", 1, samples=1_200)
+    return tmp_path
+
+
+def imubench(python: Path, lab: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [str(python), "-m", "imubench_pipeline.run.start", *arguments]
+    return subprocess.run(
+        command, cwd=lab, capture_output=True, text=True, check=False, timeout=120
+    )
+
+
+STATED = ("--rate", "10 Hz", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "said"),
+    [
+        (("formats",), 0, "rosbag"),
+        (("inspect", "logs/mine/run.csv"), 1, "gyro_x"),
+        (("analyse", "logs/mine/run.csv", *STATED), 0, "gyro_x"),
+        (("shortlist", "ground_robot"), 0, "mti_7"),
+        (("completion", "bash"), 0, "complete"),
+        (("simulate", "bno055", "--hours", "0.01", "--out", "made.csv"), 0, "made.csv"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, tuple) else None,
+)
+def test_a_command_that_needs_no_extra_does_without(
+    python: Path, lab: Path, command: tuple[str, ...], status: int, said: str
+) -> None:
+    done = imubench(python, lab, *command)
+    assert done.returncode == status, done.stderr
+    assert said in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "lacks"),
+    [
+        (("run", "."), "to run the workflow, snakemake"),
+        (("nightly", "."), "to run the workflow, snakemake"),
+        (("report", "results"), "to write the report, jinja2"),
+        (("analyse", "logs/mine/run.csv", *STATED, "--output", "made"),
+         "to write pages and figures (--output), jinja2"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, tuple) else None,
+)  # fmt: skip
+def test_a_command_that_needs_the_workflow_says_how_to_install_it(
+    python: Path, lab: Path, command: tuple[str, ...], lacks: str
+) -> None:
+    done = imubench(python, lab, *command)
+    assert done.returncode == 2
+    assert done.stderr == f"imubench {command[0]}: {lacks} is needed, {WORKFLOW}\n"
+    assert not (lab / "made").exists() and not (lab / "results").exists()
+
+
+DRAWN = """
+import numpy as np
+import imubench_pipeline as imu
+from imubench_pipeline.settings.extras import ExtraError
+
+noise = np.random.default_rng(1).normal(size=(3000, 6))
+curves = imu.allan_variance(noise, rate="10 Hz")
+print(curves["gyro_x"].deviation[0])
+try:
+    curves.plot()
+except ExtraError as error:
+    print(error)
+"""
+
+
+def test_the_library_computes_without_what_draws(python: Path) -> None:
+    done = subprocess.run(
+        [str(python), "-c", DRAWN], capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    value, said = done.stdout.splitlines()
+    assert 0.9 < float(value) < 1.1  # white noise of deviation 1, one sample a cluster
+    assert said == f"to draw, matplotlib is needed, {WORKFLOW}"
+
+
+def test_a_log_without_its_extra_is_one_that_cannot_be_read(python: Path, lab: Path) -> None:
+    (lab / "run.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(2000))
+    done = imubench(python, lab, "inspect", "run.h5")
+    assert done.returncode == 2
+    assert "h5py is needed, which is not installed: pip install 'imubench_pipeline[hdf5]'" in (
+        done.stderr
+    )
+    assert sys.executable != str(python)
