@@ -3,9 +3,10 @@
 python benchmarks/installed.py [--wheel FILE]
 
 Makes an environment of a wheel, one with the workflow and one with all extras, adds up their files,
-says which packages are large, and times what a new user does first, in processes of their own: the import of the package, a command that answers
-at once, and ``imubench analyse`` of six axes of an hour at 100 Hz, with no compiled cache and with
-one. Times are of a whole process, and of this machine: compare them on a quiet one.
+and times what a new user does first, in processes of their own: the import of the package, a
+command that answers at once, and ``imubench analyse`` of six axes of an hour at 100 Hz, with no
+compiled cache and with one. Times are of a whole process, and of this machine: compare them on a
+quiet one.
 """
 
 from __future__ import annotations

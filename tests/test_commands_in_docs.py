@@ -32,6 +32,7 @@ _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _COMMENT = re.compile(r"(^|\s+)#( .*)?$")
 
 INSTALLS = "installs from an index: .ci/run"
+OF_A_WHEEL = "installs from an index: benchmarks/installed.py"
 HOURS = "minutes to hours: by hand before a release; its flags are tried by -m release"
 ELSEWHERE = {
     "git clone <this repository> && cd imubench_pipeline": "needs a place where it is kept",
@@ -46,8 +47,10 @@ ELSEWHERE = {
     "docs/_build/html": INSTALLS,
     ".venv/bin/pip install -r requirements/docs.txt && .venv/bin/sphinx-build -W -q docs "
     "docs/_build/html": INSTALLS,
-    "python3 -m venv .venv && .venv/bin/pip install imubench_pipeline-*.whl": "installs from an "
-    "index: benchmarks/installed.py",
+    'python3 -m venv .venv && .venv/bin/pip install "$(echo imubench_pipeline-*.whl)[workflow]"': (
+        OF_A_WHEEL
+    ),
+    '.venv/bin/pip install "$(echo imubench_pipeline-*.whl)[all]"': OF_A_WHEEL,
     ". .venv/bin/activate": "of a shell that is typed into: what it puts on the path is tested",
     ".venv/bin/ruff check . && .venv/bin/ruff format .": "of the whole project: .ci/run",
     ".venv/bin/snakefmt Snakefile workflow": "of the whole project: .ci/run",
