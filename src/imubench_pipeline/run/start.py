@@ -7,10 +7,11 @@ import sys
 
 ONE_THREAD = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
-}
+} | {"JE_ARROW_MALLOC_CONF": "background_thread:false"}
 """The environment of a process that computes with one core, and forks for the others: threads of a
-library that spin for work in each fork take more of a core than what they wait for. NumPy asks for
-it when it is imported, and never again."""
+library that spin for work in each fork take more of a core than what they wait for, and Python from
+3.12 on warns of each fork of a process that has another thread, as pyarrow starts for an allocator
+that it does not use. NumPy and pyarrow ask for it when they are imported, and never again."""
 
 
 def main() -> int:
