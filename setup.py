@@ -1,15 +1,20 @@
-"""Puts workflow, configuration and catalogue into a wheel; all else is in pyproject.toml."""
+"""Puts workflow, catalogue and plotly.js into a wheel; all else is in pyproject.toml."""
 
+from importlib.metadata import distribution
 from pathlib import Path
 
 from setuptools import setup
 from setuptools.command.build_py import build_py
 
+PLOTTING = "plotly/package_data/plotly.min.js"
 SHIPPED = ("Snakefile", "workflow/**/*", "config/**/*", "profiles/**/*")
 
 
 class WithProject(build_py):
-    """Copies the files of a checkout to where `settings.shipped` looks for them in a wheel."""
+    """Copies the files of a checkout to where `settings.shipped` looks for them in a wheel.
+
+    In a checkout both they and plotly.js stay where they are.
+    """
 
     def run(self) -> None:
         """Copy the package, and the files."""
@@ -17,6 +22,9 @@ class WithProject(build_py):
         for source, target in self._shipped().items():
             self.mkpath(str(Path(target).parent))
             self.copy_file(source, target, preserve_mode=False)
+        if not self.editable_mode:
+            script = distribution("plotly").locate_file(PLOTTING)
+            self.copy_file(str(script), self._plotting(), preserve_mode=False)
 
     def get_source_files(self) -> list[str]:
         """Return what a source distribution needs."""
@@ -24,12 +32,17 @@ class WithProject(build_py):
 
     def get_outputs(self, include_bytecode: bool = True) -> list[str]:
         """Return what is built."""
-        return [*super().get_outputs(include_bytecode), *self._shipped().values()]
+        plotting = [] if self.editable_mode else [self._plotting()]
+        return [*super().get_outputs(include_bytecode), *self._shipped().values(), *plotting]
 
     def get_output_mapping(self) -> dict[str, str]:
         """Return which file is built of which."""
         shipped = {target: source for source, target in self._shipped().items()}
         return {**super().get_output_mapping(), **shipped}
+
+    def _plotting(self) -> str:
+        """Return where `report.plotting` looks for plotly.js in a wheel."""
+        return str(Path(self.build_lib, "imubench_pipeline/report/static/plotly.min.js"))
 
     def _shipped(self) -> dict[str, str]:
         """Return the files and their places in the wheel; in an editable install they stay."""

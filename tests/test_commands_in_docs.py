@@ -59,7 +59,8 @@ ELSEWHERE = {
     "cyclonedx-py environment --output-reproducible --of JSON -o sbom.json .venv": "an "
     "environment of its own, before a release",
     "pip-audit --disable-pip --require-hashes -r requirements/run.txt": "asks a service",
-    "python3 -m venv .venv && .venv/bin/pip install -c constraints.txt -e '.[cluster]'": INSTALLS,
+    "python3 -m venv .venv && .venv/bin/pip install -c constraints.txt -r requirements/build.in "
+    "-e '.[cluster]'": INSTALLS,
     ".venv/bin/snakemake --workflow-profile profiles/slurm --config logs=/data/logs "
     "results=/data/results": "needs Slurm: tests/slurm",
     ".venv/bin/imubench nightly -- --workflow-profile profiles/slurm": "needs Slurm: tests/slurm",

@@ -12,5 +12,5 @@ def small_report() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(theory, "figure_text", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+")
         patch.setattr(theory, "theory_figure", lambda system: None)
-        patch.setattr(publishing, "get_plotlyjs", lambda: "var Plotly = {};")
+        patch.setattr(publishing, "plotting_script", lambda: "var Plotly = {};")
         yield

@@ -57,7 +57,7 @@ def _quick() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(theory, "figure_text", lambda figure: THEORY_FIGURE)
         patch.setattr(theory, "theory_figure", lambda system: None)
-        patch.setattr(publishing, "get_plotlyjs", lambda: PLOTTING)
+        patch.setattr(publishing, "plotting_script", lambda: PLOTTING)
         patch.setattr(publishing, "source_digest", lambda *modules: "code")
         patch.setattr(publishing, "environment", cache(publishing.environment))
         for module in (made_page, site_module):

@@ -10,6 +10,7 @@ import sys
 import sysconfig
 import tarfile
 from dataclasses import dataclass
+from importlib.metadata import distribution
 from pathlib import Path
 
 import pytest
@@ -248,6 +249,9 @@ def test_a_wheel_holds_the_files_of_the_checkout(ways: Ways) -> None:
         for path in files
         if path.is_file() and "__pycache__" not in path.parts
     }
+    (script,) = ways.package.glob("report/static/plotly.min.js")
+    bundle = distribution("plotly").locate_file("plotly/package_data/plotly.min.js")
+    assert script.read_bytes() == Path(str(bundle)).read_bytes()
 
 
 def test_another_workflow_uses_the_rules_under_other_names_from_a_git_address(ways: Ways) -> None:

@@ -6,6 +6,7 @@ import platform
 from importlib.metadata import version
 from typing import Any
 
+from imubench_pipeline.report.plotting import plotting_version
 from imubench_pipeline.report.shell import imubench
 from imubench_pipeline.report.site import Entry, Site
 
@@ -16,7 +17,6 @@ _LIBRARIES = (
     "numba",
     "pyarrow",
     "matplotlib",
-    "plotly",
     "snakemake",
 )
 
@@ -49,7 +49,11 @@ def _context(site: Site) -> dict[str, Any]:
                 for name, options, words in _COMMANDS
             ),
         ],
-        "versions": {"python": platform.python_version()} | {n: version(n) for n in _LIBRARIES},
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in _LIBRARIES},
+            "plotly.js": plotting_version(),
+        },
         "settings": {
             f"{section}.{key}": value
             for section, values in site.settings["settings"].items()

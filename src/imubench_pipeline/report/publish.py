@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import jinja2
 import pyarrow as pa
-from plotly.offline import get_plotlyjs
 
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import ENTRIES, pages
+from imubench_pipeline.report.plotting import plotting_script
 from imubench_pipeline.report.practical import units_of_pages
 from imubench_pipeline.report.search import index
 from imubench_pipeline.report.site import Page, Site
@@ -47,14 +46,6 @@ _SCRIPTS = (
     "calibration",
     "trend",
     "start",
-)
-
-_FACTORY = ": this, () => {"
-_FACTORY_IN_BRACKETS = ": this, (() => {"
-_STYLES_OF_MAPS = re.compile(
-    r"\(function\(\)\{if\(!document\.getElementById\(\"[0-9a-f]{64}\"\)\).{,200000}?"
-    r"document\.head\.appendChild\(e\)\}\}\)\(\)",
-    re.DOTALL,
 )
 
 _STYLES = ("report", "decisions")
@@ -152,18 +143,6 @@ def _assets() -> dict[str, str]:
         "assets/report.js": _script(),
         "assets/plotly.min.js": plotting_script(),
     }
-
-
-def plotting_script() -> str:
-    """Return plotly so that a browser evaluates it in about three fifths of the time.
-
-    Its one large function is put in brackets, by which V8 compiles it as a whole and beside the
-    page, not twice and before it; the styles of maps, which no page has, are left out.
-    """
-    script = _STYLES_OF_MAPS.sub("", get_plotlyjs())
-    head, opening, body = script.partition(_FACTORY)
-    body, closing, tail = body.rpartition("}));")
-    return f"{head}{_FACTORY_IN_BRACKETS}{body}}})));{tail}" if opening and closing else script
 
 
 def _search(site: Site) -> dict[str, str]:
