@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 from scipy.signal import butter, lfilter, sosfilt
 
 from imubench_pipeline.estimators.cutoff import find_cutoff
+from imubench_pipeline.estimators.low_pass import Filter, Frequencies
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
@@ -66,7 +67,7 @@ def test_folds_are_those_of_the_sampled_covariance(order, cutoff):
     ]
     terms = [2.0 * c * np.cos(2.0 * np.pi * f * k / rate) for k, c in enumerate(covariance)]
     expected = (np.sum(terms, axis=0) - covariance[0]) / rate
-    assert LowPass(cutoff, order).folded_power(f, rate) == pytest.approx(
+    assert Filter("analogue", order, cutoff).white(Frequencies(f, rate)) == pytest.approx(
         expected, rel=2e-3, abs=1e-6
     )
 
@@ -77,7 +78,9 @@ def test_folds_that_are_not_added_one_by_one_are_not_lost(order, cutoff):
     f = np.array([0.0, 1.0, 13.0, 50.0])
     folds = f[:, None] + 100.0 * np.arange(-3000, 3001)
     every = (1.0 / (1.0 + (folds / cutoff) ** (2 * order))).sum(axis=1)
-    assert LowPass(cutoff, order).folded_power(f, 100.0) == pytest.approx(every, rel=1e-5)
+    assert Filter("analogue", order, cutoff).white(Frequencies(f, 100.0)) == pytest.approx(
+        every, rel=1e-5
+    )
 
 
 @pytest.mark.parametrize(

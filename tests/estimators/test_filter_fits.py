@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.filter_fits import (
     draw_factors,
 )
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
-from imubench_pipeline.estimators.low_pass import Filter, Kind
+from imubench_pipeline.estimators.low_pass import Filter, Frequencies, Kind
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -201,7 +201,7 @@ def test_the_limits_are_the_outermost_of_several_hollows(
     order: int, cutoff: float, duration: float
 ) -> None:
     flat = ideal_spectrum(RATE, duration, RATE / 2.0)
-    density = Filter("analogue", order, cutoff).white(flat.frequency, RATE)
+    density = Filter("analogue", order, cutoff).white(Frequencies(flat.frequency, RATE))
     fits = FilterFits(replace(flat, density=density))
     fits.slow = []
     best = trial(cutoff, "analogue", order)

@@ -12,7 +12,7 @@ from imubench_pipeline.estimators.filter_fits import Allowed, FilterFits
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
-from imubench_pipeline.estimators.low_pass import Filter
+from imubench_pipeline.estimators.low_pass import Filter, Frequencies
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
@@ -150,8 +150,8 @@ def test_a_filter_is_told_with_n_and_the_limits_of_both(profile: Profile) -> Non
 def test_bins_are_ruled_by_the_ends_where_the_filter_leaves_less() -> None:
     flat = ideal_spectrum(RATE, 30.0, RATE / 2.0)
     steep = Filter("bilinear", 4, 5.0)
-    shape = steep.white(flat.frequency, RATE)
-    leak = steep.leak(flat.frequency, flat.length, RATE)
+    shape = steep.white(Frequencies(flat.frequency, RATE))
+    leak = steep.leak(Frequencies(flat.frequency, RATE), flat.length)
     spectrum = replace(flat, density=4.0 * (shape + leak))
     fits = FilterFits(spectrum)
     fits.slow = []

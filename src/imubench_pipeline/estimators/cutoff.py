@@ -25,13 +25,13 @@ from imubench_pipeline.estimators.filter_fits import (
     FEWEST_BINS,
     PROCESSES,
     Allowed,
+    BinGains,
     FilterFits,
     FilterTrial,
     OfModel,
     Reading,
     also_after_sampling,
     draw_factors,
-    frequencies_in_bins,
     highest_cutoff,
 )
 from imubench_pipeline.estimators.low_pass import Filter, Kind
@@ -285,9 +285,7 @@ def _with_filter(
         )
     else:
         frequency = Parameter(shown, lower=lower, upper=upper)
-    whole = FilterFits(spectrum)
-    whole.rounded = fits.rounded
-    white, *slow = whole.gains(best)
+    white, *slow = BinGains(spectrum)(best)
     return Cutoff(
         frequency,
         best.order,
@@ -296,7 +294,7 @@ def _with_filter(
         gained,
         or_quantization,
         best.kind,
-        behind=Behind(white + (after / N) ** 2, *slow),
+        behind=Behind(white + fits.rounded + (after / N) ** 2, *slow),
         ruled=settled.ruled,
         readings=readings,
         allowed=[
@@ -351,12 +349,10 @@ def _ruled_by_ends(
     Those in which something else stands are none of them.
     """
     N = fits.density(best)[0]
-    low_pass = best.low_pass
-    within = low_pass.white(frequencies_in_bins(spectrum), spectrum.rate) + rounding / N**2
-    white = within.mean(axis=1)
-    leak = low_pass.leak(spectrum.frequency, spectrum.length, spectrum.rate)
-    leak = np.where(spectrum.block == 1, leak, 0.0)
-    rules = (leak > _ENDS_RULE * white) | (within.min(axis=1) < _STEEP * within.max(axis=1))
+    gains, low_pass = BinGains(spectrum), best.low_pass
+    within = gains.white(low_pass) + rounding / N**2
+    white, leak = within.mean(axis=0), gains.leak(low_pass)
+    rules = (leak > _ENDS_RULE * white) | (within.min(axis=0) < _STEEP * within.max(axis=0))
     return np.asarray(rules & (spectrum.density < _SOMETHING_ELSE * N**2 * (white + leak)))
 
 

@@ -11,11 +11,10 @@ from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.estimators.goodness import goodness
-from imubench_pipeline.estimators.low_pass import BOXCAR, Filter, Kind
+from imubench_pipeline.estimators.low_pass import BOXCAR, Filter, Frequencies, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, whittle_of
 from imubench_pipeline.estimators.whittle_kernels import TOLERANCE, best_powers
-from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.typing import Array
 
 _POINTS = 6
@@ -92,26 +91,34 @@ _TWIN = 0.1
 sampling, whose folds are in N."""
 
 
-def frequencies_in_bins(spectrum: Spectrum) -> Array:
-    """Return frequencies within each bin, shape (b, 6), Hz."""
-    within = (np.arange(_POINTS) + 0.5) / _POINTS
-    width = (spectrum.upper - spectrum.lower)[:, None]
-    return np.asarray(spectrum.lower[:, None] + width * within)
+class BinGains:
+    """What filters leave of noise in the bins of a spectrum."""
+
+    def __init__(self, spectrum: Spectrum) -> None:
+        points = (np.arange(_POINTS)[:, None] + 0.5) / _POINTS
+        width = spectrum.upper - spectrum.lower
+        self._within = Frequencies(spectrum.lower + width * points, spectrum.rate)
+        self._mean = Frequencies(spectrum.frequency, spectrum.rate)
+        self._length, self._single = spectrum.length, spectrum.block == 1
+
+    def __call__(self, trial: FilterTrial) -> tuple[Array, Array, Array]:
+        """Return what is left of white noise, of flicker noise and of slow noise."""
+        low_pass = trial.low_pass
+        white, flicker, slow = (gain.mean(axis=0) for gain in low_pass.gains(self._within))
+        return white + self.leak(low_pass), flicker, slow
+
+    def white(self, low_pass: Filter) -> Array:
+        """Return what is left of white noise at points within each bin, shape (6, b)."""
+        return low_pass.white(self._within)
+
+    def leak(self, low_pass: Filter) -> Array:
+        """Return what the ends of the transform add, of single samples."""
+        return np.where(self._single, low_pass.leak(self._mean, self._length), 0.0)
 
 
 def highest_cutoff(kind: Kind, order: int, rate: float) -> float:
     """Return the highest cut-off of a filter that is looked for at a rate, Hz."""
     return _HIGHEST[kind, order] * rate
-
-
-def gains(spectrum: Spectrum, trial: FilterTrial) -> tuple[Array, Array, Array]:
-    """Return what a filter leaves of white noise, of flicker noise and of slow noise."""
-    low_pass, frequency = trial.low_pass, frequencies_in_bins(spectrum)
-    white = low_pass.white(frequency, spectrum.rate).mean(axis=1)
-    leak = low_pass.leak(spectrum.frequency, spectrum.length, spectrum.rate)
-    flicker = low_pass.flicker(frequency, spectrum.rate).mean(axis=1)
-    slow = low_pass.slow(frequency, spectrum.rate).mean(axis=1)
-    return white + np.where(spectrum.block == 1, leak, 0.0), flicker, slow
 
 
 @dataclass(frozen=True)
@@ -174,6 +181,8 @@ class FilterFits:
         self.slow = [0, 1, *range(2, len(columns), _A_DECADE)]  # those that are in the fits
         self.penalty = 0.5 * math.log(len(spectrum.frequency))
         self.rounded = 0.0  # density of rounding, parts of N^2
+        self._left = BinGains(spectrum)
+        self._bins = self.whittle.bins()
 
     def choose_slow(self, trial: FilterTrial) -> None:
         """Keep the terms of slow noise that the spectrum asks for behind a filter, by BIC.
@@ -347,7 +356,7 @@ class FilterFits:
 
     def gains(self, trial: FilterTrial) -> tuple[Array, Array, Array]:
         """Return what a filter leaves of white noise, with rounding, of flicker and slow noise."""
-        white, flicker, slow = gains(self.whittle.spectrum, trial)
+        white, flicker, slow = self._left(trial)
         return white + self.rounded, flicker, slow
 
     def _columns(self, trial: FilterTrial) -> Array:
@@ -368,7 +377,7 @@ class FilterFits:
     def _powers(self, columns: Array) -> tuple[Array, float]:
         norm = columns.mean(axis=0)
         powers, _, cost = best_powers(
-            np.ascontiguousarray(columns / norm), self.whittle.bins(), False, TOLERANCE
+            np.ascontiguousarray(columns / norm), self._bins, False, TOLERANCE
         )
         return powers / norm * self.whittle.scale, cost
 
@@ -411,7 +420,7 @@ def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Re
 
     Its shape is the same, and it folds nothing into N.
     """
-    gain = 0.5 * math.log(float(LowPass(trial.cutoff).folded_power(0.0, rate)))
+    gain = 0.5 * math.log(float(trial.low_pass.white(Frequencies(0.0, rate))))
     return Reading(
         _TWIN * reading.weight, reading.below + gain, reading.at + gain, reading.above + gain
     )

@@ -21,12 +21,12 @@ from imubench_pipeline.estimators.filter_fits import (
     HALF_CHI_SQUARED,
     PROCESSES,
     Allowed,
+    BinGains,
     FilterTrial,
     OfModel,
     Reading,
     also_after_sampling,
     explains_bend,
-    gains,
     highest_cutoff,
 )
 from imubench_pipeline.estimators.model_choice import Candidate
@@ -111,7 +111,7 @@ def refine_cutoff(
         kind=best.kind,
         order=best.order,
         floor=math.sqrt(state.floor + low_pass.rounded * state.N**2),
-        behind=joint.behind(spectrum, best, state.floor / state.N**2),
+        behind=joint.behind(BinGains(spectrum), best, state.floor / state.N**2),
         readings=models[chosen].readings,
         allowed=[
             Allowed(each.allowed.at(each.x), each.allowed.half_width) for each in tried[chosen]
@@ -157,13 +157,14 @@ class _Joint:
     def __init__(self, spectrum: Spectrum, clear: NDArray[np.bool_], low_pass: Cutoff) -> None:
         self._low_pass = low_pass
         self._spectrum = spectrum.select(clear)
+        self._gains = BinGains(self._spectrum)
         shortest = PROCESSES / spectrum.rate
         self._plain = whittle_of(self._spectrum, 0.5 * spectrum.rate, COARSE, shortest=shortest)
         self._states: dict[tuple[FilterTrial, float, Terms], _State] = {}
 
-    def behind(self, spectrum: Spectrum, trial: FilterTrial, floor: float = 0.0) -> Behind:
+    def behind(self, gains: BinGains, trial: FilterTrial, floor: float = 0.0) -> Behind:
         """Return what a filter leaves, with what stands behind it in parts of N^2."""
-        white, flicker, slow = gains(spectrum, trial)
+        white, flicker, slow = gains(trial)
         return Behind(white + self._low_pass.rounded + floor, flicker, slow)
 
     def fits(self, terms: Terms) -> list[_Fit]:
@@ -209,7 +210,7 @@ class _Joint:
         return self._states[key]
 
     def _maximum(self, allowed: Allowed, x: float, terms: Terms) -> tuple[Whittle, Maximum]:
-        whittle = self._plain.standing(self.behind(self._spectrum, allowed.at(x)))
+        whittle = self._plain.standing(self.behind(self._gains, allowed.at(x)))
         if allowed.filter.floor:
             # White noise behind the filter stands where quantization noise would.
             whittle = whittle.with_column("Q", np.ones(len(self._spectrum.density)))

@@ -14,9 +14,6 @@ from imubench_pipeline.typing import Array
 
 _HIGHEST_ORDER = 10
 
-_FOLDS = 2
-"""Folds on each side that are added one by one, besides those up to four times the cut-off."""
-
 
 @dataclass(frozen=True)
 class LowPass:
@@ -90,34 +87,7 @@ class LowPass:
         """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)), in the shape of the frequency, Hz."""
         square = np.square(np.asarray(frequency, dtype=np.float64) / self.cutoff)
         # Products: numpy takes ten times as long for a power above 2.
-        return np.asarray(1.0 / (1.0 + math.prod([square] * self.order)))
-
-    def folded_power(self, frequency: ArrayLike, rate: float) -> Array:
-        """Return the power gain of white noise behind the filter, sampled, up to Nyquist.
-
-        In the shape of the frequencies, Hz. For n = 1 the sum over the folds is (pi f_c / f_s)
-        sinh(2 pi f_c / f_s) / (cosh(2 pi f_c / f_s) - cos(2 pi f / f_s)), the spectrum of a sampled
-        Gauss-Markov process.
-        """
-        f = np.asarray(frequency, dtype=np.float64)
-        if self.order == 1:
-            h = 2.0 * np.pi * self.cutoff / rate
-            # Both over e^h, which may be great.
-            decay = math.exp(-h)
-            sine, cosine = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
-            return np.asarray(0.5 * h * sine / (cosine - decay * np.cos(2.0 * np.pi * f / rate)))
-        folds = _FOLDS + math.ceil(4.0 * self.cutoff / rate)
-        total = np.zeros(f.shape)
-        for k in range(-folds, folds + 1):
-            total += self.power(f + k * rate)
-        # Folds beyond: the integral of (f / f_c)^(-2 n) on each side, with the next term of the
-        # sum formula of Euler and Maclaurin.
-        steep = 2 * self.order
-        for side in (f, -f):
-            end = (folds + 0.5) + side / rate
-            rest = (self.cutoff / rate) ** steep / math.prod([end] * (steep - 1)) / (steep - 1)
-            total += rest * (1.0 - steep * (steep - 1) / 24.0 / end**2)
-        return np.asarray(total)
+        return np.asarray(1.0 / (1.0 + math.prod([square] * (self.order - 1), start=square)))
 
     def response(self, frequency: float) -> complex:
         """Return H: gain and phase of a sinusoid of a frequency in Hz."""
