@@ -1,11 +1,19 @@
 """What the page of navigation says of tunings and sensors."""
 
+import math
+import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pytest
+
 from imubench_pipeline.report.navigated import NAVIGATION, TUNINGS, answers, ranking
+from imubench_pipeline.report.publish import publish
 from imubench_pipeline.settings.config import Method
 from imubench_pipeline.tables import build
+from tests.report.browser.test_numbers import number
+from tests.report.pages import unfolded
 from tests.report.tables import joined, recording_rows, site
 
 
@@ -112,3 +120,63 @@ def test_the_page_is_there_where_something_was_run(tmp_path: Path) -> None:
     context = NAVIGATION.page(made).context()
     assert [line["tuning"] for line in context["lines"]] == ["likelihood"]
     assert [line["reason"] for line in context["lacking"]] == ["no model lies above the curve"]
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, list[dict[str, Any]]]:
+    """The page of forty tunings of all sizes, unfolded, and the rows of the table."""
+    rng = np.random.default_rng(3)
+
+    def drawn(tuning: int) -> dict[str, Any]:
+        sizes = {
+            name: float(size)
+            for name, size in navigation_row().items()
+            if name.startswith(("position", "velocity", "heading"))
+        }
+        names = list(TUNINGS)
+        return navigation_row(
+            tuning=names[tuning % len(names)], outage=10.0 * (1 + tuning // len(names)),
+            nees_inside=rng.uniform(0.5, 1.0), states=15 + tuning, outages=40 + tuning,
+            **{name: size * 10.0 ** rng.uniform(-3.0, 4.0) for name, size in sizes.items()},
+        )  # fmt: skip
+
+    table = [drawn(k) for k in range(40)]
+    folder = tmp_path_factory.mktemp("navigation")
+    publish(site(joined(recording_rows("imu"), {"navigation": table})), folder)
+    return unfolded((folder / "navigation.html").read_text()), table
+
+
+def test_its_numbers_are_those_of_the_table(page: tuple[str, list[dict[str, Any]]]) -> None:
+    text, table = page
+    part = text[text.index('id="tunings"') :]
+    heads = [re.sub("<[^>]*>", "", one) for one in re.findall(r"<th scope=\"col\".*?</th>", part)]
+    lines = re.findall(r"<tr data-trajectory.*?</tr>", part, re.DOTALL)
+    assert len(lines) == len(table)
+    degrees = 180.0 / math.pi
+    columns = {
+        "Position, m": ("position", 1.0),
+        "over that of the true model": ("position_ratio", 1.0),
+        "Velocity, m/s": ("velocity", 1.0),
+        "Heading, °": ("heading", degrees),
+    }
+    for line, row in zip(lines, table, strict=True):
+        texts = re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", line)
+        cells = dict(zip(heads, (re.sub("<[^>]*>", "", one) for one in texts), strict=True))
+        for head, (name, factor) in columns.items():
+            seen = [number(one) for one in re.split(r" \(| to |\)", cells[head]) if one]
+            values = [factor * row[name + end] for end in ("", "_lower", "_upper")]
+            assert seen == [float(f"{value:.2e}") for value in values], (head, cells[head])
+        assert number(cells["Filter expects, m"]) == float(f"{row['position_predicted']:.2e}")
+        assert number(cells["NEES inside"].split(" ")[0]) == float(
+            f"{100 * row['nees_inside']:.2e}"
+        )
+        assert cells["Outage"] == f"{row['outage']:g} s"
+        assert cells["States"] == str(row["states"])
+        assert cells["Of"] == f"{row['outages']} outages"
+
+
+def test_without_a_script_a_table_says_how_much_of_it_stands_there(
+    page: tuple[str, list[dict[str, Any]]],
+) -> None:
+    (note,) = re.findall("<noscript>(.*?)</noscript>", page[0])
+    assert "The first 30 of 40 rows" in note

@@ -6,6 +6,8 @@ from collections import Counter
 from pathlib import Path
 from urllib.parse import unquote
 
+from playwright.sync_api import Browser
+
 from imubench_pipeline.report.payload import FOREST
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.static_figures.files import cross_figures
@@ -13,7 +15,7 @@ from imubench_pipeline.report.view import recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report.browser import made
 from tests.report.browser.made import Report
-from tests.report.browser.reader import Open
+from tests.report.browser.reader import READY, Open
 from tests.report.browser.visit import Seen
 
 
@@ -31,6 +33,23 @@ def test_there_is_a_page_of_everything(seen: Seen, bench: Report) -> None:
     assert all(len(page["heads"]) == 1 for page in seen.pages.values())
     titles = Counter(page["title"] for page in seen.pages.values())
     assert all(title.endswith(f" · {made.TITLE}") for title in titles)
+
+
+def test_a_browser_that_cannot_unpack_says_so_and_shows_what_is_plain(
+    browser: Browser, bench: Report
+) -> None:
+    page = browser.new_page()
+    page.add_init_script("delete window.DecompressionStream")
+    complaints: list[str] = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    for path in ("index.html", "compare.html", f"recordings/alpha/{made.NIGHT.recording}.html"):
+        page.goto((bench.folder / path).as_uri())
+        page.wait_for_function(READY)
+        assert "Firefox 113" in page.get_by_role("alert").inner_text()
+    assert page.locator("#gyro_x").is_visible()
+    assert page.locator("data").first.inner_text()
+    page.close()
+    assert complaints == []
 
 
 def test_every_figure_is_drawn(seen: Seen, bench: Report) -> None:

@@ -1,7 +1,14 @@
 // What happens when a page opens; in a report of one file, when a page of it is chosen.
 
+const UNFOLDS = typeof DecompressionStream === "function";
+
 async function openPage(main) {
   readState();
+  if (!UNFOLDS) {
+    main.prepend(ofOldBrowsers());
+    showUnits(main);
+    return;
+  }
   await unfold(main);
   const data = main.querySelector("script[type='application/json'].page");
   pageData = data ? JSON.parse(data.textContent) : {};
@@ -18,6 +25,7 @@ async function openPage(main) {
 // What a page has packed (`html.packed`): its data, further rows of tables, and what stands for its
 // own markup.
 async function unfold(root) {
+  if (!UNFOLDS) return;
   await Promise.all([...root.querySelectorAll("script[data-packed]")].map(async (script) => {
     const bytes = Uint8Array.from(atob(script.textContent), (sign) => sign.charCodeAt(0));
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
@@ -26,6 +34,17 @@ async function unfold(root) {
     if (script.matches(".later")) script.outerHTML = text;
     else script.textContent = text;
   }));
+}
+
+// What a reader sees whose browser is older than 2023: what a page has packed stays so.
+function ofOldBrowsers() {
+  const note = document.createElement("p");
+  note.className = "warnings";
+  note.setAttribute("role", "alert");
+  note.textContent =
+    "This browser cannot unpack what the page holds: figures, further rows and further channels are missing. " +
+    "It takes Chrome or Edge 80, Firefox 113, Safari 16.4, or a newer one.";
+  return note;
 }
 
 // One file: the pages lie in <template id="page:PATH">, and #/PATH or #/PATH#SECTION shows one.
