@@ -36,12 +36,13 @@ def main() -> None:
         wheel = wheel or built(folder)
         for extras in ("", "[workflow]", "[all]"):
             environment = folder / f"venv{len(extras)}"
-            begun = time.monotonic()
+            subprocess.run([sys.executable, "-m", "venv", str(environment)], check=True)
+            empty, begun = size(environment), time.monotonic()
             install(environment, f"{wheel}{extras}")
-            took = time.monotonic() - begun
+            took, weight = time.monotonic() - begun, size(environment) - empty
             print(
                 f"pip install imubench_pipeline{extras}: {took:.0f} s, "
-                f"{size(environment) / 1e6:.0f} MB in site-packages"
+                f"{weight / 1e6:.0f} MB in site-packages"
             )
         python = environment / "bin/python"
         cache = {"NUMBA_CACHE_DIR": str(folder / "compiled")}
@@ -70,8 +71,7 @@ def built(folder: Path) -> Path:
 
 
 def install(environment: Path, what: str) -> None:
-    """Install the package into an environment of its own, in the versions that are tested."""
-    subprocess.run([sys.executable, "-m", "venv", str(environment)], check=True)
+    """Install the package into an environment, in the versions that are tested."""
     subprocess.run(
         [str(environment / "bin/python"), "-m", "pip", "install", "--quiet", "--no-compile",
          "-c", str(PROJECT / "constraints.txt"), what],
@@ -80,11 +80,10 @@ def install(environment: Path, what: str) -> None:
 
 
 def size(environment: Path) -> int:
-    """Return the bytes of all that was installed, but for pip itself."""
+    """Return the bytes of all packages, without what Python compiles of them when it runs."""
     (packages,) = environment.glob("lib/python*/site-packages")
     files = (path for path in packages.rglob("*") if path.is_file() and not path.is_symlink())
-    own = (path for path in files if not path.relative_to(packages).parts[0].startswith("pip"))
-    return sum(path.stat().st_size for path in own)
+    return sum(path.stat().st_size for path in files if path.suffix != ".pyc")
 
 
 def write_log(path: Path) -> None:
