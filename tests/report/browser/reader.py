@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from playwright.sync_api import Browser, Locator
+from playwright.sync_api import Browser, Locator, Route
 
 from tests.report.browser.accessibility import UNFOLD
 
@@ -36,7 +36,9 @@ OPEN_TAB = """figure => {
 
 
 class Reader:
-    """A reader of pages, in one window: the script that draws is large, and is compiled once.
+    """A reader of pages, in one window, who waits for the script that draws once a figure is wanted.
+
+    It is large: without it a page opens in a third of the time.
 
     Parameters
     ----------
@@ -59,6 +61,21 @@ class Reader:
         self.page.on("pageerror", lambda error: self._complain("error", str(error)))
         self.page.on("request", lambda asked: self._request(asked.url))
         self.page.on("requestfailed", lambda asked: self._failed(asked.url, asked.failure))
+        self._drawing = False
+        self._held: list[Route] = []
+        self.page.route("**/plotly.min.js", self._hold)
+
+    def _hold(self, asked: Route) -> None:
+        if self._drawing:
+            asked.continue_()
+        else:
+            self._held.append(asked)
+
+    def _draw(self) -> None:
+        """Let the script that draws come."""
+        self._drawing = True
+        while self._held:
+            self._held.pop().continue_()
 
     def _complain(self, kind: str, text: str) -> None:
         if kind in ("error", "warning"):
@@ -75,6 +92,7 @@ class Reader:
     def begin(self, folder: Path, width: int, height: int, scheme: Scheme) -> None:
         """Begin anew with the pages of a folder: nothing is left of an earlier visit."""
         self.complaints.clear()
+        self._drawing = False
         self.folder = folder
         self.page.set_viewport_size({"width": width, "height": height})
         self.page.emulate_media(media="screen", color_scheme=scheme)
@@ -90,6 +108,7 @@ class Reader:
 
         What is chosen may follow the path, after a ``#``: the page is loaded anew for it.
         """
+        self._held.clear()
         file, mark, state = path.partition("#")
         address = (self.folder / file).as_uri() + mark + state
         if self.page.url.partition("#")[0] == address.partition("#")[0]:
@@ -103,6 +122,7 @@ class Reader:
 
     def show(self, one: Locator) -> Locator:
         """Bring something into view, and wait until no figure beside it changes its height."""
+        self._draw()
         one.scroll_into_view_if_needed()
         self.page.wait_for_function(SETTLED)
         one.scroll_into_view_if_needed()
@@ -119,6 +139,7 @@ class Reader:
 
     def draw_all(self) -> int:
         """Bring every figure into view, one after the other; return how many there are."""
+        self._draw()
         self.page.evaluate(UNFOLD)
         for everything in self.page.get_by_role("button", name="all channels").all():
             everything.click()
