@@ -63,7 +63,7 @@ def lab(tmp_path: Path) -> Path:
 def imubench(python: Path, lab: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [str(python), "-m", "imubench_pipeline.run.start", *arguments]
     return subprocess.run(
-        command, cwd=lab, capture_output=True, text=True, check=False, timeout=120
+        command, cwd=lab, capture_output=True, text=True, check=False, timeout=600
     )
 
 
@@ -127,7 +127,7 @@ except ExtraError as error:
 
 def test_the_library_computes_without_what_draws(python: Path) -> None:
     done = subprocess.run(
-        [str(python), "-c", DRAWN], capture_output=True, text=True, check=False, timeout=120
+        [str(python), "-c", DRAWN], capture_output=True, text=True, check=False, timeout=600
     )
     assert done.returncode == 0, done.stderr
     value, said = done.stdout.splitlines()
