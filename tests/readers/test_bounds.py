@@ -12,10 +12,20 @@ from typing import Any
 
 import pytest
 
+from tests.conftest import few
 from tests.readers.hostile import ATTACKS
 
 LIMIT_S, LIMIT_MB = 10.0, 600.0
 LONGEST_REASON = 1500
+
+JUST_WITHIN = (
+    "chunks of 128 MiB",
+    "a chunk of 128 MiB",
+    "an MCAP chunk of 128 MiB",
+    "a directory just small enough",
+)
+"""As large as may be, and read: each takes a second or more. Every day "a batch of 256 MiB" is, and
+what is beyond these bounds is refused."""
 
 Probe = Callable[[Path, "dict[str, Any] | None"], tuple[str, float, float]]
 
@@ -41,7 +51,7 @@ def probe() -> Iterator[Probe]:
         yield ask
 
 
-@pytest.mark.parametrize("name", ATTACKS)
+@pytest.mark.parametrize("name", few([x for x in ATTACKS if x not in JUST_WITHIN], JUST_WITHIN))
 def test_it_costs_little_and_ends_in_its_reason(tmp_path: Path, probe: Probe, name: str) -> None:
     attack = ATTACKS[name]
     path = attack.write(tmp_path)

@@ -226,7 +226,9 @@ def test_a_square_is_found_where_there_is_one():
     gained = half_bic(fit.plain, ordinates) - half_bic(fit.without_temperature, ordinates)
     told = float(re.search(r"by ([\d.]+)$", fit.reason)[1])
     assert told == pytest.approx(2.0 * (gained - math.log(len(ordinates))), abs=0.2)
-    assert fitted(log, DAY, longest_lag=0.0, quadratic=False).quadratic.status == "absent"
+    short = slice(SAMPLES // 10)
+    alone = fitted(log[short], DAY[short], longest_lag=0.0, quadratic=False)
+    assert alone.quadratic.status == "absent"
 
 
 @pytest.mark.release

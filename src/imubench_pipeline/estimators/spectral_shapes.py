@@ -28,19 +28,19 @@ class Shapes:
 
     def __init__(self, spectrum: Spectrum) -> None:
         self._interval = 1.0 / spectrum.rate
-        self._block = spectrum.block.astype(np.float64)[:, None]
+        self._block = m = spectrum.block.astype(np.float64)
         self._length = spectrum.length
-        inside = (np.arange(_POINTS) + 0.5) / _POINTS
+        inside = (np.arange(_POINTS)[:, None] + 0.5) / _POINTS
         width = spectrum.upper - spectrum.lower
         # A bin of one ordinate is its frequency, not the surroundings.
         single = width < 0.75 / spectrum.length
-        frequency = np.where(
-            single[:, None],
-            spectrum.frequency[:, None],
-            spectrum.lower[:, None] + width[:, None] * inside,
-        )
-        self._omega = 2.0 * np.pi * frequency * self._block * self._interval
+        # Shape (6, b), as all that is asked at frequencies.
+        frequency = np.where(single, spectrum.frequency, spectrum.lower + width * inside)
+        self._omega = 2.0 * np.pi * frequency * m * self._interval
+        self._cosine = np.cos(self._omega)
         self._gap = 4.0 * np.sin(self._omega / 2.0) ** 2  # 2 - 2 cos(omega)
+        # The mean of m samples of a walk: (2 + cos(omega)) / 3 for large m, 1 for m = 1.
+        self._averaged = 1.0 - self._gap / 6.0 * (1.0 - 1.0 / m**2)
         self._single = np.flatnonzero(single & (np.arange(len(width)) < SINGLE))
         self._order = np.rint(
             2.0 * spectrum.frequency[self._single] * spectrum.length[self._single]
@@ -57,27 +57,24 @@ class Shapes:
 
     def quantization(self) -> Array:
         """Return the density of Q = 1: (2 - 2 cos(omega)) / (m T)."""
-        return np.asarray((self._gap / (self._block * self._interval)).mean(axis=1))
+        return np.asarray((self._gap / (self._block * self._interval)).mean(axis=0))
 
     def random_walk(self) -> Array:
         """Return the density of K = 1, with what averaging m samples leaves of it."""
         step = self._block * self._interval
-        m = self._block
-        # The mean of m samples of a walk: (2 + cos(omega)) / 3 for large m, 1 for m = 1.
-        averaged = 1.0 - self._gap / 6.0 * (1.0 - 1.0 / m**2)
-        return np.asarray((step**2 / self._gap * averaged).mean(axis=1))
+        return np.asarray((step**2 / self._gap * self._averaged).mean(axis=0))
 
     def flicker(self) -> Array:
         """Return the density of B = 1 flicker noise, 1 / (2 pi f) well below Nyquist."""
         density = np.empty_like(self._omega)
         for m in np.unique(self._block):
-            rows = self._block[:, 0] == m
-            folded = (self._omega[rows][..., None] + 2.0 * np.pi * np.arange(m)) / m
+            bins = self._block == m
+            folded = (self._omega[:, bins, None] + 2.0 * np.pi * np.arange(m)) / m
             sine = np.abs(np.sin(folded / 2.0))
             # |sin(m w / 2)| is the same in every fold.
-            kernel = np.sin(self._omega[rows] / 2.0)[..., None] ** 2 / (m * sine) ** 2
-            density[rows] = (kernel / (2.0 * sine)).mean(axis=-1) * m * self._interval
-        shape = density.mean(axis=1)
+            kernel = np.sin(self._omega[:, bins] / 2.0)[..., None] ** 2 / (m * sine) ** 2
+            density[:, bins] = (kernel / (2.0 * sine)).mean(axis=-1) * m * self._interval
+        shape = density.mean(axis=0)
         shape[self._single] *= _flicker_edges(self._order)
         return np.asarray(shape)
 
@@ -97,27 +94,26 @@ class Shapes:
         covariance_0 = variance / m**2 * _bracket(m, h, p, q)
         covariance_1 = variance / m**2 * p * (Q / q) ** 2
         spread = Q**2 + P * self._gap
-        shape = covariance_0 + covariance_1 * (2.0 * (np.cos(self._omega) - P)) / spread
+        shape = covariance_0 + covariance_1 * (2.0 * (self._cosine - P)) / spread
         # That cancels for T_B far longer than a block; then averaging acts as on a random walk.
-        averaged = 1.0 - self._gap / 6.0 * (1.0 - 1.0 / m**2)
-        slow = -variance * np.expm1(-2.0 * m * h) / spread * averaged
+        slow = -variance * np.expm1(-2.0 * m * h) / spread * self._averaged
         shape = np.where(m * h < _SLOW, slow, shape)
-        shape = (shape * m * self._interval).mean(axis=1)
+        shape = (shape * m * self._interval).mean(axis=0)
         i = self._single
-        n = np.rint(self._length[i] / (self._block[i, 0] * self._interval))
-        decay, phase = P[i, 0], self._omega[i, 0] / 2.0
+        n = np.rint(self._length[i] / (m[i] * self._interval))
+        decay, phase = P[i], self._omega[0, i] / 2.0
         sign = np.where(self._order % 2 == 1, 1.0, -1.0)
         ends = (
             4.0
             * variance
             / n
             * decay
-            * Q[i, 0] ** 2
+            * Q[i] ** 2
             * np.cos(phase) ** 2
-            * (1.0 + sign * np.exp(-n * m[i, 0] * h))
-            / spread[i, 0] ** 2
+            * (1.0 + sign * np.exp(-n * m[i] * h))
+            / spread[0, i] ** 2
         )
-        shape[i] -= ends * m[i, 0] * self._interval
+        shape[i] -= ends * m[i] * self._interval
         return np.asarray(shape)
 
 
