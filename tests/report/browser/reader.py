@@ -36,7 +36,7 @@ OPEN_TAB = """figure => {
 
 
 class Reader:
-    """A reader of pages, in one window, who waits for the script that draws once a figure is wanted.
+    """A reader of pages, in one window, who has the script that draws once a figure is wanted.
 
     It is large: without it a page opens in a third of the time.
 
