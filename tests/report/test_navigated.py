@@ -179,4 +179,4 @@ def test_without_a_script_a_table_says_how_much_of_it_stands_there(
     page: tuple[str, list[dict[str, Any]]],
 ) -> None:
     (note,) = re.findall("<noscript>(.*?)</noscript>", page[0])
-    assert "The first 30 of 40 rows" in note
+    assert "30 of 40 rows;" in note

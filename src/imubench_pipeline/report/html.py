@@ -90,6 +90,7 @@ def environment(system: System) -> jinja2.Environment:
     templates.filters |= {"started": started_text, "symbol_text": symbol_text}
     templates.filters["attribute"] = _compact
     templates.filters["packed"] = packed
+    templates.tests["hidden_row"] = _is_hidden
     return templates
 
 
@@ -134,6 +135,11 @@ def _json(value: Any) -> Markup:
 def packed(text: str) -> Markup:
     """Return a text that is written in a page compressed, and unfolded when the page opens."""
     return Markup(base64.b64encode(zlib.compress(text.encode(), 6)).decode())
+
+
+def _is_hidden(row: str) -> bool:
+    """Tell whether a row of a table is there only when the reader asks for it."""
+    return row.partition(">")[0].endswith(" hidden")
 
 
 def _compact(value: Any) -> str:

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 from imubench_pipeline.report.payload import FOREST
 from tests.report.browser import made
@@ -57,6 +57,17 @@ def test_pages_of_one_file_are_turned(read: Open, alone: Path) -> None:
     expect(page.locator("main h1")).to_contain_text(NIGHT)
     assert page.locator("main h1").count() == 1
     expect(page.locator("h2#accel_x")).to_be_visible()
+
+
+def test_one_file_is_read_where_nothing_is_unfolded(browser: Browser, alone: Path) -> None:
+    page = browser.new_page()
+    page.add_init_script("delete window.DecompressionStream")
+    page.goto(alone.as_uri())
+    for name in ("Recordings", "Theory"):
+        page.get_by_role("navigation", name="Pages").get_by_role("link", name=name).click()
+        expect(page.locator("main h1")).to_contain_text(name)
+        expect(page.get_by_role("alert")).to_contain_text("Firefox 113")
+    page.close()
 
 
 def test_a_place_in_one_file_has_an_address(read: Open, alone: Path) -> None:

@@ -4,11 +4,11 @@ import math
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Locator
+from playwright.sync_api import Browser, Locator, expect
 
 from tests.report.browser import made
 from tests.report.browser.made import Report
-from tests.report.browser.reader import Open, Reader
+from tests.report.browser.reader import READY, Open, Reader
 
 SENSORS, EACH, AXES = 20, 8, 3
 PAGES = (
@@ -191,6 +191,40 @@ def test_a_long_table_is_sorted_whole(read: Open, many: Path) -> None:
     table.get_by_role("button", name="Sort by Recording").click()
     assert set(cells(table, 2)) == {f"run_{r:02d}" for r in range(EACH - 5, EACH)}
     assert count(table) == f"the first 100 of {SENSORS * EACH} rows"
+
+
+@pytest.mark.parametrize("script", [False, True], ids=["without JavaScript", "of 2021"])
+def test_a_browser_that_unfolds_nothing_says_how_much_is_left_out(
+    script: bool, browser: Browser, many: Path
+) -> None:
+    context = browser.new_context(java_script_enabled=script)
+    page = context.new_page()
+    complaints: list[str] = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    if script:
+        page.add_init_script("delete window.DecompressionStream")
+    page.goto((many / "index.html").as_uri())
+    if script:
+        page.wait_for_function(READY)
+        said = page.get_by_role("alert")
+        expect(said).to_be_in_viewport()
+        for name in ("Chrome or Edge 92", "Firefox 113", "Safari 16.4"):
+            expect(said).to_contain_text(name)
+        page.get_by_label("Gyroscopes in").select_option("SI: rad/s")
+    table = page.get_by_role("table", name="Gyroscope: parameters")
+    rows = table.locator("tbody tr").filter(visible=True)
+    assert 10 < rows.count() <= 30
+    assert ("×10⁻" in rows.last.inner_text()) == script
+    # Of each axis the recommended method and that of the papers.
+    every = 2 * SENSORS * EACH * AXES
+    words = f"{rows.count()} of {every} rows; JavaScript unfolds the others."
+    expect(page.locator("p.note", has_text=words).first).to_be_visible()
+    path = "recordings/sensor_00/run_00.html"
+    page.goto((many / path).as_uri())
+    words = f"What follows here, of {2 * AXES - 1} more"
+    expect(page.locator("p.note", has_text=words)).to_be_visible()
+    assert complaints == []
+    context.close()
 
 
 @pytest.mark.release  # long: three hundred lines in each figure

@@ -6,7 +6,7 @@ let state = new URLSearchParams();
 const inOneFile = () => document.body.dataset.oneFile === "yes";
 
 function stateText(hash) {
-  const last = hash.slice(1).split("#").at(-1);
+  const last = hash.slice(1).split("#").pop();
   return last.includes("=") ? last : "";
 }
 

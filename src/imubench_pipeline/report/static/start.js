@@ -1,14 +1,11 @@
 // What happens when a page opens; in a report of one file, when a page of it is chosen.
 
-const UNFOLDS = typeof DecompressionStream === "function";
+// What unfolds, and one of the youngest parts of the language: what the scripts need of a browser.
+const ABLE = typeof DecompressionStream === "function" && typeof [].at === "function";
 
 async function openPage(main) {
   readState();
-  if (!UNFOLDS) {
-    main.prepend(ofOldBrowsers());
-    showUnits(main);
-    return;
-  }
+  if (!ABLE) return showPlain(main);
   await unfold(main);
   const data = main.querySelector("script[type='application/json'].page");
   pageData = data ? JSON.parse(data.textContent) : {};
@@ -25,7 +22,7 @@ async function openPage(main) {
 // What a page has packed (`html.packed`): its data, further rows of tables, and what stands for its
 // own markup.
 async function unfold(root) {
-  if (!UNFOLDS) return;
+  if (!ABLE) return;
   await Promise.all([...root.querySelectorAll("script[data-packed]")].map(async (script) => {
     const bytes = Uint8Array.from(atob(script.textContent), (sign) => sign.charCodeAt(0));
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
@@ -36,15 +33,17 @@ async function unfold(root) {
   }));
 }
 
-// What a reader sees whose browser is older than 2023: what a page has packed stays so.
-function ofOldBrowsers() {
-  const note = document.createElement("p");
-  note.className = "warnings";
-  note.setAttribute("role", "alert");
-  note.textContent =
-    "This browser cannot unpack what the page holds: figures, further rows and further channels are missing. " +
-    "It takes Chrome or Edge 80, Firefox 113, Safari 16.4, or a newer one.";
-  return note;
+// Where nothing can be unfolded, what stands in the page as it is stays to read, with the notes for a
+// reader without JavaScript.
+function showPlain(main) {
+  main.querySelectorAll("figure[data-kind]").forEach((figure) => figure.remove());
+  main.querySelectorAll("noscript").forEach((note) => (note.outerHTML = note.textContent));
+  showUnits(main);
+  main.prepend(Object.assign(document.createElement("p"), {
+    className: "warnings",
+    role: "alert",
+    textContent: "This browser shows a part of this report: no figures, and the first rows and sections alone, as it cannot unfold the rest. Chrome or Edge 92, Firefox 113, Safari 16.4 and later ones show it whole.",
+  }));
 }
 
 // One file: the pages lie in <template id="page:PATH">, and #/PATH or #/PATH#SECTION shows one.
