@@ -29,6 +29,15 @@ TOO_WIDE = """() => {
 }"""
 """What is wider than the window, where one has to scroll sideways."""
 
+CUT_CAPTIONS = """() => [...document.querySelectorAll(".scroll caption")].filter((caption) => {
+  const text = document.createRange();
+  text.selectNodeContents(caption);
+  const { left, right } = caption.closest(".scroll").getBoundingClientRect();
+  const own = text.getBoundingClientRect();
+  return own.left < left || own.right > right + 1;
+}).map((caption) => caption.textContent.slice(0, 40))"""
+"""The captions of which one has to scroll sideways to read the end."""
+
 OPEN_TAB = """figure => {
   const panel = figure.closest("section.channel[hidden]");
   if (panel) document.querySelector(`[role=tab][aria-controls="${panel.id}"]`).click();
