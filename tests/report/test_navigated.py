@@ -2,6 +2,7 @@
 
 import math
 import re
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,19 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.report.navigated import NAVIGATION, TUNINGS, answers, ranking
-from imubench_pipeline.report.publish import publish
 from imubench_pipeline.settings.config import Method
 from imubench_pipeline.tables import build
-from tests.report.browser.test_numbers import number
+from tests.report.browser.made import publish_some
 from tests.report.pages import unfolded
 from tests.report.tables import joined, recording_rows, site
+
+SIZES = {
+    "Position, m": ("position", 1.0),
+    "over that of the true model": ("position_ratio", 1.0),
+    "Velocity, m/s": ("velocity", 1.0),
+    "Heading, °": ("heading", 180 / math.pi),
+}
+"""Columns of the page that have limits, with what they are called and one of them in SI."""
 
 
 def navigation_row(sensor: str = "imu", **changes: Any) -> dict[str, Any]:
@@ -123,60 +131,157 @@ def test_the_page_is_there_where_something_was_run(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, list[dict[str, Any]]]:
-    """The page of forty tunings of all sizes, unfolded, and the rows of the table."""
-    rng = np.random.default_rng(3)
-
-    def drawn(tuning: int) -> dict[str, Any]:
-        sizes = {
-            name: float(size)
-            for name, size in navigation_row().items()
-            if name.startswith(("position", "velocity", "heading"))
-        }
-        names = list(TUNINGS)
-        return navigation_row(
-            tuning=names[tuning % len(names)], outage=10.0 * (1 + tuning // len(names)),
-            nees_inside=rng.uniform(0.5, 1.0), states=15 + tuning, outages=40 + tuning,
-            **{name: size * 10.0 ** rng.uniform(-3.0, 4.0) for name, size in sizes.items()},
-        )  # fmt: skip
-
-    table = [drawn(k) for k in range(40)]
-    folder = tmp_path_factory.mktemp("navigation")
-    publish(site(joined(recording_rows("imu"), {"navigation": table})), folder)
-    return unfolded((folder / "navigation.html").read_text()), table
-
-
-def test_its_numbers_are_those_of_the_table(page: tuple[str, list[dict[str, Any]]]) -> None:
-    text, table = page
-    part = text[text.index('id="tunings"') :]
-    heads = [re.sub("<[^>]*>", "", one) for one in re.findall(r"<th scope=\"col\".*?</th>", part)]
-    lines = re.findall(r"<tr data-trajectory.*?</tr>", part, re.DOTALL)
-    assert len(lines) == len(table)
-    degrees = 180.0 / math.pi
-    columns = {
-        "Position, m": ("position", 1.0),
-        "over that of the true model": ("position_ratio", 1.0),
-        "Velocity, m/s": ("velocity", 1.0),
-        "Heading, °": ("heading", degrees),
-    }
-    for line, row in zip(lines, table, strict=True):
-        texts = re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", line)
-        cells = dict(zip(heads, (re.sub("<[^>]*>", "", one) for one in texts), strict=True))
-        for head, (name, factor) in columns.items():
-            seen = [number(one) for one in re.split(r" \(| to |\)", cells[head]) if one]
-            values = [factor * row[name + end] for end in ("", "_lower", "_upper")]
-            assert seen == [float(f"{value:.2e}") for value in values], (head, cells[head])
-        assert number(cells["Filter expects, m"]) == float(f"{row['position_predicted']:.2e}")
-        assert number(cells["NEES inside"].split(" ")[0]) == float(
-            f"{100 * row['nees_inside']:.2e}"
+def drives() -> list[dict[str, Any]]:
+    """Rows of which no two figures are alike, more than stand in a page unpacked."""
+    rng = np.random.default_rng(5)
+    rows = [
+        navigation_row(
+            sensor, trajectory=trajectory, outage=outage, tuning=tuning, signals=signals,
+            recommended=tuning == "likelihood", states=int(rng.integers(15, 40)),
+            runs=int(rng.integers(20, 400)), outages=int(rng.integers(20, 400)),
+            nees_inside=rng.uniform(0.5, 1.0), nees_error=10.0 ** rng.uniform(-4, -2),
+            consistent=True, smallest=tuning == "datasheet",
         )
-        assert cells["Outage"] == f"{row['outage']:g} s"
-        assert cells["States"] == str(row["states"])
-        assert cells["Of"] == f"{row['outages']} outages"
+        for sensor in ("one", "two")
+        for trajectory, signals in (("field", "truth"), ("rest", "log"))
+        for outage in (None, 10.0, 60.0)
+        for tuning in ("true", "datasheet", "times_ten", "likelihood")
+    ]  # fmt: skip
+    for row in rows:
+        for name in ("position", "velocity", "heading", "position_ratio"):
+            size = 10.0 ** rng.uniform(-2, 4)
+            row |= {name: size, f"{name}_lower": size * rng.uniform(0.5, 0.9)}
+            row |= {f"{name}_upper": size * rng.uniform(1.1, 2.0)}
+        row["position_predicted"] = 10.0 ** rng.uniform(-2, 4)
+    rows[3] |= {"nees_inside": None, "nees_error": None}
+    for row in rows[12:24]:
+        row |= dict.fromkeys(f"position_ratio{end}" for end in ("", "_lower", "_upper"))
+    return rows
+
+
+@pytest.fixture(scope="module")
+def source(
+    drives: list[dict[str, Any]], tmp_path_factory: pytest.TempPathFactory, small_report: None
+) -> str:
+    """The page of these rows, unfolded."""
+    about = [recording_rows(sensor) for sensor in ("one", "two")]
+    folder = tmp_path_factory.mktemp("report")
+    publish_some(site(joined(*about, {"navigation": drives})), folder, [NAVIGATION.file])
+    return unfolded((folder / NAVIGATION.file).read_text(encoding="utf-8"))
+
+
+def lines_of(source: str, title: str) -> list[dict[str, tuple[str, str]]]:
+    """The rows of a table of the page: of each column the text, and by what it is sorted."""
+    table = source.partition(f'aria-label="{title}"')[2].partition("</table>")[0]
+    lines = [
+        [
+            (
+                unescape(re.sub("<[^>]*>", "", text)),
+                "".join(re.findall('data-value="(.*?)"', about)),
+            )
+            for about, text in re.findall("<t[hd]([^>]*)>(.*?)</t[hd]>", line)
+        ]
+        for line in re.findall("<tr.*?</tr>", table)
+    ]
+    heads = [head for head, _ in lines[0]]
+    return [dict(zip(heads, line, strict=True)) for line in lines[1:]]
+
+
+def to_three_digits(*values: float) -> list[str]:
+    return [f"{float(f'{value:.3g}'):.10f}".rstrip("0").rstrip(".") for value in values]
+
+
+def hold_sizes(line: dict[str, tuple[str, str]], row: dict[str, Any]) -> set[str]:
+    """Hold what has limits to its row of the table; return the columns."""
+    shown = SIZES.keys() & line.keys()
+    for head in shown:
+        name, factor = SIZES[head]
+        text, sorted_by = line[head]
+        if row[name] is None:
+            assert (text, sorted_by) == ("–", "")
+            continue
+        sizes = [factor * row[f"{name}{end}"] for end in ("", "_lower", "_upper")]
+        assert re.findall(r"[\d.]+", text) == to_three_digits(*sizes), (head, row)
+        assert re.sub(r"[\d.]+", "#", text) == "# (# to #)"
+        if sorted_by:
+            assert float(sorted_by) == row[name]
+    return shown
+
+
+def test_every_number_of_a_tuning_is_that_of_its_table(
+    source: str, drives: list[dict[str, Any]]
+) -> None:
+    shown = lines_of(source, "Every tuning")
+    assert len(shown) == len(drives) > 30
+    for line, row in zip(shown, drives, strict=True):
+        held = hold_sizes(line, row)
+        assert held == SIZES.keys()
+        assert line["Tuning"][0].split(",")[0] == TUNINGS[row["tuning"]]
+        assert (line["Sensor"][0].split()[-1], line["Trajectory"][0]) == (
+            row["sensor"], row["trajectory"],
+        )  # fmt: skip
+        outage = row["outage"]
+        assert line["Outage"] == (f"{outage:.0f} s" if outage else "none", f"{outage or 0.0}")
+        assert line["States"] == (str(row["states"]),) * 2
+        assert [line["Filter expects, m"][0]] == to_three_digits(row["position_predicted"])
+        assert line["Of"][0] == (f"{row['outages']} outages" if outage else "")
+        text, sorted_by = line["NEES inside"]
+        if row["nees_inside"] is None:
+            assert (text, sorted_by) == ("", "")
+        else:
+            share, error = re.fullmatch(r"([\d.]+) ± ([\d.]+) %", text).groups()  # type: ignore[union-attr]  # else the test fails
+            assert [share] == to_three_digits(100 * row["nees_inside"])
+            assert float(error) == float(f"{100 * row['nees_error']:.2g}")
+            assert float(sorted_by) == 100 * row["nees_inside"]
+        held |= {"Outage", "States", "Filter expects, m", "Of", "NEES inside"}
+        assert not {head for head, (text, _) in line.items() if re.search(r"\d", text)} - held
+
+
+def test_every_number_of_a_rank_is_that_of_its_table(
+    source: str, drives: list[dict[str, Any]]
+) -> None:
+    # Pieces of a log are no drive that all have.
+    rows = [
+        row for row in drives
+        if (row["outage"], row["tuning"], row["signals"]) == (60.0, "likelihood", "truth")
+    ]  # fmt: skip
+    rows.sort(key=lambda row: row["position"])
+    shown = lines_of(source, "Which sensor goes astray least?")
+    assert len(shown) == len(rows) == 2
+    for place, (line, row) in enumerate(zip(shown, rows, strict=True), start=1):
+        held = hold_sizes(line, row) | {"Place", "Outage"}
+        assert len(held) == 5
+        assert (line["Place"][0], line["Outage"][0]) == (str(place), "60 s")
+        assert line["Sensor"][0].split()[-1] == row["sensor"]
+        assert not {head for head, (text, _) in line.items() if re.search(r"\d", text)} - held
+
+
+def test_every_number_of_an_answer_is_that_of_its_table(
+    source: str, drives: list[dict[str, Any]]
+) -> None:
+    shown = lines_of(source, "Does the tuning matter?")
+    assert len(shown) == 3  # of the fourth there is no ratio
+    told = 0
+    for line in shown:
+        of = line["Sensor"][0].split()[-1], line["Trajectory"][0].split(",")[0]
+        own = [row for row in drives if (row["sensor"], row["trajectory"]) == of]
+        assert line["Trajectory"][0] == f"{of[1]}, 60 s, {own[0]['runs']} runs"
+        smallest = next(row for row in own if row["smallest"])
+        assert line["Smallest that is consistent"][0] == f"datasheet, {smallest['states']} states"
+        ratios = {
+            TUNINGS[row["tuning"]]: row["position_ratio"] for row in own if row["outage"] == 60.0
+        }
+        for name, times in re.findall(r"(?:by|,) ([^,;]+?) ([\d.]+) times", line["Answer"][0]):
+            assert [times] == to_three_digits(ratios[name])
+            told += 1
+        assert len(re.findall(r"\d[\d.]*", line["Answer"][0])) == len(
+            re.findall("[0-9] times", line["Answer"][0])
+        )
+    assert told > 2
 
 
 def test_without_a_script_a_table_says_how_much_of_it_stands_there(
-    page: tuple[str, list[dict[str, Any]]],
+    source: str, drives: list[dict[str, Any]]
 ) -> None:
-    (note,) = re.findall("<noscript>(.*?)</noscript>", page[0])
-    assert "30 of 40 rows;" in note
+    (note,) = re.findall("<noscript>(.*?)</noscript>", source)
+    assert f"30 of {len(drives)} rows;" in note
