@@ -116,6 +116,7 @@ class Sketch {
 
   area(points, fill) {
     const known = points.filter(([x, y]) => Number.isFinite(x + y));
+    if (known.length === 0) return;
     if (known.length === points.length) this.inside.append(svg("path", { d: `${pathOf(points)}Z`, fill }));
     else this.inside.append(svg("path", { d: pathOf(points).replaceAll("M", "ZM").replace("Z", ""), fill }));
   }
