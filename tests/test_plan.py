@@ -234,7 +234,7 @@ def test_a_report_is_given_what_its_pages_show(project: dict[str, Any], tmp_path
     assert set(settings["report"]) >= {"title", "units"}
     # Sensors with recordings; of one without a file nothing is known.
     assert list(settings["sensors"]) == ["s"]
-    assert set(settings["sensors"]["s"]) == {"vendor", "model", "price_class"}
+    assert set(settings["sensors"]["s"]) == {"vendor", "model", "price_class", "sold"}
     assert settings["requirements"]["robot"]["title"] == "a robot"
     assert {"tau", "common"} <= set(settings["settings"]["fusion"])
     assert {"static_window", "latitude"} <= set(settings["settings"]["error_budget"])

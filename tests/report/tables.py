@@ -294,6 +294,7 @@ def settings_of(
     title: str = "A title",
     given: Sequence[str] = (),
     named: str = "results",
+    not_sold: Sequence[str] = (),
 ) -> str:
     """What a plan says of the report; ``named``: the folder of the results."""
     sensors = dict.fromkeys(tables["recordings"]["sensor"].to_pylist())
@@ -308,7 +309,12 @@ def settings_of(
                 "fusion": FUSION.model_dump(mode="json"),
             },
             "sensors": {
-                name: {"vendor": "V & Co", "model": name, "price_class": "cheap"}
+                name: {
+                    "vendor": "V & Co",
+                    "model": name,
+                    "price_class": "cheap",
+                    "sold": name not in not_sold,
+                }
                 for name in sensors
             },
             "boards": boards or {},

@@ -52,7 +52,7 @@ def _context(site: Site) -> dict[str, Any]:
         for name, lines in recording.datasheet.items():
             own.setdefault(name, lines)
         growth = _growth(kept["error_growth"], arrays, few=len(views) > _MANY)
-        recordings.append(_recording(view) | {"growth": growth})
+        recordings.append(_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth})
     return {
         "several": len(views) > 1,
         "page": {
@@ -119,7 +119,6 @@ def _recording(view: RecordingView) -> dict[str, Any]:
         "started": row["started"],
         "temperature": temperature,
         "decides": row["decides"] is not False,
-        "sold": "not sold" not in (row["doubts"] or ""),
         "doubts": [term(name).name for name in findings],
     }
 

@@ -38,9 +38,6 @@ _WORD_OF = {
     "surely fails": "fails",
 }
 
-_NOT_SOLD = "not sold"
-"""What the doubts of a recording say of a sensor that cannot be bought."""
-
 _LOGS = 4.0
 """Decades to either side of 1 beyond which margins are sorted alike."""
 
@@ -125,9 +122,7 @@ def matrix(site: Site) -> dict[str, Any] | None:
         for sensor in site.sensors
     }
     # What nobody can buy is no row among what can be bought.
-    apart = {
-        view.sensor: _NOT_SOLD for view in site.views if _NOT_SOLD in (view.row["doubts"] or "")
-    }
+    apart = {sensor: "not sold" for sensor in site.sensors if not site.is_sold(sensor)}
     lines = {sensor: cells for sensor, cells in lines.items() if sensor not in apart}
     order = sorted(lines, key=lambda sensor: (_merit(lines[sensor]), site.names[sensor]))
     return {

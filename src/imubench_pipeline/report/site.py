@@ -188,6 +188,11 @@ class Site:
         """Vendor and model of each sensor."""
         return sensor_names(self.sensors, self.settings["sensors"])
 
+    def is_sold(self, sensor: str) -> bool:
+        """Tell whether a sensor can be bought; of one without a file nothing else is stated."""
+        sold: bool = self.settings["sensors"].get(sensor, {}).get("sold", True)
+        return sold
+
     @cached_property
     def looks(self) -> dict[str, Appearance]:
         """How each sensor looks in every figure."""

@@ -439,7 +439,7 @@ class Plan:
                 "results": str(self.run.results),
                 "given": given_beside(self.run, Path("config/config.yaml")),
                 "settings": self.run.model_dump(mode="json", include=_SHOWN),
-                "sensors": self._described("vendor", "model", "price_class"),
+                "sensors": self._described("vendor", "model", "price_class", "sold"),
                 "boards": {name: self._board(board) for name, board in self.boards.items()},
                 "requirements": self._requirements(),
                 "on_purpose": {

@@ -372,7 +372,9 @@ def settings_of(sensors: Mapping[str, Sensor], requirements: Mapping[str, Requir
             "results": "results",
             "settings": {name: getattr(run, name).model_dump(mode="json") for name in sections},
             "sensors": {
-                name: one.model_dump(mode="json", include={"vendor", "model", "price_class"})
+                name: one.model_dump(
+                    mode="json", include={"vendor", "model", "price_class", "sold"}
+                )
                 for name, one in sensors.items()
             },
             "requirements": {

@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
@@ -21,6 +22,7 @@ from tests.report.browser import made
 from tests.report.browser.factors import ARC
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader, traces
+from tests.report.tables import joined, recording_rows, site
 
 NIGHT, SIMULATED, FIRST = made.NIGHT, made.SIMULATED, made.DATED[0]
 DRAWN = 2e-3
@@ -222,6 +224,13 @@ def test_what_is_chosen_stands_in_the_address(
     assert len(own) == len(table_rows)
     assert download(again.get_by_role("button", name="as PNG")).startswith(b"\x89PNG")
     assert b"<svg" in download(again.get_by_role("button", name="as SVG"))[:200]
+
+
+def test_what_nobody_can_buy_is_told_where_it_is_chosen(read: Open, tmp_path: Path) -> None:
+    tables = joined(recording_rows("bought"), recording_rows("made"))
+    made.publish_some(site(tables, not_sold=["made"]), tmp_path, ["compare.html"])
+    first = read(tmp_path, "compare.html").page.locator("select[data-letter=a]")
+    assert first.locator("option").all_inner_texts() == ["V & Co bought", "V & Co made (not sold)"]
 
 
 def test_what_is_not_there_is_said(read: Open, bench: Report) -> None:
