@@ -39,11 +39,12 @@ function showPlain(main) {
   main.querySelectorAll("figure[data-kind]").forEach((figure) => figure.remove());
   main.querySelectorAll("noscript").forEach((note) => (note.outerHTML = note.textContent));
   showUnits(main);
-  main.prepend(Object.assign(document.createElement("p"), {
+  const note = Object.assign(document.createElement("p"), {
     className: "warnings",
-    role: "alert",
     textContent: "This browser shows a part of this report: no figures, and the first rows and sections alone, as it cannot unfold the rest. Chrome or Edge 92, Firefox 113, Safari 16.4 and later ones show it whole.",
-  }));
+  });
+  note.setAttribute("role", "alert");
+  main.prepend(note);
 }
 
 // One file: the pages lie in <template id="page:PATH">, and #/PATH or #/PATH#SECTION shows one.
