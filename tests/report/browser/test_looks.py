@@ -103,3 +103,5 @@ def test_no_figure_is_cut_off_on_paper(read: Open, bench: Report) -> None:
     drawn = reader.page.locator("figure[data-kind] svg.main-svg").evaluate_all(ends)
     assert len(drawn) >= 4
     assert max(drawn) <= 718
+    # With their tables they take two sheets, as whoever hands them on will print them.
+    assert len(re.findall(rb"/Type\s*/Page\b", reader.page.pdf(format="A4"))) == 2

@@ -98,7 +98,7 @@ kinds.pair = (figure) => {
       { key: "datasheet", label: "datasheet", on: true, look: { ...black(), dash: "dot", marker: "diamond" }, absent: !traces.some((trace) => trace.group === "datasheet") },
       { key: "slopes", label: "slopes", on: true, look: { light: soft, dark: soft } },
     ],
-    height: 470,
+    height: printing() ? 380 : 470,
     layout: {
       margin: { l: 62, r: 26, t: 8, b: 46 }, hovermode: "x", hoversubplots: "axis",
       xaxis: { ...logAxis("averaging time τ (s)", ranges.x), anchor: "y2" },
@@ -186,7 +186,7 @@ kinds.dumbbells = (figure) => {
     });
   });
   return {
-    traces, groups: [], height: 110 + 52 * figures.length,
+    traces, groups: [], height: 110 + (printing() ? 30 : 52) * figures.length,
     layout: {
       margin: { l: 10, r: 20, t: 12, b: 50 },
       xaxis: logAxis(`times that of ${shortName(chosen[0])}`, logRange(extent, 0.08)),
@@ -394,14 +394,14 @@ function stackedShares(rows, shares, titles, width) {
         const percent = `${numberText(100 * share, 2)} %`;
         return [`${source} ${percent}`, percent].find((words) => 7 * words.length < share * inner) ?? "";
       }), textposition: "inside", insidetextanchor: "middle",
-      insidetextfont: { color: inks().ink, size: 12 }, constraintext: "none", textangle: 0,
+      insidetextfont: { color: inks().ink, size: printing() ? 9 : 12 }, constraintext: "none", textangle: 0,
       hovertext: own.map((parts, i) => `${titles[i]}<br>${parts.map(([name, share]) => `${name}: ${numberText(100 * share, 2)} %`).join("<br>")}`), hovertemplate: "%{hovertext}<extra></extra>",
     };
   });
   return {
     traces,
     groups: order.map((source, number) => ({ key: `source ${source}`, label: source, on: true, look: { light: source === "others" ? "#8a9299" : PLACES[number % PLACES.length][0], dark: source === "others" ? "#6b7680" : PLACES[number % PLACES.length][1], filled: true } })),
-    height: 90 + (rows.length > 6 ? 26 : 64) * Math.max(rows.length, 1),
+    height: 90 + (rows.length > 6 ? (printing() ? 15 : 26) : 64) * Math.max(rows.length, 1),
     layout: {
       barmode: "stack", bargap: 0.3, margin: { l: 10, r: 14, t: 8, b: 46 },
       xaxis: { ...linearAxis("part of the variance (%)"), range: [0, 100] },
