@@ -53,6 +53,28 @@ def test_no_page_is_wider_than_a_telephone(read: Open, bench: Report) -> None:
     assert {begin: found for begin, found in wide.items() if found} == {}
 
 
+SCROLLED = """() => [...document.querySelectorAll("main .scroll")]
+  .filter((one) => one.scrollWidth > one.clientWidth + 2).map((one) => {
+    one.scrollLeft = 150;
+    const from = (what) => one.querySelector(what)?.getBoundingClientRect();
+    const left = one.getBoundingClientRect().left;
+    const [caption, head] = [from("caption"), from("tbody th")];
+    return [one.ariaLabel, caption.left >= left - 1 && caption.right <= innerWidth,
+            head === undefined || head.left >= left - 1];
+  })"""
+"""Of each table that is scrolled aside: its name, and whether caption and names of rows stay."""
+
+
+def test_caption_and_first_column_stay_where_a_table_is_scrolled(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, width=700)
+    tables = []
+    for begin in ("index", "datasheets", "recordings.html"):
+        reader.open(bench.page(begin))
+        tables += reader.page.evaluate(SCROLLED)
+    assert len(tables) >= 3
+    assert [name for name, *stays in tables if stays != [True, True]] == []
+
+
 @pytest.mark.parametrize("width", [1280, 390])
 def test_there_is_something_to_see(width: int, read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT, width=width)
