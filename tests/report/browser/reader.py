@@ -80,7 +80,7 @@ class Reader:
         else:
             self._held.append(asked)
 
-    def let_draw(self) -> None:
+    def _draw(self) -> None:
         """Let the script that draws come."""
         self._drawing = True
         while self._held:
@@ -131,7 +131,7 @@ class Reader:
 
     def show(self, one: Locator) -> Locator:
         """Bring something into view, and wait until no figure beside it changes its height."""
-        self.let_draw()
+        self._draw()
         one.scroll_into_view_if_needed()
         self.page.wait_for_function(SETTLED)
         one.scroll_into_view_if_needed()
@@ -148,7 +148,7 @@ class Reader:
 
     def draw_all(self) -> int:
         """Bring every figure into view, one after the other; return how many there are."""
-        self.let_draw()
+        self._draw()
         self.page.evaluate(UNFOLD)
         for everything in self.page.get_by_role("button", name="all channels").all():
             everything.click()

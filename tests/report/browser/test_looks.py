@@ -101,8 +101,7 @@ def test_a_page_is_dark_by_night(read: Open, bench: Report) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_page_is_printed_light_and_whole(scheme: str, read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT, scheme=scheme)
-    reader.let_draw()
-    reader.page.wait_for_function("window.Plotly !== undefined")
+    ink(reader)  # the script that draws is there from now on
     reader.page.emulate_media(media="print", color_scheme=scheme)
     assert background(reader) > 0.9
     hidden = ("nav", ".units", ".skip")

@@ -8,9 +8,6 @@ from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader
 
-PLOTTING = "window.Plotly !== undefined"
-"""Who leaves a page before would break off what it loads."""
-
 
 @pytest.fixture(params=["folder", "one file"])
 def opened(request: pytest.FixtureRequest, read: Open, bench: Report, alone: Path) -> Reader:
@@ -21,7 +18,6 @@ def opened(request: pytest.FixtureRequest, read: Open, bench: Report, alone: Pat
 
 def test_a_search_by_the_keyboard(opened: Reader) -> None:
     page = opened.page
-    page.wait_for_function(PLOTTING)
     page.keyboard.press("/")
     page.keyboard.type("night missing")
     found = page.locator(".search a")
@@ -30,7 +26,6 @@ def test_a_search_by_the_keyboard(opened: Reader) -> None:
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Enter")
     page.wait_for_function("document.querySelector('h1').textContent.includes('night 1')")
-    page.wait_for_function(PLOTTING)
     assert page.get_by_role("heading", level=1).inner_text().endswith(made.NIGHT.recording)
     field = page.get_by_role("searchbox", name="Search everything")
     field.fill("qqq")

@@ -38,7 +38,6 @@ def test_a_link_opens_its_channel(link: str, read: Open, bench: Report) -> None:
 
 def test_every_channel_is_printed(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)
-    reader.page.wait_for_function("window.Plotly !== undefined")
     reader.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert reader.page.evaluate(VISIBLE) == ["gyro_x", "gyro_y", "accel_x"]
     reader.page.evaluate("dispatchEvent(new Event('afterprint'))")
