@@ -177,10 +177,13 @@ function shown(figure, group) {
 
 function drawFigure(figure) {
   const made = kinds[figure.dataset.kind](figure);
-  if (!choices.has(figure)) {
+  const own = choices.get(figure) ?? new Map();
+  const fresh = made.groups.filter((group) => !own.has(group.key));
+  if (fresh.length > 0 || !choices.has(figure)) {
     const other = new Set((state.get(`g${numberOf(figure)}`) ?? "").split("~"));
-    choices.set(figure, new Map(made.groups.map((group) => [group.key, group.on !== other.has(group.key)])));
-    drawControls(figure, made.groups);
+    fresh.forEach((group) => own.set(group.key, group.on !== other.has(group.key)));
+    choices.set(figure, own);
+    drawControls(figure, fresh);
     return drawFigure(figure);
   }
   syncControls(figure, made.groups);
