@@ -134,10 +134,10 @@ def _summary(view: RecordingView, channels: int) -> str:
     return summary_words(view, parts)
 
 
-def _drawn(score: Row) -> str:
-    """Return the score of one reconstruction with its range, in decades."""
+def _drawn(score: Row) -> tuple[str, str]:
+    """Return the score of one reconstruction and its range, in decades."""
     low, high = (number_text(score[f"drawn_log10_{end}"], 2) for end in ("lower", "upper"))
-    return f"{number_text(score['drawn_log10'], 2)} ({low} to {high})"
+    return number_text(score["drawn_log10"], 2), f"{low} to {high}"
 
 
 def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
@@ -161,7 +161,7 @@ def _channel(
         score = channel.scores.get(line["method"] or "")
         scored = score is not None and score["rms_log10"] is not None
         line["score"] = number_text(score["rms_log10"], 2) if scored and score else "–"
-        line["drawn"] = _drawn(score) if scored and score else "–"
+        line["drawn"] = _drawn(score) if scored and score else ("–", "")
         line["inside"] = f"{100 * score['inside_band']:.0f} %" if scored and score else "–"
     best = channel.models[0] if channel.models else None
     return {

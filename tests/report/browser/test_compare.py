@@ -149,9 +149,17 @@ def test_errors_grow_as_the_budget_has_it(read: Open, bench: Report) -> None:
     assert after["y"][at] == pytest.approx(math.degrees(rested["sigma"]), rel=DRAWN)
     assert abs(after["y"][at] / curve["y"][at] - 1.0) > 0.1
     assert "window=600" in reader.page.url
-    bars = traces(reader.figure("sources"))
+    sources = reader.figure("sources")
+    bars = traces(sources)
     total = np.sum([one["x"] for one in bars], axis=0)
     np.testing.assert_allclose(total, 100.0, atol=1.0)
+    # A part that the first figure had not is switched as the others, and is in no address.
+    reader.page.locator("form.growth select").first.select_option("position")
+    later = {one["name"] for one in traces(sources)}
+    assert later - {one["name"] for one in bars}
+    offered = sources.locator(".controls .toggle:not([hidden])").all_inner_texts()
+    assert {text.strip() for text in offered} == later
+    assert "source" not in reader.page.url
 
 
 def test_errors_of_the_chosen_axis_are_those_of_their_table(read: Open, bench: Report) -> None:

@@ -127,3 +127,15 @@ def test_no_figure_is_cut_off_on_paper(read: Open, bench: Report) -> None:
     assert max(drawn) <= 718
     # With their tables they take two sheets, as whoever hands them on will print them.
     assert len(re.findall(rb"/Type\s*/Page\b", reader.page.pdf(format="A4"))) == 2
+
+
+def test_the_first_column_of_a_table_stays_in_view(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, OF_NIGHT, width=768)
+    table = reader.page.get_by_role("region", name="parameters by all methods").first
+    assert table.evaluate("one => one.scrollWidth - one.clientWidth") > 100
+    table.evaluate("one => { one.scrollLeft = 100; }")
+    begin = table.evaluate("one => one.getBoundingClientRect().left")
+    first = table.locator("tr > :first-child").evaluate_all(
+        "cells => cells.map(one => one.getBoundingClientRect().left)"
+    )
+    assert len(first) > 2 and max(abs(place - begin) for place in first) < 2

@@ -152,7 +152,7 @@ kinds.spectrum = (figure) => {
     traces, groups,
     layout: {
       xaxis: logAxis("frequency f (Hz)", logRange(f, 0.1)),
-      yaxis: logAxis(`root of the two-sided density (${unit.sign})`, range),
+      yaxis: logAxis(`√PSD, two-sided (${unit.sign})`, range),
     },
   };
 };
@@ -301,6 +301,6 @@ kinds.histogram = (figure) => {
       { key: "samples", label: "samples", on: true, look: { ...look, filled: true } },
       { key: "normal", label: "normal distribution of the same spread", on: true, look: black(), absent: !(deviation > 0) },
     ],
-    layout: { xaxis: linearAxis(`${channel.replace("_", " ")} (${unit.sign})`), yaxis: { ...linearAxis(`share of the samples per ${unit.sign}`), rangemode: "tozero" }, bargap: 0 },
+    layout: { xaxis: linearAxis(`${channel.replace("_", " ")} (${unit.sign})`), yaxis: { ...linearAxis(`share per ${unit.sign}`), rangemode: "tozero" }, bargap: 0 },
   };
 };

@@ -263,7 +263,7 @@ function sentenceOf(figures, first, second, place) {
 
 function drawEvidence(root) {
   const table = root.querySelector("table.evidence");
-  table.tHead.replaceChildren(headOf("", "Recording", "Hours", "Specimens of the sensor", "Temperature", "Rate", "Doubts"));
+  table.tHead.replaceChildren(headOf("Compared", "Recording", "Hours", "Specimens of the sensor", "Temperature", "Rate", "Doubts"));
   table.tBodies[0].replaceChildren(...chosen.map((one) => {
     const { row } = one;
     const line = document.createElement("tr");

@@ -166,7 +166,7 @@ function baseLayout() {
   return {
     margin: { l: 60, r: 14, t: 14, b: 50 }, showlegend: false, hovermode: "closest",
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-    font: { family: "system-ui, sans-serif", size: 13, color: ink },
+    font: { family: "system-ui, sans-serif", size: printing() ? 10 : 13, color: ink },
     hoverlabel: { bgcolor: paper, bordercolor: ink, font: { color: ink } },
   };
 }
@@ -177,10 +177,13 @@ function shown(figure, group) {
 
 function drawFigure(figure) {
   const made = kinds[figure.dataset.kind](figure);
-  if (!choices.has(figure)) {
+  const own = choices.get(figure) ?? new Map();
+  const fresh = made.groups.filter((group) => !own.has(group.key));
+  if (fresh.length > 0 || !choices.has(figure)) {
     const other = new Set((state.get(`g${numberOf(figure)}`) ?? "").split("~"));
-    choices.set(figure, new Map(made.groups.map((group) => [group.key, group.on !== other.has(group.key)])));
-    drawControls(figure, made.groups);
+    fresh.forEach((group) => own.set(group.key, group.on !== other.has(group.key)));
+    choices.set(figure, own);
+    drawControls(figure, fresh);
     return drawFigure(figure);
   }
   syncControls(figure, made.groups);
@@ -189,10 +192,11 @@ function drawFigure(figure) {
   const canvas = figure.querySelector(".canvas");
   canvas.classList.toggle("empty", traces.length === 0);
   const layout = { ...baseLayout(), ...made.layout, datarevision: Math.random() };
-  const height = made.height ?? (printing() ? PRINTED.height : null);
+  const paper = printing() ? onPaper(figure) : null;
+  const height = made.height ?? paper?.height;
   canvas.style.height = height ? `${height}px` : "";
-  canvas.style.width = printing() ? `${PRINTED.width}px` : "";
-  if (printing()) Object.assign(layout, { width: PRINTED.width, height });
+  canvas.style.width = paper ? `${paper.width}px` : "";
+  if (paper) Object.assign(layout, { width: paper.width, height });
   wholes.set(figure, Object.fromEntries(axesOf(layout).map((name) => [name, `${layout[name].range}`])));
   zoomIn(figure, layout);
   const first = !drawn.has(figure);
@@ -341,8 +345,11 @@ function redrawAll() {
   [...drawn].filter((figure) => figure.isConnected).forEach(drawFigure);
 }
 
-// A printed page has its own width, that figures do not learn in time: they are given one.
-const PRINTED = { width: 660, height: 260 };
+// A printed page has its own width, that figures do not learn in time: they are given one. Those of
+// a channel stand in pairs.
+function onPaper(figure) {
+  return figure.matches("section.channel .figures > *") ? { width: 330, height: 200 } : { width: 660, height: 240 };
+}
 
 function startPrinting() {
   const everyFigure = () => document.querySelectorAll("figure[data-kind]:not(.on-screen *)");

@@ -404,7 +404,7 @@ function stackedShares(rows, shares, titles, width) {
     height: 90 + (rows.length > 6 ? (printing() ? 15 : 26) : 64) * Math.max(rows.length, 1),
     layout: {
       barmode: "stack", bargap: 0.3, margin: { l: 10, r: 14, t: 8, b: 46 },
-      xaxis: { ...linearAxis("part of the variance (%)"), range: [0, 100] },
+      xaxis: { ...linearAxis("% of the variance"), range: [0, 100] },
       yaxis: { ...linearAxis(""), tickvals: rows.map((_, i) => i), ticktext: rows, range: [-0.6, rows.length - 0.4], fixedrange: true },
     },
   };
