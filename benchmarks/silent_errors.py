@@ -360,7 +360,7 @@ def of_log(task: tuple[str, int]) -> tuple[str, int, list[Judged], dict[str, flo
     log = CASES[case](rng_of(case, number))
     spent["simulate"] = time.perf_counter() - begun
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+        warnings.simplefilter("ignore")  # of Python's: a user's log has them; doubts are judged
         try:
             found = list(judge(case, number, log, tables_of(log, Path(folder), spent)))
             error = "" if found else "rejected"

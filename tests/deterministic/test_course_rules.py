@@ -77,7 +77,7 @@ def test_what_regressors_take_of_the_lowest_ordinates_they_take_of_a_walk() -> N
     density = np.array([1e4, 1e4, 1.0, 1.0, 1.0, 1.0, 1.0])
     leverage = np.array([0.9, 0.3, 1.0, 1.0, 0.0, 0.0, 0.0])
     # No noise is fitted: what is asked of the fit does not use it.
-    fit = Fit((), nothing, nothing, None, density, nothing, leverage, 0.0)  # type: ignore[arg-type]
+    fit = Fit((), nothing, nothing, None, density, nothing, leverage, 0.0)  # type: ignore[arg-type]  # no noise
     assert _leverage_on_walk(fit) == pytest.approx(0.6, rel=1e-3)
 
 

@@ -153,7 +153,7 @@ def test_a_rival_is_better_above_and_as_good_a_little_below() -> None:
 def search_of_nothing() -> Fit:
     nothing = np.empty(0)
     # No noise is fitted: the search does not ask this fit for it.
-    return Fit((), nothing, np.empty((0, 0)), None, nothing, nothing, nothing, 0.0)  # type: ignore[arg-type]
+    return Fit((), nothing, np.empty((0, 0)), None, nothing, nothing, nothing, 0.0)  # type: ignore[arg-type]  # no noise
 
 
 def test_each_regressor_that_is_kept_is_needed_beside_the_others(log: np.ndarray) -> None:

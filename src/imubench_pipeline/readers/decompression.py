@@ -57,6 +57,8 @@ class _Parts:
                 if begins and not self._padded:
                     return b""
                 raise
+            except zstd.ZstdError as error:
+                raise OSError(str(error)) from None
             if block:
                 self._size += len(block)
                 return block
@@ -98,34 +100,6 @@ class _Gunzip:
         return self._inflate.decompress(self._inflate.unconsumed_tail + packed, most)
 
 
-class _Unzstd:
-    """One frame of zstd; what is wrong with it is an `OSError`, as with the others."""
-
-    def __init__(self) -> None:
-        largest: dict[int, int] = {
-            zstd.DecompressionParameter.window_log_max: LARGEST_WINDOW.bit_length() - 1
-        }
-        self._frame = zstd.ZstdDecompressor(options=largest)
-
-    @property
-    def eof(self) -> bool:
-        return self._frame.eof
-
-    @property
-    def unused_data(self) -> bytes:
-        return self._frame.unused_data
-
-    @property
-    def needs_input(self) -> bool:
-        return self._frame.needs_input
-
-    def decompress(self, packed: bytes, most: int) -> bytes:
-        try:
-            return self._frame.decompress(packed, most)
-        except zstd.ZstdError as error:
-            raise OSError(str(error)) from None
-
-
 def unpacked_zstd(data: bytes, most: int) -> bytes:
     """Return the first bytes of what is compressed in a frame of zstd.
 
@@ -137,9 +111,16 @@ def unpacked_zstd(data: bytes, most: int) -> bytes:
         If the data are corrupt.
     """
     try:
-        return _Unzstd().decompress(data, most)
-    except OSError as error:
+        return _unzstd().decompress(data, most)
+    except zstd.ZstdError as error:
         raise ValueError(str(error)) from None
+
+
+def _unzstd() -> zstd.ZstdDecompressor:
+    largest: dict[int, int] = {
+        zstd.DecompressionParameter.window_log_max: LARGEST_WINDOW.bit_length() - 1
+    }
+    return zstd.ZstdDecompressor(options=largest)
 
 
 def _unxz() -> lzma.LZMADecompressor:
@@ -149,7 +130,7 @@ def _unxz() -> lzma.LZMADecompressor:
 
 OPENED: Mapping[bytes, tuple[str, Callable[[IO[bytes]], Any]]] = {
     b"\x1f\x8b": ("gzip", lambda file: _Parts(file, _Gunzip, padded=True)),
-    b"\x28\xb5\x2f\xfd": ("zstd", lambda file: _Parts(file, _Unzstd, padded=True)),
+    b"\x28\xb5\x2f\xfd": ("zstd", lambda file: _Parts(file, _unzstd, padded=True)),
     b"\xfd7zXZ\0": ("xz", lambda file: _Parts(file, _unxz, padded=False)),
     b"BZh": ("bzip2", lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False)),
 }

@@ -48,11 +48,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the workflow on the logs that are complete; return the exit status."""
     with extra("workflow", "run the workflow"):
         import_module("snakemake")
-    try:
-        from imubench_pipeline.run.nightly.night import Night, TakenError
-    except ModuleNotFoundError as error:
-        print(f"imubench nightly needs a system such as Linux: {error}", file=sys.stderr)
-        return 2
+    from imubench_pipeline.run.nightly.night import Night, TakenError
     from imubench_pipeline.run.nightly.summary import STATUS, in_words
     from imubench_pipeline.settings.validation import ConfigError
 
