@@ -184,6 +184,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     config = folder / "config/config.yaml"
     settings = yaml.safe_load(config.read_text())
     settings["estimate"]["methods"] = ["likelihood"]
+    settings["error_budget"]["draws"] = 20
     settings["simulated"] = False
     config.write_text(yaml.safe_dump(settings))
     sensor = folder / "config/sensors/mti_7.yaml"

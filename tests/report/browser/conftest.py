@@ -13,9 +13,13 @@ from tests.report.browser.reader import Open, Reader, Scheme
 from tests.report.browser.visit import Seen, visit
 
 
+BROWSERS = ("chromium-headless-shell", "chromium")
+"""The first that is there: without windows of its own it takes a fifth less of the processor."""
+
+
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    path = os.environ.get("PLAYWRIGHT_CHROMIUM") or shutil.which("chromium")
+    path = os.environ.get("PLAYWRIGHT_CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
     if path is None:
         said = "no Chromium: not on the path, and not in PLAYWRIGHT_CHROMIUM"
         if os.environ.get("CI"):

@@ -131,10 +131,10 @@ class Reader:
 
     def show(self, one: Locator) -> Locator:
         """Bring something into view, and wait until no figure beside it changes its height."""
-        self._draw()
         one.scroll_into_view_if_needed()
-        self.page.wait_for_function(SETTLED)
-        one.scroll_into_view_if_needed()
+        if self._drawing:
+            self.page.wait_for_function(SETTLED)
+            one.scroll_into_view_if_needed()
         return one
 
     def figure(self, kind: str, **data: str) -> Locator:
@@ -142,6 +142,7 @@ class Reader:
         chosen = "".join(f"[data-{key}='{value}']" for key, value in data.items())
         wanted = self.page.locator(f"figure[data-kind={kind}]{chosen}").first
         wanted.evaluate(OPEN_TAB)
+        self._draw()
         figure = self.show(wanted)
         figure.locator("xpath=self::*[@data-drawn]").locator("svg.main-svg").first.wait_for()
         return figure

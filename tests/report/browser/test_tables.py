@@ -10,7 +10,7 @@ from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import READY, Open, Reader
 
-SENSORS, EACH, AXES = 20, 8, 3
+SENSORS, EACH, AXES = 20, 6, 3
 PAGES = (
     "index.html", "recordings.html", "datasheets.html", "sensors/sensor_00.html",
     "recordings/sensor_00/run_00.html",

@@ -11,6 +11,9 @@ KINDS = ("index", "compare", "recordings.html", "datasheets", "theory", "sensors
          "recordings/alpha/night 1")  # fmt: skip
 """One page of each kind; accessibility is looked at there, as it takes longer than to draw."""
 
+BY_NIGHT = ("index", "recordings/alpha/night 1")
+"""Of these by night, too: most colours of text stand there. Before a release, all of them."""
+
 LOOK = f"""() => ({{
   wide: ({TOO_WIDE})(),
   title: document.title,
@@ -37,7 +40,7 @@ class Seen:
 
 def visit(window: Reader, report: Report) -> Seen:
     pages, figures, hinder = {}, {}, {}
-    kinds = {report.page(kind) for kind in KINDS}
+    kinds, dark = ({report.page(kind) for kind in some} for some in (KINDS, BY_NIGHT))
     window.begin(report.folder, 1280, 900, "light")
     for path in report.pages:
         if hinder:
@@ -47,5 +50,5 @@ def visit(window: Reader, report: Report) -> Seen:
         figures[path] = window.draw_all()
         pages[path] = window.page.evaluate(LOOK)
         if path in kinds:
-            hinder[path] = hindrances(window.page)
+            hinder[path] = hindrances(window.page, by_night=path in dark)
     return Seen(pages, figures, hinder, window.end())
