@@ -1,6 +1,6 @@
 """What an installation weighs, and how long it takes to a first number.
 
-python benchmarks/installed.py [--wheel FILE]
+python benchmarks/installed.py [--wheel FILE] [--constraints FILE]
 
 Makes an environment of a wheel, one with the workflow and one with all extras, adds up their files,
 and times what a new user does first, in processes of their own: the import of the package, a
@@ -30,7 +30,14 @@ def main() -> None:
     """Print the sizes and times."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--wheel", type=Path, help="of this package; default: it is built")
-    wheel: Path | None = parser.parse_args().wheel
+    parser.add_argument(
+        "--constraints",
+        type=Path,
+        default=PROJECT / "constraints.txt",
+        help="the versions to install; default: those of %(default)s",
+    )
+    given = parser.parse_args()
+    wheel: Path | None = given.wheel
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         wheel = wheel or built(folder)
@@ -38,7 +45,7 @@ def main() -> None:
             environment = folder / f"venv{len(extras)}"
             subprocess.run([sys.executable, "-m", "venv", str(environment)], check=True)
             empty, begun = size(environment), time.monotonic()
-            install(environment, f"{wheel}{extras}")
+            install(environment, f"{wheel}{extras}", given.constraints)
             took, weight = time.monotonic() - begun, size(environment) - empty
             print(
                 f"pip install imubench_pipeline{extras}: {took:.0f} s, "
@@ -70,11 +77,11 @@ def built(folder: Path) -> Path:
     return wheel
 
 
-def install(environment: Path, what: str) -> None:
+def install(environment: Path, what: str, constraints: Path) -> None:
     """Install the package into an environment, in the versions that are tested."""
     subprocess.run(
         [str(environment / "bin/python"), "-m", "pip", "install", "--quiet", "--no-compile",
-         "-c", str(PROJECT / "constraints.txt"), what],
+         "-c", str(constraints), what],
         check=True,
     )  # fmt: skip
 

@@ -58,6 +58,18 @@ def test_all_that_is_asked_for_is_there(path: Path) -> None:
     assert names - {canonicalize_name(about["name"])} <= pins(path).keys()
 
 
+def test_the_smaller_versions_are_others_of_the_same_packages() -> None:
+    usual, small = (pins(PROJECT / f"constraints{which}.txt") for which in ("", "-small"))
+    assert small.keys() == usual.keys()
+    other = {name for name, one in small.items() if one.specifier != usual[name].specifier}
+    assert other == {"numpy", "numba", "llvmlite", "pyarrow", "matplotlib"}
+    about = project()["project"]
+    asked = [*about["dependencies"], *about["optional-dependencies"]["workflow"]]
+    for one in map(Requirement, asked):
+        (version,) = small[canonicalize_name(one.name)].specifier
+        assert one.specifier.contains(version.version), one
+
+
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_no_host_is_named(path: Path) -> None:
     assert not re.search(r"://|^--?[a-z]|index", path.read_text(), re.MULTILINE)
