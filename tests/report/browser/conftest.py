@@ -7,8 +7,9 @@ import pytest
 from playwright.sync_api import Browser, Locator, sync_playwright
 
 from imubench_pipeline.report.publish import one_file, publish
+from imubench_pipeline.report.site import Site
 from tests.report.browser import made
-from tests.report.browser.made import Report
+from tests.report.browser.made import Report, Rows
 from tests.report.browser.reader import Open, Reader, Scheme
 from tests.report.browser.visit import Seen, visit
 
@@ -72,11 +73,16 @@ def download(window: Reader) -> Callable[[Locator], bytes]:
 
 
 @pytest.fixture(scope="package")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Report:
-    results = tmp_path_factory.mktemp("bench")
-    site, rows = made.bench(results)
-    publish(site, results / "report")
-    return Report(results / "report", rows)
+def of_bench(tmp_path_factory: pytest.TempPathFactory) -> tuple[Site, Rows]:
+    return made.bench(tmp_path_factory.mktemp("bench"))
+
+
+@pytest.fixture(scope="package")
+def bench(of_bench: tuple[Site, Rows], tmp_path_factory: pytest.TempPathFactory) -> Report:
+    site, rows = of_bench
+    folder = tmp_path_factory.mktemp("published") / "report"
+    publish(site, folder)
+    return Report(folder, rows)
 
 
 @pytest.fixture(scope="package")
@@ -85,9 +91,9 @@ def seen(window: Reader, bench: Report) -> Seen:
 
 
 @pytest.fixture(scope="package")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def alone(of_bench: tuple[Site, Rows], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same report as one file, in a folder of its own."""
-    site, _ = made.bench(tmp_path_factory.mktemp("of_one_file"))
+    site, _ = of_bench
     path = tmp_path_factory.mktemp("empty") / "report.html"
     path.write_text(one_file(site), encoding="utf-8")
     return path

@@ -5,6 +5,7 @@ simulated. `beta` has no accelerometer and no datasheet, but a device that was r
 and has changed in the last. Of `gamma` there is a rejected recording alone.
 """
 
+import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -96,7 +97,7 @@ REQUIREMENTS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Log:
     """One recording: its noise is that of `TRUTH`, times its level."""
 
@@ -185,6 +186,7 @@ DATED = tuple(
     Log("beta", f"run_{month}", DEVICE, f"2026-0{month}-15T08:00:00", ("gyro_x",), 3.0 * level)
     for month, level in enumerate((1.0, 1.02, 0.99, 1.01, 3.0), start=1)
 )
+LOGS = (NIGHT, SIMULATED, *DATED)
 CHANGED = DATED[-1].recording
 REJECTED = (("alpha", "night 2"), ("gamma", "only"))
 
@@ -344,11 +346,11 @@ def fused(log: Log, channel: str) -> FusionChannel:
     return FusionChannel(*names, SAMPLES / RATE, log.recommended(channel))
 
 
+@functools.cache
 def growth_of(log: Log) -> list[Mapping[str, Any]]:
     names = {"sensor": log.sensor, "recording": log.recording}
     estimates = {channel: log.recommended(channel) for channel in log.channels}
     return [*growth_rows(names, estimates, times=[10.0, 60.0], window=60.0, **BUDGET)]
-
 
 def write_compared(log: Log, folder: Path) -> None:
     """Write what a comparison of any two logs needs of this one."""
@@ -416,10 +418,9 @@ def tables_of(rows: Rows) -> dict[str, pa.Table]:
 
 def bench(results: Path) -> tuple[Site, Rows]:
     """Return the report of all that can occur, and the rows of its tables."""
-    logs = (NIGHT, SIMULATED, *DATED)
-    for log in logs:
+    for log in LOGS:
         write_samples(log, results)
-    rows = rows_of(logs, REJECTED)
+    rows = rows_of(LOGS, REJECTED)
     return site_of(tables_of(rows), settings_of(SENSORS, REQUIREMENTS), results), rows
 
 
