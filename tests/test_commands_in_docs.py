@@ -51,6 +51,9 @@ ELSEWHERE = {
         OF_A_WHEEL
     ),
     '.venv/bin/pip install "$(echo imubench_pipeline-*.whl)[all]"': OF_A_WHEEL,
+    '.venv/bin/pip install -c constraints-small.txt "$(echo imubench_pipeline-*.whl)[all]"': (
+        OF_A_WHEEL
+    ),
     ". .venv/bin/activate": "of a shell that is typed into: what it puts on the path is tested",
     ".venv/bin/ruff check . && .venv/bin/ruff format .": "of the whole project: .ci/run",
     ".venv/bin/snakefmt Snakefile workflow": "of the whole project: .ci/run",
