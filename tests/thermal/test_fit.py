@@ -177,15 +177,18 @@ def test_temperature_that_cannot_be_told_from_time_is_said():
 
 def test_a_constant_temperature_is_refused_before_holes_are_filled_again(monkeypatch):
     rng = np.random.default_rng(13)
-    log = simulate(NOISE, RATE, SAMPLES, rng) + 3e-3
-    log[rng.random(SAMPLES) < 0.03] = np.nan
+    samples = SAMPLES // 4
+    log = simulate(NOISE, RATE, samples, rng) + 3e-3
+    log[rng.random(samples) < 0.03] = np.nan
 
     def never(*_):
         raise AssertionError("a joint fit")
 
     monkeypatch.setattr("imubench_pipeline.estimators.thermal.fit._Fit.settle", never)
-    fit = fitted(log, np.full(SAMPLES, 21.0), holes=True)
+    fit = fitted(log, np.full(samples, 21.0), holes=True)
     assert "changes" in fit.sensitivity.reason
+    # The likeliest noise is white with a ramp: so does its walk look here, which carries the mean.
+    assert fit.plain.estimates[0].parameters["R"].value is not None
     assert fit.bias.lower < 3e-3 < fit.bias.upper
 
 

@@ -263,7 +263,7 @@ def test_the_mean_of_a_log_is_known_as_its_noise_lets_it():
     for model, expected in (
         (NoiseModel(N=N), N**2 / D),
         (NoiseModel(N=N, K=K), N**2 / D + K**2 * D / 3.0),
-        (NoiseModel(N=N, R=1.0), N**2 / D),
+        (NoiseModel(N=N, R=0.2), N**2 / D + (0.2 * D / 2.0) ** 2),
         (NoiseModel(N=N, B=B, T_B=T_B), N**2 / D + process),
     ):
         assert mean_error([(model, 1.0)], spectrum) == pytest.approx(np.sqrt(expected), rel=0.02)

@@ -31,6 +31,10 @@ _JOB = re.compile(r"^( *)(?:local)?rule (\w+):\n((?:\1 .*\n)*)", re.MULTILINE)
 _WILDCARDS = re.compile(r"wildcards: sensor=(.+?)(?:, recording=(.+))?$", re.MULTILINE)
 
 
+FEW = ['error_budget={"draws": 20}', 'earth_rate={"draws": 20}', 'fusion={"draws": 100}']
+"""Few models for an interval: what is looked at here is what runs, and not how wide it is."""
+
+
 @dataclass
 class Project:
     """Logs and sensor files in a folder, and the results of their runs.
@@ -56,7 +60,7 @@ class Project:
 
     def config(self) -> list[str]:
         return [f"logs={self.folder / 'logs'}", f"sensors={self.folder / 'sensors'}",
-                f"results={self.results}", "simulated=false", *self.settings]  # fmt: skip
+                f"results={self.results}", "simulated=false", *FEW, *self.settings]  # fmt: skip
 
     def run(self, *flags: str, cores: int = 2) -> subprocess.CompletedProcess[str]:
         if flags == ("-n",) and self.environment is None:

@@ -20,11 +20,11 @@ from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.yaml_files import read_settings
 from tests.conftest import PROJECT
 from tests.workflow.dry_runs import dry_run
-from tests.workflow.project import CHANNELS, put_log, put_sensor
+from tests.workflow.project import CHANNELS, FEW, put_log, put_sensor
 
 pytestmark = pytest.mark.workflow
 
-GIVEN = ['fusion={"draws": 100}', 'error_budget={"draws": 20}']
+GIVEN = FEW
 """Settings that stand in no file: what a command passes on to Snakemake shows in the results."""
 
 BUILT_OF = ("src", "Snakefile", "workflow", "config", "profiles", "pyproject.toml", "setup.py",

@@ -42,8 +42,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
     folder = tmp_path_factory.mktemp("earth_rate")
     linked(folder)
     settings = ["logs=logs", "sensors=sensors", "results=results", "requirements=false",
-                'estimate={"methods": ["likelihood"]}', 'error_budget={"draws": 20}',
-                'earth_rate={"draws": 20}']  # fmt: skip
+                'estimate={"methods": ["likelihood"]}']  # fmt: skip
     made = Project(folder, folder / "results", folder, settings)
     sensor = {"vendor": "V", "model": "G", "log": {"rate": f"{RATE:g} Hz", "channels": {
         "gyro_x": {"column": "w", "unit": "deg/s"}}}}  # fmt: skip

@@ -55,8 +55,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
         put_log(folder / f"logs/one/{name}.csv", seed, samples=5000)
     put_log(folder / "logs/two/a.csv", 9, samples=5000)
     settings = ["logs=logs", "sensors=sensors", "results=results", "requirements=false",
-                'estimate={"methods": ["weighted"]}', 'error_budget={"draws": 20}',
-                'limits={"recording": "12 s"}']  # fmt: skip
+                'estimate={"methods": ["weighted"]}', 'limits={"recording": "12 s"}']  # fmt: skip
     return Project(folder, folder / "results", folder, settings)
 
 

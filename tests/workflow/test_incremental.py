@@ -99,7 +99,7 @@ def project_in(folder: Path) -> Project:
     """A project that runs in a folder of its own, and names everything relative to it."""
     linked(folder)
     settings = ["logs=logs", "sensors=sensors", "results=results", "requirements=requirements",
-                'estimate={"methods": ["weighted"]}', 'error_budget={"draws": 20}']  # fmt: skip
+                'estimate={"methods": ["weighted"]}']  # fmt: skip
     return Project(folder, folder / "results", folder, settings)
 
 

@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.conftest import PROJECT
-from tests.workflow.test_workflow import put_log, put_sensor
+from tests.workflow.project import FEW, put_log, put_sensor
 
 pytestmark = pytest.mark.workflow
 
@@ -28,7 +28,7 @@ from imubench_pipeline.run.cli import main
 sys.exit(main(["nightly", *sys.argv[1:]]))
 """
 SETTINGS = ["sensors=sensors", "simulated=false", "requirements=false",
-            'estimate={"methods": ["weighted"]}', 'error_budget={"draws": 20}']  # fmt: skip
+            'estimate={"methods": ["weighted"]}', *FEW]  # fmt: skip
 LAYOUT = {"rate": "100 Hz", "channels": {"gyro_x": {"column": "wx", "unit": "deg/s"}}}
 SAMPLES = 2000
 DEADLINE = 600.0

@@ -13,14 +13,14 @@ from tests.report.browser.made import Report, Rows
 from tests.report.browser.reader import Open, Reader, Scheme
 from tests.report.browser.visit import Seen, visit
 
-
 BROWSERS = ("chromium-headless-shell", "chromium")
 """The first that is there: without windows of its own it takes a fifth less of the processor."""
 
 
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    path = os.environ.get("PLAYWRIGHT_CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
+    there = [os.environ.get("PLAYWRIGHT_CHROMIUM"), *map(shutil.which, BROWSERS)]
+    path = next(filter(None, there), None)
     if path is None:
         said = "no Chromium: not on the path, and not in PLAYWRIGHT_CHROMIUM"
         if os.environ.get("CI"):

@@ -352,6 +352,7 @@ def growth_of(log: Log) -> list[Mapping[str, Any]]:
     estimates = {channel: log.recommended(channel) for channel in log.channels}
     return [*growth_rows(names, estimates, times=[10.0, 60.0], window=60.0, **BUDGET)]
 
+
 def write_compared(log: Log, folder: Path) -> None:
     """Write what a comparison of any two logs needs of this one."""
     write("error_growth", growth_of(log), folder / "error_growth.parquet")

@@ -25,9 +25,7 @@ def test_nothing_hinders_a_reader_of_a_page_alike(kind: str, read: Open, bench: 
 
 @pytest.mark.release  # long: every line of every table, and every part of a figure
 @pytest.mark.parametrize("kind", KINDS)
-def test_nothing_hinders_a_reader_of_what_is_alike(
-    kind: str, read: Open, bench: Report
-) -> None:
+def test_nothing_hinders_a_reader_of_what_is_alike(kind: str, read: Open, bench: Report) -> None:
     reader = read(bench.folder, bench.page(kind))
     reader.draw_all()
     assert hindrances(reader.page, whole=True) == []

@@ -368,16 +368,10 @@ def _described(
     added = [path.means(*place, effect) for place in fit.series.places]
     shift = float(np.concatenate(added).mean())
     candidates = settled.candidates if verdict.compensated else fit.of_the_log
-    K = without.estimates[0].parameters["K"]
-    noises = [
-        (with_likely_walk(model, K) if "K" in candidate.terms.linear else model, share)
-        for candidate, share in shares(candidates)
-        for model in [model_of(candidate.maximum)]
-    ]
     # T_0 is as uncertain as the mean of the path.
     of_reference = float(np.std(path.draws.mean(axis=1))) * (verdict.sensitivity.in_model or 0.0)
     spread = math.hypot(
-        mean_error(noises, fit.spectrum),
+        _mean_error(candidates, without, fit.spectrum),
         verdict.temperature_error,
         of_reference if verdict.compensated else 0.0,
     )
@@ -399,9 +393,20 @@ def _described(
     )
 
 
+def _mean_error(candidates: Sequence[Candidate], fitted: Likelihood, spectrum: Spectrum) -> float:
+    """Return the standard deviation of the mean of a log, whichever its noise may be."""
+    (estimate, _), K = fitted.estimates, fitted.estimates[0].parameters["K"]
+    noises = [
+        (with_likely_walk(model, K) if "K" in candidate.terms.linear else model, share)
+        for candidate, share in (shares(candidates) if candidates else [])
+        for model in [model_of(candidate.maximum)]
+    ]
+    return mean_error(noises or [(estimate.model, 1.0)], spectrum)
+
+
 def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -> ThermalFit:
     unknown = Parameter(None, "not_identified", reason)
-    mean, spread = fit.spectrum.mean, mean_error([(plain.estimates[0].model, 1.0)], fit.spectrum)
+    mean, spread = fit.spectrum.mean, _mean_error(plain.candidates, plain, fit.spectrum)
     return ThermalFit(
         path.mean,
         unknown,
