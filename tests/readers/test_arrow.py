@@ -281,7 +281,7 @@ def test_all_bytes_of_a_parquet_column_are_in_the_pages_that_are_found(
     )
     path = tmp_path / "log.parquet"
     keys = {"compression": codec, "data_page_version": version, "write_page_checksum": True}
-    saved(path, table, row_group_size=25_000, max_rows_per_page=7000, **keys)
+    saved(path, table, row_group_size=25_000, write_batch_size=7000, data_page_size=1, **keys)
     metadata = pq.read_metadata(path)
     with path.open("rb") as file:
         for group, column in product(range(3), range(3)):

@@ -16,7 +16,7 @@ from imubench_pipeline.recordings.parts import Part
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.tables import checked_parquet
+from imubench_pipeline.tables import checked_parquet, checked_row_group
 
 
 def names_of(parts: list[Part], groups: list[list[int]]) -> list[str]:
@@ -97,7 +97,7 @@ def _columns_of(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
         for group in range(files[0].num_row_groups):
             block: dict[str, NDArray[Any]] = {}
             for file in files:
-                table = file.read_row_group(group, use_threads=False)
+                table = checked_row_group(file, group)
                 block |= {name: table.column(name).to_numpy() for name in table.column_names}
             yield block
     finally:

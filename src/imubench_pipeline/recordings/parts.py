@@ -17,7 +17,7 @@ from imubench_pipeline.recordings.quality.knocks import Knock, knocks, suspects
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.sensor import UsedPart
-from imubench_pipeline.tables import checked_parquet
+from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import RecordingError
 
 _STAMP_BLOCK = 1 << 20
@@ -163,7 +163,7 @@ def _write_again(part: Part, knocks_of: dict[str, list[Knock]], scratch: Path) -
     reached = 0
     with checked_parquet(old) as file:
         for number in range(file.num_row_groups):
-            table = file.read_row_group(number, use_threads=False)
+            table = checked_row_group(file, number)
             columns = {}
             for name in part.columns:
                 values = np.array(table.column(name).to_numpy(), dtype=np.float64)
@@ -181,5 +181,5 @@ def _write_again(part: Part, knocks_of: dict[str, list[Knock]], scratch: Path) -
 def _pieces(path: Path, name: str) -> Iterator[NDArray[np.float64]]:
     with checked_parquet(path) as file:
         for number in range(file.num_row_groups):
-            table = file.read_row_group(number, columns=[name], use_threads=False)
+            table = checked_row_group(file, number, [name])
             yield np.asarray(table.column(name).to_numpy(), dtype=np.float64)

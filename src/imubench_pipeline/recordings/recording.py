@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
-from imubench_pipeline.tables import checked_parquet
+from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.typing import Array
 
@@ -148,7 +148,7 @@ class ChannelLog:
             columns = [self.channel, *(["sample"] if placed else [])]
             reached = 0
             for number in range(file.num_row_groups):
-                table = file.read_row_group(number, columns=columns, use_threads=False)
+                table = checked_row_group(file, number, columns)
                 values = _to_numpy(table.column(self.channel))
                 if not placed:
                     yield values

@@ -21,12 +21,13 @@ from imubench_pipeline.tables.files import (
     write_content,
     write_json,
 )
-from imubench_pipeline.tables.parquet import checked_parquet
+from imubench_pipeline.tables.parquet import checked_parquet, checked_row_group
 
 __all__ = [
     "TableError",
     "build",
     "checked_parquet",
+    "checked_row_group",
     "columns_of",
     "joined",
     "making",

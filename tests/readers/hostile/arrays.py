@@ -100,6 +100,10 @@ def batch(folder: Path, rows: int, said: int | None = None) -> Path:
     return path
 
 
+_PAGES_HAVE_A_LIMIT = int(pa.__version__.partition(".")[0]) >= 23
+"""And one of 20,000 rows, where nothing is said."""
+
+
 def parquet(*groups: int, rows_of_page: int = 1 << 30) -> Callable[[Path], Path]:
     """Return what writes zeros, in row groups of so many, each of one page."""
 
@@ -108,8 +112,10 @@ def parquet(*groups: int, rows_of_page: int = 1 << 30) -> Callable[[Path], Path]
         schema = pa.schema([("wx", pa.float64())])
         with pq.ParquetWriter(
             path, schema, compression="zstd", use_dictionary=False, write_statistics=False,
-            data_page_size=(1 << 31) - 1, max_rows_per_page=rows_of_page,
+            # Whether a page is full is asked after each batch.
             write_batch_size=min(rows_of_page, max(groups)),
+            data_page_size=1 if rows_of_page < max(groups) else (1 << 31) - 1,
+            **({"max_rows_per_page": rows_of_page} if _PAGES_HAVE_A_LIMIT else {}),
         ) as out:  # fmt: skip
             for rows in groups:
                 out.write_table(pa.table({"wx": np.zeros(rows)}), row_group_size=rows)

@@ -312,8 +312,8 @@ def mean_error(models: Iterable[tuple[NoiseModel, float]], spectrum: Spectrum) -
     A random walk counts from 0 at the beginning of the log: sigma^2 = N^2 / D + K^2 D / 3 and, of a
     process of variance v, 2 v T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long. The models are
     those that the log does not rule out, with their shares of 1: a walk that is too weak to be the
-    choice may still carry the mean away. A ramp does by R D / 2, and a walk of one log may look like
-    it.
+    choice may still carry the mean away. A ramp does by R D / 2, and a walk of one log may look
+    like it.
     """
     return math.sqrt(sum(share * _variance(model, spectrum) for model, share in models))
 
