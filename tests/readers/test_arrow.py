@@ -231,6 +231,18 @@ def test_a_page_with_a_wrong_checksum(tmp_path: Path, rng: np.random.Generator) 
     refused(path, log({"gyro_x": {"column": 1}}), "corrupt data.*CRC")
 
 
+def test_rows_that_are_left_out_are_no_log(tmp_path: Path, rng: np.random.Generator) -> None:
+    table = pa.table({"wx": rng.standard_normal(1000)})
+    path = saved(tmp_path / "a", table, row_group_size=1000)
+    data = path.read_bytes()
+    footer = len(data) - 8 - int.from_bytes(data[-8:-4], "little")
+    # The first integer of the footer that is 1000 is the number of all rows; twice that, in Thrift.
+    before, stated, after = data[footer:].partition(b"\x16\xd0\x0f")
+    assert stated
+    path.write_bytes(data[:footer] + before + b"\x16\xd2\x0f" + after)
+    refused(path, log({"gyro_x": {"column": "wx"}}), "1000 rows are found, expected 1001")
+
+
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("arrow")

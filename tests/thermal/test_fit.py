@@ -187,7 +187,7 @@ def test_a_constant_temperature_is_refused_before_holes_are_filled_again(monkeyp
     monkeypatch.setattr("imubench_pipeline.estimators.thermal.fit._Fit.settle", never)
     fit = fitted(log, np.full(samples, 21.0), holes=True)
     assert "changes" in fit.sensitivity.reason
-    # The likeliest noise is white with a ramp: so does its walk look here, which carries the mean.
+    # The likeliest noise has a ramp: so does its walk look here, which carries the mean.
     assert fit.plain.estimates[0].parameters["R"].value is not None
     assert fit.bias.lower < 3e-3 < fit.bias.upper
 

@@ -110,7 +110,14 @@ class _ParquetTable(_ArrowTable):
 
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
         check_pages(self._path, self._file.metadata, names)
-        yield from self._file.iter_batches(rows, columns=names, use_threads=False)
+        read = 0
+        for batch in self._file.iter_batches(rows, columns=names, use_threads=False):
+            read += len(batch)
+            yield batch
+        if read != self.rows:  # of a damaged page, rows can be left out without an error
+            raise UnusableError(
+                f"is damaged: {read} rows are found, expected {self.rows}; copy the file again"
+            )
 
 
 class _IpcTable(_ArrowTable):
