@@ -6,11 +6,13 @@ import json
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
+import pandas as pd
 import pytest
 import yaml
 
-from imubench_pipeline.run.analysis import compilation
+from imubench_pipeline.run.analysis import chain, compilation
 from imubench_pipeline.run.analysis.project import Stated, UnfilledError, lay_out
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.validation import ConfigError
@@ -143,6 +145,56 @@ def test_parameters_doubts_and_rejections_are_printed(
     assert "rejected: bad.csv, line 3, column 'ax': found 'x'" in said
     assert "Gyroscopes" in said and "°/√h" in said and " to " in said
     assert "short recording: the recording lasts 50 s" in said
+
+
+def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("whole", "unread", "unrebuilt"):
+        put_log(tmp_path / f"{name}.csv", 1, samples=2000)
+    steps = {"unread": "write_recording", "unrebuilt": "reconstruction_rows"}
+    for name, step in steps.items():
+        monkeypatch.setattr(chain, step, failing(getattr(chain, step), name))
+    printed: list[str] = []
+    monkeypatch.setattr(
+        chain.Analysis,
+        "for_pages",
+        lambda self, rest=chain.Analysis.for_pages: (
+            printed.append(capsys.readouterr().out) or rest(self)
+        ),
+    )
+    config = tmp_path / "config.yaml"
+    config.write_text(yaml.safe_dump(FEW))
+    logs = [str(tmp_path / f"{name}.csv") for name in ("whole", *steps)]
+    made = tmp_path / "made"
+    status = main(["analyse", *logs, *UNITS, "--config", str(config), "--output", str(made)])
+    assert status == 1
+    (numbers,) = printed
+    assert "whole: 20 s at 100 Hz, 2 channels\n" in numbers and "°/√h" in numbers
+    assert "unrebuilt: 20 s at 100 Hz, 2 channels\n" in numbers
+    assert "failed: the step ingest failed: RuntimeError: no such luck" in numbers
+    said = capsys.readouterr()
+    assert said.out == f"{made}/report.html: open it in a browser\n"
+    assert "unrebuilt: the step reconstruct failed: RuntimeError: no such luck" in said.err
+    written = pd.read_csv(made / "recordings.csv").set_index("recording")["status"]
+    assert dict(written) == {"whole": "ok", "unread": "failed", "unrebuilt": "failed"}
+    assert {path.name for path in (made / "figures").iterdir()} == {
+        f"{figure}_{channel}.{kind}"
+        for figure in ("allan", "forest")
+        for channel in ("gyro_x", "accel_x")
+        for kind in ("svg", "pdf")
+    }
+
+
+def failing(step: Any, name: str) -> Any:
+    """Return a step that fails for the recording of a name."""
+
+    def called(first: Any, *rest: Any) -> Any:
+        if any(name in str(given) for given in (first, *rest)):
+            raise RuntimeError("no such luck")
+        return step(first, *rest)
+
+    return called
 
 
 @pytest.mark.parametrize("expected", [False, True])

@@ -8,8 +8,8 @@ estimated and reconstructed side by side.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import fields
 from itertools import chain
 from pathlib import Path
@@ -66,12 +66,10 @@ _SLOW = 3.0
 """s; who waits for longer is told for what."""
 
 
-def analysed(
-    plan: Plan, compiling: Compilation, cores: int, say: Say, *, pages: bool
-) -> dict[str, pa.Table]:
-    """Run the steps of all recordings of a plan; return every joined table.
+class Analysis:
+    """The steps of all recordings of a plan: what the numbers need, and then what pages need.
 
-    A step that fails for a recording leaves that out, and `failures` says so.
+    A step that fails for a recording leaves that out, and the table ``failures`` says so.
 
     Parameters
     ----------
@@ -83,41 +81,33 @@ def analysed(
         Processes that compute at a time.
     say : callable
         Is told what goes on.
-    pages : bool
-        Whether what the pages show beside the estimates is computed, too; else those tables are
-        empty.
     """
-    with ThreadPoolExecutor(cores) as beside:
-        return _Chain(plan, compiling, beside, say, pages=pages).run()
 
-
-class _Chain:
-    def __init__(
-        self,
-        plan: Plan,
-        compiling: Compilation,
-        beside: ThreadPoolExecutor,
-        say: Say,
-        *,
-        pages: bool,
-    ) -> None:
-        self._plan, self._compiling, self._beside = plan, compiling, beside
-        self._say, self._pages = say, pages
+    def __init__(self, plan: Plan, compiling: Compilation, cores: int, say: Say) -> None:
+        self._plan, self._compiling, self._cores, self._say = plan, compiling, cores, say
         self._limits = limits_of_steps(plan)
         self._failed: dict[tuple[str, str], Failure] = {}
+        self._series: list[tuple[str, str, str]] = []
 
-    def run(self) -> dict[str, pa.Table]:
-        recordings = list(self._plan.recordings)
+    def estimates(self) -> dict[str, pa.Table]:
+        """Read the logs and estimate; return every joined table, of what is known by then."""
         self._compiling.expected()
-        channels = self._each("ingest", recordings, self._read)
-        self._compiling.finish()
-        series = [(*key, channel) for key in recordings for channel in channels.get(key, ())]
-        self._write_parts(_OF_ESTIMATE, self._each("estimate", series, self._estimate))
-        if self._pages:
-            parts = self._each("reconstruct", series, self._reconstruct)
-            self._write_parts(_OF_RECONSTRUCTION, parts)
-            self._each("datasheet", recordings, self._compare)
-        return self._joined()
+        with ThreadPoolExecutor(self._cores) as beside:
+            channels = _ended(self._begun(beside, "ingest", self._plan.recordings, self._read))
+            self._series = [(*key, channel) for key, own in channels.items() for channel in own]
+            self._compiling.finish()
+            parts = _ended(self._begun(beside, "estimate", self._series, self._estimate))
+        self._write_parts(_OF_ESTIMATE, parts)
+        return self._joined(_OF_ESTIMATE)
+
+    def for_pages(self) -> dict[str, pa.Table]:
+        """Compute what pages show beside the estimates, after them; return every joined table."""
+        with ThreadPoolExecutor(self._cores) as beside:
+            compared = self._begun(beside, "datasheet", self._plan.recordings, self._compare)
+            parts = _ended(self._begun(beside, "reconstruct", self._series, self._reconstruct))
+            _ended(compared)
+        self._write_parts(_OF_RECONSTRUCTION, parts)
+        return self._joined((*_OF_ESTIMATE, *_OF_COMPARISON, *_OF_RECONSTRUCTION))
 
     # ------------------------------------------------------------------ the steps of a recording
 
@@ -193,11 +183,10 @@ class _Chain:
 
     # ---------------------------------------------------------------------------- all together
 
-    def _joined(self) -> dict[str, pa.Table]:
-        """Join the tables of each sensor, and those of all; the others are empty."""
+    def _joined(self, made: Sequence[str]) -> dict[str, pa.Table]:
+        """Join the tables of each sensor that were made, and those of all; the others are empty."""
         plan = self._plan
-        steps = [*_OF_ESTIMATE, *((*_OF_COMPARISON, *_OF_RECONSTRUCTION) if self._pages else ())]
-        names = [name for name in steps if name not in OF_ONE_RECORDING]
+        names = [name for name in made if name not in OF_ONE_RECORDING]
         parts: dict[str, list[Path]] = {}
         for sensor in dict.fromkeys(sensor for sensor, _ in plan.recordings):
             folders = [self._folder(*key) for key in plan.recordings if key[0] == sensor]
@@ -220,15 +209,22 @@ class _Chain:
     def _folder(self, sensor: str, recording: str) -> Path:
         return self._plan.run.results / "recordings" / sensor / recording
 
-    def _each(self, step: str, keys: Sequence[K], function: Callable[..., T]) -> dict[K, T]:
-        """Call a step for each key, of a recording that is not left out; return what came of it."""
-        pending = {key: self._beside.submit(self._bounded, step, function, key) for key in keys}
-        return {key: value for key, done in pending.items() if (value := done.result()) is not None}
+    def _begun(
+        self,
+        beside: ThreadPoolExecutor,
+        step: str,
+        keys: Iterable[K],
+        function: Callable[..., T],
+    ) -> dict[K, Future[T | None]]:
+        """Begin a step for each key, of a recording that is not left out."""
+        return {key: beside.submit(self._bounded, step, function, key) for key in keys}
 
     def _bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:
         """Call a step in a process of its own; where it fails, its recording is left out."""
         sensor, recording, *_ = key
-        if (sensor, recording) in self._failed:
+        failure = self._failed.get((sensor, recording))
+        if failure is not None:
+            self._write_nothing(step, sensor, recording, failure)
             return None
         limit = self._limits(sensor, recording)
         begun = time.monotonic()
@@ -247,10 +243,17 @@ class _Chain:
 
     def _leave_out(self, step: str, sensor: str, recording: str, cause: Cause, reason: str) -> None:
         failure = Failure(sensor, recording, step, cause, reason)
-        self._failed[sensor, recording] = failure
-        folder = self._folder(sensor, recording)
+        self._failed.setdefault((sensor, recording), failure)
         if step == "ingest":
-            write_failed(
-                self._plan.ingest_settings(sensor, recording), failure, folder / "quality.json"
-            )
+            quality = self._folder(sensor, recording) / "quality.json"
+            write_failed(self._plan.ingest_settings(sensor, recording), failure, quality)
+        self._write_nothing(step, sensor, recording, failure)
+
+    def _write_nothing(self, step: str, sensor: str, recording: str, failure: Failure) -> None:
+        folder = self._folder(sensor, recording)
         write_empty((folder / f"{name}.parquet" for name in _OUTPUTS[step]), failure)
+
+
+def _ended(begun: Mapping[K, Future[T | None]]) -> dict[K, T]:
+    """Wait for a step; return what came of it, where something did."""
+    return {key: value for key, done in begun.items() if (value := done.result()) is not None}

@@ -8,6 +8,7 @@ import os
 import shlex
 import sys
 import tempfile
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,13 +16,16 @@ from typing import TYPE_CHECKING
 from imubench_pipeline.settings.extras import extra
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     import pyarrow as pa
 
     from imubench_pipeline.report.practical import System
     from imubench_pipeline.run.analysis.compilation import Compilation
     from imubench_pipeline.run.plan import Plan
+
+_LONGEST, _MEMORY = 600.0, 4 << 30
+"""s and bytes that a process may take for its figures."""
 
 _DESCRIPTION = (
     "Read static logs, say what is wrong with them, and estimate the noise parameters of each "
@@ -72,15 +76,16 @@ def run(arguments: argparse.Namespace) -> int:
     """Analyse logs, print the parameters and write what is asked for; return the exit status."""
     from imubench_pipeline.run.analysis.compilation import Compilation
 
-    if arguments.output is not None:
-        with extra("workflow", "write pages and figures (--output)"):
-            import_module("imubench_pipeline.report.publish")
     with Compilation(_say) as compiling:  # while this process imports all else
+        if arguments.output is not None:
+            with extra("workflow", "write pages and figures (--output)"):
+                import_module("imubench_pipeline.report.publish")
         return _run(arguments, compiling)
 
 
 def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
-    from imubench_pipeline.run.analysis.chain import analysed
+    from imubench_pipeline.report.run_summary import left_out
+    from imubench_pipeline.run.analysis.chain import Analysis
     from imubench_pipeline.run.analysis.project import Stated, lay_out
     from imubench_pipeline.run.plan import Plan
     from imubench_pipeline.settings.config import Run, read_config
@@ -96,10 +101,15 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
         except ConfigError as error:
             print(f"imubench analyse: {error}", file=sys.stderr)
             return 2
-        pages = arguments.output is not None
-        tables = analysed(plan, compiling, arguments.cores, _say, pages=pages)
+        analysis = Analysis(plan, compiling, arguments.cores, _say)
+        tables = analysis.estimates()
         _print(tables, arguments.units)
-        if pages:
+        if arguments.output is not None:
+            printed = tables["failures"].to_pylist()
+            tables = analysis.for_pages()
+            later = [row for row in tables["failures"].to_pylist() if row not in printed]
+            for line in left_out(later):
+                _say(f"left out of the page: {line}")
             _write(plan, tables, arguments)
     statuses = set(tables["recordings"]["status"].to_pylist())
     return 0 if statuses == {"ok"} else 1
@@ -139,17 +149,40 @@ def _print(tables: Mapping[str, pa.Table], system: System) -> None:
 
 
 def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Namespace) -> None:
-    """Write the page, the figures and the tables."""
+    """Write the page, and beside it the figures and the tables."""
     from imubench_pipeline.report.publish import one_file, site_of
-    from imubench_pipeline.report.static_figures.of_run import draw_comparison
+    from imubench_pipeline.report.static_figures.of_run import figures_of
     from imubench_pipeline.tables import write_arrow, write_content
 
     folder: Path = arguments.output
+    # Of one log there are no intervals to hold side by side.
+    kinds = ("comparison", "forest") if len(arguments.logs) > 1 else ("comparison",)
+    figures = figures_of(tables, arguments.units, folder / "figures", kinds=kinds)
     # The results are gone with the process: what makes them again is this command.
     told = json.loads(plan.report_settings()) | {"at_once": _called(arguments)}
-    site = site_of(tables, json.dumps(told), plan.run.results)
-    write_content(one_file(site), folder / "report.html")
-    for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
-        write_arrow(tables[name], folder / f"{name}.csv")
-    draw_comparison(tables, arguments.units, folder / "figures")
+    with _drawn_beside(figures, arguments.cores):
+        site = site_of(tables, json.dumps(told), plan.run.results)
+        write_content(one_file(site), folder / "report.html")
+        for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
+            write_arrow(tables[name], folder / f"{name}.csv")
     print(f"{folder / 'report.html'}: open it in a browser")
+
+
+@contextmanager
+def _drawn_beside(figures: Sequence[Callable[[], None]], cores: int) -> Iterator[None]:
+    """Draw figures in processes of their own meanwhile; wait for them in the end."""
+    from imubench_pipeline.readers.bounded import Bounded
+
+    shares = [figures[first::cores] for first in range(min(cores, len(figures)))]
+    with ExitStack() as beside:
+        drawing = [Bounded(_MEMORY, _draw, share) for share in shares]
+        for process in drawing:
+            beside.callback(process.end)
+        yield
+        for process in drawing:
+            process.result(_LONGEST)
+
+
+def _draw(figures: Sequence[Callable[[], None]]) -> None:
+    for draw in figures:
+        draw()
