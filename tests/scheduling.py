@@ -5,7 +5,7 @@ from __future__ import annotations
 from xdist.scheduler import LoadScopeScheduling
 
 FIRST = (
-    "tests/workflow/test_incremental.py",  # two dozen lists of jobs, of one finished project
+    "tests/verification",  # a folder: one finished project, spoilt and changed in every way
     "tests/report/browser",  # a folder: one browser, and one report that is looked at in all of it
     "tests/test_corpus.py",  # logs of every format, together and one by one
     # From here on the kernels of a run are compiled: two runs at once would both do so.
@@ -14,7 +14,6 @@ FIRST = (
     "tests/workflow/test_failures.py",  # waits for a step that takes too long
     "tests/workflow/test_deployed.py",  # three runs of one log, and a wheel
     "tests/workflow/test_earth_rate.py",  # a run, and lists of jobs
-    "tests/verification",  # a folder: one finished project, of which every file is spoilt once
     "tests/test_fuzz.py",  # waits for readers that hang
     "tests/thermal/test_fit.py",  # the longest of those that only compute, and else among the last
 )

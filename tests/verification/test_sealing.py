@@ -50,7 +50,7 @@ def test_a_run_that_is_complete_has_nothing_to_make_again(results: Path) -> None
         ("sensors/two/drift.parquet", "sensors/two/sensor_tables"),
         ("tables/allan.csv", "tables"),
         ("report/recordings/one/a.html", "report"),
-        ("exports/one/not_made.txt", "exports"),
+        ("exports/one/kalibr/imu.yaml", "exports"),
         ("simulated/two/sim_a", "recordings/two/sim_a/simulate"),
     ],
 )
@@ -61,7 +61,7 @@ def test_what_was_removed_or_edited_is_made_again(
     settings = jobs(results)
     path = results / name
     if path.is_dir():
-        path = next(iter(path.iterdir()))
+        path = next(path.glob("[!.]*"))
     data = path.read_bytes()
     path.unlink()
     if damage == "edited":

@@ -10,10 +10,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import yaml
 
 import imubench_pipeline
-from tests.workflow.project import CHANNELS, Job, Project, linked, put_log, put_sensor
+from tests.verification.finished import (
+    REQUIREMENT,
+    Finished,
+    project_in,
+    put_requirement,
+    put_two,
+)
+from tests.workflow.project import Job, Project, put_log, put_sensor
 
 pytestmark = pytest.mark.workflow
 
@@ -32,17 +38,9 @@ TOGETHER = {
         "report",
     )
 }
-ONE = ("one/a", "one/big")
-ALL = (*ONE, "two/f")
-BIG = 60_000  # samples, of a log above 1 MB
-IN_FILES = {
-    name: {**source, "file": f"{name}.csv", "column": 1} for name, source in CHANNELS.items()
-}
-REQUIREMENT = {
-    "title": "Robot",
-    "static_window": "30 s",
-    "limits": [{"error": "heading", "after": "60 s", "at_most": "1 deg"}],
-}
+ONE = ("one/a", "one/b")
+TWO = ("two/f", "two/sim_a")
+ALL = (*ONE, *TWO)
 INPUTS = ("logs", "sensors", "requirements")
 
 
@@ -61,27 +59,6 @@ def joined(*recordings: str) -> set[Job]:
     return {("sensor_tables", of.partition("/")[0]) for of in recordings} | TOGETHER
 
 
-def put_requirement(folder: Path, **changes: object) -> None:
-    path = folder / "requirements/robot.yaml"
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(yaml.safe_dump(REQUIREMENT | changes))
-
-
-def put_two(folder: Path, **changes: object) -> None:
-    layout = {"rate": "100 Hz", "channels": IN_FILES, "header": True}
-    put_sensor(folder / "sensors/two.yaml", log=layout | changes)
-
-
-def put_parts(folder: Path, seed: int) -> None:
-    """Write a recording of two files, one a channel."""
-    put_log(folder / "whole", seed)
-    lines = (folder / "whole").read_text().splitlines()
-    (folder / "whole").unlink()
-    for column, name in enumerate(CHANNELS):
-        text = "".join(line.split(",")[column] + "\n" for line in lines)
-        (folder / f"{name}.csv").write_text(text)
-
-
 def replace(path: Path, old: str, new: str, count: int = 1) -> None:
     text = path.read_text()
     assert old in text
@@ -95,14 +72,6 @@ def exchange_lines(path: Path, first: int) -> None:
     assert path.write_text("".join(lines)) == sum(map(len, lines))
 
 
-def project_in(folder: Path) -> Project:
-    """A project that runs in a folder of its own, and names everything relative to it."""
-    linked(folder)
-    settings = ["logs=logs", "sensors=sensors", "results=results", "requirements=requirements",
-                'estimate={"methods": ["weighted"]}']  # fmt: skip
-    return Project(folder, folder / "results", folder, settings)
-
-
 @contextlib.contextmanager
 def restored(path: Path) -> Iterator[None]:
     """Leave a file as it was, with its date."""
@@ -114,33 +83,18 @@ def restored(path: Path) -> Iterator[None]:
         os.utime(path, ns=(date, date))
 
 
-@pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> Project:
-    """A project whose run is complete."""
-    made = project_in(tmp_path_factory.mktemp("incremental"))
-    put_sensor(made.folder / "sensors/one.yaml")
-    put_two(made.folder)
-    put_requirement(made.folder)
-    put_log(made.folder / "logs/one/a.csv", 1)
-    put_log(made.folder / "logs/one/big.csv", 2, samples=BIG)
-    put_parts(made.folder / "logs/two/f", 3)
-    assert (made.folder / "logs/one/big.csv").stat().st_size > 1 << 20
-    ran = made.run(cores=1)  # this is the first of all runs: two steps would compile the same twice
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-    return made
-
-
 @pytest.fixture
-def project(done: Project, tmp_path: Path) -> Iterator[Project]:
+def project(done: Finished, tmp_path: Path) -> Iterator[Project]:
     """The same before every test: a dry run leaves the results as they are."""
+    made = done.project
     for name in INPUTS:
-        shutil.copytree(done.folder / name, tmp_path / name)
-    settings = list(done.settings)
-    yield done
-    done.settings, done.environment = settings, None
+        shutil.copytree(made.folder / name, tmp_path / name)
+    settings = list(made.settings)
+    yield made
+    made.settings, made.environment = settings, None
     for name in INPUTS:
-        shutil.rmtree(done.folder / name)
-        shutil.copytree(tmp_path / name, done.folder / name)
+        shutil.rmtree(made.folder / name)
+        shutil.copytree(tmp_path / name, made.folder / name)
 
 
 @pytest.fixture
@@ -156,7 +110,7 @@ def code(project: Project, tmp_path: Path) -> Path:
 def test_nothing_runs_again_when_dates_and_comments_alone_change(project: Project) -> None:
     logs = project.folder / "logs"
     now = time.time()
-    dates = {"a.csv": now, "big.csv": 2e9, "../two/f/gyro_x.csv": now, "../two/f/accel_x.csv": 1e9}
+    dates = {"a.csv": now, "b.csv": 2e9, "../two/f/gyro_x.csv": now, "../two/f/accel_x.csv": 1e9}
     for name, date in dates.items():
         os.utime(logs / "one" / name, (date, date))
     (logs / "one/a.yaml").write_text("# a log of nothing in particular\n")
@@ -177,11 +131,11 @@ def test_a_replaced_log_runs_its_own_steps(project: Project) -> None:
 
 def test_logs_replaced_by_older_ones_of_their_size_run_their_own_steps(project: Project) -> None:
     logs = project.folder / "logs"
-    exchange_lines(logs / "one/big.csv", 1)
-    exchange_lines(logs / "two/f/accel_x.csv", 10_000)
-    for path in (logs / "one/big.csv", logs / "two/f/accel_x.csv"):
+    exchange_lines(logs / "one/b.csv", 1)
+    exchange_lines(logs / "two/f/accel_x.csv", 1000)
+    for path in (logs / "one/b.csv", logs / "two/f/accel_x.csv"):
         os.utime(path, (1e9, 1e9))
-    assert project.job_list() == steps_of("one/big", "two/f")
+    assert project.job_list() == steps_of("one/b", "two/f")
 
 
 def test_a_removed_log_runs_what_joins_the_others(project: Project) -> None:
@@ -207,7 +161,7 @@ def test_an_edit_of_a_layout_runs_the_logs_of_its_sensor(project: Project) -> No
 
 def test_an_edit_of_a_bandwidth_runs_the_estimates_of_its_sensor(project: Project) -> None:
     put_two(project.folder, bandwidth="40 Hz")
-    assert project.job_list() == steps_of("two/f", since="estimate")
+    assert project.job_list() == steps_of(*TWO, since="estimate")
 
 
 def test_an_edit_of_a_datasheet_runs_its_comparison(project: Project) -> None:
@@ -276,67 +230,74 @@ def test_samples_that_are_not_as_they_were_left_are_read_again(
 
 
 @pytest.mark.release
-def test_what_is_lost_or_damaged_is_made_again_or_named(done: Project) -> None:
-    kept = done.results / "recordings/one/a"
-    right = {path: path.read_bytes() for path in done.results.glob("tables/*")}
+def test_what_is_lost_or_damaged_is_made_again_or_named(done: Finished) -> None:
+    made = done.project
+    kept = made.results / "recordings/one/a"
+    right = {path: path.read_bytes() for path in made.results.glob("tables/*")}
     every = {path.name for path in kept.iterdir() if path.is_file()}
     for names in ({"log.parquet"}, {"quality.json"}, every - {"log.parquet", "quality.json"}):
         for name in names:
             (kept / name).unlink()
-        ran = done.run()
+        ran = made.run()
         assert ran.returncode == 0, ran.stdout + ran.stderr
-        assert done.job_list() == set(), names
+        assert made.job_list() == set(), names
         assert right == {path: path.read_bytes() for path in right}, names
     # bits that a step meets: it fails for its recording alone, and the next run is right again
+    kept = made.results / "recordings/one/b"  # a large one: small ones are looked at whole, before
     log, curve = kept / "log.parquet", kept / "curve.parquet"
     data = bytearray(log.read_bytes())
     data[5000:5008] = bytes(8)
     log.write_bytes(data)
     curve.unlink()
     (kept / "allan.parquet").unlink()
-    ran = done.run()
-    assert ran.returncode == 1 and f"{log.relative_to(done.folder)}: is damaged" in ran.stderr
-    assert {row["recording"]: row["status"] for row in done.table("recordings")} == {
-        "a": "failed", "big": "ok", "f": "ok",
+    ran = made.run()
+    assert ran.returncode == 1 and f"{log.relative_to(made.folder)}: is damaged" in ran.stderr
+    assert {row["recording"]: row["status"] for row in made.table("recordings")} == {
+        "a": "ok", "b": "failed", "f": "ok", "sim_a": "ok",
     }  # fmt: skip
-    ran = done.run()
+    ran = made.run()
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert right == {path: path.read_bytes() for path in right}
-    # a table of which a bit changed: it is named by the step that needs it
+    # a table that was cut is made again
     curve.write_bytes(curve.read_bytes()[:-20])
     (kept / "allan.parquet").unlink()
-    ran = done.run()
-    assert ran.returncode == 1 and f"{curve.relative_to(done.folder)}: is damaged" in ran.stderr
-    curve.unlink()
-    ran = done.run()
+    ran = made.run()
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert right == {path: path.read_bytes() for path in right}
 
 
 @pytest.mark.release
-def test_an_interrupted_run_ends_as_a_fresh_one(done: Project, tmp_path: Path) -> None:
+def test_an_interrupted_run_ends_as_a_fresh_one(done: Finished, tmp_path: Path) -> None:
+    made = done.project
     # The last of this file: it runs, and leaves another project.
-    logs = done.folder / "logs"
+    logs = made.folder / "logs"
     quality = "results/recordings/one/a/quality.json"
     exchange_lines(logs / "one/a.csv", 2)
     os.utime(logs / "one/a.csv", (1e9, 1e9))
-    (logs / "one/big.csv").unlink()
+    (logs / "one/b.csv").unlink()
     (logs / "two/f").rename(logs / "two/g")
-    put_two(done.folder, bandwidth="40 Hz")
+    put_two(made.folder, bandwidth="40 Hz")
 
-    assert done.run(quality).returncode == 0
-    assert done.job_list() == (steps_of("one/a", since="allan") | steps_of("two/g"))
+    assert made.run(quality).returncode == 0
+    assert made.job_list() == (
+        steps_of("one/a", since="allan")
+        | steps_of("two/g")
+        | steps_of("two/sim_a", since="estimate")
+    )
 
-    ran = done.run()
+    ran = made.run()
     assert ran.returncode == 0, ran.stdout + ran.stderr
-    assert done.job_list() == set()
+    assert made.job_list() == set()
     fresh = project_in(tmp_path)
     for name in INPUTS:
-        shutil.copytree(done.folder / name, fresh.folder / name)
+        shutil.copytree(made.folder / name, fresh.folder / name)
+    shutil.copy(made.folder / "simulated.yaml", fresh.folder)
     ran = fresh.run("results/tables/ranking.parquet")
     assert ran.returncode == 0, ran.stdout + ran.stderr
     tables = sorted(fresh.results.glob("tables/*"))
     assert len(tables) > 30
     for path in (*tables, *fresh.results.glob("recordings/*/*/*")):
-        same = done.results / path.relative_to(fresh.results)
+        if path.name == "log.json":  # has the dates of the log's file
+            continue
+        same = made.results / path.relative_to(fresh.results)
         assert same.read_bytes() == path.read_bytes(), same
