@@ -33,8 +33,24 @@ PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Have each worker begin to collect elsewhere, where all tests are run.
+
+    On a fresh checkout the first who imports a module of tests rewrites it and keeps that, for a
+    minute in all: so they share it.
+    """
+    own = getattr(config, "workerinput", None)
+    if own is None or [Path(argument).name for argument in config.args] != ["tests"]:
+        return
+    parts = [str(path) for path in sorted((PROJECT / "tests").iterdir())
+             if (path / "__init__.py").is_file() or path.match("test_*.py")]  # fmt: skip
+    first = int(own["workerid"].removeprefix("gw")) * len(parts) // own["workercount"]
+    config.args = parts[first:] + parts[:first]
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: place(item.nodeid))
+    # In one order, wherever a worker began; those of a file stay as they are.
+    items.sort(key=lambda item: (place(item.nodeid), item.nodeid.partition("::")[0]))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -76,9 +92,6 @@ def pytest_xdist_setupnodes(config: pytest.Config) -> None:
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": PROJECT}
     if not any(PROJECT.glob("src/**/*.nbi")):
         config.stash[_COMPILING] = subprocess.Popen([sys.executable, "-c", _KERNELS], **quiet)
-    if not any(PROJECT.glob("tests/workflow/__pycache__/test_*")):
-        collect = ["-m", "pytest", "--collect-only", "-qq", "-n0"]
-        subprocess.run([sys.executable, *collect], check=False, **quiet)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
