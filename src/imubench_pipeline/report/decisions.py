@@ -12,7 +12,7 @@ from typing import Any
 
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED
 from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.report.practical import duration_text, number_text
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.told import Told, margin, margin_limits, of_ranking
 from imubench_pipeline.report.view import RecordingView
@@ -272,12 +272,12 @@ def strip(site: Site) -> list[dict[str, Any]]:
     views = site.views
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected
-    days = sum(view.row["duration"] or 0.0 for view in views) / 86400.0
+    seconds = sum(view.row["duration"] or 0.0 for view in views)
     doubted = sum(bool(view.warnings) for view in views)
     parts = [
         (len(site.sensors), counted(len(site.sensors), "sensor"), "#sensors"),
         (len(views), counted(len(views), "recording"), "recordings.html"),
-        (days, f"{number_text(days, 3)} days of data", "recordings.html"),
+        (seconds, f"{duration_text(seconds)} of data", "recordings.html"),
         (rejected, f"{rejected} rejected", "#rejected" if rejected else "recordings.html"),
         (doubted, f"{doubted} in doubt", "#warnings" if doubted else "recordings.html"),
     ]
