@@ -109,6 +109,7 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
         tables = analysis.estimates()
         _print(tables, arguments.units)
         if arguments.output is not None:
+            _say("making the page and the figures: some seconds")
             printed = tables["failures"].to_pylist()
             tables = analysis.for_pages()
             later = [row for row in tables["failures"].to_pylist() if row not in printed]
