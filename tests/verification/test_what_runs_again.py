@@ -19,25 +19,10 @@ from tests.verification.finished import (
     put_requirement,
     put_two,
 )
-from tests.workflow.project import Job, Project, put_log, put_sensor
+from tests.workflow.project import STEPS, TOGETHER, Job, Project, put_log, put_sensor
 
 pytestmark = pytest.mark.workflow
 
-STEPS = ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget")
-TOGETHER = {
-    (rule, "")
-    for rule in (
-        "tables",
-        "ranking",
-        "shortlist",
-        "repeatability",
-        "fusion",
-        "papers",
-        "exports",
-        "figures",
-        "report",
-    )
-}
 ONE = ("one/a", "one/b")
 TWO = ("two/f", "two/sim_a")
 ALL = (*ONE, *TWO)
@@ -56,7 +41,8 @@ def outlooks(*recordings: str) -> set[Job]:
 
 
 def joined(*recordings: str) -> set[Job]:
-    return {("sensor_tables", of.partition("/")[0]) for of in recordings} | TOGETHER
+    sensors = {("sensor_tables", of.partition("/")[0]) for of in recordings}
+    return sensors | {(rule, "") for rule in TOGETHER}
 
 
 def replace(path: Path, old: str, new: str, count: int = 1) -> None:

@@ -24,6 +24,22 @@ CHANNELS = {
 }
 DATASHEET = {"gyro": {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}}}
 
+STEPS = ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget")
+"""Rules for one recording, in their order."""
+
+TOGETHER = (
+    "tables",
+    "ranking",
+    "shortlist",
+    "repeatability",
+    "fusion",
+    "papers",
+    "exports",
+    "figures",
+    "report",
+)
+"""Rules for all recordings of all sensors, once those of each sensor are joined."""
+
 Job = tuple[str, str]
 """A rule, and what a job of it is for: a recording (sensor and name), a sensor, or all."""
 

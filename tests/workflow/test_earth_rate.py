@@ -13,9 +13,11 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.calibration.recordings import BIAS, SCALE, STEPS, UP, on_table
 from tests.earth_rate.runs import turned
-from tests.workflow.project import Job, Project, linked
+from tests.workflow.project import TOGETHER, Job, Project, linked
 
 pytestmark = pytest.mark.workflow
+
+JOINED: set[Job] = {(rule, "") for rule in TOGETHER}
 
 RATE = 32.0
 NOISE = NoiseModel(N=2e-4)
@@ -154,7 +156,7 @@ def test_a_second_run_has_nothing_to_do_and_notes_run_their_own(project: Project
                                     "two_position": NOTES | {"latitude": "41 deg"}}))  # fmt: skip
     changed = project.job_list()
     path.write_text(before)
-    assert changed == {("earth_rotation", "gyro/run"), ("tables", ""), *_joined()}
+    assert changed == {("earth_rotation", "gyro/run"), *JOINED}
 
 
 def test_steps_and_directions_run_their_own_again(project: Project) -> None:
@@ -167,23 +169,7 @@ def test_steps_and_directions_run_their_own_again(project: Project) -> None:
         path.write_text(yaml.safe_dump({"device": "serial 7", key: change}))
         changed = project.job_list()
         path.write_text(before)
-        assert changed == {("calibration", f"gyro/{name}"), ("tables", ""), *_joined()}
-
-
-def _joined() -> set[Job]:
-    return {
-        (rule, "")
-        for rule in (
-            "ranking",
-            "shortlist",
-            "repeatability",
-            "fusion",
-            "papers",
-            "exports",
-            "figures",
-            "report",
-        )
-    }
+        assert changed == {("calibration", f"gyro/{name}"), *JOINED}
 
 
 @pytest.mark.release

@@ -13,29 +13,21 @@ import pytest
 import yaml
 
 from imubench_pipeline.run.cli import main
-from tests.workflow.project import CHANNELS, FEW, Project, linked, put_log, put_sensor
+from tests.workflow.project import (
+    CHANNELS,
+    FEW,
+    STEPS,
+    TOGETHER,
+    Project,
+    linked,
+    put_log,
+    put_sensor,
+)
 
 pytestmark = pytest.mark.workflow
 
-STEPS_OF_A_RECORDING = dict.fromkeys(
-    ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget"), 1
-)
-GLOBAL_STEPS = dict.fromkeys(
-    (
-        "sensor_tables",
-        "tables",
-        "ranking",
-        "shortlist",
-        "repeatability",
-        "fusion",
-        "papers",
-        "exports",
-        "figures",
-        "report",
-    ),
-    1,
-)
-
+STEPS_OF_A_RECORDING = dict.fromkeys(STEPS, 1)
+GLOBAL_STEPS = dict.fromkeys(("sensor_tables", *TOGETHER), 1)
 
 METHODS = ['estimate={"methods": ["likelihood", "weighted"]}']
 
@@ -232,10 +224,7 @@ def test_to_include_it_makes_the_tables_and_the_report_anew(project: Project) ->
     project.settings = [*METHODS, "decide={include: [one/c]}"]
     jobs = project.jobs()
     project.settings = METHODS
-    assert set(jobs) == {
-        "sensor_tables", "tables", "ranking", "shortlist", "repeatability", "fusion", "papers",
-        "exports", "figures", "report",
-    }  # fmt: skip
+    assert set(jobs) == {"sensor_tables", *TOGETHER}
 
 
 def test_what_the_samples_look_like_is_kept_with_each_recording(project: Project) -> None:
