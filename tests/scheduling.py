@@ -16,6 +16,7 @@ FIRST = (
     "tests/workflow/test_earth_rate.py",  # a run, and lists of jobs
     "tests/test_fuzz.py",  # waits for readers that hang
     "tests/thermal/test_fit.py",  # the longest of those that only compute, and else among the last
+    "tests/aided",  # a folder: its kernels take long to compile, each worker would do so
 )
 """What takes longest begins first, and what is short fills the rest. A file is run by one worker,
 so that what its tests share is made once; so is a folder that stands here."""

@@ -207,55 +207,62 @@ def _smoothed(
     A path is simulated; the smoothed difference between the measurements and those of the
     simulated path is added to it. It goes through the log in windows, each with a look ahead.
     """
+    # Plain loops: expressions of arrays take four times as long to compile.
     n, s = len(mean), len(decay)
-    simulated = np.empty(n)
-    difference = np.zeros(n)
+    simulated, difference, path = np.empty(n), np.zeros(n), np.empty(n)
     for k in range(n):
-        simulated[k] = state.sum()
-        if present[k]:
-            difference[k] = mean[k] - simulated[k] - np.sqrt(error[k]) * normals[k, s]
+        simulated[k] = 0.0
         for a in range(s):
-            state[a] = decay[a] * state[a] + np.sqrt(drive[a]) * normals[k, a]
-    path = np.empty(n)
-    ahead = np.zeros(s)
-    spread = np.diag(begin)
+            simulated[k] += state[a]
+        if present[k]:
+            difference[k] = mean[k] - simulated[k] - math.sqrt(error[k]) * normals[k, s]
+        for a in range(s):
+            state[a] = decay[a] * state[a] + math.sqrt(drive[a]) * normals[k, a]
     size = min(n, _WINDOW + _AHEAD)
-    means = np.empty((size, s))
-    gains = np.empty((size, s))
-    spreads = np.empty((size, s, s))
-    innovations = np.empty((size, 2))
+    means, gains = np.zeros((size + 1, s)), np.zeros((size, s))
+    spreads = np.zeros((size + 1, s, s))
+    innovations = np.empty(size)
+    total, back = np.empty(s), np.empty(s)
+    for a in range(s):
+        spreads[0, a, a] = begin[a]
     for first in range(0, n, _WINDOW):
         last = min(n, first + _WINDOW + _AHEAD)
-        state_mean, covariance = ahead, spread
         for k in range(first, last):
             i = k - first
-            if k == first + _WINDOW:
-                ahead, spread = state_mean.copy(), covariance.copy()
-            means[i] = state_mean
-            spreads[i] = covariance
-            total = covariance.sum(axis=1)
-            if present[k]:
-                variance = total.sum() + error[k]
-                gain = total / variance
-                wrong = difference[k] - state_mean.sum()
-                innovations[i, 0], innovations[i, 1] = wrong, variance
-                state_mean = state_mean + gain * wrong
-                covariance = covariance - np.outer(gain, total)
-                gains[i] = gain
-            state_mean = state_mean * decay
-            covariance = covariance * np.outer(decay, decay)
+            wrong, variance = difference[k], error[k]
             for a in range(s):
-                covariance[a, a] += drive[a]
-        back = np.zeros(s)
+                wrong -= means[i, a]
+                total[a] = 0.0
+                for b in range(s):
+                    total[a] += spreads[i, a, b]
+                variance += total[a]
+            innovations[i] = wrong / variance
+            for a in range(s):
+                gains[i, a] = total[a] / variance if present[k] else 0.0
+            for a in range(s):
+                means[i + 1, a] = decay[a] * (means[i, a] + gains[i, a] * wrong)
+                for b in range(s):
+                    spread = spreads[i, a, b] - gains[i, a] * total[b]
+                    spreads[i + 1, a, b] = decay[a] * decay[b] * spread
+                spreads[i + 1, a, a] += drive[a]
+        back[:] = 0.0
         for k in range(last - 1, first - 1, -1):
             i = k - first
-            back = back * decay
+            along = 0.0
+            for a in range(s):
+                back[a] *= decay[a]
+                along += gains[i, a] * back[a]
             if present[k]:
                 # L = Phi (I - gain H): its transpose, and H / F times the innovation.
-                along = 0.0
                 for a in range(s):
-                    along += gains[i, a] * back[a]
-                back = back - along + innovations[i, 0] / innovations[i, 1]
+                    back[a] += innovations[i] - along
             if k < first + _WINDOW:
-                path[k] = simulated[k] + (means[i] + spreads[i] @ back).sum()
+                path[k] = simulated[k]
+                for a in range(s):
+                    path[k] += means[i, a]
+                    for b in range(s):
+                        path[k] += spreads[i, a, b] * back[b]
+        # The next window begins with what was known where this one ends.
+        if first + _WINDOW < last:
+            means[0], spreads[0] = means[_WINDOW], spreads[_WINDOW]
     return path

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.experiments.aided.strapdown import (
     GRADIENT,
+    copy,
     multiply,
     rotation,
     step,
@@ -39,15 +40,14 @@ ERRORS = 9
 
 
 @njit(cache=True, nogil=True)
-def _normalised(P: Array, e: Array) -> float:
-    """Return e^T P^-1 e by Cholesky; NaN where P is not positive."""
-    n = len(e)
+def _normalised(P: Array, e: Array, first: int, n: int) -> float:
+    """Return e^T P^-1 e of n states from a first on, by Cholesky; NaN where P is not positive."""
     L = np.zeros((n, n))
     y = np.empty(n)
     total = 0.0
     for i in range(n):
         for j in range(i + 1):
-            s = P[i, j]
+            s = P[first + i, first + j]
             for k in range(j):
                 s -= L[i, k] * L[j, k]
             if i == j:
@@ -56,7 +56,7 @@ def _normalised(P: Array, e: Array) -> float:
                 L[i, i] = math.sqrt(s)
             else:
                 L[i, j] = s / L[j, j]
-        s = e[i]
+        s = e[first + i]
         for k in range(i):
             s -= L[i, k] * y[k]
         y[i] = s / L[i, i]
@@ -142,13 +142,16 @@ def run(
             total += 1
     n_states = total - NAV
     P = np.zeros((total, total))
-    P[:NAV, :NAV] = start
-    P[NAV : NAV + m, NAV : NAV + m] = start_of_states
+    copy(start, P)
+    for i in range(m):
+        for j in range(m):
+            P[NAV + i, NAV + j] = start_of_states[i, j]
     for a in range(6):
         if of_scale[a] >= 0:
             P[of_scale[a], of_scale[a]] = scale[a] ** 2
     x = np.zeros(n_states)
-    x[:m] = mean
+    for j in range(m):
+        x[j] = mean[j]
     axis_of = np.empty(m, np.int64)
     for a in range(6):
         axis_of[first[a] : first[a + 1]] = a
@@ -199,7 +202,7 @@ def run(
                         rotation(0.5 * T * w[0], 0.5 * T * w[1], 0.5 * T * w[2], turn)
                         multiply(C, turn, C_mid)
                     else:
-                        C_mid[:] = C
+                        copy(C, C_mid)
                 step(p, v, C, w, f, T, earth, room)
                 for i in range(3):
                     mean_force[i] += room[3, 0, i] / width
@@ -283,7 +286,7 @@ def run(
                 for a in range(6):
                     if of_scale[a] >= 0:
                         B_new[i, of_scale[a] - NAV] += M[i, a] * moved[a]
-            B[:] = B_new
+            copy(B_new, B)
             for i in range(NAV):
                 for a in range(6):
                     for j in range(first[a], first[a + 1]):
@@ -298,7 +301,7 @@ def run(
                         if A_step[i, r] != 0.0:
                             s += A_step[i, r] * A[r, j]
                     A_new[i, j] = s
-            A[:] = A_new
+            copy(A_new, A)
         _predict(P, A, B, Qnn, Qnx, D_epoch, noise, first)
         if available[epoch]:
             x_error = _update(P, fixes[epoch], p, v, C, spread)
@@ -307,7 +310,7 @@ def run(
                 v[i] += x_error[3 + i]
             rotation(x_error[6], x_error[7], x_error[8], turn)
             multiply(turn, C, turned)
-            C[:] = turned
+            copy(turned, C)
             for j in range(n_states):
                 x[j] += x_error[NAV + j]
         _orthonormal(C)
@@ -315,22 +318,21 @@ def run(
         for i in range(3):
             whole[i] = position[epoch, i] - p[i]
             whole[3 + i] = velocity[epoch, i] - v[i]
-        turn_between(C.T.copy(), attitude[epoch].T.copy(), error)
+        for i in range(3):
+            for j in range(3):
+                turn[i, j], turned[i, j] = C[j, i], attitude[epoch, j, i]
+        turn_between(turn, turned, error)
         for i in range(3):
             whole[6 + i] = -error[i]
         for i in range(NAV):
             errors[epoch, i] = whole[i]
             variances[epoch, i] = P[i, i]
         for g in range(3):
-            normalised[epoch, g] = _normalised(
-                P[3 * g : 3 * g + 3, 3 * g : 3 * g + 3], whole[3 * g : 3 * g + 3]
-            )
-        normalised[epoch, 5] = _normalised(P[:NAV, :NAV], whole)
+            normalised[epoch, g] = _normalised(P, whole, 3 * g, 3)
+        normalised[epoch, 5] = _normalised(P, whole, 0, NAV)
         for g in range(2):
             if not math.isnan(bias[epoch, 3 * g]):
-                normalised[epoch, 3 + g] = _of_biases(
-                    P, x, output, first, bias[epoch, 3 * g : 3 * g + 3], 3 * g
-                )
+                normalised[epoch, 3 + g] = _of_biases(P, x, output, first, bias[epoch], 3 * g)
     return errors, variances, normalised, P
 
 
@@ -473,22 +475,27 @@ def _update(P: Array, fix: Array, p: Array, v: Array, C: Array, spread: Array) -
 @njit(cache=True, nogil=True)
 def _orthonormal(C: Array) -> None:
     """Take rounding out of an attitude, in place: one step towards the nearest rotation."""
-    square = C.T.copy() @ C
-    fresh = 1.5 * C - 0.5 * (C @ square)
-    C[:] = fresh
+    square, cube = np.empty((3, 3)), np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            square[i, j] = C[0, i] * C[0, j] + C[1, i] * C[1, j] + C[2, i] * C[2, j]
+    multiply(C, square, cube)
+    for i in range(3):
+        for j in range(3):
+            C[i, j] = 1.5 * C[i, j] - 0.5 * cube[i, j]
 
 
 @njit(cache=True, nogil=True)
 def _of_biases(P: Array, x: Array, output: Array, first: Array, true: Array, offset: int) -> float:
-    """Return the normalised error squared of the slow errors of three axes."""
+    """Return the normalised error squared of the slow errors of three axes, from ``offset`` on."""
     covariance, error = np.zeros((3, 3)), np.empty(3)
     for a in range(3):
         own = range(first[offset + a], first[offset + a + 1])
-        error[a] = true[a]
+        error[a] = true[offset + a]
         for i in own:
             error[a] -= output[i] * x[i]
         for b in range(3):
             for i in own:
                 for j in range(first[offset + b], first[offset + b + 1]):
                     covariance[a, b] += output[i] * output[j] * P[NAV + i, NAV + j]
-    return _normalised(covariance, error)
+    return _normalised(covariance, error, 0, 3)

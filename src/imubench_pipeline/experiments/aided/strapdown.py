@@ -12,6 +12,9 @@ that there is Schuler feedback; a drive of some 10 km is well within that.
 A sample is the mean of w and f over the interval that it ends, as of an integrating sensor. In an
 interval the mechanisation is of second order, and `inverse` is exactly its inverse: what it gives,
 `mechanise` takes back to rounding. So an error of navigation is one of sensors, GNSS or the start.
+
+Kernels loop over scalars: what numba compiles of an assignment to a slice, or of a sum of arrays,
+takes longer than the kernel itself.
 """
 
 from __future__ import annotations
@@ -64,6 +67,14 @@ def multiply(a: Array, b: Array, into: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
+def copy(a: Array, into: Array) -> None:
+    """Write a matrix into another one of its shape."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            into[i, j] = a[i, j]
+
+
+@njit(cache=True, nogil=True)
 def step(
     p: Array, v: Array, C: Array, w: Array, f: Array, T: float, earth: Array, room: Array
 ) -> None:
@@ -88,7 +99,7 @@ def step(
     rotation(back * earth[0], back * earth[1], back * earth[2], C)
     multiply(C, other, middle)
     multiply(middle, half, other)
-    half[:] = C
+    copy(C, half)
     multiply(half, other, C)
     for i in range(3):
         force[i] = middle[i, 0] * f[0] + middle[i, 1] * f[1] + middle[i, 2] * f[2]
@@ -127,12 +138,16 @@ def mechanise(
     """
     L = len(rate)
     ps, vs, Cs = np.empty((L + 1, 3)), np.empty((L + 1, 3)), np.empty((L + 1, 3, 3))
-    ps[0], vs[0], Cs[0] = p, v, C
+    for i in range(3):
+        ps[0, i], vs[0, i] = p[i], v[i]
+    copy(C, Cs[0])
     here, speed, attitude = p.copy(), v.copy(), C.copy()
     room = np.empty((4, 3, 3))
     for k in range(L):
         step(here, speed, attitude, rate[k], force[k], T, earth, room)
-        ps[k + 1], vs[k + 1], Cs[k + 1] = here, speed, attitude
+        for i in range(3):
+            ps[k + 1, i], vs[k + 1, i] = here[i], speed[i]
+        copy(attitude, Cs[k + 1])
     return ps, vs, Cs
 
 
@@ -173,25 +188,27 @@ def inverse(
     """
     L = len(velocity) - 1
     position, rate, force = np.empty((L + 1, 3)), np.empty((L, 3)), np.empty((L, 3))
-    position[0] = start
+    for i in range(3):
+        position[0, i] = start[i]
+    a = np.empty(3)
     back, on, half, middle, lifted = np.empty((5, 3, 3))
     rotation(T * earth[0], T * earth[1], T * earth[2], back)
     rotation(-0.5 * T * earth[0], -0.5 * T * earth[1], -0.5 * T * earth[2], on)
     for k in range(L):
         multiply(back, attitude[k + 1], lifted)  # without the turn of the Earth
         turn_between(attitude[k], lifted, rate[k])
-        x, y, z = rate[k] * 0.5
-        rotation(x, y, z, half)
+        rotation(0.5 * rate[k, 0], 0.5 * rate[k, 1], 0.5 * rate[k, 2], half)
         multiply(attitude[k], half, lifted)
         multiply(on, lifted, middle)
         v, p = velocity[k], position[k]
-        a = (velocity[k + 1] - v) / T
+        for i in range(3):
+            a[i] = (velocity[k + 1, i] - v[i]) / T
         a[0] += GRADIENT * p[0] + 2.0 * (earth[1] * v[2] - earth[2] * v[1])
         a[1] += GRADIENT * p[1] + 2.0 * (earth[2] * v[0] - earth[0] * v[2])
         a[2] += 2.0 * (earth[0] * v[1] - earth[1] * v[0])
         a[2] -= STANDARD_GRAVITY + 2.0 * GRADIENT * p[2]
         for i in range(3):
             force[k, i] = middle[0, i] * a[0] + middle[1, i] * a[1] + middle[2, i] * a[2]
-        position[k + 1] = p + 0.5 * T * (v + velocity[k + 1])
-        rate[k] /= T
+            position[k + 1, i] = p[i] + 0.5 * T * (v[i] + velocity[k + 1, i])
+            rate[k, i] /= T
     return position, rate, force

@@ -75,22 +75,40 @@ def _innovations(
     columns: Array,
 ) -> Array:
     """Return innovations over their deviations; the last row of a transition gives the mean."""
-    m = covariance.shape[0]
-    filtered = np.zeros((m, columns.shape[1]))
-    innovations = np.zeros_like(columns)
+    # Plain loops: products of arrays take eight times as long to compile.
+    m, width = covariance.shape[0], columns.shape[1]
+    covariance = covariance.copy()
+    filtered = np.zeros((m, width))
+    through, predicted = np.zeros((m + 1, m)), np.zeros((m + 1, m + 1))
+    states = np.zeros((m + 1, width))
+    innovations = np.zeros(columns.shape)
     for k in range(len(which)):
-        transition = transitions[which[k]]
-        predicted = transition @ covariance @ transition.T + noises[which[k]]
-        states = transition @ filtered
+        transition, noise = transitions[which[k]], noises[which[k]]
+        for i in range(m + 1):
+            for j in range(m):
+                through[i, j] = 0.0
+                for r in range(m):
+                    through[i, j] += transition[i, r] * covariance[r, j]
+            for j in range(m + 1):
+                predicted[i, j] = noise[i, j]
+                for r in range(m):
+                    predicted[i, j] += through[i, r] * transition[j, r]
+            for j in range(width):
+                states[i, j] = 0.0
+                for r in range(m):
+                    states[i, j] += transition[i, r] * filtered[r, j]
         variance = predicted[m, m] + white[k]
-        missed = columns[k] - states[m]
         if not variance > 0.0:
-            innovations[k] = np.nan
+            innovations[k, 0] = np.nan
             return innovations
-        innovations[k] = missed / np.sqrt(variance)
-        gain = predicted[:m, m] / variance
-        covariance = predicted[:m, :m] - np.outer(gain, gain) * variance
-        filtered = states[:m] + np.outer(gain, missed)
+        for j in range(width):
+            missed = columns[k, j] - states[m, j]
+            innovations[k, j] = missed / math.sqrt(variance)
+            for i in range(m):
+                filtered[i, j] = states[i, j] + predicted[i, m] / variance * missed
+        for i in range(m):
+            for j in range(m):
+                covariance[i, j] = predicted[i, j] - predicted[i, m] * predicted[j, m] / variance
     return innovations
 
 
