@@ -151,7 +151,10 @@ def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for name in ("whole", "unread", "unrebuilt"):
-        put_log(tmp_path / f"{name}.csv", 1, samples=2000)
+        path = tmp_path / f"{name}.csv"
+        put_log(path, 1, samples=2000)
+        only = [line.partition(",")[0] for line in path.read_text().splitlines()]
+        path.write_text("\n".join(only))  # of a gyro: each channel more is eight figures more
     steps = {"unread": "write_recording", "unrebuilt": "reconstruction_rows"}
     for name, step in steps.items():
         monkeypatch.setattr(chain, step, failing(getattr(chain, step), name))
@@ -170,8 +173,8 @@ def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
     status = main(["analyse", *logs, *UNITS, "--config", str(config), "--output", str(made)])
     assert status == 1
     (numbers,) = printed
-    assert "whole: 20 s at 100 Hz, 2 channels\n" in numbers and "°/√h" in numbers
-    assert "unrebuilt: 20 s at 100 Hz, 2 channels\n" in numbers
+    assert "whole: 20 s at 100 Hz, 1 channel\n" in numbers and "°/√h" in numbers
+    assert "unrebuilt: 20 s at 100 Hz, 1 channel\n" in numbers
     assert "failed: the step ingest failed: RuntimeError: no such luck" in numbers
     said = capsys.readouterr()
     assert said.out == f"{made}/report.html: open it in a browser\n"
@@ -179,10 +182,7 @@ def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
     written = pd.read_csv(made / "recordings.csv").set_index("recording")["status"]
     assert dict(written) == {"whole": "ok", "unread": "failed", "unrebuilt": "failed"}
     assert {path.name for path in (made / "figures").iterdir()} == {
-        f"{figure}_{channel}.{kind}"
-        for figure in ("allan", "forest")
-        for channel in ("gyro_x", "accel_x")
-        for kind in ("svg", "pdf")
+        f"{figure}_gyro_x.{kind}" for figure in ("allan", "forest") for kind in ("svg", "pdf")
     }
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import sysconfig
 import venv
+from collections.abc import Callable, Iterator
 from importlib.metadata import distribution
 from pathlib import Path
 
@@ -60,11 +62,39 @@ def lab(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def imubench(python: Path, lab: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [str(python), "-m", "imubench_pipeline.run.start", *arguments]
-    return subprocess.run(
-        command, cwd=lab, capture_output=True, text=True, check=False, timeout=600
-    )
+FORKS = """
+import json, os, runpy, sys
+import imubench_pipeline.run.cli, pandas, pyarrow.parquet, scipy.optimize, scipy.signal
+for line in sys.stdin:
+    lab, arguments = json.loads(line)
+    if not (process := os.fork()):
+        os.chdir(lab)
+        for number in (1, 2):
+            os.dup2(os.open(f"said_{number}", os.O_CREAT | os.O_WRONLY | os.O_TRUNC), number)
+        sys.argv[1:] = arguments
+        runpy.run_module("imubench_pipeline.run.start", run_name="__main__", alter_sys=True)
+    print(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), flush=True)
+"""
+"""Runs each command in a fork of a process that has imported what most of them import."""
+
+Imubench = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture(scope="module")
+def imubench(python: Path) -> Iterator[Imubench]:
+    """Return what runs a command in a folder."""
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen([str(python), "-c", FORKS], **pipes) as process:
+
+        def ran(lab: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+            assert process.stdin is not None and process.stdout is not None
+            process.stdin.write(json.dumps([str(lab), arguments]) + "\n")
+            process.stdin.flush()
+            status = int(process.stdout.readline())
+            said = [(lab / f"said_{number}").read_text() for number in (1, 2)]
+            return subprocess.CompletedProcess(arguments, status, *said)
+
+        yield ran
 
 
 STATED = ("--rate", "10 Hz", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
@@ -83,9 +113,9 @@ STATED = ("--rate", "10 Hz", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
     ids=lambda value: value[0] if isinstance(value, tuple) else None,
 )
 def test_a_command_that_needs_no_extra_does_without(
-    python: Path, lab: Path, command: tuple[str, ...], status: int, said: str
+    imubench: Imubench, lab: Path, command: tuple[str, ...], status: int, said: str
 ) -> None:
-    done = imubench(python, lab, *command)
+    done = imubench(lab, *command)
     assert done.returncode == status, done.stderr
     assert said in done.stdout + done.stderr
 
@@ -102,9 +132,9 @@ def test_a_command_that_needs_no_extra_does_without(
     ids=lambda value: value[0] if isinstance(value, tuple) else None,
 )  # fmt: skip
 def test_a_command_that_needs_the_workflow_says_how_to_install_it(
-    python: Path, lab: Path, command: tuple[str, ...], lacks: str
+    imubench: Imubench, lab: Path, command: tuple[str, ...], lacks: str
 ) -> None:
-    done = imubench(python, lab, *command)
+    done = imubench(lab, *command)
     assert done.returncode == 2
     assert done.stderr == f"imubench {command[0]}: {lacks} is needed, {WORKFLOW}\n"
     assert not (lab / "made").exists() and not (lab / "results").exists()
@@ -135,9 +165,11 @@ def test_the_library_computes_without_what_draws(python: Path) -> None:
     assert said == f"to draw, matplotlib is needed, {WORKFLOW}"
 
 
-def test_a_log_without_its_extra_is_one_that_cannot_be_read(python: Path, lab: Path) -> None:
+def test_a_log_without_its_extra_is_one_that_cannot_be_read(
+    imubench: Imubench, python: Path, lab: Path
+) -> None:
     (lab / "run.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(2000))
-    done = imubench(python, lab, "inspect", "run.h5")
+    done = imubench(lab, "inspect", "run.h5")
     assert done.returncode == 2
     assert "h5py is needed, which is not installed: pip install 'imubench_pipeline[hdf5]'" in (
         done.stderr

@@ -116,6 +116,7 @@ def test_who_asks_for_more_or_less_gets_what_snakemake_says(
     assert ("rule ingest:" in left) == (flags == ("--verbose",))
 
 
+@pytest.mark.release  # every day: what a run says in tests/workflow/test_workflow.py
 def test_a_pipe_gets_a_line_for_each_recording(folder: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "snakemake", "-c1", "--logger", "imubench"], cwd=folder,

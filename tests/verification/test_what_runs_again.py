@@ -87,8 +87,7 @@ def project(done: Finished, tmp_path: Path) -> Iterator[Project]:
 def code(project: Project, tmp_path: Path) -> Path:
     """A copy of the package that the project runs with."""
     package = Path(imubench_pipeline.__file__).parent
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(package, tmp_path / package.name, ignore=ignored)
+    shutil.copytree(package, tmp_path / package.name)  # with what Python has compiled
     project.environment = os.environ | {"PYTHONPATH": str(tmp_path)}
     return tmp_path / package.name
 

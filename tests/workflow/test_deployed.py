@@ -254,6 +254,7 @@ def test_a_wheel_holds_the_files_of_the_checkout(ways: Ways) -> None:
     assert script.read_bytes() == Path(str(bundle)).read_bytes()
 
 
+@pytest.mark.release  # every day: what another workflow would run, and a wheel that runs
 def test_another_workflow_uses_the_rules_under_other_names_from_a_git_address(ways: Ways) -> None:
     place = using(ways.folder / "using", ways, GITHUB, "rules.imu_ranking.output")
     said = ended(snakemake("-c2", "--configfile", "config/all.yaml"), place, **ways.hub)
