@@ -17,6 +17,7 @@ from imubench_pipeline.settings.config import EstimateSettings, Method
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel, resolution_of
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
+from tests.conftest import few
 from tests.kept import curve_of, kept
 
 RATE = 10.0
@@ -187,6 +188,8 @@ def test_one_model_is_chosen_and_scores_add_up(found: Estimation, channel: str) 
         assert row["free"] == len(row["model"].split("+")) + row["model"].count("GM")
     assert sum(row["weight"] for row in rows) == pytest.approx(1.0)
     assert chosen["verdict"] == "explained"
+    assert chosen["band"] == pytest.approx(RATE / 2)
+    assert "Nyquist" in chosen["band_source"]
     assert chosen["deviance"] == pytest.approx(1.0, abs=0.35)
 
 
@@ -267,18 +270,20 @@ def test_the_table_of_draws_gives_the_noise_models_back(found: Estimation, tmp_p
 
 @pytest.mark.parametrize(
     ("methods", "best"),
-    [
-        (("curve", "paper", "weighted"), "weighted"),
-        (("curve", "paper"), "paper"),
-        (("curve",), "curve"),
-        (("paper", "likelihood_gm", "curve"), "likelihood_gm"),
-        (("weighted", "likelihood"), "likelihood"),
-    ],
+    few(
+        [
+            (("curve", "paper", "weighted"), "weighted"),
+            (("curve", "paper"), "paper"),
+            (("curve",), "curve"),
+            (("paper", "likelihood_gm", "curve"), "likelihood_gm"),
+        ],
+        [(("weighted", "likelihood"), "likelihood")],
+    ),
 )
 def test_only_what_is_asked_for_is_there_and_the_best_of_it_is_recommended(
     tmp_path: Path, methods: tuple[Method, ...], best: str
 ) -> None:
-    (log,) = recorded(tmp_path, {"gyro_x": samples_of("gyro_x", 20_000)}).values()
+    (log,) = recorded(tmp_path, {"gyro_x": samples_of("gyro_x", 5_000)}).values()
     found = estimated(log, methods=methods)
     assert tuple(dict.fromkeys(row["method"] for row in found.parameters)) == methods
     assert {row["method"] for row in found.parameters if row["recommended"]} == {best}
@@ -302,40 +307,42 @@ def test_the_papers_model_alone_says_what_it_says_beside_the_others(
     assert alone.spectrum == of(found.spectrum, "gyro_x")
 
 
-def test_the_seed_and_the_name_of_the_channel_make_the_draws(tmp_path: Path) -> None:
-    log = samples_of("gyro_x", 10_000)
-    logs = recorded(tmp_path, {"gyro_x": log, "gyro_y": log})
-
-    def limits(channel: str, **settings: Any) -> list[object]:
-        found = estimated(logs[channel], methods=("likelihood_gm",), **settings)
+def test_the_seed_and_the_name_of_the_channel_make_the_draws(
+    found: Estimation, logs: dict[str, ChannelLog], tmp_path: Path
+) -> None:
+    def limits(rows: list[Row]) -> list[object]:
         # Whether a value is known well enough to be quoted is told by the draws.
-        of_terms = [row for row in found.parameters if row["parameter"] in ("N", "B", "T_B", "K")]
+        of_terms = [row for row in rows if row["parameter"] in ("N", "B", "T_B", "K")]
         return [
             (row["fitted"] if row["value"] is None else row["value"], row["lower"], row["upper"])
             for row in of_terms
         ]
 
-    first = limits("gyro_x")
-    assert limits("gyro_x") == first
-    for other in (limits("gyro_x", seed=1), limits("gyro_y")):
+    # That the same make the same, the test before this shows.
+    first = limits(of(found.parameters, "gyro_x", method="likelihood_gm"))
+    renamed = recorded(tmp_path, {"gyro_y": samples_of("gyro_x")})["gyro_y"]
+    for log, seed in ((logs["gyro_x"], 1), (renamed, EstimateSettings().seed)):
+        other = limits(estimated(log, methods=("likelihood_gm",), seed=seed).parameters)
         assert [value for value, *_ in other] == [value for value, *_ in first]
         assert other != first
 
 
 @pytest.mark.parametrize(
     ("settings", "bandwidth", "band", "source"),
-    [
-        ({"band": "0.5 Hz"}, None, 0.5, "set"),
-        ({"band": "0.5 Hz"}, 20.0, 0.5, "set"),
-        ({"band": "800 mHz"}, None, 0.8, "set"),
-        ({}, 20.0, 5.0, "Nyquist"),
-        ({}, None, 5.0, "Nyquist"),
-    ],
+    few(
+        [({"band": "800 mHz"}, 20.0, 0.8, "set")],
+        [
+            ({}, 20.0, 5.0, "Nyquist"),
+            ({"band": "0.5 Hz"}, None, 0.5, "set"),
+            ({"band": "800 mHz"}, None, 0.8, "set"),
+            ({}, None, 5.0, "Nyquist"),
+        ],
+    ),
 )
 def test_the_band_is_as_set_or_all_that_the_model_follows(
     tmp_path: Path, settings: dict[str, str], bandwidth: float | None, band: float, source: str
 ) -> None:
-    (log,) = recorded(tmp_path, {"gyro_x": samples_of("gyro_x", 10_000)}).values()
+    (log,) = recorded(tmp_path, {"gyro_x": samples_of("gyro_x", 5_000)}).values()
     found = estimated(log, bandwidth, methods=("likelihood",), **settings)
     for row in found.models:
         assert row["band"] == pytest.approx(band)
@@ -366,7 +373,7 @@ def lose_one_part(log: np.ndarray) -> None:
     log[20_000:27_000] = np.nan
 
 
-@pytest.mark.parametrize("lose", [lose_some, lose_one_part])
+@pytest.mark.parametrize("lose", few([lose_one_part], [lose_some]))
 def test_missing_samples_are_neither_in_the_mean_nor_in_the_noise(
     tmp_path: Path, lose: Callable[[np.ndarray], None]
 ) -> None:
@@ -422,6 +429,8 @@ def test_a_short_log_behind_a_slow_filter_has_rows(tmp_path: Path) -> None:
         build(name, rows)
 
 
+# Every day test_likelihood.py has noise behind a found filter, and beyond what is explained.
+@pytest.mark.release
 def test_where_a_drift_hides_all_below_a_found_cutoff_noise_is_told_behind_it(
     tmp_path: Path,
 ) -> None:

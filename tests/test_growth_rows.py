@@ -1,5 +1,7 @@
 """What a comparison of any two recordings needs: equal to what is computed of the pair alone."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.navigation.ratios import deviation_rows, ratio_of_deviations
 
 NAMES = {"sensor": "alpha", "recording": "night"}
+DRAWS = 40
 
 
 def estimate(level: float, seed: int) -> Estimate:
@@ -17,10 +20,10 @@ def estimate(level: float, seed: int) -> Estimate:
     sizes = {"Q": 0.0, "N": 1e-4, "B": 2e-5, "T_B": 90.0, "K": 2e-7, "R": 0.0}
     sizes = {name: v if name == "T_B" else v * level for name, v in sizes.items()}
     first = np.array(list(sizes.values())) * np.exp(
-        0.1 * np.random.default_rng(seed).standard_normal((200, 6))
+        0.1 * np.random.default_rng(seed).standard_normal((DRAWS, 6))
     )
     first[::3, 4] = 0.0
-    further = np.tile([0.0, np.nan], (200, 1, 1))
+    further = np.tile([0.0, np.nan], (DRAWS, 1, 1))
     further[::2, 0] = 1e-5 * level, 1500.0
     known = {name: Parameter(v, lower=0.8 * v, upper=1.2 * v) for name, v in sizes.items() if v}
     return Estimate("likelihood", known, draws=JointDraws(first, further))
@@ -32,7 +35,12 @@ ESTIMATES = {
     "accel_x": estimate(30.0, 3),
     "accel_z": Estimate("curve", {"N": Parameter(5e-3, lower=4e-3, upper=6e-3)}),
 }
-HOW = {"draws": 200, "seed": 7}
+HOW = {"draws": DRAWS, "seed": 7}
+
+
+@cache
+def grown() -> list[dict[str, object]]:
+    return list(growth_rows(NAMES, ESTIMATES, times=[10.0, 45.0], window=90.0, **HOW))
 
 
 def test_errors_that_grow_are_those_of_the_budget() -> None:
@@ -42,13 +50,13 @@ def test_errors_that_grow_are_those_of_the_budget() -> None:
         for row in error_rows(NAMES, ESTIMATES, questions, **HOW)
         if row["error"] != "north"
     }
-    grown = [
+    of_table = [
         row
-        for row in growth_rows(NAMES, ESTIMATES, times=[10.0, 45.0], window=90.0, **HOW)
+        for row in grown()
         if row["axis"] == "worst" and row["window"] == 90.0 and row["time"] in (10.0, 45.0)
     ]
-    assert len(grown) == len(asked) > 40
-    for row in grown:
+    assert len(of_table) == len(asked) > 40
+    for row in of_table:
         of_budget = asked[row["error"], row["time"], row["source"]]
         for name in ("gyro", "accel", "unit"):
             assert row[name] == of_budget[name]
@@ -57,8 +65,8 @@ def test_errors_that_grow_are_those_of_the_budget() -> None:
 
 
 def test_an_axis_alone_is_as_if_its_log_had_no_other() -> None:
-    how = HOW | {"times": (), "window": 60.0}
-    rows = list(growth_rows(NAMES, ESTIMATES, **how))
+    how = HOW | {"times": [10.0, 45.0], "window": 90.0}
+    rows = grown()
     assert {row["axis"] for row in rows} == {"worst", "x", "y"}  # z has no gyro
     for letter in "xy":
         alone = {channel: one for channel, one in ESTIMATES.items() if channel.endswith(letter)}
@@ -69,7 +77,7 @@ def test_an_axis_alone_is_as_if_its_log_had_no_other() -> None:
 def test_errors_grow_with_time_and_shrink_with_the_window() -> None:
     rows = [
         row
-        for row in growth_rows(NAMES, ESTIMATES, times=(), window=60.0, **HOW)
+        for row in grown()
         if row["axis"] == "worst" and row["source"] == "total" and row["error"] == "heading"
     ]
     by_window = {w: [r["sigma"] for r in rows if r["window"] == w] for w in (10.0, 60.0)}
@@ -83,7 +91,7 @@ def test_a_ratio_follows_from_what_is_kept_of_each_channel() -> None:
         FusionChannel("s", f"r{n}", "gyro_x", True, 3600.0, estimate(1.0 + n / 3, n))
         for n in (1, 2)
     )
-    how = {"longest": 1 / 9, "draws": 200, "seed": 3}
+    how = {"longest": 1 / 9, "draws": DRAWS, "seed": 3}
     kept = [list(deviation_rows(one, 100.0, **how)) for one in (a, b)]
     taus = sorted({row["tau"] for row in kept[0]})
     np.testing.assert_allclose(np.log10(taus), np.arange(-2.0, 2.6, 0.5), atol=1e-12)
@@ -91,7 +99,7 @@ def test_a_ratio_follows_from_what_is_kept_of_each_channel() -> None:
         own, other = (
             np.array([r["adev"] for r in rows if r["tau"] == tau and "draw" in r]) for rows in kept
         )
-        assert len(own) == 200 and (np.diff(own) >= 0).all()
+        assert len(own) == DRAWS and (np.diff(own) >= 0).all()
         ratio = ratio_of_deviations(a, b, tau, **how)
         limits = np.quantile(own[:, None] / other, [0.025, 0.975], method="inverted_cdf")
         np.testing.assert_allclose([ratio.lower, ratio.upper], limits, rtol=1e-12)

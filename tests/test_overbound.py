@@ -1,5 +1,6 @@
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from imubench_pipeline.export.smallest_model import FAMILIES, Family, smallest
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.typing import Array
+from tests.conftest import few
 
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 RATE = 5.0
@@ -24,6 +26,11 @@ def measured(model: NoiseModel, edf: float | None = None) -> AllanCurve:
     n = cluster_sizes(SAMPLES)
     degrees = SAMPLES / n / 2.0 if edf is None else np.full(len(n), edf)
     return AllanCurve(n / RATE, n, model.allan_variance(n / RATE, RATE), degrees, SAMPLES)
+
+
+@cache
+def of_gyro(family: Family = "N+K") -> Overbound:
+    return overbound(measured(GYRO), GYRO, RATE, family=family)
 
 
 def above(model: NoiseModel, other: NoiseModel, longest: float, horizon: float) -> list[float]:
@@ -43,11 +50,13 @@ def above(model: NoiseModel, other: NoiseModel, longest: float, horizon: float) 
 
 @pytest.mark.parametrize(
     ("family", "model"),
-    [
-        ("N+K", NoiseModel(N=1e-4, K=1e-5)),
-        ("N+GM", NoiseModel(N=1e-4, B=2e-4, T_B=15.0)),
-        ("N+GM+K", NoiseModel(N=1e-4, B=2e-4, T_B=5.0, K=3e-5)),
-    ],
+    few(
+        [("N+GM+K", NoiseModel(N=1e-4, B=2e-4, T_B=5.0, K=3e-5))],
+        [
+            ("N+K", NoiseModel(N=1e-4, K=1e-5)),
+            ("N+GM", NoiseModel(N=1e-4, B=2e-4, T_B=15.0)),
+        ],
+    ),
 )
 def test_without_uncertainty_the_smallest_is_the_model_itself(
     family: Family, model: NoiseModel
@@ -61,12 +70,14 @@ def test_without_uncertainty_the_smallest_is_the_model_itself(
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("model", [GYRO, NoiseModel(N=1e-4, B=6e-5, K=1e-6), NoiseModel(N=1e-4)])
+@pytest.mark.parametrize(
+    "model", few([GYRO], [NoiseModel(N=1e-4, B=6e-5, K=1e-6), NoiseModel(N=1e-4)])
+)
 def test_it_lies_above_everything_that_was_measured_and_fitted(
     family: Family, model: NoiseModel
 ) -> None:
     curve = measured(model)
-    found = overbound(curve, model, RATE, family=family)
+    found = of_gyro(family) if model == GYRO else overbound(curve, model, RATE, family=family)
     assert min(above(found.model, model, 60.0, 60.0)) >= 1.0
     within = curve.tau <= 60.0
     upper = curve.limits(0.95)[1] ** 2
@@ -75,7 +86,7 @@ def test_it_lies_above_everything_that_was_measured_and_fitted(
     assert found.touches
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", few(["N+GM+K"], ["N+K", "N+GM"]))
 def test_no_term_of_it_can_be_smaller(family: Family) -> None:
     limits = limits_of(measured(GYRO), GYRO, RATE, 60.0, 60.0, (1 / 600, RATE / 2))
     model = smallest(limits, family, (0.4, 1800.0))
@@ -94,15 +105,13 @@ def test_no_term_of_it_can_be_smaller(family: Family) -> None:
 
 def test_it_is_close_to_the_truth_where_the_curve_is_lowest() -> None:
     for family, most in (("N+K", 1.25), ("N+GM", 1.2), ("N+GM+K", 1.2)):
-        found = overbound(measured(GYRO), GYRO, RATE, family=family)  # type: ignore[arg-type]  # one of the families, as text
+        found = of_gyro(family)
         assert 1.0 < found.at_minimum < most
 
 
 def test_a_longer_tau_asks_for_more() -> None:
-    short, long = (
-        overbound(measured(GYRO), GYRO, RATE, family="N+GM", longest=longest)
-        for longest in (60.0, 1000.0)
-    )
+    short = of_gyro("N+GM")
+    long = overbound(measured(GYRO), GYRO, RATE, family="N+GM", longest=1000.0)
     tau = np.array([1000.0])
     truth = GYRO.allan_variance(tau)
     assert short.model.allan_variance(tau) < long.model.allan_variance(tau)
@@ -148,16 +157,21 @@ def test_a_random_walk_beyond_two_correlation_times_is_warned_of() -> None:
 def test_a_random_walk_far_too_large_is_refused_with_what_to_take() -> None:
     curve = measured(PROCESS, 1e9)
     with pytest.raises(ValueError, match=r"N\+GM is 1 times.*at most 3 times is allowed") as error:
-        overbound(curve, PROCESS, RATE, horizon=400.0)
+        overbound(curve, PROCESS, RATE, horizon=150.0)
     assert "beyond 2 T_B = 40 s" in str(error.value)
-    allowed = overbound(curve, PROCESS, RATE, horizon=400.0, most_excess=20.0)
+
+
+@pytest.mark.release  # test_where_a_walk_must_be_far_too_large allows it every day
+def test_a_random_walk_far_too_large_is_given_where_it_is_allowed() -> None:
+    curve = measured(PROCESS, 1e9)
+    allowed = overbound(curve, PROCESS, RATE, horizon=150.0, most_excess=20.0)
     assert allowed.excess[0] > 3.0
     assert allowed.warning is not None
 
 
 def test_a_log_too_short_for_a_horizon_is_told_from_a_family_that_does_not_suit() -> None:
     with pytest.raises(ValueError, match="no family comes closer than"):
-        overbound(measured(GYRO), GYRO, RATE, horizon=4000.0)
+        overbound(measured(GYRO), GYRO, RATE, horizon=2000.0)
 
 
 def test_the_density_is_bounded_above_the_band_s_lowest_frequency_only() -> None:
@@ -177,12 +191,12 @@ def test_the_density_is_bounded_above_the_band_s_lowest_frequency_only() -> None
     assert same.passed_below is None
 
 
-def test_limits_for_all_tau_together_hold_in_so_many_logs() -> None:
+@pytest.mark.parametrize(("logs", "least"), few([(75, 0.89)], [(150, 0.91)]))
+def test_limits_for_all_tau_together_hold_in_so_many_logs(logs: int, least: float) -> None:
     """Pointwise limits leave out the true curve in a quarter of the logs and more."""
     rng = np.random.default_rng(7)
     model = NoiseModel(N=1.0, K=0.03)
     pointwise = together = 0
-    logs = 150
     for _ in range(logs):
         curve = allan_variance(simulate(model, 1.0, 20_000, rng), 1.0, overlap="octave")
         within = curve.tau <= 1000.0
@@ -190,7 +204,7 @@ def test_limits_for_all_tau_together_hold_in_so_many_logs() -> None:
         pointwise += bool(np.all(curve.limits(0.95)[1][within] ** 2 > truth))
         together += bool(np.all(simultaneous_upper(curve, 1000.0)[within] > truth))
     assert pointwise / logs < 0.85
-    assert together / logs > 0.91
+    assert together / logs > least  # 95 % less two standard errors and more
 
 
 @pytest.mark.parametrize(
@@ -250,14 +264,14 @@ def test_a_filter_that_loads_it_is_not_overconfident() -> None:
     assert expected_over_true(GYRO, GYRO, start) == pytest.approx(1.0, abs=0.02)
     plain = NoiseModel(N=GYRO.N, K=0.5e-5)
     assert expected_over_true(plain, GYRO, start) < 0.9
-    found = [overbound(measured(GYRO), GYRO, RATE, family=family) for family in FAMILIES]
+    found = [of_gyro(family) for family in FAMILIES]
     ratios = [expected_over_true(one.model, GYRO, start) for one in found]
     assert min(ratios) >= 1.0
     assert max(ratios) < 1.8
 
 
 def test_its_words_tell_how_large_it_is() -> None:
-    found: Overbound = overbound(measured(GYRO), GYRO, RATE)
+    found = of_gyro()
     assert f"{math.sqrt(found.at_minimum):.2f} times the measured one" in found.words
     assert "from 0.00167 to 2.5 Hz" in found.words
 

@@ -9,6 +9,7 @@ from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
+from tests.conftest import few
 
 RATE = 50.0
 BINS = np.concatenate((np.ones(64), np.rint(np.geomspace(2, 2000, 140))))
@@ -50,13 +51,13 @@ def place(text: str) -> tuple[float, float, int, float]:
     return float(match[1]), float(match[2]), side, float(match[4])
 
 
+@pytest.mark.parametrize("logs", few([1000], [2000]))
 @pytest.mark.parametrize(
     "nu",
-    [BINS, np.full(200, 50.0), np.ones(60)],
+    few([BINS], [(np.full(200, 50.0),), (np.ones(60),)]),
     ids=["bins of a spectrum", "equal bins", "single ordinates"],
 )
-def test_the_chance_of_the_right_model_is_uniform(rng, nu: np.ndarray) -> None:
-    logs = 2000
+def test_the_chance_of_the_right_model_is_uniform(rng, nu: np.ndarray, logs: int) -> None:
     chance = np.array([judged(drawn(rng, nu), nu).chance for _ in range(logs)])
     assert chance.min() > 0
     assert chance.max() == 1
@@ -71,8 +72,8 @@ def test_the_chance_of_the_right_model_is_uniform(rng, nu: np.ndarray) -> None:
 
 
 def test_the_mean_deviance_of_the_right_model_is_one(rng) -> None:
-    deviance = np.array([judged(drawn(rng)).deviance for _ in range(1000)])
-    assert deviance.mean() == pytest.approx(1.0, abs=4 * deviance.std() / np.sqrt(1000))
+    deviance = np.array([judged(drawn(rng)).deviance for _ in range(500)])
+    assert deviance.mean() == pytest.approx(1.0, abs=4 * deviance.std() / np.sqrt(500))
     assert deviance.std() == pytest.approx(np.sqrt(2 / len(BINS)), rel=0.15)
 
 
@@ -93,10 +94,10 @@ def test_the_deviance_is_that_of_the_likelihood() -> None:
     assert found == pytest.approx(expected / (3 * one), rel=1e-4)
 
 
-@pytest.mark.parametrize("nu", [2.0, 30.0])
+@pytest.mark.parametrize("nu", few([2.0], [30.0]))
 def test_parameters_that_were_fitted_are_taken_off(rng, nu: float) -> None:
     # Ten bins and their own mean: a tenth of the deviance goes into the fit.
-    bins, logs = np.full(10, nu), 1500
+    bins, logs = np.full(10, nu), 800
     taken, kept = [], []
     for _ in range(logs):
         data = drawn(rng, bins)
@@ -109,12 +110,14 @@ def test_parameters_that_were_fitted_are_taken_off(rng, nu: float) -> None:
 
 @pytest.mark.parametrize(
     ("model", "terms"),
-    [
-        (NoiseModel(N=1e-3), Terms("N")),
-        (NoiseModel(N=1e-3, K=3e-4), Terms("NK")),
-        (NoiseModel(N=1e-3, B=2e-3, T_B=20.0, K=3e-4), Terms("NK", 1)),
-        (NoiseModel(Q=2e-5, N=1e-3, B=2e-3), Terms("QNF")),
-    ],
+    few(
+        [(NoiseModel(N=1e-3, B=2e-3, T_B=20.0, K=3e-4), Terms("NK", 1))],
+        [
+            (NoiseModel(N=1e-3), Terms("N")),
+            (NoiseModel(N=1e-3, K=3e-4), Terms("NK")),
+            (NoiseModel(Q=2e-5, N=1e-3, B=2e-3), Terms("QNF")),
+        ],
+    ),
     ids=lambda value: value.name,
 )
 def test_the_right_model_explains_a_log(rng, model: NoiseModel, terms: Terms) -> None:

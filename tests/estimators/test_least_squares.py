@@ -53,7 +53,7 @@ def test_a_noiseless_curve_gives_its_parameters_back(method) -> None:
     assert estimate.model.name == "N+GM+K"
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(st.floats(0.5, 3), st.floats(0.5, 1.4), st.floats(20, 500), st.floats(0.3, 3))
 def test_noiseless_curves_of_many_sensors(N: float, B: float, T_B: float, K: float) -> None:
     model = NoiseModel(N=N * 1e-4, B=B * 7e-5, T_B=T_B, K=K * 1e-6)
@@ -118,8 +118,9 @@ def test_holes_do_not_bias_n(rng, loss: float) -> None:
     log = simulate(MTI_7, 100.0, HOURS_10, rng)
     log[rng.random(HOURS_10) < loss] = np.nan
     curve = allan_variance(log, 100.0)
-    assert value(fit(curve), "N") == pytest.approx(8.4e-5, rel=0.005)
-    assert fit(curve).parameters["N"].reason is None
+    estimate = fit(curve)
+    assert value(estimate, "N") == pytest.approx(8.4e-5, rel=0.005)
+    assert estimate.parameters["N"].reason is None
     assert value(read(curve), "N") == pytest.approx(8.4e-5, rel=0.01)
 
 
@@ -128,8 +129,9 @@ def test_noiseless_curves_of_sampled_logs() -> None:
     for T_B, B in ((2.0, 6.7e-4), (20.0, 6.7e-4), (89.5, 6.7e-3)):
         model = NoiseModel(N=8.4e-5, B=B, T_B=T_B, K=8.2e-5)
         curve = curve_of(model.allan_variance(sizes / 100.0, 100.0), sizes, 100.0, HOURS_10)
+        estimate = fit(curve)
         for name in ("N", "B", "T_B", "K"):
-            assert fitted(fit(curve), name) == pytest.approx(getattr(model, name), rel=1e-6)
+            assert fitted(estimate, name) == pytest.approx(getattr(model, name), rel=1e-6)
 
 
 def test_a_low_pass_in_the_sensor_harms_neither_n_nor_b(rng) -> None:
@@ -143,14 +145,15 @@ def test_a_low_pass_in_the_sensor_harms_neither_n_nor_b(rng) -> None:
     assert plain.parameters["N"].reason is None
 
 
-def test_clean_curves_keep_their_short_taus(rng) -> None:
+@pytest.mark.parametrize(("logs", "most"), few([(20, 1)], [(60, 2)]))
+def test_clean_curves_keep_their_short_taus(rng, logs: int, most: int) -> None:
     sizes = cluster_sizes(HOURS_10)
-    curves = ensemble(MTI_7, 100.0, HOURS_10, sizes, 60, rng)
+    curves = ensemble(MTI_7, 100.0, HOURS_10, sizes, logs, rng)
     shortened = sum(
         fit(curve_of(variance, sizes, 100.0, HOURS_10)).parameters["N"].reason is not None
         for variance in curves
     )
-    assert shortened <= 2
+    assert shortened <= most
 
 
 @pytest.mark.release
@@ -206,11 +209,14 @@ def test_standard_errors_are_the_scatter_of_fits() -> None:
         assert np.median(errors[name]) == pytest.approx(np.std(logarithms), rel=0.3), name
 
 
-@pytest.mark.parametrize("method", few(["weighted"], ["paper"]))
-def test_white_logs_have_neither_b_nor_k(method) -> None:
-    """At most 5 % may have; more than 5 of 30 then has a probability of 0.3 %."""
+@pytest.mark.parametrize(
+    ("method", "logs", "most"),
+    few([("weighted", 15, 3)], [("weighted", 30, 5), ("paper", 30, 5)]),
+)
+def test_white_logs_have_neither_b_nor_k(method: str, logs: int, most: int) -> None:
+    """At most 5 % may have; more than 3 of 15, or 5 of 30, then has 0.5 or 0.3 %."""
     phantoms = 0
-    for curve in simulated_curves(WHITE, 30):
+    for curve in simulated_curves(WHITE, logs):
         parameters = fit(curve, method=method).parameters
         assert parameters["N"].status == "ok"
         phantoms += any(parameters[name].value is not None for name in ("B", "K"))
@@ -221,23 +227,27 @@ def test_white_logs_have_neither_b_nor_k(method) -> None:
                 assert found.fitted is not None
                 assert found.upper is None or found.upper > found.fitted
                 assert "standard error" in (found.reason or "")
-    assert phantoms <= 5
+    assert phantoms <= most
 
 
-def test_a_random_walk_is_told_although_no_bias_instability_is() -> None:
+@pytest.mark.parametrize(("logs", "told", "held"), few([(10, 8, 7)], [(20, 17, 16)]))
+def test_a_random_walk_is_told_although_no_bias_instability_is(
+    logs: int, told: int, held: int
+) -> None:
+    """Of 20 limits 19 hold K, of 10 9.5: fewer than 16, and than 7, have 0.3 and 0.1 %."""
     model = NoiseModel(N=8.4e-5, K=2e-6)
-    found = [fit(curve).parameters["K"] for curve in simulated_curves(model, 20)]
+    found = [fit(curve).parameters["K"] for curve in simulated_curves(model, logs)]
     limits = [(k.lower, k.upper) for k in found if k.lower is not None and k.upper is not None]
-    assert sum(k.value is not None for k in found) >= 17
-    assert sum(lower <= 2e-6 <= upper for lower, upper in limits) >= 16
+    assert sum(k.value is not None for k in found) >= told
+    assert sum(lower <= 2e-6 <= upper for lower, upper in limits) >= held
 
 
 def test_a_short_log_does_not_tell_the_correlation_time() -> None:
     model = NoiseModel(N=8.4e-5, B=1e-5, T_B=200.0)
     for curve in simulated_curves(model, 5, hours=1.0):
-        found = fit(curve).parameters
-        assert value(fit(curve), "N") == pytest.approx(8.4e-5, rel=0.02)
-        assert found["T_B"].status in ("absent", "not_identified", "at_bound")
+        found = fit(curve)
+        assert value(found, "N") == pytest.approx(8.4e-5, rel=0.02)
+        assert found.parameters["T_B"].status in ("absent", "not_identified", "at_bound")
 
 
 def test_holes_widen_the_limits(rng) -> None:

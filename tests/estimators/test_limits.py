@@ -18,7 +18,7 @@ WALK = {"N": 1.0, "K": 1e-2}
 SAMPLES = 100_000
 """At 1 Hz."""
 
-LOGS = 30
+LOGS = 15
 METHODS = ("weighted", "paper")
 
 
@@ -55,17 +55,17 @@ def estimate_of(truth: dict[str, float], method: str = "weighted") -> Estimate:
 
 
 @cache
-def fits(names: str, method: str) -> list[Estimate]:
+def fits(names: str, method: str, logs: int = LOGS) -> list[Estimate]:
     """Fits to curves of simulated logs."""
     truth = {"SENSOR": SENSOR, "WALK": WALK}[names]
-    return [fit(curve, method=method) for curve in curves(names, **truth)]
+    return [fit(curve, method=method) for curve in curves(names, logs, **truth)]
 
 
 @cache
-def curves(names: str, **truth: float) -> list[AllanCurve]:
+def curves(names: str, logs: int = LOGS, **truth: float) -> list[AllanCurve]:
     rng = channel_rng(20260107, names)
-    logs = (simulate(NoiseModel(**truth), 1.0, SAMPLES, rng) for _ in range(LOGS))
-    return [allan_variance(log, 1.0, overlap="octave") for log in logs]
+    made = (simulate(NoiseModel(**truth), 1.0, SAMPLES, rng) for _ in range(logs))
+    return [allan_variance(log, 1.0, overlap="octave") for log in made]
 
 
 @cache
@@ -129,13 +129,14 @@ def test_the_error_of_n_from_one_tau_has_a_closed_form(method: str, samples: int
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
     ("truth", "held"),
-    [
-        (WALK, ()),
-        ({"N": 3.0, "B": 1.0, "T_B": 8.0}, ()),
-        ({"N": 3.0, "B": 1.0, "T_B": 8.0, "K": 0.05}, ()),
-        ({"N": 3.0, "B": 1.0, "T_B": 8.0, "K": 0.05}, ("T_B",)),
-        ({"N": 3.0, "B": 1.0, "T_B": 8.0, "K": 0.05}, ("B", "T_B")),
-    ],
+    few(
+        [
+            ({"N": 3.0, "B": 1.0, "T_B": 8.0, "K": 0.05}, ()),
+            ({"N": 3.0, "B": 1.0, "T_B": 8.0, "K": 0.05}, ("T_B",)),
+            ({"N": 3.0, "B": 1.0, "T_B": 8.0, "K": 0.05}, ("B", "T_B")),
+        ],
+        [(WALK, ()), ({"N": 3.0, "B": 1.0, "T_B": 8.0}, ())],
+    ),
 )
 def test_errors_are_those_of_the_exact_covariance(
     method: str, truth: dict[str, float], held: tuple[str, ...]
@@ -154,7 +155,7 @@ def test_errors_are_those_of_the_exact_covariance(
 def test_the_width_of_the_limits_is_the_scatter_of_fits(method: str) -> None:
     """Thirty logs know a standard deviation to 13 %."""
     for name, truth in SENSOR.items():
-        found = [estimate.parameters[name] for estimate in fits("SENSOR", method)]
+        found = [estimate.parameters[name] for estimate in fits("SENSOR", method, 30)]
         assert all(parameter.status == "ok" for parameter in found)
         values = np.log([parameter.value or np.nan for parameter in found])
         limits = [(p.lower or np.nan, p.upper or np.nan) for p in found]
@@ -164,29 +165,35 @@ def test_the_width_of_the_limits_is_the_scatter_of_fits(method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("names", "method"),
-    few([("SENSOR", "weighted"), ("WALK", "paper")], [("SENSOR", "paper"), ("WALK", "weighted")]),
+    ("names", "method", "logs", "least"),
+    few(
+        [("SENSOR", "weighted", LOGS, 11), ("WALK", "paper", LOGS, 11)],
+        [(names, method, 30, 24) for names in ("SENSOR", "WALK") for method in METHODS],
+    ),
 )
-def test_limits_hold_the_truth(names: str, method: str) -> None:
-    """Of 30 logs 95 % are 28.5; fewer than 24 has a probability of 0.06 %."""
+def test_limits_hold_the_truth(names: str, method: str, logs: int, least: int) -> None:
+    """Of 30 logs 95 % are 28.5, of 15 14.2; fewer than 24, and than 11, have 0.06 %."""
     for name, truth in {"SENSOR": SENSOR, "WALK": WALK}[names].items():
-        found = [estimate.parameters[name] for estimate in fits(names, method)]
+        found = [estimate.parameters[name] for estimate in fits(names, method, logs)]
         limits = [(p.lower, p.upper) for p in found if p.lower is not None and p.upper is not None]
-        assert len(limits) >= LOGS - 4
-        assert sum(lower <= truth <= upper for lower, upper in limits) >= 24, name
+        assert len(limits) >= 0.86 * logs
+        assert sum(lower <= truth <= upper for lower, upper in limits) >= least, name
 
 
+@pytest.mark.parametrize(("logs", "most"), few([(LOGS, 3)], [(30, 5)]))
 @pytest.mark.parametrize("method", METHODS)
-def test_a_bias_instability_that_is_not_there_may_be_zero(method: str) -> None:
-    """In at most 5 % of logs it may seem to be there; more than 5 of 30 has 0.3 %."""
+def test_a_bias_instability_that_is_not_there_may_be_zero(
+    method: str, logs: int, most: int
+) -> None:
+    """It may seem to be there in 5 % of logs; more than 3 of 15, or 5 of 30, has 0.5 or 0.3 %."""
     phantoms = 0
-    for estimate in fits("WALK", method):
+    for estimate in fits("WALK", method, logs):
         bias = estimate.parameters["B"]
         phantoms += bool(bias.status == "ok" and bias.lower)
         if bias.status == "not_identified":
             assert bias.value is None and bias.lower == 0.0 and bias.reason
             assert bias.fitted is not None and (bias.upper is None or bias.upper > bias.fitted)
-    assert phantoms <= 5
+    assert phantoms <= most
 
 
 def test_ten_times_the_log_narrows_the_limits_by_the_root_of_ten() -> None:
@@ -216,9 +223,9 @@ def test_half_the_degrees_of_freedom_widen_the_limits_by_the_root_of_two() -> No
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("unit", [1e-6, 57.29577951308232])
 def test_limits_have_the_unit_of_the_log(method: str, unit: float) -> None:
-    (curve, *_) = curves("SENSOR", **SENSOR)
+    (curve,) = curves("SENSOR", 1, **SENSOR)
     scaled = fit(replace(curve, variance=unit**2 * curve.variance), method=method)
-    for name, parameter in fits("SENSOR", method)[0].parameters.items():
+    for name, parameter in fits("SENSOR", method, 1)[0].parameters.items():
         factor = 1.0 if name == "T_B" else unit
         twin = scaled.parameters[name]
         assert twin.status == parameter.status

@@ -16,7 +16,7 @@ def k_of(log: np.ndarray) -> tuple[str, str | None]:
     return found.status, found.reason
 
 
-@pytest.mark.parametrize("seed", few(range(2), range(2, 4)))
+@pytest.mark.parametrize("seed", few([0], [1, 2, 3]))
 def test_part_of_a_day_is_no_walk(seed: int) -> None:
     rng = np.random.default_rng(seed)
     angle = 2.0 * np.pi * (0.3 * np.arange(SAMPLES) / SAMPLES + rng.random())
@@ -26,7 +26,7 @@ def test_part_of_a_day_is_no_walk(seed: int) -> None:
         assert reason is not None and "drift" in reason
 
 
-@pytest.mark.parametrize("seed", few(range(3), range(3, 6)))
+@pytest.mark.parametrize("seed", few([0], range(1, 6)))
 def test_a_drift_that_turns_a_few_times_is_no_walk(seed: int) -> None:
     rng = np.random.default_rng(seed)
     places = np.linspace(0.0, 1.0, 7)
@@ -36,7 +36,7 @@ def test_a_drift_that_turns_a_few_times_is_no_walk(seed: int) -> None:
     assert status != "ok"
 
 
-@pytest.mark.parametrize(("logs", "most"), few([(6, 2)], [(12, 4)]))
+@pytest.mark.parametrize(("logs", "most"), few([(3, 1)], [(12, 4)]))
 def test_a_walk_is_seldom_a_drift(logs: int, most: int) -> None:
     # Known to 18 %: the walk is as dense as the white noise at the twentieth cosine.
     K = 2.0 * np.pi * 1e-4 * 20.0 / (2.0 * SAMPLES / RATE)
@@ -49,7 +49,7 @@ def test_a_walk_is_seldom_a_drift(logs: int, most: int) -> None:
     assert doubted <= most
 
 
-@pytest.mark.parametrize("seed", few(range(2), range(2, 4)))
+@pytest.mark.parametrize("seed", few([0], [1, 2, 3]))
 def test_walk_is_no_smooth_drift(seed: int) -> None:
     rng = np.random.default_rng(seed)
     walk = np.cumsum(1e-5 / np.sqrt(RATE) * rng.standard_normal(SAMPLES))

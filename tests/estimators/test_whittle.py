@@ -109,10 +109,10 @@ def test_costs_of_a_short_log_differ_as_exact_likelihoods_do(rng, K: float) -> N
     np.testing.assert_allclose(np.diff([one.cost for one in found]), np.diff(costs), atol=1e-8)
 
 
-@pytest.mark.parametrize("R", [0.0, 3e-3, -3e-3])
-@pytest.mark.parametrize("K", [0.0, 5e-4, 5e-3])
+@pytest.mark.parametrize("R", few([0.0, -3e-3], [3e-3]))
+@pytest.mark.parametrize("K", few([0.0, 5e-3], [5e-4]))
 def test_the_fit_of_a_short_log_is_that_of_its_exact_likelihood(rng, K: float, R: float) -> None:
-    for _ in range(3):
+    for _ in range(2):
         log = 9.81 + simulate(NoiseModel(N=1e-3, K=K, R=R), RATE, SINGLE + 1, rng)
         found = whittle_to(spectrum_of(log)).maximum(Terms("NK", 0, True))
         exact = contrasts(log)
@@ -169,7 +169,7 @@ def test_the_exact_density_of_two_processes_gives_both_back() -> None:
     assert found.parameter("N") == pytest.approx(1e-3, rel=5e-3)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", few([0], [1, 2, 3]))
 def test_a_sharp_process_does_not_hide_another_beside_a_walk(seed: int) -> None:
     # A process a hundred times as dense as the white noise has a sharp time, beside which no pair
     # of a coarse grid shows what else is there.
@@ -204,7 +204,7 @@ def test_the_exact_density_of_flicker_and_quantization_gives_them_back() -> None
     assert found.parameter("K") < 1e-4
 
 
-@pytest.mark.parametrize("terms", [Terms("NK"), Terms("NFK"), PAPERS])
+@pytest.mark.parametrize("terms", few([PAPERS], [Terms("NK"), Terms("NFK")]))
 def test_a_term_that_is_absent_is_fitted_at_nothing(terms: Terms) -> None:
     found = noiseless(NoiseModel(N=2e-3), 1200).maximum(terms)
     assert found.parameter("N") == pytest.approx(2e-3, rel=1e-3)
@@ -255,12 +255,12 @@ def searched(whittle: Whittle, terms: Terms, rng: np.random.Generator, starts: i
 @pytest.mark.parametrize(
     "terms",
     few(
-        [Terms("NFK"), PAPERS, Terms("NK", 1, True)],
-        [Terms("K"), Terms("QNF"), Terms("NK", 0, True), Terms("N", 1)],
+        [PAPERS, Terms("NK", 1, True)],
+        [Terms("NFK"), Terms("K"), Terms("QNF"), Terms("NK", 0, True), Terms("N", 1)],
     ),
 )
 def test_no_general_minimiser_finds_a_better_fit(rng, terms: Terms) -> None:
-    for _ in range(4):
+    for _ in range(3):
         model = NoiseModel(
             N=10 ** rng.uniform(-3.5, -2.5),
             B=10 ** rng.uniform(-4, -2),
@@ -280,16 +280,16 @@ def test_no_general_minimiser_finds_a_better_fit(rng, terms: Terms) -> None:
 
 def test_two_processes_are_not_fitted_worse_than_by_a_general_minimiser(rng) -> None:
     model = NoiseModel(N=1e-3, B=3e-3, T_B=3.0, further=[GaussMarkov(3e-3, 100.0)])
-    for _ in range(2):
-        whittle = whittle_for(model, 20_000, rng)
-        found = whittle.maximum(Terms("N", 2))
-        assert found.times[0] < found.times[1]
-        assert found.cost < searched(whittle, Terms("N", 2), rng, 4) + 0.05
+    whittle = whittle_for(model, 20_000, rng)
+    found = whittle.maximum(Terms("N", 2))
+    assert found.times[0] < found.times[1]
+    assert found.cost < searched(whittle, Terms("N", 2), rng, 4) + 0.05
 
 
-def test_the_fit_is_never_less_likely_than_the_truth(rng) -> None:
+@pytest.mark.parametrize("logs", few([15], [40]))
+def test_the_fit_is_never_less_likely_than_the_truth(rng, logs: int) -> None:
     ordinates = []
-    for _ in range(40):
+    for _ in range(logs):
         whittle = whittle_for(MODEL, 5000, rng)
         truth = np.array([MODEL.N, MODEL.K, MODEL.B]) ** 2
         true = Maximum(PAPERS, truth, np.array([MODEL.T_B or 0.0]), 0.0, 0.0)
@@ -300,7 +300,7 @@ def test_the_fit_is_never_less_likely_than_the_truth(rng) -> None:
         assert gain > -1e-3
         ordinates.append(2 * gain)
     # Wilks: twice the gain is chi-squared, with one degree of freedom for each parameter.
-    assert np.mean(ordinates) == pytest.approx(4.0, abs=4 * np.sqrt(8 / 40))
+    assert np.mean(ordinates) == pytest.approx(4.0, abs=4 * np.sqrt(8 / logs))
 
 
 def raw_likelihood(log: np.ndarray, rate: float) -> Callable[[np.ndarray], float]:
@@ -387,8 +387,9 @@ def test_the_information_is_the_curvature_of_the_mean_cost(found: Maximum) -> No
     )
 
 
-def test_estimates_scatter_as_their_information_says(rng) -> None:
-    model, logs = NoiseModel(N=1e-3, K=5e-4), 300
+@pytest.mark.parametrize("logs", few([120], [300]))
+def test_estimates_scatter_as_their_information_says(rng, logs: int) -> None:
+    model = NoiseModel(N=1e-3, K=5e-4)
     estimates = []
     for _ in range(logs):
         whittle = whittle_for(model, 2000, rng, 8)
@@ -440,7 +441,6 @@ def test_a_ramp_that_is_not_in_the_model_is_taken_for_a_random_walk(rng) -> None
     without_it, with_it = np.median(ratios, axis=0)
     assert without_it > 1.2
     assert with_it == pytest.approx(1.0, abs=0.15)
-    print(without_it, with_it)
 
 
 @pytest.mark.parametrize("terms", [Terms("NFK"), PAPERS, Terms("NK", 1, True)])

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,8 @@ KNOWN = {
     "K": Parameter(MODEL.K, lower=0.5 * MODEL.K, upper=2.0 * MODEL.K),
 }
 WITHOUT_K = KNOWN | {"K": Parameter(None, "absent", "not there", upper=0.5 * MODEL.K)}
-FUSION = FusionSettings(draws=100)
+# Fewer draws than a run may have: of the limits no test here asks how sure they are.
+FUSION = FusionSettings().model_copy(update={"draws": 20})
 ROBOT = {
     "title": "a robot",
     "static_window": "10 s",
@@ -260,12 +262,22 @@ def coverage_rows(*sensors: str) -> Rows:
     }  # fmt: skip
 
 
+@cache
+def without_rows(table: str) -> pa.Table:
+    return build(table, [])
+
+
+def tables_of(*several: Rows) -> Tables:
+    """The tables of these rows; most have none, and are the same ones each time."""
+    rows = {name: [row for one in several for row in one.get(name, [])] for name in TABLES}
+    return {name: build(name, own) if own else without_rows(name) for name, own in rows.items()}
+
+
 def joined(
     *several: Rows, requirements: Mapping[str, Any] | None = None, papers: bool = False
 ) -> Tables:
     """The tables of a run: the rows of its recordings, and what it makes of them together."""
-    rows = {name: [row for one in several for row in one.get(name, [])] for name in TABLES}
-    made = {name: build(name, own) for name, own in rows.items()}
+    made = tables_of(*several)
     recommended = [row for row in made["parameters"].to_pylist() if row["recommended"]]
     biases = made["fixed_bias"].to_pylist()
     about = made["recordings"].to_pylist()

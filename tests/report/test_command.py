@@ -89,17 +89,23 @@ def test_a_report_elsewhere_has_the_same_pages_and_the_figures_for_print(
     assert tables["parameters"].num_rows > 0
 
 
-def test_all_pages_in_one_file_are_the_same_from_every_process(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    one, other = tmp_path / "mail/one.html", tmp_path / "other.html"
+@pytest.mark.release  # long: it starts another process; every day test_publish.py compares two runs
+def test_one_file_is_the_same_from_every_process(results: Path, tmp_path: Path) -> None:
+    one, other = tmp_path / "one.html", tmp_path / "other.html"
     assert main(["report", str(results), "--one-file", str(one)]) == 0
-    out, err = said(capsys)
-    assert re.fullmatch(rf"{re.escape(str(one))}: [0-9.]+ MB\n", out) and err == ""
     code = "import sys; from imubench_pipeline.run.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", code, "report", str(results), "--one-file", str(other)]
     subprocess.run(command, check=True, env=os.environ | {"PYTHONHASHSEED": "7"})
     assert one.read_bytes() == other.read_bytes()
+
+
+def test_all_pages_stand_in_one_file(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = tmp_path / "mail/one.html"
+    assert main(["report", str(results), "--one-file", str(one)]) == 0
+    out, err = said(capsys)
+    assert re.fullmatch(rf"{re.escape(str(one))}: [0-9.]+ MB\n", out) and err == ""
     assert [path.name for path in one.parent.iterdir()] == ["one.html"]
     page = Read(one.read_text(encoding="utf-8"))
     assert page.faults == [] and page.external() == []

@@ -1,5 +1,6 @@
 """The pages of gyros that were turned between north and south."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import pytest
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.earth_rate import published_words
+from imubench_pipeline.report.pages import pages
 from imubench_pipeline.report.publish import one_file, publish
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.turned import answer, given_words, needs
@@ -67,10 +69,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Site:
 
 
 @pytest.fixture(scope="module")
-def read(made: Site, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
+def published(made: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
     publish(made, folder)
-    return sound_pages(folder, {f"figures/allan_gyro_x.{kind}" for kind in ("svg", "pdf")})
+    return folder
+
+
+@pytest.fixture(scope="module")
+def read(published: Path) -> dict[str, Read]:
+    return sound_pages(published, {f"figures/allan_gyro_x.{kind}" for kind in ("svg", "pdf")})
 
 
 def test_the_page_of_a_run_says_what_was_found(read: dict[str, Read]) -> None:
@@ -118,17 +125,17 @@ def test_the_page_of_all_runs(read: dict[str, Read]) -> None:
     assert page.data["published"][0]["published"] == PUBLISHED["published"]
 
 
-def test_every_page_leads_there_only_where_there_are_such_runs(
-    read: dict[str, Read], tmp_path: Path
-) -> None:
+def test_every_page_leads_there_only_where_there_are_such_runs(read: dict[str, Read]) -> None:
     assert all("Earth’s rate" in page.text for page in read.values())
-    publish(site(joined(recording_rows("s", "night"))), tmp_path)
-    assert "earth_rate.html" not in read_pages(tmp_path)
-    assert "earth_rate.html" not in (tmp_path / "index.html").read_text()
+    others = site(joined(recording_rows("s", "night")))
+    assert "earth_rate.html" not in {page.path for page in pages(others)}
+    assert "earth_rate.html" not in {path for path, _ in others.navigation}
 
 
-def test_a_page_is_written_again_only_where_its_run_changed(made: Site, tmp_path: Path) -> None:
-    publish(made, tmp_path)
+def test_a_page_is_written_again_only_where_its_run_changed(
+    made: Site, published: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(published, tmp_path, dirs_exist_ok=True)
     tables = dict(made.tables)
     again = replace(made)
     assert publish(again, tmp_path) == []
@@ -154,12 +161,13 @@ def test_turns_that_nothing_shows_are_a_remark(tmp_path: Path) -> None:
     rows = {"recordings": [{"sensor": "s", "recording": "run"} | ABOUT]}
     rows |= run(put(tmp_path / "run", log), [rest])
     publish(site(joined(recording_rows("s", "night"), rows), tmp_path), tmp_path / "report")
-    pages = read_pages(tmp_path / "report")
+    found = read_pages(tmp_path / "report")
     for path in ("earth_rate.html", "recordings/s/run.html"):
-        assert "19 of 19 turns rest on the schedule" in pages[path].text, path
-        assert "ambiguous" in pages[path].text
+        assert "19 of 19 turns rest on the schedule" in found[path].text, path
+        assert "ambiguous" in found[path].text
 
 
+@pytest.mark.release  # every day tests/report/test_publish.py asks for all pages in one file
 def test_all_pages_stand_in_one_file(made: Site) -> None:
     text = one_file(made)
     assert 'id="page:earth_rate.html"' in text and 'id="page:recordings/s/run.html"' in text

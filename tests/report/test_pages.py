@@ -17,7 +17,7 @@ from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import BY_RECORDING
 from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site
-from tests.report.test_boards import BOARD, some
+from tests.report.test_boards import BOARD, of_board, some
 from tests.report.test_navigated import navigation_row
 
 pytestmark = pytest.mark.usefixtures("small_report")
@@ -66,10 +66,12 @@ def test_a_page_reads_no_table_that_it_does_not_declare(entry: Entry, whole: Sit
     environment(noting.system).get_template(page.template)
 
 
-def test_a_page_disappears_with_what_it_shows(whole: Site, tmp_path: Path) -> None:
-    publish(whole, tmp_path)
+def test_a_page_disappears_with_what_it_shows(tmp_path: Path) -> None:
+    few_rows = joined(of_board("cheap"))
+    with_board = site(few_rows, boards={"pair": BOARD})
+    publish(with_board, tmp_path)
     assert (tmp_path / "boards.html").is_file()
-    publish(replace(whole, settings={**whole.settings, "boards": {}}), tmp_path)
+    publish(replace(with_board, settings={**with_board.settings, "boards": {}}), tmp_path)
     assert not (tmp_path / "boards.html").exists()
     assert (tmp_path / "index.html").is_file()
 

@@ -10,6 +10,8 @@ from imubench_pipeline.tables import build
 from tests.report.pages import Read, sound_pages
 from tests.report.tables import HOUR, ROBOT, joined, recording_rows, site
 
+pytestmark = pytest.mark.usefixtures("small_report")
+
 HOSTILE = "<b>grades</b> & more"
 ROW = {"requirement": "robot", "sensor": "one", "price_class": "consumer", "best_margin": 2.0,
        "worst_margin": 0.25, "decides": "heading within 5 deg", "verdict": "worth logging",

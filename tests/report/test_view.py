@@ -1,3 +1,4 @@
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from imubench_pipeline.report.view import ChannelView, RecordingView, recording_views
 from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.tables.schemas import TABLES
+from tests.conftest import few
 from tests.report.tables import (
     MODEL,
     TAU,
@@ -51,7 +53,7 @@ def by_name(views: list[RecordingView]) -> dict[tuple[str, str], RecordingView]:
     return {(view.sensor, view.name): view for view in views}
 
 
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(st.integers(0, 2**32))
 def test_rows_go_to_their_recording_and_channel_whatever_their_order(seed: int) -> None:
     views = recording_views(shuffled(RUN, seed))
@@ -142,6 +144,11 @@ def test_nothing_has_no_recordings() -> None:
     assert recording_views({name: build(name, []) for name in TABLES}) == []
 
 
+@cache
+def keys_before() -> dict[tuple[str, str], str]:
+    return keys(RUN)
+
+
 def keys(tables: Tables) -> dict[tuple[str, str], str]:
     return {name: view.key for name, view in by_name(recording_views(tables)).items()}
 
@@ -160,9 +167,13 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("table", CHANGES)
+TELLING = ("parameters", "findings", "scores", "spectrum")
+"""A number, a text, a number that is no more, and a truth value."""
+
+
+@pytest.mark.parametrize("table", few(TELLING, [name for name in CHANGES if name not in TELLING]))
 def test_a_key_changes_with_its_own_recording_alone(table: str) -> None:
-    before = keys(RUN)
+    before = keys_before()
     rows = RUN[table].to_pylist()
     place = next(i for i, row in enumerate(rows) if (row["sensor"], row["recording"]) == ("b", "r"))
     column, value = CHANGES[table]
@@ -176,13 +187,13 @@ def test_a_key_is_the_same_wherever_the_rows_stand_in_a_table() -> None:
     several = [of("b", "r", parameters=WITHOUT_K), of("a", "r"), of("c", "r", simulated=True)]
     odd = recording_rows("d", "r", ("gyro_y",), found=[0.5, 0.7])
     alone = keys(joined(several[0]))["b", "r"]
-    for order in ([0, 1], [1, 0, 2], [2, 1, 0]):
+    for order in ([0, 1], [2, 1, 0]):
         tables = joined(odd, *(several[i] for i in order), odd | {"recordings": []})
         assert keys(tables)["b", "r"] == alone
 
 
 def test_a_key_does_not_tell_how_the_table_was_kept(tmp_path: Any) -> None:
-    before = keys(RUN)
+    before = keys_before()
     again = {}
     for name, table in RUN.items():
         write_arrow(table, tmp_path / f"{name}.parquet")
@@ -208,7 +219,7 @@ def test_a_key_is_the_same_where_rows_of_recordings_are_mixed() -> None:
         mixed[name] = build(
             name, [g[i] for i in range(turns) for g in groups.values() if i < len(g)]
         )
-    assert keys(mixed) == keys(RUN)
+    assert keys(mixed) == keys_before()
 
 
 def test_a_key_tells_a_missing_number_from_nothing_and_text_from_its_neighbour() -> None:

@@ -1,9 +1,11 @@
 """Long times in one cell of a register."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.thermal.path import temperature_path
+from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
 from imubench_pipeline.estimators.thermal.register import dwells
 from tests.conftest import few
 
@@ -32,16 +34,21 @@ def test_a_path_that_passes_through_its_cells_dwells_in_none():
     assert not found(np.zeros(100, dtype=bool), np.zeros(100))
 
 
-@pytest.mark.parametrize("part", few([1, 6], [0, 2, 3, 4, 5, 7]))
-def test_a_level_of_a_chamber_may_lie_anywhere_in_its_cell(part):
-    n = 40_000
+@cache
+def path_of_a_chamber(n: int) -> TemperaturePath:
     levels = np.array([12.3, 31.7, 22.4, 38.1, 15.8, 27.2, 33.6, 19.9])
     truth = np.empty(n)
     state, mix = levels[0], 1.0 - np.exp(-80.0 / n)
     for i in range(n):
         state += mix * (levels[8 * i // n] - state)
         truth[i] = state
-    path = temperature_path([np.round(truth)], [(0, n)], np.random.default_rng(1))
+    return temperature_path([np.round(truth)], [(0, n)], np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("part", few([1, 6], [0, 2, 3, 4, 5, 7]))
+def test_a_level_of_a_chamber_may_lie_anywhere_in_its_cell(part):
+    n = 40_000
+    path = path_of_a_chamber(n)
     middle = (path.sample > (part + 0.55) * n / 8) & (path.sample < (part + 0.8) * n / 8)
     spread = np.std((path.draws - path.value)[:, middle].mean(axis=1))
     # 24 draws tell a standard deviation to 15 %.

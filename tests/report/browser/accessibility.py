@@ -12,7 +12,7 @@ UNFOLD = "document.querySelectorAll('details').forEach(one => (one.open = true))
 
 ALIKE = """() => {
   const style = document.createElement("style");
-  style.textContent = ".main-svg, tbody tr:nth-child(n + 6), section.channel ~ section.channel"
+  style.textContent = ".main-svg, tbody tr:nth-child(n + 4), section.channel ~ section.channel"
     + " { display: none }";
   document.head.append(style);
 }"""

@@ -8,7 +8,7 @@ from tests.report.browser.made import Report
 from tests.report.browser.reader import Open
 from tests.report.browser.visit import KINDS, Seen
 
-ALIKE = ("made", "sensors/gamma", "recordings/alpha/night 2")
+ALIKE = ("made", "theory", "sensors/alpha", "sensors/gamma", "recordings/alpha/night 2")
 
 
 @pytest.mark.parametrize("kind", KINDS)

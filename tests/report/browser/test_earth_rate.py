@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.report.publish import publish
 from imubench_pipeline.tables import write
+from tests.conftest import few
 from tests.report.browser.accessibility import hindrances
+from tests.report.browser.made import publish_some
 from tests.report.browser.reader import TOO_WIDE, Open, Reader, axis_title, toggle, traces
 from tests.report.tables import joined, site
 from tests.report.test_earth_rate import some
@@ -31,7 +32,8 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, list
         for i in range(400)
     ]  # fmt: skip
     write("envelope", envelope, results / "recordings/s/run/envelope.parquet")
-    publish(site(joined(*several), results), results / "report")
+    made = site(joined(*several), results)
+    publish_some(made, results / "report", [RUN, "earth_rate.html", "recordings/s/unknown.html"])
     return results / "report", several[1]
 
 
@@ -41,7 +43,8 @@ def named(drawn: list[dict[str, Any]], text: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("path", "figures"), [(RUN, 6), ("earth_rate.html", 3), ("recordings/s/unknown.html", 0)]
+    ("path", "figures"),
+    few([(RUN, 6), ("earth_rate.html", 3)], [("recordings/s/unknown.html", 0)]),
 )
 def test_every_figure_is_drawn_and_nothing_is_too_wide_or_hinders_a_reader(
     path: str, figures: int, read: Open, rows: Any
@@ -50,10 +53,17 @@ def test_every_figure_is_drawn_and_nothing_is_too_wide_or_hinders_a_reader(
     assert reader.draw_all() == figures
     assert reader.page.evaluate(TOO_WIDE) == []
     if figures:
-        assert hindrances(reader.page, by_night=path == RUN) == []
+        assert hindrances(reader.page, by_night=False) == []
     if path == RUN:
         narrow: Reader = read(rows[0], path, width=400)
         assert narrow.page.evaluate(TOO_WIDE) == []
+
+
+@pytest.mark.release  # every day the start page is looked at by night
+def test_nothing_hinders_a_reader_by_night(read: Open, rows: Any) -> None:
+    reader: Reader = read(rows[0], RUN)
+    reader.draw_all()
+    assert hindrances(reader.page) == []
 
 
 def test_the_estimates_over_time_are_those_of_the_tables(read: Open, rows: Any) -> None:
@@ -119,9 +129,8 @@ def test_a_gap_in_the_samples_is_left_open(
     ]  # fmt: skip
     results = tmp_path_factory.mktemp("gap")
     write("envelope", envelope, results / "recordings/s/run/envelope.parquet")
-    publish(site(joined(run), results), results / "report")
+    publish_some(site(joined(run), results), results / "report", [RUN])
     reader: Reader = read(results / "report", RUN)
-    assert reader.draw_all() == 6
     (shape,) = (one for one in traces(reader.figure("turning")) if one["fill"] == "toself")
     ends = [k for k, at in enumerate(shape["x"]) if at is None]
     assert len(ends) == 2

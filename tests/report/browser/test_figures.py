@@ -2,10 +2,12 @@
 
 import math
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from tests.report.browser import made
 from tests.report.browser.factors import ARC, DEGREES, FACTORS, MICRO_G
@@ -53,8 +55,28 @@ def column(rows: list[dict[str, Any]], name: str) -> list[float]:
     return [row[name] for row in rows]
 
 
-def test_the_curves_of_all_sensors(read: Open, bench: Report) -> None:
-    figure = read(bench.folder).figure("overlay")
+def kept(browser: Browser, bench: Report, path: str) -> Iterator[Reader]:
+    """A page that is opened once, for tests that leave it as they found it."""
+    reader = Reader(browser)
+    reader.begin(bench.folder, 1280, 900, "light")
+    reader.open(path)
+    yield reader
+    assert reader.end() == []
+    reader.page.context.close()
+
+
+@pytest.fixture(scope="module")
+def start(browser: Browser, bench: Report) -> Iterator[Reader]:
+    yield from kept(browser, bench, "index.html")
+
+
+@pytest.fixture(scope="module")
+def night(browser: Browser, bench: Report) -> Iterator[Reader]:
+    yield from kept(browser, bench, OF_NIGHT)
+
+
+def test_the_curves_of_all_sensors(start: Reader, bench: Report) -> None:
+    figure = start.figure("overlay")
     drawn = traces(figure)
     of_alpha = {f"{A}, {NIGHT}", f"{A} (simulated), sim_published"}
     assert names(drawn) == of_alpha | {f"{B}, {log.recording}" for log in made.DATED}
@@ -75,8 +97,8 @@ def test_the_curves_of_all_sensors(read: Open, bench: Report) -> None:
     np.testing.assert_allclose(bands[0]["y"], expected, rtol=LEVELS)
 
 
-def test_sensors_and_layers_are_switched(read: Open, bench: Report) -> None:
-    figure = read(bench.folder).figure("overlay")
+def test_sensors_and_layers_are_switched(start: Reader) -> None:
+    figure = start.figure("overlay")
     count = len(traces(figure))
     toggle(figure, A).uncheck()
     assert all(name.startswith(B) for name in names(traces(figure)))
@@ -95,11 +117,13 @@ def test_sensors_and_layers_are_switched(read: Open, bench: Report) -> None:
     assert len(traces(figure)) == count
 
 
-def test_lines_of_the_datasheet_among_sensors(read: Open, bench: Report) -> None:
-    figure = read(bench.folder).figure("overlay")
+@pytest.mark.release  # every day those of one channel and of a pair are asked for
+def test_lines_of_the_datasheet_among_sensors(start: Reader) -> None:
+    figure = start.figure("overlay")
     before = len(traces(figure))
     toggle(figure, "datasheet").check()
     added = traces(figure)[before:]
+    toggle(figure, "datasheet").uncheck()
     assert {one["line"]["dash"] for one in added} == {"dot"}
     # 0.007 °/s/√Hz is 0.42 °/√h, or that over √2 if it is one-sided; and 8 °/h.
     at_start = sorted(one["y"][0] for one in added)
@@ -134,6 +158,7 @@ def test_axis_method_and_recordings_are_chosen(read: Open, bench: Report) -> Non
     assert names(traces(figure)) == {f"{A} (simulated), sim_published", f"{B}, {last}"}
 
 
+@pytest.mark.release  # every day the same figure is asked for on the start page
 def test_the_recordings_of_one_sensor(read: Open, bench: Report) -> None:
     reader = read(bench.folder, "sensors/beta.html")
     figure = reader.figure("overlay")
@@ -181,9 +206,8 @@ def test_ticks_follow_the_zoom(read: Open, bench: Report) -> None:
     assert [float(text) for text in shown] == pytest.approx(inside)
 
 
-def test_parameters_of_all_sensors(read: Open, bench: Report) -> None:
-    reader = read(bench.folder)
-    figure = reader.figure("forest", symbol="N")
+def test_parameters_of_all_sensors(start: Reader, bench: Report) -> None:
+    figure = start.figure("forest", symbol="N")
     shown = sorted(one["x"][0] for one in traces(figure))
     best = {"recommended": True, "channel": "gyro_x", "parameter": "N"}
     rows = sorted(bench.of("parameters", **best), key=lambda row: row["value"])
@@ -193,8 +217,11 @@ def test_parameters_of_all_sensors(read: Open, bench: Report) -> None:
     assert (bar["arrayminus"], bar["array"]) == (
         pytest.approx([0.03], rel=1e-3), pytest.approx([0.039], rel=1e-3)
     )  # fmt: skip
-    reader.page.get_by_role("combobox", name=MODEL).select_option("likelihood_gm")
+    model = start.page.get_by_role("combobox", name=MODEL)
+    before = model.input_value()
+    model.select_option("likelihood_gm")
     assert min(one["x"][0] for one in traces(figure)) == pytest.approx(0.3 * 1.02, rel=1e-4)
+    model.select_option(before)
 
 
 def test_a_parameter_without_a_value_has_another_mark(read: Open, bench: Report) -> None:
@@ -236,8 +263,8 @@ def test_the_curve_of_a_channel_with_its_methods(read: Open, bench: Report) -> N
     assert len({one["name"] for one in chosen(traces(figure), mode="lines")} - {None}) == 5 + 3 + 3
 
 
-def test_the_spectrum(read: Open, bench: Report) -> None:
-    figure = read(bench.folder, OF_NIGHT).figure("spectrum", channel="gyro_x")
+def test_the_spectrum(night: Reader, bench: Report) -> None:
+    figure = night.figure("spectrum", channel="gyro_x")
     drawn = traces(figure)
     fit = only(drawn, name="fit N+GM+K")
     marks = chosen(drawn, mode="markers")
@@ -254,10 +281,11 @@ def test_the_spectrum(read: Open, bench: Report) -> None:
     assert fit["y"][-1] == pytest.approx(0.005, rel=0.01)
     toggle(figure, "line").uncheck()
     assert len(traces(figure)) == len(drawn) - 1
+    toggle(figure, "line").check()
 
 
-def test_samples_over_time_with_findings_and_temperature(read: Open, bench: Report) -> None:
-    figure = read(bench.folder, OF_NIGHT).figure("series", channel="gyro_x")
+def test_samples_over_time_with_findings_and_temperature(night: Reader) -> None:
+    figure = night.figure("series", channel="gyro_x")
     low, high, mean, drift, warmth = traces(figure)
     bias = 0.2  # °/s
     assert np.mean(mean["y"]) == pytest.approx(bias, rel=0.02)
@@ -283,12 +311,15 @@ def test_samples_over_time_with_findings_and_temperature(read: Open, bench: Repo
     assert canvas.evaluate(shapes) == []
     toggle(figure, "temperature").uncheck()
     assert len(traces(figure)) == 4 and figure.locator("svg .y3title").count() == 0
-    toggle(figure, "drift: the mean alone, less that of the whole log").uncheck()
+    layer = "drift: the mean alone, less that of the whole log"
+    toggle(figure, layer).uncheck()
     assert len(traces(figure)) == 3 and figure.locator("svg .y2title").count() == 0
+    for label in ("findings", "temperature", layer):
+        toggle(figure, label).check()
 
 
-def test_the_histogram(read: Open, bench: Report) -> None:
-    figure = read(bench.folder, OF_NIGHT).figure("histogram", channel="gyro_x")
+def test_the_histogram(night: Reader) -> None:
+    figure = night.figure("histogram", channel="gyro_x")
     bars, normal = traces(figure)
     share = np.multiply(bars["y"], bars["width"])
     assert share.sum() == pytest.approx(1.0)
@@ -371,8 +402,8 @@ def test_everything_is_done_by_the_keyboard(read: Open, bench: Report) -> None:
     assert reader.page.get_by_role("combobox", name=MODEL).input_value() == made.METHODS[-1]
 
 
-def test_the_units_of_the_figures_follow_the_reader(read: Open, bench: Report) -> None:
-    reader = read(bench.folder, OF_NIGHT)
+def test_the_units_of_the_figures_follow_the_reader(night: Reader, bench: Report) -> None:
+    reader = night
     rows = bench.of("allan", recording=NIGHT, channel="gyro_x")
     for choice, units in FACTORS["gyro"].items():
         reader.page.get_by_label("Gyroscopes in").select_option(choice)
@@ -382,8 +413,9 @@ def test_the_units_of_the_figures_follow_the_reader(read: Open, bench: Report) -
         measured = only(traces(reader.figure("allan", channel="gyro_x")), mode="lines+markers")
         expected = np.multiply(column(rows, "adev"), units["adev"][1])
         np.testing.assert_allclose(measured["y"], expected, rtol=LEVELS)
-        # The unit of the other quantity stays.
-        assert "(µg)" in axis_title(reader.figure("allan", channel="accel_x"), "y")
+    # The unit of the other quantity stays.
+    assert "(µg)" in axis_title(reader.figure("allan", channel="accel_x"), "y")
+    reader.page.get_by_label("Gyroscopes in").select_option(next(iter(FACTORS["gyro"])))
 
 
 def test_the_plotting_script_is_compiled_once_and_has_no_styles_of_maps(bench: Report) -> None:

@@ -2,23 +2,20 @@
 
 import io
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
 from PIL import Image, ImageColor
 
+from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import CUT_CAPTIONS, TOO_WIDE, Open, Reader
 
 OF_NIGHT = f"recordings/alpha/{made.NIGHT.recording}.html"
-KINDS = (
-    "index", "compare", "recordings.html", "datasheets", "theory", "made", "sensors/alpha",
-    "sensors/gamma", "devices/", "recordings/alpha/night 1", "recordings/alpha/night 2",
-    "recordings/beta/run_1",
-)  # fmt: skip
-DRAWN = ("index", "compare", "sensors/alpha", "devices/", "recordings/alpha/night 1")
-"""The figures of the others are as these."""
+WRITTEN = ("recordings.html", "datasheets", "theory", "sensors/alpha")
+"""Pages at which it is looked without their figures."""
 
 INK = """() => document.querySelector("figure[data-kind=allan] .canvas").data
   .find((one) => one.name === "likelihood").line.color"""
@@ -44,12 +41,27 @@ def picture(reader: Reader, **how: Any) -> Image.Image:
     return Image.open(io.BytesIO(reader.page.screenshot(**how))).convert("RGB")
 
 
-def test_no_page_is_wider_than_a_telephone(read: Open, bench: Report) -> None:
+@pytest.mark.parametrize(
+    ("drawn", "written"),
+    few(
+        [(("compare", "recordings/alpha/night 1"), WRITTEN)],
+        [
+            (
+                ("index", "sensors/alpha", "devices/"),
+                ("made", "sensors/gamma", "recordings/alpha/night 2", "recordings/beta/run_1"),
+            )
+        ],
+    ),
+    ids=str,
+)
+def test_no_page_is_wider_than_a_telephone(
+    drawn: Sequence[str], written: Sequence[str], read: Open, bench: Report
+) -> None:
     reader = read(bench.folder, width=390, height=5000)
     wide = {}
-    for begin in KINDS:
+    for begin in (*drawn, *written):
         reader.open(bench.page(begin))
-        if begin in DRAWN:
+        if begin in drawn:
             reader.draw_all()
         wide[begin] = reader.page.evaluate(TOO_WIDE) + reader.page.evaluate(CUT_CAPTIONS)
     assert {begin: found for begin, found in wide.items() if found} == {}
@@ -77,7 +89,7 @@ def test_caption_and_first_column_stay_where_a_table_is_scrolled(read: Open, ben
     assert [name for name, *stays in tables if stays != [True, True]] == []
 
 
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", few([390], [1280]))
 def test_there_is_something_to_see(width: int, read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT, width=width)
     for show in (lambda: None, lambda: reader.figure("allan", channel="gyro_x")):
@@ -100,7 +112,7 @@ def test_a_page_is_dark_by_night(read: Open, bench: Report) -> None:
     assert sorted(pixels)[len(pixels) // 2] < 60
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", few(["dark"], ["light"]))
 def test_a_page_is_printed_light_and_whole(scheme: str, read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT, scheme=scheme)
     ink(reader)  # the script that draws is there from now on

@@ -3,12 +3,12 @@
 import re
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from imubench_pipeline.report.payload import FOREST
 from tests.report.browser import made
-from tests.report.browser.reader import Open, Reader, toggle, traces
-from tests.report.pages import unfolded
+from tests.report.browser.reader import Open, toggle, traces
 
 NIGHT = made.NIGHT.recording
 OF_NIGHT = f"recordings/alpha/{NIGHT}.html"
@@ -33,6 +33,10 @@ def test_one_file_needs_no_other(read: Open, alone: Path) -> None:
         "all => all.map(a => a.getAttribute('href'))"
     )
     assert not [link for link in links if link.startswith(kinds)]
+    # The choice of units lasts from page to page.
+    reader.page.get_by_label("Gyroscopes in").select_option("SI: rad/s")
+    reader.page.get_by_role("link", name=NIGHT).first.click()
+    expect(reader.page.locator("tr.recommended data").first).to_have_text("8.7×10⁻⁵")
 
 
 def test_pages_of_one_file_are_turned(read: Open, alone: Path) -> None:
@@ -71,51 +75,16 @@ def test_one_file_is_read_where_nothing_is_unfolded(browser: Browser, alone: Pat
 
 
 def test_a_place_in_one_file_has_an_address(read: Open, alone: Path) -> None:
-    reader = read(alone.parent, f"{alone.name}")
+    reader = read(alone.parent, f"{alone.name}#/theory.html#bias-instability")
     page = reader.page
-    page.goto(alone.as_uri() + "#/theory.html#bias-instability")
-    page.reload()
     expect(page.locator("#bias-instability")).to_be_in_viewport()
     marked = page.locator("header nav a[aria-current]")
     expect(marked).to_have_text(["Theory"])
     page.goto(alone.as_uri() + "#/nothing.html")
-    page.reload()
-    assert head(page) == made.TITLE
+    expect(page.locator("main h1")).to_have_text(made.TITLE)
 
 
-def test_every_link_of_one_file_leads_somewhere(read: Open, alone: Path) -> None:
-    reader = read(alone.parent, alone.name)
-    lost = reader.page.evaluate(
-        """text => {
-          const whole = new DOMParser().parseFromString(text, "text/html");
-          const templates = [...whole.querySelectorAll("template[id^='page:']")];
-          const pages = new Map(templates.map(one => [one.id.slice(5), one.content]));
-          const lost = [];
-          for (const [path, content] of pages) {
-            for (const link of content.querySelectorAll("a[href]")) {
-              const url = new URL(link.getAttribute("href"), `file:///${path}`);
-              const page = pages.get(decodeURIComponent(url.pathname.slice(1)));
-              const section = decodeURIComponent(url.hash.slice(1));
-              const state = section.includes("=");  // what is chosen on the page
-              if (page && (!section || state || page.getElementById(section))) continue;
-              lost.push(`${path}: ${link.outerHTML}`);
-            }
-          }
-          return pages.size ? lost : ["no pages"];
-        }""",
-        unfolded(alone.read_text(encoding="utf-8")),
-    )
-    assert lost == []
-
-
-def test_the_choice_of_units_lasts_from_page_to_page(read: Open, alone: Path) -> None:
-    reader: Reader = read(alone.parent, alone.name)
-    reader.page.get_by_label("Gyroscopes in").select_option("SI: rad/s")
-    reader.page.get_by_role("link", name=NIGHT).first.click()
-    cell = reader.page.locator("tr.recommended data").first
-    expect(cell).to_have_text("8.7×10⁻⁵")
-
-
+@pytest.mark.release  # every day test_compare.py asks it of the folder
 def test_what_is_chosen_stands_behind_the_page(read: Open, alone: Path) -> None:
     reader = read(alone.parent, f"{alone.name}#/compare.html#a=alpha&b=beta&axis=gyro_x")
     page = reader.page

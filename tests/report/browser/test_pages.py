@@ -6,17 +6,24 @@ from collections import Counter
 from pathlib import Path
 from urllib.parse import unquote
 
+import pytest
 from playwright.sync_api import Browser
 
 from imubench_pipeline.report.payload import FOREST
-from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.static_figures.files import cross_figures
 from imubench_pipeline.report.view import recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
+from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import READY, Open
-from tests.report.browser.visit import Seen
+from tests.report.browser.visit import LOOK, Seen
+
+OF_ONE = [
+    "sensors/beta.html", "recordings/beta/alone.html", "recordings.html", "datasheets.html",
+    "theory.html", "made.html",
+]  # fmt: skip
+"""Those of a report of one recording, beside the start page."""
 
 
 def test_no_page_complains_or_asks_for_anything_else(seen: Seen) -> None:
@@ -53,15 +60,27 @@ def test_a_browser_that_cannot_unpack_says_so_and_shows_what_is_plain(
 
 
 def test_every_figure_is_drawn(seen: Seen, bench: Report) -> None:
-    empty = {path: page["empty"] for path, page in seen.pages.items() if page["empty"]}
-    assert empty == {}
+    empty = {path: seen.pages[path]["empty"] for path in seen.figures}
+    assert {path: found for path, found in empty.items() if found} == {}
+    offered = {path: page["offered"] for path, page in seen.pages.items()}
+    assert seen.figures.items() <= offered.items()
     night = seen.figures[f"recordings/alpha/{made.NIGHT.recording}.html"]
     assert night == 3 * len(("allan", "spectrum", "series", "histogram")) + 1  # of its errors
     assert seen.figures["index.html"] == 1 + len(FOREST)
-    assert seen.figures["sensors/gamma.html"] == seen.figures["recordings/gamma/only.html"] == 0
+    assert offered["sensors/gamma.html"] == offered["recordings/gamma/only.html"] == 0
     followed = {(row["channel"], row["parameter"]) for row in bench.rows["drift"]}
     device = bench.page("devices/")
     assert seen.figures[device] == len(followed)
+
+
+@pytest.mark.release  # long; every day one page of each kind is drawn
+def test_every_figure_of_the_others_is_drawn(read: Open, seen: Seen, bench: Report) -> None:
+    reader = read(bench.folder)
+    for path in seen.pages.keys() - seen.figures.keys():
+        reader.open(path)
+        assert reader.draw_all() == seen.pages[path]["offered"], path
+        looked = reader.page.evaluate(LOOK)
+        assert looked["empty"] == looked["wide"] == [], path
 
 
 def test_every_link_leads_somewhere(seen: Seen, bench: Report) -> None:
@@ -140,12 +159,12 @@ def test_a_sensor_without_a_datasheet_says_so(seen: Seen) -> None:
     assert "No figures of a datasheet" in seen.pages["sensors/beta.html"]["text"]
 
 
-def test_a_report_of_one_recording(read: Open, tmp_path: Path) -> None:
-    publish(made.single(tmp_path), tmp_path / "report")
+@pytest.mark.parametrize("others", few([[]], [OF_ONE]), ids=len)
+def test_a_report_of_one_recording(others: list[str], read: Open, tmp_path: Path) -> None:
+    made.publish_some(made.single(tmp_path), tmp_path / "report", ("index.html", *others))
     reader = read(tmp_path / "report")
     assert reader.draw_all() == 1 + len(FOREST)
-    for path in ("sensors/beta.html", "recordings/beta/alone.html"):
+    for path in others:
         reader.open(path)
-        assert reader.draw_all() > 0
-    for path in ("recordings.html", "datasheets.html", "theory.html", "made.html"):
-        reader.open(path)
+        if path.startswith(("sensors", "recordings/")):
+            assert reader.draw_all() > 0

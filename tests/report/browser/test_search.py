@@ -4,15 +4,17 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader
 
 
-@pytest.fixture(params=["folder", "one file"])
-def opened(request: pytest.FixtureRequest, read: Open, bench: Report, alone: Path) -> Reader:
+@pytest.fixture(params=few(["folder"], ["one file"]))
+def opened(request: pytest.FixtureRequest, read: Open, bench: Report) -> Reader:
     if request.param == "folder":
         return read(bench.folder, "sensors/beta.html")
+    alone: Path = request.getfixturevalue("alone")
     return read(alone.parent, f"{alone.name}#/sensors/beta.html")
 
 

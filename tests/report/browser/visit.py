@@ -7,12 +7,15 @@ from tests.report.browser.accessibility import hindrances
 from tests.report.browser.made import Report
 from tests.report.browser.reader import TOO_WIDE, Reader
 
-KINDS = ("index", "compare", "recordings.html", "datasheets", "theory", "sensors/alpha", "devices/",
+KINDS = ("index", "compare", "recordings.html", "datasheets", "devices/",
          "recordings/alpha/night 1")  # fmt: skip
 """One page of each kind; accessibility is looked at there, as it takes longer than to draw."""
 
-BY_NIGHT = ("index", "recordings/alpha/night 1")
+BY_NIGHT = ("index",)
 """Of these by night, too: most colours of text stand there. Before a release, all of them."""
+
+DRAWN = ("index", "compare", "devices/", "recordings/alpha/night 1")
+"""The figures of the others are as these. Before a release, all of them are drawn."""
 
 LOOK = f"""() => ({{
   wide: ({TOO_WIDE})(),
@@ -22,6 +25,7 @@ LOOK = f"""() => ({{
   links: [...document.querySelectorAll("a[href], link[href], [src]")]
     .map((one) => one.getAttribute("href") ?? one.getAttribute("src")),
   text: document.querySelector("main").innerText,
+  offered: document.querySelectorAll("figure[data-kind]").length,
   empty: [...document.querySelectorAll("figure[data-kind] .canvas")]
     .filter((one) => !one.querySelector("svg.main-svg") || !one.data?.length)
     .map((one) => one.getAttribute("aria-label")),
@@ -30,7 +34,7 @@ LOOK = f"""() => ({{
 
 @dataclass
 class Seen:
-    """What a reader found who opened every page and looked at every figure."""
+    """What a reader found who opened every page and looked at every figure of some."""
 
     pages: dict[str, dict[str, Any]]
     figures: dict[str, int]
@@ -40,14 +44,15 @@ class Seen:
 
 def visit(window: Reader, report: Report) -> Seen:
     pages, figures, hinder = {}, {}, {}
-    kinds, dark = ({report.page(kind) for kind in some} for some in (KINDS, BY_NIGHT))
+    kinds, dark, drawn = ({report.page(kind) for kind in some} for some in (KINDS, BY_NIGHT, DRAWN))
     window.begin(report.folder, 1280, 900, "light")
     for path in report.pages:
         if hinder:
             window.page.goto("about:blank")  # or the figures of the page before would turn light
             window.page.emulate_media(color_scheme="light")
         window.open(path)
-        figures[path] = window.draw_all()
+        if path in drawn:
+            figures[path] = window.draw_all()
         pages[path] = window.page.evaluate(LOOK)
         if path in kinds:
             hinder[path] = hindrances(window.page, by_night=path in dark)
