@@ -1,7 +1,7 @@
 import allantools
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.allan import allan_variance, cluster_sizes, of_phase
@@ -15,7 +15,6 @@ def by_definition(samples: np.ndarray, n: int) -> float:
     return float(np.mean(np.square(differences)) / 2)
 
 
-@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 200), st.floats(-10, 10))
 def test_agrees_with_its_definition(seed: int, length: int, offset: float) -> None:
     samples = np.random.default_rng(seed).standard_normal(length) + offset

@@ -45,8 +45,8 @@ def test_a_good_log_has_nothing_to_say(
 def test_warnings_and_rejections_set_the_exit_status(
     logs: Path, rng: np.random.Generator, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    log = simulate(GYRO, RATE, 100_000, rng)
-    log[50_000:] += 0.01
+    log = simulate(GYRO, RATE, 30_000, rng)
+    log[15_000:] += 0.01
     drop(logs, "moved", log)
     (logs / "one/empty.csv").write_text("")
     assert check(logs) == 1

@@ -26,6 +26,7 @@ from imubench_pipeline.noise import (
 )
 from imubench_pipeline.noise.growth import SensorStart
 from imubench_pipeline.noise.simulate import simulate
+from tests.conftest import few
 from tests.noise.examples import EXAMPLES, model_of, named
 
 Array = NDArray[np.float64]
@@ -46,12 +47,12 @@ def fractional_noise(shape: tuple[int, int], rng: np.random.Generator, earlier: 
     return np.asarray(fftconvolve(white, weights[None, :], axes=1)[:, earlier : samples + earlier])
 
 
-def logs(model: NoiseModel, begun: bool, rng: np.random.Generator) -> Array:
+def logs(model: NoiseModel, begun: bool, rng: np.random.Generator, runs: int = RUNS) -> Array:
     """Return simulated logs; flicker noise has a long past, or it begins with the log."""
     samples = round((BEFORE + max(TIMES)) * RATE)
     flicker = model.B if model.T_B is None else 0.0
     rest = replace(model, B=0.0) if flicker else model
-    log = np.array([simulate(rest, RATE, samples, stream) for stream in rng.spawn(RUNS)])
+    log = np.array([simulate(rest, RATE, samples, stream) for stream in rng.spawn(runs)])
     if flicker:
         earlier = 0 if begun else 8 * samples
         log += flicker * fractional_noise(log.shape, rng, earlier)
@@ -76,11 +77,12 @@ def spread(errors: Array) -> tuple[float, float]:
     return sigma, float(squares.std()) / math.sqrt(len(errors)) / (2.0 * sigma)
 
 
+@pytest.mark.parametrize("runs", few([300], [RUNS]))
 @pytest.mark.parametrize("calibrated", [True, False])
 @pytest.mark.parametrize("term", EXAMPLES, ids=named)
-def test_each_term_grows_as_in_simulated_runs(term: Term, calibrated: bool) -> None:
+def test_each_term_grows_as_in_simulated_runs(term: Term, calibrated: bool, runs: int) -> None:
     rng = np.random.default_rng([7, EXAMPLES.index(term), calibrated])
-    log = logs(model_of(term), not calibrated, rng)
+    log = logs(model_of(term), not calibrated, rng, runs)
     rest = round(BEFORE * RATE)
     # A sample stands for the middle of its interval: a walk begins half an interval later.
     start: SensorStart = Uncalibrated(bias=0.0, on_time=BEFORE - 0.5 / RATE)

@@ -36,7 +36,7 @@ def gauss_markov_variance(tau: np.ndarray, B: float, T_B: float) -> np.ndarray:
 def test_the_allan_variance_of_simulated_logs_is_the_theoretical_one(rng) -> None:
     sizes = np.array([2, 10, 50, 200, 800, 2000])
     tau = sizes / RATE
-    found = np.array([reconstructed_variance(MODEL, RATE, 20_000, sizes, rng) for _ in range(400)])
+    found = np.array([reconstructed_variance(MODEL, RATE, 20_000, sizes, rng) for _ in range(200)])
     expected = (
         MODEL.N**2 / tau
         + gauss_markov_variance(tau, MODEL.B, 20.0)
@@ -64,9 +64,10 @@ def test_the_spectrum_of_simulated_logs_is_the_theoretical_one(rng) -> None:
 
 def test_gauss_markov_starts_stationary(rng) -> None:
     model = NoiseModel(B=1.0, T_B=1000.0)
-    starts = [simulate(model, RATE, 1, rng)[0] for _ in range(4000)]
+    starts = [simulate(model, RATE, 1, rng)[0] for _ in range(1000)]
     stationary = model.state_space(RATE).initial_variance[0, 0]
-    assert np.var(starts) == pytest.approx(stationary, rel=0.1)
+    # The variance of 1000 is known to 4.5 %.
+    assert np.var(starts) == pytest.approx(stationary, rel=0.18)
 
 
 def test_a_log_depends_on_its_seed_only() -> None:
@@ -108,7 +109,7 @@ def test_block_sums_are_distributed_as_the_sums_of_a_log(rng, model: NoiseModel)
 def test_every_term_is_simulated_as_its_allan_variance_says(rng, kind: type[Term]) -> None:
     model = model_of(example(kind))
     sizes = np.array([1, 2, 5, 10, 50, 200, 800])
-    found = np.array([reconstructed_variance(model, RATE, 8000, sizes, rng) for _ in range(150)])
+    found = np.array([reconstructed_variance(model, RATE, 8000, sizes, rng) for _ in range(80)])
     error = found.std(axis=0) / np.sqrt(len(found))
     expected = model.allan_variance(sizes / RATE, RATE)
     tolerance = 4.5 * error + 5e-3 * expected

@@ -17,6 +17,7 @@ from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
 from imubench_pipeline.noise import NoiseModel
 from tests.alignment.triads import ALIKE, ATTITUDE, ONE, POSITIONS, SITE, TWO, UNLIKE
+from tests.conftest import few
 
 angles = st.floats(-3.1, 3.1)
 
@@ -40,7 +41,7 @@ def test_roll_and_pitch_are_those_of_gravity_alone():
     assert heading == pytest.approx(math.atan2(-level[1], level[0]))
 
 
-@pytest.mark.parametrize("triad", [ALIKE, UNLIKE])
+@pytest.mark.parametrize("triad", few([UNLIKE], [ALIKE]))
 @pytest.mark.parametrize("name", POSITIONS)
 def test_errors_are_as_large_as_it_says(name, triad):
     positions = POSITIONS[name]

@@ -76,11 +76,16 @@ def put_at_rest(
 
 
 def run(
-    folder: Path, static: list[Path], *, sensor: dict[str, Any] | None = None, **declared: Any
+    folder: Path,
+    static: list[Path],
+    *,
+    sensor: dict[str, Any] | None = None,
+    asked: dict[str, Any] | None = None,
+    **declared: Any,
 ) -> dict[str, list[dict[str, Any]]]:
     """What a run finds in a kept recording."""
     settings = {
-        "earth_rate": EarthRateSettings().model_dump(mode="json"),
+        "earth_rate": EarthRateSettings(**asked or {}).model_dump(mode="json"),
         "sensor": SENSOR if sensor is None else sensor,
         "two_position": DECLARED | declared,
     }

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,11 @@ from tests.earth_rate.runs import EARTH, PAPER, RATE, turned
 
 OWN: dict[str, Any] = {"device": "7", "simulated": False}
 
+# What a run predicts takes longer than what it finds: of one run alone all of it is asked for.
+briefly = partial(run, asked={"goals": (1.0,), "run_time": "2 min", "draws": 20})
+
+Found = dict[str, list[dict[str, Any]]]
+
 
 def by_method(rows: list[dict[str, Any]], part: str = "whole") -> dict[str, dict[str, Any]]:
     return {row["method"]: row for row in rows if row["part"] == part}
@@ -37,8 +43,13 @@ def rest(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return put_at_rest(tmp_path_factory.mktemp("s") / "night")
 
 
-def test_the_rate_is_found_within_what_is_said_of_it(tmp_path: Path, rest: Path) -> None:
-    found = run(put(tmp_path / "a", turned_log()), [rest], last=["5 min"])
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory, rest: Path) -> Found:
+    folder = put(tmp_path_factory.mktemp("t") / "a", turned_log())
+    return run(folder, [rest], last=["5 min"])
+
+
+def test_the_rate_is_found_within_what_is_said_of_it(found: Found) -> None:
     for table in EARTH_RATE_TABLES:
         build(table, found[table])  # the columns and their types are those of the table
     rows = by_method(found["earth_rate"])
@@ -64,19 +75,19 @@ def test_the_rate_is_found_within_what_is_said_of_it(tmp_path: Path, rest: Path)
     assert senses == [1, -1] * 10
 
 
-def test_the_courses_end_with_the_estimates(tmp_path: Path, rest: Path) -> None:
-    found = run(put(tmp_path / "a", turned_log()), [rest])
+def test_the_courses_end_with_the_estimates(found: Found) -> None:
     rows = by_method(found["earth_rate"])
+    series = [one for one in found["earth_rate_series"] if one["part"] == "whole"]
     for method, row in rows.items():
-        own = [one for one in found["earth_rate_series"]
+        own = [one for one in series
                if (one["method"], one["quantity"]) == (method, "rate")]  # fmt: skip
         assert own[-1]["value"] == row["value"] and own[-1]["sigma"] == row.get("sigma")
         assert [one["time"] for one in own] == sorted(one["time"] for one in own)
     # Before the second position is seen the filter says nothing.
-    of_filter = [one for one in found["earth_rate_series"]
+    of_filter = [one for one in series
                  if (one["method"], one["quantity"]) == ("filter", "rate")]  # fmt: skip
     assert of_filter[0]["time"] > 30.0
-    drift = [one for one in found["earth_rate_series"] if one["quantity"] == "drift"]
+    drift = [one for one in series if one["quantity"] == "drift"]
     assert drift and all(abs(one["value"] - 0.002) < 6 * one["sigma"] + 1e-3 for one in drift)
 
 
@@ -84,7 +95,7 @@ def test_sixty_seconds_never_know_the_rate_better_than_white_noise_allows(
     tmp_path: Path, rest: Path
 ) -> None:
     log = {"gyro_x": turned([29.0], 60.0)}
-    found = run(put(tmp_path / "a", log), [rest], latitude="40 deg")
+    found = briefly(put(tmp_path / "a", log), [rest], latitude="40 deg")
     least = PAPER.N / math.sqrt(60.0) / math.cos(math.radians(40.0))
     rows = by_method(found["earth_rate"])
     for method in ("pairs", "filter", "smoother"):
@@ -96,9 +107,10 @@ def test_sixty_seconds_never_know_the_rate_better_than_white_noise_allows(
 
 
 def test_the_sign_of_the_latitude_changes_nothing(tmp_path: Path, rest: Path) -> None:
-    folder = put(tmp_path / "a", turned_log())
+    folder = put(tmp_path / "a", {"gyro_x": turned_log()["gyro_x"][: round(120 * RATE)]})
     north, south = (
-        by_method(run(folder, [rest], latitude=at)["earth_rate"]) for at in ("40 deg", "-40 deg")
+        by_method(briefly(folder, [rest], latitude=at)["earth_rate"])
+        for at in ("40 deg", "-40 deg")
     )
     for method, row in north.items():
         assert row["value"] == south[method]["value"]
@@ -108,33 +120,35 @@ def test_the_sign_of_the_latitude_changes_nothing(tmp_path: Path, rest: Path) ->
 def test_a_known_bias_and_a_drift_enter_the_filter(tmp_path: Path, rest: Path) -> None:
     folder = put(tmp_path / "a", {"gyro_x": turned_log()["gyro_x"][: round(90 * RATE)]})
     plain, known, drifting = (
-        by_method(run(folder, [rest], **more)["earth_rate"])["filter"]["sigma"]
+        by_method(briefly(folder, [rest], **more)["earth_rate"])["filter"]["sigma"]
         for more in ({}, {"turn_on_bias": "1 deg/h"}, {"drift": "10000 deg/h/h"})
     )
     assert known < plain < drifting
 
 
 def test_a_sense_that_is_not_known_is_said(tmp_path: Path, rest: Path) -> None:
-    found = run(put(tmp_path / "a", turned_log(first=-1)), [rest], first=None)
+    found = briefly(put(tmp_path / "a", turned_log(first=-1)), [rest], first=None)
     row = by_method(found["earth_rate"])["pairs"]
     assert row["status"] == "ambiguous" and row["value"] < 0.0
     assert "state 'first: north' or 'first: south'" in row["reason"]
     assert any("assumed" in one["doubts"] for one in found["turning"] if one["what"] == "doubt")
 
 
-def test_turns_that_the_schedule_alone_says_are_a_doubt(tmp_path: Path, rest: Path) -> None:
+def test_turns_that_the_schedule_alone_says_are_a_doubt(
+    tmp_path: Path, rest: Path, found: Found
+) -> None:
     # Half the noise: the level alternates by some 5 standard errors, and no turn is seen.
     noise = NoiseModel(N=PAPER.N / 2.0)
     log = {"gyro_x": turned(EVERY_30, 600.0, peak=0.0, noise=noise)}
     folder = put(tmp_path / "a", log)
-    doubted = by_method(run(folder, [rest])["earth_rate"])
+    doubted = by_method(briefly(folder, [rest])["earth_rate"])
     assert {doubted[name]["status"] for name in ("pairs", "filter")} == {"ambiguous"}
     assert "19 of 19 turns rest on the schedule" in doubted["filter"]["reason"]
     assert "state 'trust_schedule: true'" in doubted["filter"]["reason"]
     assert doubted["known_rate"]["status"] == "given"
-    trusted = by_method(run(folder, [rest], trust_schedule=True)["earth_rate"])["filter"]
+    trusted = by_method(briefly(folder, [rest], trust_schedule=True)["earth_rate"])["filter"]
     assert trusted["status"] == "ok" and "19 of 19" in trusted["reason"]
-    seen = by_method(run(put(tmp_path / "b", turned_log()), [rest])["earth_rate"])["filter"]
+    seen = by_method(found["earth_rate"])["filter"]
     assert seen["status"] == "ok" and "reason" not in seen
 
 
@@ -142,7 +156,7 @@ def test_the_column_with_the_position_decides(tmp_path: Path, rest: Path) -> Non
     log = turned_log(peak=0.0, first=-1)
     turns = np.searchsorted(EVERY_30, np.arange(len(log["gyro_x"])) / RATE)
     folder = put(tmp_path / "a", log | {"position": -((-1.0) ** turns)})
-    found = run(folder, [rest], first=None)
+    found = briefly(folder, [rest], first=None)
     row = by_method(found["earth_rate"])["filter"]
     assert row["status"] == "ok" and abs(row["off_sigma"]) < 3.5
     turn = next(one for one in found["turning"] if one["what"] == "turn")
@@ -152,8 +166,8 @@ def test_the_column_with_the_position_decides(tmp_path: Path, rest: Path) -> Non
 
 def test_times_count_from_the_first_sample_of_the_recording(tmp_path: Path, rest: Path) -> None:
     log = {"gyro_x": turned_log()["gyro_x"][: round(120 * RATE)]}
-    plain = run(put(tmp_path / "a", log), [rest])
-    later = run(put(tmp_path / "b", log, begins=60.0), [rest])
+    plain = briefly(put(tmp_path / "a", log), [rest])
+    later = briefly(put(tmp_path / "b", log, begins=60.0), [rest])
     for table in ("turning", "earth_rate_series"):
         for one, other in zip(plain[table], later[table], strict=True):
             for name in {"start", "stop", "time"} & set(one):
@@ -164,7 +178,7 @@ def test_times_count_from_the_first_sample_of_the_recording(tmp_path: Path, rest
 
 
 def test_a_log_without_turns_says_so(tmp_path: Path, rest: Path) -> None:
-    found = run(put(tmp_path / "a", {"gyro_x": turned([], 600.0)}), [rest])
+    found = briefly(put(tmp_path / "a", {"gyro_x": turned([], 600.0)}), [rest])
     assert {row["status"] for row in found["earth_rate"]} == {"no_turns"}
     assert "nothing shows that the log was turned every 30 s" in found["earth_rate"][0]["reason"]
     assert "check 'dwell' and 'channel'" in found["earth_rate"][0]["reason"]
@@ -173,13 +187,13 @@ def test_a_log_without_turns_says_so(tmp_path: Path, rest: Path) -> None:
 
 def test_a_position_that_never_changes_says_so(tmp_path: Path, rest: Path) -> None:
     log = turned_log()
-    found = run(put(tmp_path / "a", log | {"position": np.ones(len(log["gyro_x"]))}), [rest])
+    found = briefly(put(tmp_path / "a", log | {"position": np.ones(len(log["gyro_x"]))}), [rest])
     assert "the log never turns" in found["earth_rate"][0]["reason"]
 
 
 def test_a_log_that_is_too_short_says_so(tmp_path: Path, rest: Path) -> None:
     short = {"gyro_x": turned_log()["gyro_x"][: round(40 * RATE)]}
-    found = run(put(tmp_path / "a", short), [rest])
+    found = briefly(put(tmp_path / "a", short), [rest])
     assert "less than two dwells of 30 s" in found["earth_rate"][0]["reason"]
 
 
@@ -187,7 +201,7 @@ def test_segments_of_unknown_distance_are_refused(tmp_path: Path, rest: Path) ->
     log = turned_log()
     half = len(log["gyro_x"]) // 2
     folder = put(tmp_path / "a", log, segments=[[0, half], [half, 2 * half]])
-    assert "2 segments" in run(folder, [rest])["earth_rate"][0]["reason"]
+    assert "2 segments" in briefly(folder, [rest])["earth_rate"][0]["reason"]
 
 
 def test_a_position_on_another_clock_is_refused(tmp_path: Path, rest: Path) -> None:
@@ -197,7 +211,7 @@ def test_a_position_on_another_clock_is_refused(tmp_path: Path, rest: Path) -> N
     (other / "log.parquet").rename(folder / "log.position.parquet")
     path = folder / "quality.json"
     replace(Quality.read(path), kept=identified(log_paths(folder))).write(path)
-    assert "a clock of its own" in run(folder, [rest])["earth_rate"][0]["reason"]
+    assert "a clock of its own" in briefly(folder, [rest])["earth_rate"][0]["reason"]
 
 
 @pytest.mark.parametrize("stated", [{"channel": "gyro_x"}, {}])
@@ -205,7 +219,7 @@ def test_a_gyro_that_cannot_be_used_is_said_beside_what_can(
     tmp_path: Path, rest: Path, stated: dict[str, str]
 ) -> None:
     log = {"accel_x": np.zeros(1000)}
-    found = run(put(tmp_path / "a", log, unusable=["gyro_x"]), [rest], **stated)
+    found = briefly(put(tmp_path / "a", log, unusable=["gyro_x"]), [rest], **stated)
     assert {row["status"] for row in found["earth_rate"]} == {"not_shown"}
     assert all("gyro_x cannot be used" in row["reason"] for row in found["earth_rate"])
     build("earth_rate", found["earth_rate"])
@@ -214,13 +228,13 @@ def test_a_gyro_that_cannot_be_used_is_said_beside_what_can(
 def test_a_rejected_recording_leaves_nothing(tmp_path: Path, rest: Path) -> None:
     (tmp_path / "a").mkdir()
     Quality({"status": "rejected"}, [], {}, {}).write(tmp_path / "a/quality.json")
-    assert set(map(len, run(tmp_path / "a", [rest]).values())) == {0}
+    assert set(map(len, briefly(tmp_path / "a", [rest]).values())) == {0}
 
 
 def test_without_a_static_recording_the_turns_are_found_and_nothing_is_estimated(
     tmp_path: Path,
 ) -> None:
-    found = run(put(tmp_path / "a", turned_log()), [])
+    found = briefly(put(tmp_path / "a", turned_log()), [])
     assert {row["status"] for row in found["earth_rate"]} == {"no_model"}
     assert "add a static log of this sensor" in found["earth_rate"][0]["reason"]
     assert sum(row["what"] == "turn" for row in found["turning"]) == 19
@@ -229,7 +243,7 @@ def test_without_a_static_recording_the_turns_are_found_and_nothing_is_estimated
 
 def test_the_datasheet_answers_where_no_static_recording_does(tmp_path: Path) -> None:
     sensor = SENSOR | {"datasheet": PRINTED | {"document": "sheet 1"}}
-    found = run(put(tmp_path / "a", turned_log()), [], sensor=sensor)
+    found = briefly(put(tmp_path / "a", turned_log()), [], sensor=sensor)
     row = by_method(found["earth_rate"])["filter"]
     assert row["status"] == "ok" and row["model"] == "N"
     assert row["model_from"].startswith(
@@ -267,8 +281,8 @@ def test_the_device_itself_answers_before_others_and_long_logs_before_short(
     assert from_static([bad, accel], OWN, "gyro_x") is None
 
 
-def test_what_it_takes(tmp_path: Path, rest: Path) -> None:
-    rows = run(put(tmp_path / "a", turned_log()), [rest])["earth_rate_prediction"]
+def test_what_it_takes(found: Found) -> None:
+    rows = found["earth_rate_prediction"]
     goals = {row["goal"]: row for row in rows if row["of"] == "goal"}
     assert list(goals) == [1.0, 0.1, 0.01]
     # N / sqrt(T) / cos(latitude) alone takes (0.0122 / 0.1 / 0.00418)^2 s for 10 %.

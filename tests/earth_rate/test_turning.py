@@ -11,6 +11,7 @@ from imubench_pipeline.experiments.earth_rate.transients import CLEAR, blocks_of
 from imubench_pipeline.experiments.earth_rate.turning import find_turning
 from imubench_pipeline.experiments.earth_rate.turns import Turning
 from imubench_pipeline.noise import NoiseModel
+from tests.conftest import few
 from tests.earth_rate.runs import DEGREE, EARTH, PAPER, RATE, TURN, bump, turned
 
 EVERY_30 = 30.0 * np.arange(1, 20)
@@ -216,9 +217,10 @@ def test_a_log_that_never_turns_is_refused(seed: int) -> None:
     assert len(trusted.dwells) == 60
 
 
-def test_hardly_a_log_at_rest_alternates_with_the_schedule() -> None:
+@pytest.mark.parametrize("number", few([30], [100]))
+def test_hardly_a_log_at_rest_alternates_with_the_schedule(number: int) -> None:
     noise, taken = NoiseModel(N=PAPER.N), []
-    for seed in range(100):
+    for seed in range(number):
         log = turned([], 600.0, noise=noise, rate=8.0, seed=seed)
         try:
             taken.append(find_turning(log, 8.0, 30.0, first_sense=1))

@@ -120,7 +120,7 @@ BOARDS = {
 }
 
 
-@pytest.mark.parametrize("name", few(list(BOARDS)[1:5], ["2 alike", "8 mixed"]))
+@pytest.mark.parametrize("name", few(list(BOARDS)[1:4], ["2 alike", "5 with a floor", "8 mixed"]))
 def test_the_prediction_lies_within_the_limits_of_simulated_curves(name: str) -> None:
     board = BOARDS[name]
     sizes = np.array([1, 3, 10, 30, 100, 300, 1000, 3000, 10_000])
@@ -137,12 +137,12 @@ def test_the_prediction_lies_within_the_limits_of_simulated_curves(name: str) ->
 def test_the_limits_of_the_curve_hold_the_prediction_as_often_as_they_say() -> None:
     board = Board([SMOOTH, FLICKER], [10.0, 10.0])
     fusion = KalmanFusion(board)
-    sizes = np.array([1, 10, 100, 1000])
+    sizes = np.array([1, 10, 100, 400])
     predicted = fused_allan(board, fusion, sizes / 10.0).deviation
     inside = []
     for seed in range(100):
         curve = allan_variance(
-            fuse(board, fusion, logs(board, 20_000, seed)), 10.0, cluster_sizes=sizes
+            fuse(board, fusion, logs(board, 8_000, seed)), 10.0, cluster_sizes=sizes
         )
         lower, upper = curve.limits(0.95)
         inside.append((lower < predicted) & (predicted < upper))
@@ -184,10 +184,11 @@ def test_the_limits_follow_from_those_of_the_parameters() -> None:
     estimate = Estimate("likelihood", {"N": Parameter(1e-4, lower=0.5e-4, upper=2e-4)})
     board = Board.alike(NoiseModel(N=1e-4), 4, RATE)
     rng = np.random.default_rng(1)
-    lower, upper = prediction_limits(board, [estimate] * 4, equal(4), [1.0], draws=4000, rng=rng)
+    lower, upper = prediction_limits(board, [estimate] * 4, equal(4), [1.0], draws=1000, rng=rng)
     # Specimens of one sensor: what is not known of one is not known of the others.
-    assert lower == pytest.approx([0.25e-4], rel=0.05)
-    assert upper == pytest.approx([1e-4], rel=0.05)
+    # Of 1000 draws the limits are known to 3 %.
+    assert lower == pytest.approx([0.25e-4], rel=0.1)
+    assert upper == pytest.approx([1e-4], rel=0.1)
 
 
 def test_sensors_of_their_own_estimates_vary_apart() -> None:

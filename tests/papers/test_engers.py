@@ -97,7 +97,7 @@ def test_what_he_says_of_axes_and_datasheets() -> None:
 def test_one_curve_in_twenty_is_less_in_its_band() -> None:
     # White noise, whose curve is known: points of a curve go together, and so leave a band at once.
     rng = np.random.default_rng(1)
-    logs = rng.standard_normal((400, 10_000))
+    logs = rng.standard_normal((200, 10_000))
     curves = np.array([allan_variance(log, 1.0, overlap="octave").variance for log in logs])
     lower, upper = np.percentile(curves, [2.5, 97.5], axis=0)
     shares = np.mean((curves >= lower) & (curves <= upper), axis=1)

@@ -306,7 +306,7 @@ def test_the_discrete_model(lines: dict[str, Any]) -> None:
 def test_the_weight_of_equation_25() -> None:
     """The standard deviation of the Allan variance over that of many logs, of a tenth the rate."""
     rng = np.random.default_rng(4)
-    logs = [simulate(GYRO, 1.0, 36_000, rng) for _ in range(200)]
+    logs = [simulate(GYRO, 1.0, 36_000, rng) for _ in range(100)]
     taus = np.array(WEIGHED_AT)
     variances = np.array(
         [allantools.oadev(log, rate=1.0, data_type="freq", taus=taus)[1] ** 2 for log in logs]
@@ -314,7 +314,7 @@ def test_the_weight_of_equation_25() -> None:
     relative = variances.std(axis=0) / variances.mean(axis=0)
     for tau, spread in zip(taus, relative / (2 * np.sqrt(taus / 72_000.0)), strict=True):
         meant, printed = spread_over_weight(tau)
-        assert spread == pytest.approx(meant, rel=0.15)
+        assert spread == pytest.approx(meant, rel=0.2)  # of 100 it is known to 7 %
         assert 0.7 < meant < 1.1  # the weight meant takes about what is there
         assert printed < 1e-3  # in rad/s; in degrees it would be 57 times that
 

@@ -6,7 +6,7 @@ import pytest
 
 from imubench_pipeline.experiments.papers.panel import panel_rows
 
-LOGS = 24
+LOGS = 12
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from imubench_pipeline.tables.findings import Finding
 Log = dict[str, np.ndarray]
 
 RATE = 100.0
-SAMPLES = 200_000
+SAMPLES = 120_000
 UNITS = {"gyro": np.radians(1.0), "accel": 9.80665}
 
 
@@ -31,7 +31,7 @@ def _adis16405(path: Path) -> Log:
 
 
 def adis16405(shared: Path) -> Log:
-    """Return the first 2000 s of a log of an ADIS16405, a copy of its own."""
+    """Return the first 1200 s of a log of an ADIS16405, a copy of its own."""
     log = _adis16405(shared / "logs/adis16405/imu1.csv.gz")
     return {name: values.copy() for name, values in log.items()}
 

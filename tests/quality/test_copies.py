@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.recordings.quality.repeats import WINDOW, Repeats
+from tests.conftest import few
 from tests.quality.real import adis16405, findings, warnings
 
 
@@ -84,7 +85,7 @@ def test_a_real_log_is_free_of_copies(shared: Path) -> None:
     assert warnings(adis16405(shared)) == []
 
 
-@pytest.mark.parametrize("factor", [1.0, -1.0, np.degrees(1.0), 9.80665])
+@pytest.mark.parametrize("factor", few([-1.0, np.degrees(1.0)], [1.0, 9.80665]))
 def test_a_gyro_that_is_another_one_in_another_unit(shared: Path, factor: float) -> None:
     log = adis16405(shared)
     log["gyro_y"] = factor * log["gyro_x"]
@@ -113,21 +114,21 @@ def test_axes_that_feel_one_vibration_are_two(rng: np.random.Generator, shared: 
 
 
 def test_a_real_log_that_was_appended_to_itself(shared: Path) -> None:
-    log = {name: np.tile(values[:90_000], 2) for name, values in adis16405(shared).items()}
+    log = {name: np.tile(values[:60_000], 2) for name, values in adis16405(shared).items()}
     (found,) = [f for f in findings(log) if f.severity != "note"]
     assert (found.finding, found.channel) == ("log_twice", None)
-    assert found.start == pytest.approx(900.0, abs=1.0)
-    assert found.end == pytest.approx(1800.0, abs=1.0)
+    assert found.start == pytest.approx(600.0, abs=1.0)
+    assert found.end == pytest.approx(1200.0, abs=1.0)
 
 
 def test_a_stretch_that_was_pasted_into_a_real_log(shared: Path) -> None:
     log = adis16405(shared)
     for values in log.values():
-        values[150_000:151_000] = values[40_010:41_010]
+        values[100_000:101_000] = values[40_010:41_010]
     (found,) = [f for f in findings(log) if f.finding in ("log_twice", "repeated_stretch")]
     assert (found.finding, found.channel) == ("repeated_stretch", None)
-    assert found.start == pytest.approx(1500.0, abs=1.0)
-    assert found.end == pytest.approx(1510.0, abs=1.0)
+    assert found.start == pytest.approx(1000.0, abs=1.0)
+    assert found.end == pytest.approx(1010.0, abs=1.0)
     assert "from 400." in found.detail
     assert found.value == pytest.approx(1000, abs=2 * WINDOW)
 

@@ -101,19 +101,34 @@ def kept(tmp_path: Path, log: np.ndarray) -> tuple[list[str], np.ndarray]:
     return [finding.finding for finding in out.findings], values
 
 
-def test_knocks_leave_the_parameters_unharmed(tmp_path: Path, rng: np.random.Generator) -> None:
-    log = simulate(MODEL, RATE, 200_000, rng)
-    clean = fit(log, RATE).estimates[1].parameters
+def knocked_log(samples: int, number: int, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    log = simulate(MODEL, RATE, samples, rng)
     knocked = log.copy()
-    for place in rng.choice(np.arange(500, 199_500), 60, replace=False):
+    for place in rng.choice(np.arange(500, samples - 500), number, replace=False):
         knocked[place : place + 4] += rng.choice([-1, 1]) * 40 * SIGMA * 0.5 ** np.arange(4)
-    spoilt = fit(knocked, RATE).estimates[1].parameters
-    assert spoilt["N"].value > 1.1 * MODEL.N
+    return log, knocked
+
+
+def test_what_is_left_beside_knocks_is_the_log_as_it_was(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    log, knocked = knocked_log(70_000, 21, rng)
     names, values = kept(tmp_path, knocked)
     assert names == ["knocks"]
-    # What is left is the log as it was.
     there = np.isfinite(values)
+    assert np.mean(there) > 0.97
     np.testing.assert_allclose(values[there], log[there], atol=4.2 * SIGMA)
+    assert np.diff(knocked).std() > 1.1 * np.diff(log).std()
+    assert np.nanstd(np.diff(values)) == pytest.approx(np.diff(log).std(), rel=0.01)
+
+
+@pytest.mark.release  # every day the log itself is held to what it was, above
+def test_knocks_leave_the_parameters_unharmed(tmp_path: Path, rng: np.random.Generator) -> None:
+    log, knocked = knocked_log(200_000, 60, rng)
+    clean = fit(log, RATE).estimates[1].parameters
+    spoilt = fit(knocked, RATE).estimates[1].parameters
+    assert spoilt["N"].value > 1.1 * MODEL.N
+    _, values = kept(tmp_path, knocked)
     mended = fit(values, RATE).estimates[1].parameters
     for name in ("N", "B", "T_B", "K"):
         truth = getattr(MODEL, name)

@@ -21,7 +21,7 @@ from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import write, write_arrow
 from imubench_pipeline.tables.keys import Key
-from tests.conftest import PROJECT
+from tests.conftest import PROJECT, few
 from tests.report.tables import HOUR, joined, recording_rows
 
 SENSORS = PROJECT / "config/sensors"
@@ -45,7 +45,7 @@ def ingested(path: Path, sensor: str, folder: Path) -> dict[str, np.ndarray]:
     return found
 
 
-@pytest.mark.parametrize("sensor", ["bno055", "adis16405", "mti_7", "mpu9250"])
+@pytest.mark.parametrize("sensor", few(["adis16405"], ["bno055", "mpu9250", "mti_7"]))
 def test_a_log_is_read_with_its_sensor_file(sensor: str, tmp_path: Path, capsys) -> None:
     (tmp_path / "warm.csv").write_text(WARM)
     found = {}
@@ -266,7 +266,8 @@ def test_a_log_of_every_sensor_file_is_read(tmp_path: Path) -> None:
                 for channel in sensor.log.channels}  # fmt: skip
         model = tmp_path / f"{name}.model.yaml"
         model.write_text(yaml.safe_dump({"sensor": name, "axes": axes}))
-        for suffix in ("csv", "parquet"):
+        # Parquet for one of them: what is written is the same.
+        for suffix in ("csv", "parquet") if name == "mti_7" else ("csv",):
             path = tmp_path / f"{name}.{suffix}"
             given = ["--duration", "5 s", "--rate", "100 Hz", "--temperature", "30 degC"]
             assert simulate(model, *given, "--out", path) == 0

@@ -231,7 +231,7 @@ def test_any_model_has_the_folded_spectrum_and_its_allan_variance(
     # What a filter of high order leaves far beyond its cut-off is lost beside what it lets pass.
     np.testing.assert_allclose(found, wanted, rtol=1e-4, atol=1e-12 * wanted.max())
     # The Allan variance of single samples is half the mean square of their differences.
-    theta = np.linspace(0.0, np.pi, 4001)[1:]
+    theta = np.linspace(0.0, np.pi, 2001)[1:]
     spectrum = model.sampled_spectrum(theta, RATE)
     single = 2 * spectrum * np.sin(theta / 2) ** 2 / np.pi
     # Near zero frequency the walk is (1 / theta^2) theta^2: flat.

@@ -32,9 +32,9 @@ def allan_variance(
 ) -> Array:
     """Integral of the folded density times the filter of the Allan variance of samples."""
     f = np.concatenate(
-        [np.geomspace(lowest, 1e-3 * rate, 20_000), np.linspace(1e-3 * rate, rate / 2, 60_000)[1:]]
+        [np.geomspace(lowest, 1e-3 * rate, 8_000), np.linspace(1e-3 * rate, rate / 2, 24_000)[1:]]
     )
-    S = np.concatenate([folded(density, part, rate, 60) for part in np.array_split(f, 40)])
+    S = np.concatenate([folded(density, part, rate, 40) for part in np.array_split(f, 40)])
     found = []
     for size in n:
         x = np.pi * f / rate
