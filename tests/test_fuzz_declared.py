@@ -12,7 +12,7 @@ from tests.fuzz import declared
 from tests.fuzz.declared import SEEDS, Subject, changed, fuzz, subjects, tried
 
 SUBJECTS = subjects()
-SECONDS, MOST = 0.4, 40
+SECONDS, MOST = 0.4, 20
 
 
 @pytest.mark.parametrize("name", SUBJECTS)

@@ -53,14 +53,15 @@ TEXTS = [
     Entry("xsens", file(XSENS, "MT_1.txt"), MT_MANAGER, kept(ROWS)),
     Entry(
         "xsens with lost packets",
-        file(lines_without(XSENS, *range(100, 120), 700), "MT_1.txt"),
+        file(lambda: lines_without(XSENS, *range(100, 120), 700), "MT_1.txt"),
         MT_MANAGER,
         kept(ROWS - 21, "missing_samples"),
     ),
     Entry(
         "xsens whose preamble contradicts its stamps",
         file(
-            export(SHORT.replace("100.0Hz", "40.0Hz"), "\t", COUNTS, DATA, 100 * COUNTS), "MT_1.txt"
+            lambda: export(SHORT.replace("100.0Hz", "40.0Hz"), "\t", COUNTS, DATA, 100 * COUNTS),
+            "MT_1.txt",
         ),
         {"time": TICKS, "channels": CHANNELS},
         kept(ROWS, "rate_contradicts_stamps"),
@@ -79,30 +80,30 @@ TEXTS = [
     ),
 ]
 FOLDERS = [
-    Entry("phyphox", file(archive(PHYPHOX), "run.zip"), PHYPHOX_LOG, kept(ROWS)),
+    Entry("phyphox", file(lambda: archive(PHYPHOX), "run.zip"), PHYPHOX_LOG, kept(ROWS)),
     Entry("phyphox in a folder", folder_of(PHYPHOX, "run"), PHYPHOX_LOG, kept(ROWS)),
     Entry(
         "phyphox with decimal commas",
-        file(archive(phyphox(GYRO, ACCEL, ";", ",")), "run.zip"),
+        file(lambda: archive(phyphox(GYRO, ACCEL, ";", ",")), "run.zip"),
         PHYPHOX_LOG,
         kept(ROWS),
     ),
     Entry(
         "phyphox without the gyroscope",
-        file(archive(without(PHYPHOX, "Gyroscope.csv")), "run.zip"),
+        file(lambda: archive(without(PHYPHOX, "Gyroscope.csv")), "run.zip"),
         PHYPHOX_LOG,
         Rejected(r"run\.zip: no file 'Gyroscope\.csv' for gyro_x; the folder has Accel"),
     ),
     Entry(
         "phyphox cut short",
-        file(part(archive(PHYPHOX), 0.7), "run.zip"),
+        file(lambda: part(archive(PHYPHOX), 0.7), "run.zip"),
         PHYPHOX_LOG,
         kept(ROWS, "truncated_file", "incomplete_last_record"),
     ),
     Entry(
         "phyphox without acceleration",
         file(
-            archive(
+            lambda: archive(
                 PHYPHOX | {"Accelerometer.csv": PHYPHOX["Accelerometer.csv"].split("\n")[0] + "\n"}
             ),
             "run.zip",
@@ -110,7 +111,7 @@ FOLDERS = [
         PHYPHOX_LOG,
         Rejected(r"Accelerometer\.csv: no record after the header"),
     ),
-    Entry("sensor logger", file(archive(LOGGER), "run.zip"), LOGGER_LOG, kept(ROWS)),
+    Entry("sensor logger", file(lambda: archive(LOGGER), "run.zip"), LOGGER_LOG, kept(ROWS)),
     Entry("sensor logger in a folder", folder_of(LOGGER, "run"), LOGGER_LOG, kept(ROWS)),
     Entry(
         "sensor logger with an empty file",
@@ -120,13 +121,13 @@ FOLDERS = [
     ),
     Entry(
         "sensor logger packed with its folder",
-        file(archive({f"run/{name}": text for name, text in LOGGER.items()}), "run.zip"),
+        file(lambda: archive({f"run/{name}": text for name, text in LOGGER.items()}), "run.zip"),
         LOGGER_LOG,
         kept(ROWS),
     ),
     Entry(
         "sensor logger without its file names",
-        file(archive(LOGGER), "run.zip"),
+        file(lambda: archive(LOGGER), "run.zip"),
         {"time": LOGGER_LOG["time"], "channels": {"gyro_x": {"column": "x", "unit": "rad/s"}}},
         Rejected(r"run\.zip: expected one file, the folder has Annotation\.csv, .*'file:'"),
     ),

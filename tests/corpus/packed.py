@@ -60,7 +60,7 @@ def zip_bomb() -> bytes:
 
 def thousands() -> bytes:
     """Return an archive of a log among thousands of files that are none."""
-    pictures: dict[str, bytes | str] = {f"{n}.jpg": b"\xff\xd8\0\0" for n in range(3000)}
+    pictures: dict[str, bytes | str] = {f"{n}.jpg": b"\xff\xd8\0\0" for n in range(2000)}
     return archive(pictures | {"log.csv": TEXT})
 
 
@@ -97,7 +97,7 @@ WELL = [
 CORRUPT = [
     Entry(
         f"csv in {way} with a flipped bit",
-        file(flipped(pack(TEXT), 0.5), f"log.csv.{way}"),
+        file(lambda pack=pack: flipped(pack(TEXT), 0.5), f"log.csv.{way}"),
         STAMPED,
         Rejected(r"log\.csv.*: corrupt compressed data .*copy it again"),
     )
@@ -115,7 +115,7 @@ CHECKSUMS = [
 CUT = [
     Entry(
         f"csv in {way} cut short",
-        file(part(pack(TEXT), 0.7), f"log.csv.{way}"),
+        file(lambda pack=pack: part(pack(TEXT), 0.7), f"log.csv.{way}"),
         STAMPED,
         kept(cut_samples(part(pack(TEXT), 0.7), way), "truncated_file", "incomplete_last_record"),
     )
@@ -123,58 +123,63 @@ CUT = [
     if way in ("gz", "xz", "zip")
 ]
 ODD = [
-    Entry("gzip of nothing", file(gzip.compress(b"")), STAMPED, Rejected("the file is empty")),
+    Entry(
+        "gzip of nothing", file(lambda: gzip.compress(b"")), STAMPED, Rejected("the file is empty")
+    ),
     Entry(
         "gzip cut in its header",
-        file(gzip.compress(TEXT)[:7]),
+        file(lambda: gzip.compress(TEXT)[:7]),
         STAMPED,
         Rejected("is empty, or cut short"),
     ),
     Entry(
         "gzip in gzip",
-        file(gzip.compress(gzip.compress(TEXT)), "log.csv.gz.gz"),
+        file(lambda: gzip.compress(gzip.compress(TEXT)), "log.csv.gz.gz"),
         STAMPED,
         Rejected(r"log\.csv\.gz\.gz: is compressed twice, by gzip and inside by gzip"),
     ),
     Entry(
         "gzip with more behind it",
-        file(gzip.compress(TEXT) + b"more"),
+        file(lambda: gzip.compress(TEXT) + b"more"),
         STAMPED,
         Rejected(r"corrupt compressed data"),
     ),
     Entry(
         "gzip in a zip archive",
-        file(archive({"log.csv.gz": gzip.compress(TEXT)}), "log.zip"),
+        file(lambda: archive({"log.csv.gz": gzip.compress(TEXT)}), "log.zip"),
         STAMPED,
         Rejected(r"log\.csv\.gz: is compressed twice, by zip and inside by gzip"),
     ),
     Entry(
         "zip in a zip archive",
-        file(archive({"log.zip": archive({"log.csv": TEXT})}), "log.zip"),
+        file(lambda: archive({"log.zip": archive({"log.csv": TEXT})}), "log.zip"),
         STAMPED,
         Rejected(r"log\.zip: is compressed twice, by zip and inside by zip"),
     ),
     Entry(
         "zip archive of nothing",
-        file(archive({}), "log.zip"),
+        file(lambda: archive({}), "log.zip"),
         STAMPED,
         Rejected(r"log\.zip: .*no file"),
     ),
     Entry(
         "zip archive of several logs",
-        file(archive({"a.csv": TEXT, "b.csv": TEXT}), "log.zip"),
+        file(lambda: archive({"a.csv": TEXT, "b.csv": TEXT}), "log.zip"),
         STAMPED,
         Rejected(r"log\.zip: expected one file, the folder has a\.csv, b\.csv"),
     ),
     Entry(
         "zip archive with a file without a name",
-        file(archive({"log.csv": TEXT, "xname": b"1"}).replace(b"xname", b"\0name"), "log.zip"),
+        file(
+            lambda: archive({"log.csv": TEXT, "xname": b"1"}).replace(b"xname", b"\0name"),
+            "log.zip",
+        ),
         STAMPED,
         kept(ROWS),
     ),
     Entry(
         "zip archive of thousands of logs",
-        file(lambda: archive({f"{number}.csv": TEXT[:99] for number in range(3000)}), "log.zip"),
+        file(lambda: archive({f"{number}.csv": TEXT[:99] for number in range(2000)}), "log.zip"),
         STAMPED,
         Rejected(r"log\.zip: expected one file, the folder has 0\.csv, 1\.csv, 10\.csv"),
     ),
@@ -186,13 +191,13 @@ ODD = [
     ),
     Entry(
         "zip archive of a log and a picture",
-        file(archive({"a.csv": TEXT, "b.jpg": b"\xff\xd8\0\0" * 99}), "log.zip"),
+        file(lambda: archive({"a.csv": TEXT, "b.jpg": b"\xff\xd8\0\0" * 99}), "log.zip"),
         STAMPED,
         kept(ROWS),
     ),
     Entry(
         "zip archive without its directory",
-        file(archive({"log.csv": TEXT}).split(b"PK\1\2")[0], "log.zip"),
+        file(lambda: archive({"log.csv": TEXT}).split(b"PK\1\2")[0], "log.zip"),
         STAMPED,
         kept(ROWS),
     ),
@@ -204,13 +209,13 @@ ODD = [
     ),
     Entry(
         "zip archive packed by bzip2",
-        file(archive({"log.csv": TEXT}, zipfile.ZIP_BZIP2), "log.zip"),
+        file(lambda: archive({"log.csv": TEXT}, zipfile.ZIP_BZIP2), "log.zip"),
         STAMPED,
         Rejected(r"log\.zip/log\.csv: is packed by method 12 \(bzip2\); .*unpack the archive"),
     ),
     Entry(
         "zip archive packed by LZMA",
-        file(archive({"log.csv": TEXT}, zipfile.ZIP_LZMA), "log.zip"),
+        file(lambda: archive({"log.csv": TEXT}, zipfile.ZIP_LZMA), "log.zip"),
         STAMPED,
         Rejected(r"is packed by method 14 \(LZMA\); .*unpack the archive"),
     ),

@@ -58,7 +58,7 @@ def text(columns: Mapping[str, Array], delimiter: str = ",", header: bool = True
     """Return columns as lines of text, each figure in the digits that it needs."""
     lines = [delimiter.join(columns)] if header else []
     for row in np.column_stack(list(columns.values())).tolist():
-        lines.append(delimiter.join(repr(figure) for figure in row))
+        lines.append(repr(row)[1:-1].replace(", ", delimiter))
     return "\n".join(lines) + "\n"
 
 

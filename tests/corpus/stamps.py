@@ -59,25 +59,25 @@ def with_stamps(places: Array | slice, stamps: Array | float) -> str:
 ENTRIES = [
     Entry(
         "time of the epoch in ms",
-        file(log(t=1e3 * EPOCH + 10 * np.arange(ROWS))),
+        file(lambda: log(t=1e3 * EPOCH + 10 * np.arange(ROWS))),
         timed(unit="ms"),
         kept(ROWS),
     ),
     Entry(
         "time in ISO 8601",
-        file(written([iso(row) for row in range(ROWS)])),
+        file(lambda: written([iso(row) for row in range(ROWS)])),
         STAMPED | {"time": ISO},
         kept(ROWS),
     ),
     Entry(
         "time in ns of the epoch",
-        file(written([str(EPOCH * 10**9 + 10**7 * row) for row in range(ROWS)])),
+        file(lambda: written([str(EPOCH * 10**9 + 10**7 * row) for row in range(ROWS)])),
         timed(unit="ns"),
         kept(ROWS),
     ),
     Entry(
         "time in another unit than stated",
-        file(log(t=1e3 * T)),
+        file(lambda: log(t=1e3 * T)),
         STAMPED | {"rate": "100 Hz"},
         Rejected(
             "the stamps say 0.1 Hz, stated are 100 Hz: 'unit' of 'time' is probably another one"
@@ -85,102 +85,111 @@ ENTRIES = [
     ),
     Entry(
         "time at another rate than stated",
-        file(log()),
+        file(log),
         STAMPED | {"rate": "104 Hz"},
         kept(ROWS, "rate_contradicts_stamps"),
     ),
-    Entry("time that is reversed", file(log(t=T[::-1])), STAMPED, Rejected("do not advance")),
+    Entry(
+        "time that is reversed", file(lambda: log(t=T[::-1])), STAMPED, Rejected("do not advance")
+    ),
     Entry(
         "time that stands still",
-        file(log(t=np.full(ROWS, 7.0))),
+        file(lambda: log(t=np.full(ROWS, 7.0))),
         STAMPED,
         Rejected("do not advance"),
     ),
     Entry(
         "time with missing records",
-        file(without(*range(300, 310), 700)),
+        file(lambda: without(*range(300, 310), 700)),
         STAMPED,
         kept(ROWS - 11, "missing_samples"),
     ),
     Entry(
         "time with a long gap",
-        file(with_stamps(slice(600, None), T[600:] + 7200)),
+        file(lambda: with_stamps(slice(600, None), T[600:] + 7200)),
         STAMPED,
         kept(ROWS, "segments"),
     ),
     Entry(
         "time that jumps back",
-        file(with_stamps(slice(600, None), T[600:] - 5)),
+        file(lambda: with_stamps(slice(600, None), T[600:] - 5)),
         STAMPED,
         kept(ROWS, "segments"),
     ),
     Entry(
         "time that jumps by decades",
-        file(with_stamps(slice(600, None), T[600:] + EPOCH)),
+        file(lambda: with_stamps(slice(600, None), T[600:] + EPOCH)),
         STAMPED,
         kept(ROWS, "segments"),
     ),
     Entry(
         "time with one stamp astray",
-        file(with_stamps(slice(600, 601), 1e9)),
+        file(lambda: with_stamps(slice(600, 601), 1e9)),
         STAMPED,
         kept(ROWS, "missing_stamps"),
     ),
     Entry(
         "time with a stamp of 1e300",
-        file(with_stamps(slice(600, 601), 1e300)),
+        file(lambda: with_stamps(slice(600, 601), 1e300)),
         STAMPED,
         kept(ROWS, "missing_stamps"),
     ),
     Entry(
         "time with repeated stamps",
-        file(with_stamps(slice(600, 605), T[600])),
+        file(lambda: with_stamps(slice(600, 605), T[600])),
         STAMPED,
         kept(ROWS - 4, "repeated_stamps", "missing_samples"),
     ),
     Entry(
         "time with repeated records",
-        file("".join(line * (1 + (n == 600)) for n, line in enumerate(log().splitlines(True)))),
+        file(
+            lambda: "".join(
+                line * (1 + (n == 600)) for n, line in enumerate(log().splitlines(True))
+            )
+        ),
         STAMPED,
         kept(ROWS, "repeated_stamps"),
     ),
     Entry(
-        "time in whole seconds", file(log(t=np.floor(T))), STAMPED, kept(ROWS, "jittered_stamps")
+        "time in whole seconds",
+        file(lambda: log(t=np.floor(T))),
+        STAMPED,
+        kept(ROWS, "jittered_stamps"),
     ),
     Entry(
         "time with jitter",
-        file(log(t=T + 2e-2 * np.random.default_rng(2).random(ROWS))),
+        file(lambda: log(t=T + 2e-2 * np.random.default_rng(2).random(ROWS))),
         STAMPED,
         kept(ROWS, "jittered_stamps"),
     ),
     Entry(
         "time without some stamps",
-        file(with_stamps(slice(600, 603), np.nan)),
+        file(lambda: with_stamps(slice(600, 603), np.nan)),
         STAMPED,
         kept(ROWS, "missing_stamps"),
     ),
     Entry(
         "time without stamps",
-        file(with_stamps(slice(None), np.nan)),
+        file(lambda: with_stamps(slice(None), np.nan)),
         STAMPED,
         Rejected("no time stamp in the first 1000 records"),
     ),
     Entry(
         "counter that wraps",
-        file(log(t=(np.arange(ROWS) + 65_000.0) % 65_536)),
+        file(lambda: log(t=(np.arange(ROWS) + 65_000.0) % 65_536)),
         UNSTAMPED | {"time": COUNTER},
         kept(ROWS),
     ),
     Entry(
         "counter that wraps unsaid",
-        file(log(t=(np.arange(ROWS) + 65_000.0) % 65_536)),
+        file(lambda: log(t=(np.arange(ROWS) + 65_000.0) % 65_536)),
         UNSTAMPED | {"time": {"column": "t", "unit": "samples"}},
         kept(ROWS, "segments"),
     ),
     Entry(
         "counter that wraps with losses",
         file(
-            text(
+            lambda: text(
                 {
                     name: np.delete(column, range(500, 540))
                     for name, column in (
@@ -194,13 +203,13 @@ ENTRIES = [
     ),
     Entry(
         "time of day over midnight",
-        file(written([iso(row)[11:23] for row in range(ROWS)])),
+        file(lambda: written([iso(row)[11:23] for row in range(ROWS)])),
         timed(unit=None, format="%H:%M:%S.%f"),
         kept(ROWS),
     ),
     Entry(
         "time of a day that is none",
-        file(written(["2024-02-30T10:00:00"] * ROWS)),
+        file(lambda: written(["2024-02-30T10:00:00"] * ROWS)),
         STAMPED | {"time": ISO},
         Rejected(r"log\.csv, line 2, column 't': found '2024-02-30T10:00:00'"),
     ),

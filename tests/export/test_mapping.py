@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.export.mapping import as_process, as_walk
@@ -14,7 +14,6 @@ def deviation(model: NoiseModel, tau: float) -> float:
     return float(np.sqrt(model.allan_variance(np.array([tau]))[0]))
 
 
-@settings(max_examples=40)
 @given(log10, log10, st.floats(-1.5, 3.0), log10, log10, st.booleans())
 def test_the_allan_variance_at_the_horizon_stays(
     N: float, B: float, log_time: float, K: float, horizon: float, flicker: bool

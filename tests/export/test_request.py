@@ -20,6 +20,7 @@ from imubench_pipeline.steps.exports import exports
 from imubench_pipeline.tables import build, write, write_arrow
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Row
+from tests.conftest import few
 from tests.export.sensors import ACCEL, GYRO
 
 CHANNELS = {
@@ -137,7 +138,7 @@ def test_the_tables_of_a_run_are_found_in_its_folder(
         load(tmp_path / "elsewhere")
 
 
-@pytest.mark.parametrize("name", ["px4", "gnss-ins-sim", "matlab"])
+@pytest.mark.parametrize("name", few(["px4", "matlab"], ["gnss-ins-sim"]))
 def test_an_overbound_has_the_terms_that_the_program_holds(
     tables: dict[str, pa.Table], name: str
 ) -> None:
@@ -207,11 +208,10 @@ def test_a_walk_that_cannot_follow_is_refused_or_warned_of(tables: dict[str, pa.
     joined = text.replace("\n#  ", "")
     assert "WARNING: the Allan deviation of the smallest N+K is" in joined
     assert "N+GM is held by gnss-ins-sim; N+GM+K is held by matlab, json, npz, python" in joined
-    with pytest.raises(ExportError, match=r"at most 1\.2 times is allowed; N\+GM is held by gnss"):
-        made(tables, replace(REQUEST, overbound=True, horizon=150.0, most_excess=1.2))
     settings = ExportSettings(targets=("kalibr",), overbound=True, horizon="150 s", most_excess=1.2)
     ((place, content),) = exports(tables, settings)
     assert str(place) == "mti_7/not_made.txt"
+    assert "at most 1.2 times is allowed; N+GM is held by gnss" in str(content)
     assert "take a horizon shorter than 150 s" in str(content)
 
 

@@ -8,7 +8,8 @@ import tempfile
 import warnings
 from pathlib import Path
 
-from tests.fuzz.inputs import READERS, Input
+from tests.fuzz.held import Input
+from tests.fuzz.inputs import READERS
 from tests.fuzz.supervision import Fuzzing, Result, table
 from tests.fuzz.target import outcome
 from tests.fuzz.worker import Memory, limit_memory

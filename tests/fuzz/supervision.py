@@ -19,7 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.conftest import PROJECT
-from tests.fuzz.inputs import FAULT, Input, seeds
+from tests.fuzz.held import FAULT, Input
+from tests.fuzz.inputs import seeds
 from tests.fuzz.worker import CURRENT, FAILED
 
 TARGET = "tests.fuzz.target:outcome"

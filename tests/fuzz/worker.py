@@ -21,7 +21,7 @@ from typing import Any
 import imubench_pipeline.readers
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.fuzz.arcs import Arc, Arcs
-from tests.fuzz.inputs import Input
+from tests.fuzz.held import Input
 from tests.fuzz.mutations import mutated
 
 CURRENT = "current"

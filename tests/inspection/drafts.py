@@ -16,7 +16,7 @@ from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import parse
 
 DEG, G = np.pi / 180, 9.80665
-ROWS = 400
+ROWS = 240
 Columns = dict[str, np.ndarray]
 
 

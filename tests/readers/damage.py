@@ -7,9 +7,9 @@ Damage = tuple[int, list[tuple[int, int]]]
 
 
 def examples(number: int) -> settings:
-    """So many examples; a test may write each over the last one in its folder."""
+    """So many examples, every day a fourth; a test may write each over the last in its folder."""
     return settings(
-        max_examples=number,
+        max_examples=number * settings.default.max_examples // 100,
         suppress_health_check=[HealthCheck.function_scoped_fixture],
     )
 

@@ -9,9 +9,10 @@ import pyarrow as pa
 import pyarrow.feather as feather
 import pyarrow.parquet as pq
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from imubench_pipeline.readers.arrays import file as arrays
+from imubench_pipeline.readers.arrays import parquet_pages
 from imubench_pipeline.readers.arrays.parquet_pages import pages
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.array_files import (
@@ -25,6 +26,7 @@ from tests.readers.array_files import (
     refused,
     survives,
 )
+from tests.readers.damage import examples
 
 KINDS = ["parquet", "feather", "stream"]
 ROWS = 60
@@ -274,12 +276,33 @@ def test_cut_files_are_refused(whole: list[Path]) -> None:
     assert cut_everywhere(whole[-1], log(EVERY, time=STAMPED)) <= 2
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(damage=damages)
 def test_damaged_files_never_crash(whole: list[Path], damage: Damage) -> None:
     for path in whole:
         data = damage(path.read_bytes())
         survives(path.with_name("damaged"), data, log(EVERY, time=STAMPED))
+
+
+def test_pages_beyond_the_bounds_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Row groups of 10 and of 50 rows: the larger page stands behind.
+    path = tmp_path / "log.parquet"
+    keys: dict[str, Any] = {"compression": "none", "use_dictionary": False}
+    table = pa.table({"wx": np.arange(50.0)})
+    with pq.ParquetWriter(path, table.schema, **keys) as out:
+        out.write_table(table.slice(0, 10))
+        out.write_table(table)
+    channels = {"gyro_x": {"column": "wx"}}
+    monkeypatch.setattr(parquet_pages, "LARGEST_PAGES", 399)
+    refused(
+        path, log(channels), r"pages unpack to 4\d\d bytes together; expected at most 399: write"
+    )
+    monkeypatch.setattr(parquet_pages, "LARGEST_PAGES", 500)
+    assert len(contents(path, log(channels))[0]["gyro_x"]) == 60
+    monkeypatch.setattr(parquet_pages, "MOST_PAGES", 1)
+    refused(path, log(channels), "more than 1 pages; expected larger ones")
 
 
 @pytest.mark.parametrize("codec", ["none", "zstd", "snappy"])

@@ -81,7 +81,7 @@ def compute() -> None:
 def test_the_command_says_what_listing_took(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = ATTACKS["20 GB of zeros"].write(tmp_path)
+    path = ATTACKS["6 GB of comments"].write(tmp_path)
     monkeypatch.setattr("imubench_pipeline.run.cli.INSPECTED_S", 0.001)
     assert main(["inspect", str(path)]) == 2
     said = capsys.readouterr().err

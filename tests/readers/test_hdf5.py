@@ -4,7 +4,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from imubench_pipeline.readers.arrays import file as arrays
 from imubench_pipeline.readers.arrays import hdf5
@@ -20,6 +20,7 @@ from tests.readers.array_files import (
     refused,
     survives,
 )
+from tests.readers.damage import examples
 
 ROWS = 60
 RECORD = np.dtype([("t", "i8"), ("gyro", "f4", (3,)), ("imu", [("temp", "i2")]), ("note", "S3")])
@@ -167,6 +168,11 @@ def test_what_cannot_be_read_in_blocks(tmp_path: Path, monkeypatch: pytest.Monke
     channels = {"gyro_x": {"column": 1, "variable": "imu/m"}}
     monkeypatch.setattr(hdf5, "LARGEST_CHUNKS", 100)
     refused(path, log(channels), "imu/m has chunks of 1440 bytes; expected at most 100: repack")
+    monkeypatch.setattr(hdf5, "LARGEST_CHUNKS", 1500)
+    monkeypatch.setattr(arrays, "LARGEST_CHUNKS", 1500)
+    contents(path, log(channels))
+    channels["gyro_y"] = {"column": "imu/wx"}
+    refused(path, log(channels), "the columns lie in chunks of 1560 bytes together; expected at mo")
 
 
 def test_what_is_elsewhere_is_not_followed(tmp_path: Path) -> None:
@@ -242,7 +248,7 @@ def test_cut_files_are_refused(whole: list[Path]) -> None:
         assert cut_everywhere(path, log(EVERY, time=STAMPED), 40) == 0
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(damage=damages)
 def test_damaged_files_never_crash(whole: list[Path], damage: Damage) -> None:
     for path in whole:

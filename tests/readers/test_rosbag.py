@@ -18,6 +18,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
+from imubench_pipeline.readers.rosbag import file as bags
+from imubench_pipeline.readers.rosbag import version_1
 from imubench_pipeline.readers.rosbag.file import RosbagFile
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.settings.sensor import LogFormat
@@ -263,13 +265,14 @@ def test_two_topics_have_two_clocks(tmp_path: Path) -> None:
         contents(RosbagFile(path, log, {str(n): source for n, source in log.channels.items()}))
 
 
-def test_many_blocks(tmp_path: Path) -> None:
-    rows = np.tile(figures(100), (400, 1))
+def test_many_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bags, "_BATCH", 1 << 11)
+    rows = np.tile(figures(100), (50, 1))
     data = [message(2, IMU, EPOCH, row) for row in rows[:100]]
     topic = IMU, [(EPOCH + i * 10**7, i, data[i % 100]) for i in range(len(rows))]
     found, time, _ = columns(bag(tmp_path, "mcap", {"/imu": topic}), log_format(time=LOGGED))
     same(found, rows)
-    assert time is not None and len(time) == 40_000
+    assert time is not None and len(time) == 5000
 
 
 def test_stamps_of_a_simulation_are_no_date(tmp_path: Path) -> None:
@@ -333,6 +336,18 @@ def test_a_ros_1_bag_cut_short_is_read_as_far_as_it_goes(tmp_path: Path) -> None
     found, _, file = columns(path, log_format())
     same(found, rows)
     assert counts(file) == {"truncated_file": 1}
+
+
+@pytest.mark.parametrize("kind", ["ros1-bz2", "ros1-lz4"])
+def test_a_bag_that_expands_too_far_is_rejected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    path = bag(tmp_path, kind, {"/imu": imu_topic(kind, np.zeros((500, 6)))})
+    monkeypatch.setattr(version_1, "UNSUSPICIOUS", 1000)
+    assert len(columns(path, log_format())[0]["gyro_x"]) == 500
+    monkeypatch.setattr(version_1, "LARGEST_RATIO", 1)
+    with pytest.raises(RecordingError, match="its chunks expand to more than 1 times its size"):
+        columns(path, log_format())
 
 
 def test_records_that_are_not_merged_are_told(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import os
 import sqlite3
 import struct
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
 import lz4.frame
@@ -139,6 +140,7 @@ def packed_zeros(count: int) -> bytes:
     return zstd.compress(bytes(64 * MIB), level=1) * (count // 64)
 
 
+@cache
 def one_frame(count: int) -> bytes:
     """Return so many MiB of zeros in one frame."""
     compress = zstd.ZstdCompressor(level=1)

@@ -94,8 +94,8 @@ def long_names(made: h5py.File) -> None:
 
 
 def one_unit_for_all(folder: Path) -> Path:
-    """Write 300 data sets whose units are one text of 60 MB."""
-    path, longest, short = folder / "log.h5", 60_000_000, 77
+    """Write 300 data sets whose units are one text of 10 MB."""
+    path, longest, short = folder / "log.h5", 10_000_000, 77
     with h5py.File(path, "w") as made:
         for number in range(300):
             made[f"w{number}"] = np.ones(100)
@@ -113,7 +113,7 @@ def one_unit_for_all(folder: Path) -> Path:
 
 
 HDF5 = {
-    "one unit of 60 MB for 300": Attack(one_unit_for_all, "^read: 100$", "^listed: "),
+    "one unit of 10 MB for 300": Attack(one_unit_for_all, "^read: 100$", "^listed: "),
     "names that clear a terminal": Attack(
         hdf5(long_names), "no variable or column 'wx' .*; the file has .*; mend 'column'", "^listed"
     ),

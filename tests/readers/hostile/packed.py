@@ -92,7 +92,7 @@ PACKED = {
         file("log.csv.xz", xz_of_a_large_dictionary), "Memory usage limit exceeded"
     ),
     "20 GB of zeros": Attack(
-        file("log.csv.gz", lambda: gzip.compress(bytes(64 * MIB), 1) * 320),
+        file("log.csv.gz", lambda: gzip.compress(bytes(16 * MIB), 1) * 1280),
         "the file is empty, or cut short in its first line",
     ),
     "6 GB of comments": Attack(
