@@ -113,6 +113,8 @@ READ_DAILY = {
     *("csv with a line of units", "csv with mixed ends of lines", "csv with zeros at the end"),
     *("csv with the header again", "csv with an empty cell", "csv with NaN", "csv of nothing"),
     *("csv with a word in a cell", "csv without a column that is named", "csv of a header"),
+    *("csv with a short record", "csv with zeros between records", "csv with an open quote"),
+    *("csv cut in a record", "csv with a name twice"),
     # test_text_time.py
     *("time in ns of the epoch", "time of the epoch in ms", "time in ISO 8601"),
     *("time of a day that is none", "time of day over midnight", "counter that wraps"),

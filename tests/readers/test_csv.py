@@ -152,10 +152,10 @@ def test_zeros_after_the_end_are_passed_over(tmp_path: Path) -> None:
 def test_a_compressed_file_cut_short_is_read_as_far_as_it_goes(
     tmp_path: Path, rng: np.random.Generator
 ) -> None:
-    text = "wx,ax\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in rng.standard_normal((50_000, 2)))
+    text = "wx,ax\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in rng.standard_normal((20_000, 2)))
     packed = gzip.compress(text.encode())
     found, _, file = columns(written(tmp_path, packed[: len(packed) // 2]), log_format())
-    assert 20_000 < len(found["gyro_x"]) < 30_000
+    assert 8000 < len(found["gyro_x"]) < 12_000
     assert "truncated_file" in [note.finding for note in file.findings]
 
 
@@ -263,7 +263,7 @@ def test_a_position_that_is_missing_is_mended_where_it_is_stated(
 def test_compressed_data_corrupt_inside_reject(
     tmp_path: Path, rng: np.random.Generator, place: float
 ) -> None:
-    text = "wx,ax\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in rng.standard_normal((50_000, 2)))
+    text = "wx,ax\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in rng.standard_normal((20_000, 2)))
     packed = bytearray(gzip.compress(text.encode()))
     begin = int(place if place > 1 else place * len(packed))
     packed[begin : begin + 64] = bytes(64)
