@@ -50,8 +50,8 @@ def six(gyro: float = 1e-6, accelerometer: float = 1e-3) -> dict[str, NoiseModel
 def outlook(
     folders: list[Path], datasheet: dict[str, Any] | None = None, **changes: Any
 ) -> dict[str, list[dict[str, Any]]]:
-    # The course and the best dwell, which nothing here looks at, take longest of long runs.
-    asked: dict[str, Any] = {"goals": (0.01,), "run_time": "2 min"} | changes
+    # The best dwell, which nothing here looks at, takes longest of long runs.
+    asked: dict[str, Any] = {"run_time": "2 min"} | changes
     settings = {
         "earth_rate": EarthRateSettings(**asked).model_dump(mode="json"),
         "datasheet": datasheet or {},

@@ -38,18 +38,19 @@ def cut_samples(packed: bytes, way: str) -> int:
 
 
 def deflated_zeros(size: int) -> bytes:
-    """Return a raw deflate stream of many zeros, made of equal pieces."""
+    """Return a raw deflate stream of a log and many zeros, made of equal pieces."""
     piece_size = 1 << 24
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    log = packer.compress(TEXT) + packer.flush(zlib.Z_FULL_FLUSH)
     piece = packer.compress(bytes(piece_size)) + packer.flush(zlib.Z_FULL_FLUSH)
-    return piece * (size // piece_size) + packer.flush()
+    return log + piece * (size // piece_size) + packer.flush()
 
 
 def zip_bomb() -> bytes:
-    """Return an archive of a log of 3 GiB of zeros."""
+    """Return an archive of a log with 3 GiB of zeros at its end."""
     data = deflated_zeros(3 * GIB)
     name = b"log.csv"
-    sizes = struct.pack("<III", 0, len(data), 3 * GIB)
+    sizes = struct.pack("<III", 0, len(data), len(TEXT) + 3 * GIB)
     local = b"PK\3\4" + struct.pack("<HHHHH", 20, 0, 8, 0, 0) + sizes
     local += struct.pack("<HH", len(name), 0) + name
     entry = b"PK\1\2" + struct.pack("<HHHHHH", 20, 20, 0, 8, 0, 0) + sizes
@@ -245,25 +246,25 @@ ODD = [
     ),
     Entry(
         "gzip bomb",
-        file(lambda: gzip.compress(bytes(1 << 24)) * 40, "log.csv.gz"),
+        file(lambda: gzip.compress(TEXT) + gzip.compress(bytes(1 << 24)) * 40, "log.csv.gz"),
         STAMPED,
         Rejected("expands to more than 800 times its size"),
     ),
     Entry(
         "bzip2 bomb",
-        file(lambda: bz2.compress(bytes(1 << 22)) * 800, "log.csv.bz2"),
+        file(lambda: bz2.compress(TEXT) + bz2.compress(bytes(1 << 22)) * 800, "log.csv.bz2"),
         STAMPED,
         Rejected("expands to more than 800 times its size"),
     ),
     Entry(
         "zstd bomb",
-        file(lambda: zstd.compress(bytes(1 << 26)) * 48, "log.csv.zst"),
+        file(lambda: zstd.compress(TEXT) + zstd.compress(bytes(1 << 26)) * 48, "log.csv.zst"),
         STAMPED,
         Rejected("expands to more than 800 times its size"),
     ),
     Entry(
         "xz bomb",
-        file(lambda: lzma.compress(bytes(1 << 25)) * 90, "log.csv.xz"),
+        file(lambda: lzma.compress(TEXT) + lzma.compress(bytes(1 << 25)) * 90, "log.csv.xz"),
         STAMPED,
         Rejected("expands to more than 800 times its size"),
     ),

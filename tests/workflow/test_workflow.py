@@ -171,7 +171,7 @@ def test_bad_logs_are_rejected_and_stop_nothing_else(project: Project, said: str
     assert complete == {("one", "a"), ("one", "b"), ("one", "c"), ("two", "a")}
     assert "4 recordings analysed, 6 rejected" in said
     assert "\none/a: 0.0556 h at 100 Hz, 2 channels" in said
-    assert "\ntwo/empty: rejected: empty.csv: the file is empty\n" in said
+    assert "\ntwo/empty: rejected: empty.csv: the file is empty" in said
     page = (project.results / "report/index.html").read_text()
     assert "6 rejected" in page
     for name, text in BAD.items():
