@@ -296,6 +296,19 @@ def test_what_temperature_follows_is_its_squared_correlation(log):
     assert _explained(log.regressors, found) == pytest.approx(expected)
 
 
+def test_what_a_fast_temperature_explains_is_where_most_of_it_is():
+    fast = 20.0 + 3.0 * np.sin(2.0 * np.pi * TIMES / 4.0 + 0.5)
+    noise = np.random.default_rng(6).standard_normal(SAMPLES)
+    made = Log(0.2 * (fast - REFERENCE) + noise, path_of(fast))
+    found = made.regressors.at(0.0, WEIGHTS)
+    x, y = dct(means(lagged(TIMES, fast, 0.0) - REFERENCE)), made.coefficients
+    upto = int(np.argmax(np.cumsum(x**2) >= 0.95 * np.sum(x**2))) + 1
+    assert 12 < upto < 40
+    x, y = x[:upto], y[:upto]
+    expected = (x @ y) ** 2 / (x @ x) / (y @ y)
+    assert _explained(made.regressors, found) == pytest.approx(expected)
+
+
 def test_lags_are_drawn_by_their_likelihood(log):
     flat = np.full(SAMPLES - 1, 1.0 / N**2)
     lags = log.regressors.lags(8.0)
