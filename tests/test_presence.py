@@ -46,6 +46,17 @@ def test_a_long_log_is_counted_at_a_stride() -> None:
     assert gone[-1] == pytest.approx(160_000 - 2_000, abs=2 * stride)
 
 
+def test_no_difference_crosses_from_one_segment_to_the_next_in_a_long_log() -> None:
+    log, n = np.zeros(300_000), 20_000
+    found = presence([log], len(log), [(0, 120_000), (120_000, 300_000)])
+    there, stride = found.differences(n) or (np.empty(0), 1)
+    assert found.stride == 16 and stride > 16
+    gone = stride * np.flatnonzero(~there)
+    assert gone[0] == pytest.approx(120_000 - 2 * n, abs=2 * stride)
+    assert gone[-1] == pytest.approx(120_000, abs=2 * stride)
+    assert len(gone) == pytest.approx(2 * n / stride, abs=2)
+
+
 def test_no_answer_rather_than_one_of_few_clusters() -> None:
     length = 8 << 20
     found = presence([np.zeros(1 << 20)] * 8, length)

@@ -35,6 +35,20 @@ def test_power_laws_agree_with_greenhall_and_riley(model: NoiseModel, exponent: 
     np.testing.assert_allclose(found, expected, rtol=0.015)
 
 
+def test_the_unit_of_the_log_changes_no_degrees() -> None:
+    one, other = (
+        degrees_of_model(
+            NoiseModel(Q=3.0 * unit, N=unit, B=0.5 * unit, T_B=30.0, K=0.1 * unit),
+            1.0,
+            SIZES,
+            SAMPLES,
+        )
+        for unit in (1.0, 1e-3)
+    )
+    np.testing.assert_allclose(other.edf, one.edf, rtol=1e-6)
+    np.testing.assert_allclose(other.upper, one.upper, rtol=1e-6)
+
+
 def masked_quadratic_form(
     model: NoiseModel, n: int, there: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

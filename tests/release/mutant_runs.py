@@ -93,9 +93,11 @@ def copied(folder: Path) -> Path:
     source = folder.resolve() / hashlib.sha256(text).hexdigest()[:16]
     if not source.is_dir():
         made = Path(tempfile.mkdtemp(dir=folder))
-        shutil.copytree(PACKAGE, made / PACKAGE.name, ignore=shutil.ignore_patterns("__pycache__"))
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(PACKAGE, made / "src" / PACKAGE.name, ignore=ignored)
+        (made / "config").symlink_to(PROJECT / "config")  # which the package finds beside it
         made.rename(source)
-    return source
+    return source / "src"
 
 
 def seen(tests: Path, source: Path) -> Seen:
