@@ -38,13 +38,14 @@ ELSEWHERE = {
     "git clone <this repository> && cd imubench_pipeline": "needs a place where it is kept",
     "python3 -m venv .venv && .venv/bin/pip install -r requirements/dev.txt": INSTALLS,
     ".venv/bin/pip install --no-deps --no-build-isolation -e .": INSTALLS,
-    "python3 -m venv .venv && .venv/bin/pip install -r requirements/run.txt && .venv/bin/pip "
-    "install --no-deps --no-build-isolation -e . && .venv/bin/snakemake -c2": INSTALLS,
-    "python3 -m venv .venv-test && .venv-test/bin/pip install -r requirements/test.txt && "
-    ".venv-test/bin/pip install --no-deps --no-build-isolation -e . && .venv-test/bin/python -m "
-    "pytest -n 3": INSTALLS,
-    ".venv-test/bin/pip install -r requirements/docs.txt && .venv-test/bin/sphinx-build -W -q docs "
-    "docs/_build/html": INSTALLS,
+    "python3 -m venv .venv && .venv/bin/pip install uv && .venv/bin/uv pip install -p .venv "
+    "-r requirements/run.txt && .venv/bin/uv pip install -p .venv --no-deps --no-build-isolation "
+    "-e . && .venv/bin/snakemake -c2": INSTALLS,
+    "python3 -m venv .venv-test && .venv-test/bin/pip install uv && .venv-test/bin/uv pip install "
+    "-p .venv-test -r requirements/test.txt && .venv-test/bin/uv pip install -p .venv-test "
+    "--no-deps --no-build-isolation -e . && .venv-test/bin/python -m pytest -n 3": INSTALLS,
+    ".venv-test/bin/uv pip install -p .venv-test -r requirements/docs.txt && "
+    ".venv-test/bin/sphinx-build -W -q docs docs/_build/html": INSTALLS,
     ".venv/bin/pip install -r requirements/docs.txt && .venv/bin/sphinx-build -W -q docs "
     "docs/_build/html": INSTALLS,
     'python3 -m venv .venv && .venv/bin/pip install "$(echo imubench_pipeline-*.whl)[workflow]"': (
