@@ -47,7 +47,11 @@ _JOB = re.compile(r"^( *)(?:local)?rule (\w+):\n((?:\1 .*\n)*)", re.MULTILINE)
 _WILDCARDS = re.compile(r"wildcards: sensor=(.+?)(?:, recording=(.+))?$", re.MULTILINE)
 
 
-FEW = ['error_budget={"draws": 20}', 'earth_rate={"draws": 20}', 'fusion={"draws": 100}']
+FEW = [
+    'error_budget={"draws": 20}',
+    'earth_rate={"draws": 20, "goals": [1], "run_time": "90 s"}',
+    'fusion={"draws": 100}',
+]
 """Few models for an interval: what is looked at here is what runs, and not how wide it is."""
 
 
