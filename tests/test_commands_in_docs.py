@@ -96,6 +96,8 @@ ELSEWHERE = {
 
 COSTLY = (
     ".venv/bin/imubench analyse run.csv",  # every day: tests/test_analyse.py
+    ".venv/bin/imubench check logs",  # tests/test_checking.py
+    ".venv/bin/imubench papers",  # tests/report/test_papers.py
     ".venv/bin/imubench init lab",
     ".venv/bin/imubench run lab",
     "imubench init station/",
@@ -367,7 +369,10 @@ def programs() -> dict[str, list[str]]:
     return found
 
 
-LONG_PROGRAMS = ("docs/how-to/library.md",)  # every day: the README has the same calls
+LONG_PROGRAMS = (
+    "docs/how-to/library.md",  # every day: the README has the same calls
+    "docs/how-to/fusion.md",  # every day: tests/fusion
+)
 
 RUN_PROGRAMS = sorted(programs().keys() - NO_PROGRAMS.keys() - set(LONG_PROGRAMS))
 

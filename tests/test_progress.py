@@ -86,6 +86,9 @@ def seen(text: str) -> str:
     return "\n".join(lines)
 
 
+# Every day: the line of a run in which a step fails, below, and the same said in a pipe by a run
+# of tests/workflow/test_workflow.py.
+@pytest.mark.release
 def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
     written, left = in_terminal(folder)
     assert re.search(r"first steps: ingest s/(a|b|bad) 0:00", written)
@@ -100,7 +103,13 @@ def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
 
 
 def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
-    _, left = in_terminal(folder, FAIL="1")
+    written, left = in_terminal(folder, FAIL="1", PAUSE="0.4")
+    assert re.search(r"first steps: ingest s/(a|b|bad) 0:00", written)
+    assert re.search(r"[12] of 4 steps, about \d+ s left: ingest s/(a|b|bad) 0:00", written)
+    # The line is erased each time, but for where a step writes to the terminal itself.
+    assert left.count("steps, about") <= 1 and not re.search(r"(?<!in )rule ingest:", left)
+    assert "Job stats" not in left
+    assert left.count("s/a: of 3 channels") == left.count("s/b: of 3 channels") == 1
     assert "Traceback (most recent call last):\n" in left
     assert "ValueError: upside down\nturn it over\n" in left
     assert "Error in rule ingest:" in left and "output: s/bad.done" in left
