@@ -15,6 +15,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from imubench_pipeline.readers.formats import FILE_FORMATS
 from tests.conftest import PROJECT
 from tests.test_pins import project
 from tests.workflow.project import put_log
@@ -104,6 +105,34 @@ def imubench(python: Path) -> Iterator[Imubench]:
             return subprocess.CompletedProcess(arguments, status, *said)
 
         yield ran
+
+
+LOADED = """
+import json
+from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.readers.formats import FILE_FORMATS
+said = {}
+for name, file_format in FILE_FORMATS.items():
+    try:
+        file_format.load()
+    except RecordingError as error:
+        said[name] = str(error)
+print(json.dumps(said), flush=True)
+"""
+
+
+def test_each_format_whose_library_is_not_installed_names_it(
+    imubench: Imubench, tmp_path: Path
+) -> None:
+    done = imubench(tmp_path, "-c", LOADED)
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    extras = {name: form.extra for name, form in FILE_FORMATS.items() if form.extra}
+    assert said.keys() == extras.keys() == {"rosbag", "matlab", "hdf5"}
+    for name, extra in extras.items():
+        library = {"ros": "rosbags", "hdf5": "h5py"}[extra]
+        assert f"{library} is needed, which is not installed" in said[name]
+        assert f"pip install 'imubench_pipeline[{extra}]'" in said[name]
 
 
 STATED = ("--rate", "10 Hz", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
