@@ -61,7 +61,7 @@ def test_lines_and_the_band_are_notes(
     logs: Path, rng: np.random.Generator, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = NoiseModel(N=8.4e-5, sinusoids=(Sinusoid(2e-4, 17.0),))
-    log = simulate(model, RATE, 150_000, rng)
+    log = simulate(model, RATE, 400_000, rng)
     for taps in (3, 4, 5):  # such a cascade is no filter that is tried
         log = np.convolve(log, np.ones(taps) / taps, "valid")
     drop(logs, "line", log)

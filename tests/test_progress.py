@@ -14,6 +14,7 @@ from tests.conftest import few
 pytestmark = pytest.mark.workflow
 
 WORKFLOW = """
+from imubench_pipeline.run.progress import OURS
 rule all:
     input: expand("s/{recording}.done", recording=["a", "b", "bad"])
 rule ingest:
@@ -24,10 +25,12 @@ onstart:
     of = (job.wildcards for job in workflow.dag.needrun_jobs() if job.name == "ingest")
     follow(((w.sensor, w.recording) for w in of), lambda s, r: f"{s}/{r}: of 3 channels")
 onsuccess:
-    from imubench_pipeline.run.progress import OURS
     logger.info("the summary", extra=OURS)
 onerror:
+    from pathlib import Path
+    from imubench_pipeline.report.run_summary import failure
     logger.error("what failed")
+    logger.error(failure(log, Path("s")), extra=OURS)
 """
 SCRIPT = """
 import os, time
@@ -114,6 +117,10 @@ def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
     assert "ValueError: upside down\nturn it over\n" in left
     assert "Error in rule ingest:" in left and "output: s/bad.done" in left
     assert left.index("turn it over") < left.index("what failed")
+    # What a run says of its failures, by the log that it wrote.
+    said = [line.strip() for line in left.partition("what failed")[2].splitlines() if line.strip()]
+    assert said[:2] == ["1 step failed; why stands above", "ingest"]
+    assert said[2].endswith("run the same command again: it goes on where this run stopped")
 
 
 @pytest.mark.parametrize("flags", few([], [(("--quiet",),), (("--verbose",),)]))

@@ -147,7 +147,8 @@ def snakemake(folder: Path, command: str, *flags: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-@pytest.mark.workflow
+# Every day: what a run says whose step fails in tests/test_progress.py.
+@pytest.mark.release
 def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
     lines = snakemake(tmp_path, "exit 3")
     assert lines[0] == "2 steps failed; why stands above"
