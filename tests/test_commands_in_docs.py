@@ -96,8 +96,7 @@ ELSEWHERE = {
 
 COSTLY = (
     ".venv/bin/imubench analyse run.csv",  # every day: tests/test_analyse.py
-    ".venv/bin/imubench check logs",  # tests/test_checking.py
-    ".venv/bin/imubench papers",  # tests/report/test_papers.py
+    ".venv/bin/imubench papers",  # every day: tests/report/test_papers.py
     ".venv/bin/imubench init lab",
     ".venv/bin/imubench run lab",
     "imubench init station/",
