@@ -12,10 +12,13 @@ import pandas as pd
 import pytest
 import yaml
 
+from imubench_pipeline.report import publish
+from imubench_pipeline.report.static_figures import of_run
 from imubench_pipeline.run.analysis import chain, compilation
 from imubench_pipeline.run.analysis.project import Stated, UnfilledError, lay_out
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.validation import ConfigError
+from tests.conftest import few
 from tests.workflow.project import put_log, put_sensor
 
 UNITS = ["--rate", "100 Hz", "--gyro-unit", "deg/s", "--accel-unit", "m/s^2"]
@@ -147,9 +150,21 @@ def test_parameters_doubts_and_rejections_are_printed(
     assert "short recording: the recording lasts 50 s" in said
 
 
+# Every day a page and figures are made of one log: tests/workflow/test_workflow.py.
+@pytest.mark.parametrize("drawn", few([False], [True]))
 def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    drawn: bool,
 ) -> None:
+    asked: dict[str, Any] = {}
+    if not drawn:
+        monkeypatch.setattr(publish, "site_of", lambda *given: asked.update(page=given[0]))
+        monkeypatch.setattr(publish, "one_file", lambda site: "a page")
+        monkeypatch.setattr(
+            of_run, "figures_of", lambda *given, kinds: asked.update(kinds=kinds) or []
+        )
     for name in ("whole", "unread", "unrebuilt"):
         path = tmp_path / f"{name}.csv"
         put_log(path, 1, samples=2000)
@@ -181,6 +196,11 @@ def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
     assert "unrebuilt: the step reconstruct failed: RuntimeError: no such luck" in said.err
     written = pd.read_csv(made / "recordings.csv").set_index("recording")["status"]
     assert dict(written) == {"whole": "ok", "unread": "failed", "unrebuilt": "failed"}
+    assert (made / "report.html").stat().st_size > 0
+    if not drawn:
+        assert asked["kinds"] == ("comparison", "forest")
+        assert asked["page"]["recordings"].num_rows == 3
+        return
     assert {path.name for path in (made / "figures").iterdir()} == {
         f"{figure}_gyro_x.{kind}" for figure in ("allan", "forest") for kind in ("svg", "pdf")
     }

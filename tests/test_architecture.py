@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import PROJECT
+from tests.conftest import PROJECT, few
 
 PACKAGE = PROJECT / "src/imubench_pipeline"
 LINT = "import sys, importlinter.cli as cli; sys.exit(cli.lint_imports(no_cache=True))"
@@ -35,26 +35,38 @@ def test_no_arrow_points_back() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize(
-    ("module", "line"),
-    [
-        ("noise/terms/ramp.py", "from imubench_pipeline.estimators.estimate import Estimate\n"),
-        ("readers/batch.py", "from imubench_pipeline.noise import NoiseModel\n"),
-        ("experiments/alignment/fine.py", "from imubench_pipeline.settings.config import Run\n"),
-        ("flat.py", "\n"),
-    ],
-    ids=["back", "files and models", "settings of a run", "no room"],
-)
-def test_an_arrow_back_or_a_module_in_no_room_is_found(
-    module: str, line: str, tmp_path: Path
-) -> None:
-    ignored = shutil.ignore_patterns("__pycache__")
+# A module, what is written at its end, and what is said of it.
+WRONG = {
+    "back": (
+        "noise/terms/ramp.py",
+        "from imubench_pipeline.estimators.estimate import Estimate\n",
+        "imubench_pipeline.noise is not allowed to import imubench_pipeline.estimators:",
+    ),
+    "files and models": (
+        "readers/batch.py",
+        "from imubench_pipeline.noise import NoiseModel\n",
+        "imubench_pipeline.readers is not allowed to import imubench_pipeline.noise:",
+    ),
+    "settings of a run": (
+        "experiments/alignment/fine.py",
+        "from imubench_pipeline.settings.config import Run\n",
+        "imubench_pipeline.experiments is not allowed to import imubench_pipeline.settings.config:",
+    ),
+    "no room": ("flat.py", "\n", "- imubench_pipeline.flat\n"),
+}
+
+
+@pytest.mark.parametrize("names", few([list(WRONG)], [[name] for name in WRONG]), ids="-".join)
+def test_an_arrow_back_or_a_module_in_no_room_is_found(names: list[str], tmp_path: Path) -> None:
+    ignored = shutil.ignore_patterns("__pycache__", "*.nb?")
     shutil.copytree(PACKAGE, tmp_path / PACKAGE.name, ignore=ignored)
-    with (tmp_path / PACKAGE.name / module).open("a") as file:
-        file.write(line)
+    for module, line, _ in map(WRONG.__getitem__, names):
+        with (tmp_path / PACKAGE.name / module).open("a") as file:
+            file.write(line)
     done = lint(tmp_path)
     assert done.returncode == 1, done.stdout + done.stderr
     assert "Contracts: " in done.stdout and " 0 broken" not in done.stdout, done.stdout
+    assert all(WRONG[name][2] in done.stdout for name in names), done.stdout
 
 
 def test_the_house_has_few_rooms_and_three_leaves() -> None:

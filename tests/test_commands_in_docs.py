@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 import yaml
 
-from imubench_pipeline.run.cli import main
-from tests.conftest import PROJECT
+from imubench_pipeline.run.cli import command_parser, main
+from tests.conftest import PROJECT, few
 
 PAGES = [
     *(
@@ -97,6 +97,7 @@ ELSEWHERE = {
 
 COSTLY = (
     ".venv/bin/imubench analyse run.csv",  # every day: tests/test_analyse.py
+    ".venv/bin/imubench papers",  # every day: tests/report/test_papers.py
     ".venv/bin/imubench init lab",
     ".venv/bin/imubench run lab",
     "imubench init station/",
@@ -112,6 +113,11 @@ COSTLY = (
     "for batch in ",
 )
 """How those begin that take more than a few seconds, and are run before a release."""
+
+OF_RESULTS = re.compile(r"\bresults\b(?!/)")
+"""In what needs a finished run: before a release too. Every day such commands are asked of results
+that are made by hand: tests/report/test_command.py, tests/test_show.py, tests/export,
+tests/shortlist and tests/verification."""
 
 ANALYSE = ".venv/bin/snakemake -c2"
 """What all others find done."""
@@ -153,10 +159,15 @@ def of_tutorial() -> list[str]:
     return [one for language, block in blocks if language == "sh" for one in commands_of(block)]
 
 
+def is_left(command: str) -> bool:
+    """Whether a command is run before a release alone."""
+    return command.startswith(COSTLY) or bool(OF_RESULTS.search(command))
+
+
 COMMANDS = listed()
 BENCHMARK = re.compile(r"(\w+=\w+ )?\.venv-test/bin/python (-m )?(benchmarks/\w+\.py|[\w.]+)( .*)?")
 RUN = [
-    pytest.param(command, marks=pytest.mark.release if command.startswith(COSTLY) else ())
+    pytest.param(command, marks=pytest.mark.release if is_left(command) else ())
     for command in COMMANDS
     if command not in {*ELSEWHERE, *of_tutorial(), ANALYSE} and not BENCHMARK.fullmatch(command)
 ]
@@ -179,7 +190,7 @@ def put_log(path: Path, names: list[str], separator: str, *, samples: int = 6000
 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A checkout with one short log, which was analysed by the README's command."""
+    """A checkout with one short log, and what the pages have beside it."""
     folder = tmp_path_factory.mktemp("lab")
     for name in ("Snakefile", "profiles", "workflow", "docs"):
         (folder / name).symlink_to(PROJECT / name)
@@ -198,8 +209,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(folder / "logs", folder / "data/batches/batch_07")
     shutil.copytree(folder / "logs", folder / "scratch/logs")
     shutil.copytree(folder / "config/sensors", folder / "data/sensors")
-    run(ANALYSE, folder)
-    (folder / "results/nightly").mkdir()
+    (folder / "results/nightly").mkdir(parents=True)
     units = ["t [s]", "gz [deg/s]", "az [m/s^2]"]
     for name in ("logs/mine/run.csv", "run.csv", "other.csv"):
         put_log(folder / name, units, ",", samples=2000)
@@ -216,6 +226,13 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }.items():
         (folder / name).write_text(block_of("docs/how-to/simulator.md", begin))
     return folder
+
+
+@pytest.fixture(scope="module")
+def analysed(lab: Path) -> Path:
+    """The same, analysed by the README's command."""
+    run(ANALYSE, lab)
+    return lab
 
 
 def block_of(page: str, begin: str) -> str:
@@ -255,16 +272,34 @@ def run(command: str, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("command", RUN)
-def test_it_runs(command: str, lab: Path) -> None:
+def test_it_runs(command: str, lab: Path, request: pytest.FixtureRequest) -> None:
+    if is_left(command):
+        request.getfixturevalue("analysed")
     run(command, lab)
 
 
-def test_what_it_runs_on_was_analysed(lab: Path) -> None:
-    assert ANALYSE in COMMANDS
-    assert (lab / "results/report/sensors/mti_7.html").is_file()
+OURS = [
+    command
+    for command in COMMANDS
+    if re.match(r"(\.venv/bin/)?imubench ", command) and not re.search(r"&&|[;|>]", command)
+]
+
+
+@pytest.mark.parametrize("command", OURS)
+def test_the_parser_knows_its_options(command: str) -> None:
+    own = shlex.split(command)[1:]
+    given = command_parser().parse_args(own[: own.index("--")] if "--" in own else own)
+    assert given.command == own[0]
+
+
+# Every day the same command is that of tests/workflow/test_workflow.py.
+@pytest.mark.release
+def test_what_it_runs_on_was_analysed(analysed: Path) -> None:
+    assert (analysed / "results/report/sensors/mti_7.html").is_file()
 
 
 def test_what_is_not_run_is_still_there() -> None:
+    assert ANALYSE in COMMANDS
     assert ELSEWHERE.keys() <= COMMANDS.keys()
     assert all(any(command.startswith(begin) for command in COMMANDS) for begin in COSTLY)
 
@@ -276,10 +311,10 @@ def test_what_runs_it_instead_is_there(reason: str) -> None:
 
 
 @pytest.mark.release
-def test_the_tutorial_from_first_to_last(lab: Path) -> None:
+def test_the_tutorial_from_first_to_last(analysed: Path) -> None:
     for command in of_tutorial():
-        run(command, lab)
-    assert "accelerometer_noise_density" in (lab / "safe.yaml").read_text()
+        run(command, analysed)
+    assert "accelerometer_noise_density" in (analysed / "safe.yaml").read_text()
 
 
 def benchmarks() -> dict[str, str]:
@@ -334,7 +369,15 @@ def programs() -> dict[str, list[str]]:
     return found
 
 
-@pytest.mark.parametrize("page", sorted(programs().keys() - NO_PROGRAMS.keys()))
+LONG_PROGRAMS = (
+    "docs/how-to/library.md",  # every day: the README has the same calls
+    "docs/how-to/fusion.md",  # every day: tests/fusion
+)
+
+RUN_PROGRAMS = sorted(programs().keys() - NO_PROGRAMS.keys() - set(LONG_PROGRAMS))
+
+
+@pytest.mark.parametrize("page", few(RUN_PROGRAMS, LONG_PROGRAMS))
 def test_python_of_a_page_runs(page: str, lab: Path, rng: np.random.Generator) -> None:
     logs = rng.normal(0.0, 2e-3, (2, 20_000))
     names = {"rng": rng, "cheap_log": logs[0], "better_log": logs[1]}

@@ -98,10 +98,7 @@ def check_accounts(quality: Quality, kept: Path) -> None:
 CUT_DAILY = {
     f"{name} (cut)"
     for name in (
-        *("csv", "csv by position", "csv in UTF-16", "csv of a header", "csv of binary data"),
-        *("csv that is JSON", "csv with zeros at the end"),
-        *("time in ISO 8601", "time with repeated stamps", "time without stamps", "vectornav"),
-        *("vectornav with garbage", "xsens", "xsens whose preamble contradicts its stamps"),
+        *("csv", "csv in UTF-16", "csv of binary data", "time in ISO 8601", "vectornav", "xsens"),
     )
 }
 """Of the texts that are cut short, some of each reader."""
@@ -134,6 +131,17 @@ READ_DAILY = {
     *("parquet with a wrong checksum", "parquet without records", "parquet without a column"),
     *("ubx without sensors", "ubx of both messages", "ubx without an axis", "ubx in gzip"),
     *("ubx between NMEA and RTCM", "ubx with counters that wrap"),
+    *("phyphox cut short", "sensor logger packed with its folder", "xsens cut in a record"),
+    *("ros 2 bag of two sensors", "ros 2 bag with damaged messages", "mcap cut short"),
+    *("ros 2 bag without acceleration", "ubx of the beginnings of long messages"),
+    # test_text_hostile.py: lines and headers without end
+    *("csv of lines of 10 MB", "csv of a million columns"),
+    "zip archive of thousands of pictures and a log",  # that of thousands of logs
+    # tests/quality: a stuck axis and one of spikes are here every day
+    *("axis that is stuck for a while", "axis that is saturated", "axis in visible steps"),
+    *("axis that is repeated", "log with knocks", "log of a sensor that was moved"),
+    *("log of a sensor that was shaken", "log of a sensor that warms up", "log that becomes noisy"),
+    *("log with 1e300 in a cell", "gyro that turns", "acceleration in g that is said to be m s-2"),
 }
 """The tests of the readers read the like every day."""
 

@@ -15,7 +15,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from tests.conftest import PROJECT
+from imubench_pipeline.readers.formats import FILE_FORMATS
+from tests.conftest import PROJECT, few
 from tests.test_pins import project
 from tests.workflow.project import put_log
 
@@ -63,19 +64,28 @@ def lab(tmp_path: Path) -> Path:
 
 
 FORKS = """
-import json, os, runpy, sys
-import imubench_pipeline.run.cli, pandas, pyarrow.parquet, scipy.optimize, scipy.signal
+import gc, json, os, runpy, sys
+import imubench_pipeline.run.analysis.chain, imubench_pipeline.run.cli
+import imubench_pipeline.readers.inspection, imubench_pipeline.simulate.simulation
+import pandas, pyarrow.parquet, scipy.optimize, scipy.signal
+gc.disable()
+gc.freeze()
 for line in sys.stdin:
     lab, arguments = json.loads(line)
     if not (process := os.fork()):
         os.chdir(lab)
         for number in (1, 2):
             os.dup2(os.open(f"said_{number}", os.O_CREAT | os.O_WRONLY | os.O_TRUNC), number)
+        if arguments[0] == "-c":
+            exec(arguments[1], {})
+            sys.exit()
         sys.argv[1:] = arguments
         runpy.run_module("imubench_pipeline.run.start", run_name="__main__", alter_sys=True)
     print(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), flush=True)
 """
-"""Runs each command in a fork of a process that has imported what most of them import."""
+"""Runs each command, or the Python after ``-c``, in a fork of a process that has imported what most
+of them import. Nothing is looked through for garbage, which would copy the memory of that process.
+"""
 
 Imubench = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -97,19 +107,52 @@ def imubench(python: Path) -> Iterator[Imubench]:
         yield ran
 
 
+LOADED = """
+import json
+from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.readers.formats import FILE_FORMATS
+said = {}
+for name, file_format in FILE_FORMATS.items():
+    try:
+        file_format.load()
+    except RecordingError as error:
+        said[name] = str(error)
+print(json.dumps(said), flush=True)
+"""
+
+
+def test_each_format_whose_library_is_not_installed_names_it(
+    imubench: Imubench, tmp_path: Path
+) -> None:
+    done = imubench(tmp_path, "-c", LOADED)
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    extras = {name: form.extra for name, form in FILE_FORMATS.items() if form.extra}
+    assert said.keys() == extras.keys() == {"rosbag", "matlab", "hdf5"}
+    for name, extra in extras.items():
+        library = {"ros": "rosbags", "hdf5": "h5py"}[extra]
+        assert f"{library} is needed, which is not installed" in said[name]
+        assert f"pip install 'imubench_pipeline[{extra}]'" in said[name]
+
+
 STATED = ("--rate", "10 Hz", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
 
 
 @pytest.mark.parametrize(
     ("command", "status", "said"),
-    [
-        (("formats",), 0, "rosbag"),
-        (("inspect", "logs/mine/run.csv"), 1, "gyro_x"),
-        (("analyse", "logs/mine/run.csv", *STATED), 0, "gyro_x"),
-        (("shortlist", "ground_robot"), 0, "mti_7"),
-        (("completion", "bash"), 0, "complete"),
-        (("simulate", "bno055", "--hours", "0.01", "--out", "made.csv"), 0, "made.csv"),
-    ],
+    few(
+        [
+            (("formats",), 0, "rosbag"),
+            (("inspect", "logs/mine/run.csv"), 1, "gyro_x"),
+            (("analyse", "logs/mine/run.csv", *STATED), 0, "gyro_x"),
+            (("completion", "bash"), 0, "complete"),
+        ],
+        # Every day the process of these tests imports what simulates, and `analyse` what computes.
+        [
+            (("shortlist", "ground_robot"), 0, "mti_7"),
+            (("simulate", "bno055", "--hours", "0.01", "--out", "made.csv"), 0, "made.csv"),
+        ],
+    ),
     ids=lambda value: value[0] if isinstance(value, tuple) else None,
 )
 def test_a_command_that_needs_no_extra_does_without(
@@ -124,7 +167,10 @@ def test_a_command_that_needs_no_extra_does_without(
     ("command", "lacks"),
     [
         (("run", "."), "to run the workflow, snakemake"),
-        (("nightly", "."), "to run the workflow, snakemake"),
+        # Every day: `run`, and what both are in tests/workflow.
+        pytest.param(
+            ("nightly", "."), "to run the workflow, snakemake", marks=pytest.mark.release
+        ),
         (("report", "results"), "to write the report, jinja2"),
         (("analyse", "logs/mine/run.csv", *STATED, "--output", "made"),
          "to write pages and figures (--output), jinja2"),
@@ -155,10 +201,8 @@ except ExtraError as error:
 """
 
 
-def test_the_library_computes_without_what_draws(python: Path) -> None:
-    done = subprocess.run(
-        [str(python), "-c", DRAWN], capture_output=True, text=True, check=False, timeout=600
-    )
+def test_the_library_computes_without_what_draws(imubench: Imubench, tmp_path: Path) -> None:
+    done = imubench(tmp_path, "-c", DRAWN)
     assert done.returncode == 0, done.stderr
     value, said = done.stdout.splitlines()
     assert 0.9 < float(value) < 1.1  # white noise of deviation 1, one sample a cluster

@@ -52,6 +52,8 @@ def test_a_bad_reader_is_caught(tmp_path: Path, bad: str, faults: list[str]) -> 
         assert again.path_in(folder).read_bytes() == again.files[again.path]
 
 
+# Every day a reader that fails with some logs, above.
+@pytest.mark.release
 def test_a_reader_that_fails_with_every_log_is_caught(tmp_path: Path) -> None:
     found = Fuzzing("numpy", SECONDS, tmp_path, target="tests.fuzz.target:no_such_function").run()
     assert found.failures.total() == 1

@@ -15,6 +15,7 @@ from imubench_pipeline.recordings.overview import MOST_BINS, Overview, bin_edges
 from imubench_pipeline.recordings.recording import ROW_GROUP, LogWriter, log_paths
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
+from tests.conftest import few
 
 RATE = 50.0
 Columns = Mapping[str, np.ndarray]
@@ -196,8 +197,8 @@ def test_a_hole_of_many_row_groups(tmp_path: Path, rng: np.random.Generator) -> 
     counted(values, found, "gyro_x")
 
 
-@pytest.mark.parametrize("noise", [0.3, 2.0, 9.7, 13.3, 40.0, 200.0])
-@pytest.mark.parametrize("step", [1.0, 0.0012345, 9.80665 / 16384])
+@pytest.mark.parametrize("noise", few([0.3, 13.3, 200.0], [2.0, 9.7, 40.0]))
+@pytest.mark.parametrize("step", few([0.0012345], [1.0, 9.80665 / 16384]))
 def test_no_comb_is_drawn_of_steps(
     tmp_path: Path, rng: np.random.Generator, noise: float, step: float
 ) -> None:
@@ -223,10 +224,13 @@ def smooth(counts: np.ndarray) -> None:
     assert np.abs(ratio - np.median(ratio)).max(initial=0.0) < 0.15
 
 
-@pytest.mark.parametrize("noise", [3.0, 12.0, 30.0])
+@pytest.mark.parametrize("noise", few([3.0, 30.0], [12.0]))
 @pytest.mark.parametrize(
     ("lsb", "digits"),
-    [(0.0609756, 3), (0.0609756, 2), (1.4, 0), (1.2, 0), (9.80665 / 16384, 5), (0.25, 6)],
+    few(
+        [(0.0609756, 2), (1.4, 0), (9.80665 / 16384, 5)],
+        [(0.0609756, 3), (1.2, 0), (0.25, 6)],
+    ),
 )
 def test_no_comb_of_steps_that_were_printed_in_few_digits(
     tmp_path: Path, rng: np.random.Generator, noise: float, lsb: float, digits: int

@@ -14,6 +14,7 @@ from tests.conftest import few
 pytestmark = pytest.mark.workflow
 
 WORKFLOW = """
+from imubench_pipeline.run.progress import OURS
 rule all:
     input: expand("s/{recording}.done", recording=["a", "b", "bad"])
 rule ingest:
@@ -24,10 +25,12 @@ onstart:
     of = (job.wildcards for job in workflow.dag.needrun_jobs() if job.name == "ingest")
     follow(((w.sensor, w.recording) for w in of), lambda s, r: f"{s}/{r}: of 3 channels")
 onsuccess:
-    from imubench_pipeline.run.progress import OURS
     logger.info("the summary", extra=OURS)
 onerror:
+    from pathlib import Path
+    from imubench_pipeline.report.run_summary import failure
     logger.error("what failed")
+    logger.error(failure(log, Path("s")), extra=OURS)
 """
 SCRIPT = """
 import os, time
@@ -86,6 +89,9 @@ def seen(text: str) -> str:
     return "\n".join(lines)
 
 
+# Every day: the line of a run in which a step fails, below, and the same said in a pipe by a run
+# of tests/workflow/test_workflow.py.
+@pytest.mark.release
 def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
     written, left = in_terminal(folder)
     assert re.search(r"first steps: ingest s/(a|b|bad) 0:00", written)
@@ -100,11 +106,21 @@ def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
 
 
 def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
-    _, left = in_terminal(folder, FAIL="1")
+    written, left = in_terminal(folder, FAIL="1", PAUSE="0.4")
+    assert re.search(r"first steps: ingest s/(a|b|bad) 0:00", written)
+    assert re.search(r"[12] of 4 steps, about \d+ s left: ingest s/(a|b|bad) 0:00", written)
+    # The line is erased each time, but for where a step writes to the terminal itself.
+    assert left.count("steps, about") <= 1 and not re.search(r"(?<!in )rule ingest:", left)
+    assert "Job stats" not in left
+    assert left.count("s/a: of 3 channels") == left.count("s/b: of 3 channels") == 1
     assert "Traceback (most recent call last):\n" in left
     assert "ValueError: upside down\nturn it over\n" in left
     assert "Error in rule ingest:" in left and "output: s/bad.done" in left
     assert left.index("turn it over") < left.index("what failed")
+    # What a run says of its failures, by the log that it wrote.
+    said = [line.strip() for line in left.partition("what failed")[2].splitlines() if line.strip()]
+    assert said[:2] == ["1 step failed; why stands above", "ingest"]
+    assert said[2].endswith("run the same command again: it goes on where this run stopped")
 
 
 @pytest.mark.parametrize("flags", few([], [(("--quiet",),), (("--verbose",),)]))

@@ -147,7 +147,8 @@ def snakemake(folder: Path, command: str, *flags: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-@pytest.mark.workflow
+# Every day: what a run says whose step fails in tests/test_progress.py.
+@pytest.mark.release
 def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
     lines = snakemake(tmp_path, "exit 3")
     assert lines[0] == "2 steps failed; why stands above"
@@ -161,7 +162,8 @@ def test_a_quiet_run_says_that_a_step_failed(tmp_path: Path) -> None:
     assert snakemake(tmp_path, "exit 3", "--quiet", "all")[0] == "a step failed; why stands above"
 
 
-@pytest.mark.workflow
+# Every day: that a log of Snakemake which says so is understood, below.
+@pytest.mark.release
 def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path) -> None:
     # Snakemake loses a signal that comes while it is busy: it is sent until the log has it.
     heard = "grep -qs 'on user request' .snakemake/log/*"
@@ -171,6 +173,17 @@ def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path) -> None:
     lines = snakemake(tmp_path, f"{send}; exit 3")
     assert lines[0].startswith("stopped before its end; to go on, run the same command again")
     assert len(lines) == 2
+
+
+def test_a_log_of_a_run_that_was_interrupted_is_understood(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    log.write_text(
+        "Terminating processes on user request, this might take some time.\n"
+        "Error in rule allan:\n    jobid: 4\n    output: out/recordings/a/r/allan.parquet\n"
+    )
+    first, last = failure([str(log)], Path("out")).splitlines()
+    assert first.startswith("stopped before its end; to go on, run the same command again")
+    assert last == f"log: {log}"
 
 
 def test_a_step_that_was_tried_again_is_named_once(tmp_path: Path) -> None:

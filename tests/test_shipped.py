@@ -77,6 +77,9 @@ def test_a_folder_has_the_workflow_of_the_package_unless_it_has_its_own(lab: Pat
         snakefile_of(lab / "logs")
 
 
+# Every day: that such a run of tests/workflow/test_nightly.py ends so, and `run` without Snakemake
+# in tests/test_extras.py.
+@pytest.mark.release
 def test_a_run_ends_as_snakemake_does_and_says_why(lab: Path) -> None:
     command = [sys.executable, "-m", "imubench_pipeline.run.start", "run", ".", "--"]
     wrong = [*command, "--config", "sensors=nosuch"]
@@ -105,26 +108,29 @@ def test_each_command_says_its_exit_statuses(name: str, capsys: pytest.CaptureFi
     assert f"Exit status: 0 {COMMANDS[name].statuses[0]}" in said
 
 
-@pytest.mark.parametrize(
-    ("typed", "expected"),
-    [
-        ("in", {"init", "inspect"}),
-        ("nightly --se", {"--settle"}),
-        ("show --units p", {"practical"}),
-        ("run mylogs", {"mylogs/"}),
-    ],
-)
-def test_a_shell_completes(typed: str, expected: set[str], tmp_path: Path) -> None:
+COMPLETED = {
+    "in": {"init", "inspect"},
+    "nightly --se": {"--settle"},
+    "show --units p": {"practical"},
+    "run mylogs": {"mylogs"},
+}
+"""What is typed after the name of the command, and what a shell makes of it."""
+
+
+def test_a_shell_completes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mylogs").mkdir()
-    script = (
-        f'source <("{sys.executable}" -m imubench_pipeline.run.start completion bash); '
-        f"COMP_WORDS=(imubench {typed}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); "
-        '_shtab_imubench; printf "%s\\n" "${COMPREPLY[@]}"'
+    assert main(["completion", "bash"]) == 0
+    (tmp_path / "completion").write_text(capsys.readouterr().out)
+    script = "source ./completion\n" + "".join(
+        f"COMP_WORDS=(imubench {typed}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); COMPREPLY=(); "
+        '_shtab_imubench; echo "${COMPREPLY[@]}"\n'
+        for typed in COMPLETED
     )
     done = subprocess.run(
         ["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True
     )
-    assert {line.rstrip("/") for line in done.stdout.split()} == {e.rstrip("/") for e in expected}
+    said = [{word.rstrip("/") for word in line.split()} for line in done.stdout.splitlines()]
+    assert said == list(COMPLETED.values())
 
 
 def test_where_there_is_no_posix_it_says_so_at_once() -> None:

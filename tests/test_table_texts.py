@@ -34,7 +34,7 @@ def cells(path: Path, delimiter: str) -> list[list[str]]:
         return list(csv.reader(file, delimiter=delimiter))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(settings.default, max_examples=settings.default.max_examples)
 @given(st.lists(st.tuples(texts, st.floats(-1e300, 1e300)), min_size=1, max_size=3))
 def test_no_cell_is_a_formula_and_each_text_can_be_told(
     tmp_path_factory: pytest.TempPathFactory, given_rows: list[tuple[str, float]]

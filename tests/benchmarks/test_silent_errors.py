@@ -173,7 +173,10 @@ def test_log_that_the_steps_cannot_use_is_a_failure(monkeypatch):
     assert {one.judgement for one in found} == {"failed"}
 
 
-LONG = ("analogue_steep", "filtered_and_rounded", "filtered_walk", "mti_7_gyro")
+LONG = (
+    *("analogue_steep", "filtered_and_rounded", "filtered_walk", "mti_7_gyro"),
+    *("analogue_2", "resonant_low_pass", "comb", "c102_accelerometer", "decimated_with_filter"),
+)
 
 
 @pytest.mark.parametrize("name", few([name for name in CASES if name not in LONG], LONG))

@@ -79,8 +79,11 @@ def nothing(samples, rate):
     return np.zeros(samples)
 
 
-@pytest.mark.parametrize("order", few([2], [1, 4]))
-@pytest.mark.parametrize("kind", ["analogue", "digital"])
+# Every day an analogue one has the variance of the sampled process, below.
+@pytest.mark.parametrize(
+    ("kind", "order"),
+    few([("digital", 2)], [("digital", 1), ("digital", 4), *(("analogue", n) for n in (1, 2, 4))]),
+)
 def test_low_pass_has_lost_half_of_the_power_at_its_cutoff(rng, kind, order):
     if kind == "analogue":
         log = sim.analogue(nothing, 1.0, 200_000, RATE, 0.5, order, rng)

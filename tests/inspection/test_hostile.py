@@ -36,7 +36,7 @@ from tests.inspection.drafts import (
 from tests.readers import test_rosbag, test_ubx
 from tests.readers.array_files import damages as array_damages
 from tests.readers.damage import examples
-from tests.readers.test_text_hostile import FILES
+from tests.readers.test_text_hostile import FILES, LIKE
 
 
 def survives(path: Path) -> None:
@@ -76,16 +76,6 @@ def test_a_thousand_columns_are_looked_at_whatever_they_hold(tmp_path: Path) -> 
     path = saved(tmp_path, ",".join(names) + "\n" + ("1.5,2" + ",3" * 8000 + "\n") * 3)
     (table,) = contents(path).tables
     assert len(table.columns) == 1000
-
-
-LIKE = {
-    *("20000 columns", "100000 columns"),  # 32769 columns
-    "comments and a record",  # only comments
-    *("spaces", "lines of delimiters"),  # line breaks
-    "bytes of chance later",  # bytes of chance
-    *("zeros at the end", "zeros after a cut record"),  # zeros between
-}
-"""Texts that take long, and beside them one that is inspected every day and much like them."""
 
 
 @pytest.mark.parametrize(

@@ -37,10 +37,20 @@ DEAR = (
     "three chunks of 100 MB",
     "100000 members and no directory",
     "a packed file of 5 GiB",
+    "a batch that is said to have 8 GiB",  # a dictionary of 3 GiB, below
+    *("20 GB of zeros", "6 GB of comments"),  # test_bombs_are_stopped of test_compressed.py
+    *("empty zstd frames", "empty xz streams", "empty bzip2 streams"),  # empty gzip members
+    "8000 brackets",  # 8000 signs
+    "10001 connections",  # 10001 channels
+    "11000 cells",  # a MATLAB file of many sides; that an array is of cells: test_matlab.py
+    *("20000 links", "5000 groups deep"),  # a cycle of groups
+    "one unit of 10 MB for 300",  # names that clear a terminal
+    *("a chunk of more", "an MCAP chunk that is longer than it says"),  # that of ROS 1
+    "a topic of 10 MB",  # a connection whose number has 1 MB
 )
-"""Each takes a second or more to write or to refuse. Every day `test_npy.py`, `test_arrow.py`,
-`test_hdf5.py`, `test_rosbag.py` and `test_compressed.py` have such files that are small, beyond
-bounds that are low; and damaged chunks."""
+"""Each takes a second or more to write or to refuse, or is refused for what another one is.
+Every day `test_npy.py`, `test_arrow.py`, `test_hdf5.py`, `test_rosbag.py` and `test_compressed.py`
+have such files that are small, beyond bounds that are low; and damaged chunks."""
 
 LEFT = (*JUST_WITHIN, *DEAR)
 

@@ -73,6 +73,8 @@ print(json.dumps(said))
 """
 
 
+# Every day the same is asked where they are not installed: tests/test_extras.py.
+@pytest.mark.release
 def test_a_library_that_is_not_installed_is_named() -> None:
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=True, timeout=60
