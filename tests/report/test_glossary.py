@@ -187,7 +187,8 @@ def values_of(name: str, inside: ast.FunctionDef, tree: ast.Module) -> set[str]:
     arguments = [argument.arg for argument in inside.args.args if argument.arg != "self"]
     if name in arguments:
         place = arguments.index(name)
-        for module in [tree] if calls(tree, inside.name) else trees():  # else in a subclass
+        # Of a method that is called in another module, in that of a subclass.
+        for module in [tree] if calls(tree, inside.name) else trees(f"{inside.name}("):
             for caller, call in calls(module, inside.name):
                 if len(call.args) > place:  # else a method of another class
                     found |= texts(call.args[place], caller, module)
@@ -200,10 +201,19 @@ def texts(node: ast.expr, inside: ast.FunctionDef, tree: ast.Module) -> set[str]
     return found
 
 
-@lru_cache(maxsize=1)
-def trees() -> dict[ast.Module, str]:
-    """Return the modules of the source, with their names."""
-    return {ast.parse(path.read_text()): path.stem for path in sorted(SOURCE.rglob("*.py"))}
+@cache
+def sources() -> dict[Path, str]:
+    return {path: path.read_text() for path in sorted(SOURCE.rglob("*.py"))}
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(sources()[path])
+
+
+def trees(word: str) -> dict[ast.Module, str]:
+    """Return the modules of the source in which a word stands, with their names."""
+    return {parsed(path): path.stem for path, text in sources().items() if word in text}
 
 
 def calls(tree: ast.Module, name: str) -> list[tuple[ast.FunctionDef, ast.Call]]:
@@ -228,7 +238,7 @@ def calls_in(tree: ast.Module) -> dict[str, list[tuple[ast.FunctionDef, ast.Call
 def emitted() -> dict[str, str]:
     """Return the findings that the source can emit, each with a module that does."""
     found = {}
-    for tree, name_of_module in trees().items():
+    for tree, name_of_module in trees("Finding(").items():
         for function, call in calls(tree, "Finding"):
             named = [keyword.value for keyword in call.keywords if keyword.arg == "finding"]
             if not (stated := [*call.args, *named]):

@@ -404,9 +404,9 @@ SHAPES: dict[str, list[Rows]] = {
 @pytest.mark.parametrize(
     ("shape", "units"),
     few(
-        [("unknown", "practical"), ("device", "practical"), ("accel", "si")],
+        [("unknown", "practical"), ("accel", "si")],
         [
-            *((shape, "practical") for shape in SHAPES if shape not in ("unknown", "device")),
+            *((shape, "practical") for shape in SHAPES if shape != "unknown"),
             ("one", "si"),
             ("ramp", "si"),
         ],
@@ -429,6 +429,7 @@ def test_nothing_to_show_is_still_a_report(tmp_path: Path) -> None:
     assert not {"comparison", "parameters", "verdict"} & page.ids
 
 
+@pytest.mark.release  # every day the page of nothing has no verdict
 def test_without_requirements_nothing_is_ranked(tmp_path: Path) -> None:
     publish(run(recording_rows()), tmp_path)
     page = read_pages(tmp_path)["index.html"]
@@ -644,6 +645,7 @@ def test_a_changed_parameter_rewrites_its_page_and_those_that_compare(old: Path)
     assert seen == OF_ALL - {"index.html"}
 
 
+@pytest.mark.release  # every day a new finding does
 def test_a_changed_reason_rewrites_all_pages_that_list_the_recording(old: Path) -> None:
     after = some()
     after[2]["recordings"][0]["reason"] = "another"
@@ -673,6 +675,7 @@ def test_a_new_finding_leaves_the_pages_of_other_recordings_alone(old: Path) -> 
     assert seen == {"datasheets.html", "devices/one/unit 7.html"}
 
 
+@pytest.mark.release  # every day a new finding does
 def test_a_new_recording_leaves_the_pages_of_other_sensors_alone(old: Path) -> None:
     after = some()
     after.insert(0, recording_rows("one", "day0", ("gyro_x", "gyro_y", "gyro_z"), found=[0.2]))
@@ -683,6 +686,7 @@ def test_a_new_recording_leaves_the_pages_of_other_sensors_alone(old: Path) -> N
     assert seen == {"fusion.html"}
 
 
+@pytest.mark.release  # every day a changed parameter does
 def test_what_is_found_out_about_a_datasheet_reaches_all_pages_that_say_so(old: Path) -> None:
     after = some()
     (row,) = (r for r in after[4]["coverage"] if (r["sensor"], r["figure"]) == ("one", "K"))
@@ -705,6 +709,7 @@ def test_the_page_of_a_removed_recording_disappears(old: Path) -> None:
     assert "recordings/one/day1.html" not in files(old)
 
 
+@pytest.mark.release  # every day the page of a recording does
 def test_the_pages_of_a_removed_sensor_disappear(old: Path) -> None:
     after = some()
     del after[3]
@@ -713,6 +718,7 @@ def test_the_pages_of_a_removed_sensor_disappear(old: Path) -> None:
     assert not {"recordings/two/phantom.html", "sensors/two.html"} & left
 
 
+@pytest.mark.release  # every day the page of a recording does
 def test_a_device_page_disappears_with_its_device(old: Path) -> None:
     after = some()
     del after[1:3]
@@ -734,6 +740,7 @@ def test_another_script_or_style_is_written_alone(report: Report, tmp_path: Path
     assert publish(made, tmp_path) == ["assets/report.css", "assets/plotly.min.js"]
 
 
+@pytest.mark.release  # every day another file of them does
 def test_changed_samples_rewrite_the_page_of_their_recording_alone(tmp_path: Path) -> None:
     tables = joined(recording_rows("one", "day1"), recording_rows("one", "day2"))
     publish(site(tables, tmp_path), tmp_path / "report")
@@ -764,8 +771,8 @@ def test_another_file_with_the_same_samples_rewrites_the_page_of_its_recording(
 @pytest.mark.parametrize(
     "damaged",
     few(
-        [b"\xff\xfe\x00", b'{"index.html": 3}'],
-        [b"", b'{"index.html": ', b"[]", b"null", b"7"],
+        [b"\xff\xfe\x00"],
+        [b'{"index.html": 3}', b"", b'{"index.html": ', b"[]", b"null", b"7"],
     ),
 )
 def test_a_damaged_list_of_pages_is_healed(report: Report, tmp_path: Path, damaged: bytes) -> None:
@@ -833,6 +840,7 @@ def test_a_write_that_is_killed_leaves_no_half_of_a_file(
     assert files(tmp_path) == complete
 
 
+@pytest.mark.release  # every day of a first run
 def test_a_kill_while_pages_are_written_again_leaves_the_old_or_the_new(
     old: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -861,6 +869,7 @@ def test_what_a_killed_run_has_written_does_not_outlive_a_step_back(
     assert files(old) == before
 
 
+@pytest.mark.release  # every day that of a recording that was new when it was killed
 def test_the_page_of_a_recording_that_was_removed_does_not_outlive_a_kill(
     old: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -884,6 +893,7 @@ def test_a_page_that_only_a_killed_run_has_written_is_removed(
     assert files(old) == before
 
 
+@pytest.mark.release  # every day a finished run tells its site
 def test_the_same_tables_give_the_same_bytes_in_any_folder(report: Report, tmp_path: Path) -> None:
     publish(report.anew(), tmp_path / "b/c")
     assert files(tmp_path / "b/c") == files(report.folder)
@@ -943,6 +953,7 @@ def test_one_file_needs_no_other_file(report: Report, whole: Read) -> None:
             assert not section or state or unquote(section) in ids[led] | ids[""], (path, link)
 
 
+@pytest.mark.release  # every day the whole file is asked
 def test_one_file_has_pages_without_fault_each(whole: Read) -> None:
     for part in re.findall(r"<template.*?</template>", whole.source, flags=re.DOTALL):
         assert Read(part, fragment=True).faults == []

@@ -42,7 +42,8 @@ def words_of(command: str, stubs: Path) -> list[str]:
     return (stubs / "words").read_bytes().decode().split("\x00")[:-1]
 
 
-@settings(max_examples=30, deadline=None)
+# Two processes each: every day eight of them, more before a release.
+@settings(max_examples=max(8, settings().max_examples // 3), deadline=None)
 @given(results=names, sensor=names, given_to=st.lists(names, max_size=1))
 @example(HOSTILE, HOSTILE, [HOSTILE])
 @example("--help", "--", [])

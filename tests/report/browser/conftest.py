@@ -1,11 +1,13 @@
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, sync_playwright
 
+from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.publish import one_file, publish
 from imubench_pipeline.report.site import Site
 from tests.report.browser import made
@@ -70,6 +72,34 @@ def download(window: Reader) -> Callable[[Locator], bytes]:
         return Path(waiting.value.path()).read_bytes()
 
     return pressed
+
+
+@pytest.fixture(autouse=True, scope="package")
+def _quick() -> Iterator[None]:
+    """Read the source once for all reports."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(publishing, "source_digest", cache(publishing.source_digest))
+        yield
+
+
+def kept(browser: Browser, bench: Report, path: str) -> Iterator[Reader]:
+    """A page that is opened once, for tests that leave it as they found it."""
+    reader = Reader(browser)
+    reader.begin(bench.folder, 1280, 900, "light")
+    reader.open(path)
+    yield reader
+    assert reader.end() == []
+    reader.page.context.close()
+
+
+@pytest.fixture(scope="package")
+def start(browser: Browser, bench: Report) -> Iterator[Reader]:
+    yield from kept(browser, bench, "index.html")
+
+
+@pytest.fixture(scope="package")
+def night(browser: Browser, bench: Report) -> Iterator[Reader]:
+    yield from kept(browser, bench, f"recordings/alpha/{made.NIGHT.recording}.html")
 
 
 @pytest.fixture(scope="package")

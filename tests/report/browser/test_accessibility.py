@@ -8,7 +8,10 @@ from tests.report.browser.made import Report
 from tests.report.browser.reader import Open
 from tests.report.browser.visit import KINDS, Seen
 
-ALIKE = ("made", "theory", "sensors/alpha", "sensors/gamma", "recordings/alpha/night 2")
+ALIKE = (
+    "made", "theory", "sensors/alpha", "sensors/gamma", "recordings/alpha/night 2",
+    "datasheets", "devices/",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -16,7 +19,7 @@ def test_nothing_hinders_a_reader(kind: str, seen: Seen, bench: Report) -> None:
     assert seen.hindrances[bench.page(kind)] == []
 
 
-@pytest.mark.parametrize("kind", few([], ALIKE))
+@pytest.mark.parametrize("kind", few([], (*KINDS, *ALIKE)))
 def test_nothing_hinders_a_reader_of_a_page_alike(kind: str, read: Open, bench: Report) -> None:
     reader = read(bench.folder, bench.page(kind))
     reader.draw_all()
@@ -24,7 +27,7 @@ def test_nothing_hinders_a_reader_of_a_page_alike(kind: str, read: Open, bench: 
 
 
 @pytest.mark.release  # long: every line of every table, and every part of a figure
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", (*KINDS, "datasheets", "devices/"))
 def test_nothing_hinders_a_reader_of_what_is_alike(kind: str, read: Open, bench: Report) -> None:
     reader = read(bench.folder, bench.page(kind))
     reader.draw_all()

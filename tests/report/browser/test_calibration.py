@@ -31,14 +31,21 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Rows, Rows]:
 
 
 @pytest.mark.parametrize("path", few([TABLE], ["earth_rate.html", "recordings/s/still.html"]))
-def test_nothing_is_too_wide_or_hinders_a_reader(path: str, read: Open, rows: Any) -> None:
+def test_nothing_is_too_wide(path: str, read: Open, rows: Any) -> None:
     reader: Reader = read(rows[0], path)
     reader.draw_all()
     reader.page.evaluate(UNFOLD)
     assert reader.page.evaluate(TOO_WIDE) == []
-    assert hindrances(reader.page, by_night=False) == []
     narrow: Reader = read(rows[0], path, width=400)
     assert narrow.page.evaluate(TOO_WIDE) == []
+
+
+@pytest.mark.release  # every day it is asked of the recordings at rest
+@pytest.mark.parametrize("path", [TABLE, "earth_rate.html", "recordings/s/still.html"])
+def test_nothing_hinders_a_reader(path: str, read: Open, rows: Any) -> None:
+    reader: Reader = read(rows[0], path)
+    reader.draw_all()
+    assert hindrances(reader.page, by_night=False) == []
 
 
 def test_residuals_have_bars_of_two_sigma_in_the_chosen_unit(read: Open, rows: Any) -> None:

@@ -44,24 +44,23 @@ def named(drawn: list[dict[str, Any]], text: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("path", "figures"),
-    few([(RUN, 6), ("earth_rate.html", 3)], [("recordings/s/unknown.html", 0)]),
+    few([(RUN, 6)], [("earth_rate.html", 3), ("recordings/s/unknown.html", 0)]),
 )
-def test_every_figure_is_drawn_and_nothing_is_too_wide_or_hinders_a_reader(
+def test_every_figure_is_drawn_and_nothing_is_too_wide(
     path: str, figures: int, read: Open, rows: Any
 ) -> None:
     reader: Reader = read(rows[0], path)
     assert reader.draw_all() == figures
     assert reader.page.evaluate(TOO_WIDE) == []
-    if figures:
-        assert hindrances(reader.page, by_night=False) == []
     if path == RUN:
         narrow: Reader = read(rows[0], path, width=400)
         assert narrow.page.evaluate(TOO_WIDE) == []
 
 
-@pytest.mark.release  # every day the start page is looked at by night
-def test_nothing_hinders_a_reader_by_night(read: Open, rows: Any) -> None:
-    reader: Reader = read(rows[0], RUN)
+@pytest.mark.release  # every day it is asked of the recordings at rest
+@pytest.mark.parametrize("path", [RUN, "earth_rate.html"])
+def test_nothing_hinders_a_reader(path: str, read: Open, rows: Any) -> None:
+    reader: Reader = read(rows[0], path)
     reader.draw_all()
     assert hindrances(reader.page) == []
 

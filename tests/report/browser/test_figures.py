@@ -2,13 +2,12 @@
 
 import math
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
 
+from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.factors import ARC, DEGREES, FACTORS, MICRO_G
 from tests.report.browser.made import Report
@@ -53,26 +52,6 @@ def names(drawn: list[dict[str, Any]]) -> set[str]:
 
 def column(rows: list[dict[str, Any]], name: str) -> list[float]:
     return [row[name] for row in rows]
-
-
-def kept(browser: Browser, bench: Report, path: str) -> Iterator[Reader]:
-    """A page that is opened once, for tests that leave it as they found it."""
-    reader = Reader(browser)
-    reader.begin(bench.folder, 1280, 900, "light")
-    reader.open(path)
-    yield reader
-    assert reader.end() == []
-    reader.page.context.close()
-
-
-@pytest.fixture(scope="module")
-def start(browser: Browser, bench: Report) -> Iterator[Reader]:
-    yield from kept(browser, bench, "index.html")
-
-
-@pytest.fixture(scope="module")
-def night(browser: Browser, bench: Report) -> Iterator[Reader]:
-    yield from kept(browser, bench, OF_NIGHT)
 
 
 def test_the_curves_of_all_sensors(start: Reader, bench: Report) -> None:
@@ -146,16 +125,21 @@ def test_axis_method_and_recordings_are_chosen(read: Open, bench: Report) -> Non
     np.testing.assert_allclose(curve["y"], expected, rtol=LEVELS)
 
     page.get_by_label("gyro x", exact=True).check()
+    page.get_by_role("combobox", name="Recordings").select_option("the last of each sensor")
+    last = made.DATED[-1].recording
+    assert names(traces(figure)) == {f"{A} (simulated), sim_published", f"{B}, {last}"}
+
+
+@pytest.mark.release  # every day the model of the parameters beside it is chosen
+def test_the_model_of_the_curves_is_chosen(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    figure, page = reader.figure("overlay"), reader.page
     toggle(figure, "95 % limits").uncheck()
     toggle(figure, "model").check()
     best = chosen(traces(figure), mode="lines")[0]["y"]
     page.get_by_role("combobox", name=MODEL).select_option("weighted")
     other = chosen(traces(figure), mode="lines")[0]["y"]
     assert other[0] / best[0] == pytest.approx(1 + 0.02 * made.METHODS.index("weighted"), rel=1e-3)
-
-    page.get_by_role("combobox", name="Recordings").select_option("the last of each sensor")
-    last = made.DATED[-1].recording
-    assert names(traces(figure)) == {f"{A} (simulated), sim_published", f"{B}, {last}"}
 
 
 @pytest.mark.release  # every day the same figure is asked for on the start page
@@ -194,16 +178,18 @@ def test_a_first_look_shows_the_same_curve_before_what_draws_is_there(
     assert reader.figure("allan", channel="gyro_x").locator("svg.sketch").count() == 0
 
 
-def test_ticks_follow_the_zoom(read: Open, bench: Report) -> None:
-    figure = read(bench.folder, OF_NIGHT).figure("allan", channel="gyro_x")
+def test_ticks_follow_the_zoom(night: Reader) -> None:
+    figure = night.figure("allan", channel="gyro_x")
     canvas = figure.locator(".canvas")
     ticks = "canvas => canvas.layout.xaxis.tickvals"
+    whole = canvas.evaluate("canvas => [...canvas.layout.xaxis.range]")
     assert {0.1, 1, 10, 100} <= set(canvas.evaluate(ticks))
     canvas.evaluate("canvas => Plotly.relayout(canvas, {'xaxis.range': [1, Math.log10(30)]})")
     inside = canvas.evaluate(ticks)
     assert len(inside) >= 3 and all(10 <= tick <= 30 for tick in inside)
     shown = figure.locator(".xaxislayer-above .xtick").all_text_contents()
     assert [float(text) for text in shown] == pytest.approx(inside)
+    canvas.evaluate("(canvas, range) => Plotly.relayout(canvas, {'xaxis.range': range})", whole)
 
 
 def test_parameters_of_all_sensors(start: Reader, bench: Report) -> None:
@@ -380,6 +366,15 @@ def tab_to(reader: Reader, pattern: str) -> None:
     pytest.fail(f"no focus on {pattern}")
 
 
+def test_the_focus_is_seen_and_leads_to_the_content(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    tab_to(reader, "Skip to the content")
+    reader.page.keyboard.press("Enter")
+    assert reader.page.evaluate("document.activeElement.id") == "main"
+    tab_to(reader, "button|select-one|searchbox|a ")
+
+
+@pytest.mark.release  # long; every day the focus is followed to the content, and tables are sorted
 def test_everything_is_done_by_the_keyboard(read: Open, bench: Report) -> None:
     reader = read(bench.folder)
     figure, keys = reader.figure("overlay"), reader.page.keyboard
@@ -402,10 +397,16 @@ def test_everything_is_done_by_the_keyboard(read: Open, bench: Report) -> None:
     assert reader.page.get_by_role("combobox", name=MODEL).input_value() == made.METHODS[-1]
 
 
-def test_the_units_of_the_figures_follow_the_reader(night: Reader, bench: Report) -> None:
+@pytest.mark.parametrize(
+    "choices", few([["SI: rad/s"]], [[*FACTORS["gyro"]]]), ids=lambda some: str(len(some))
+)
+def test_the_units_of_the_figures_follow_the_reader(
+    choices: list[str], night: Reader, bench: Report
+) -> None:
     reader = night
     rows = bench.of("allan", recording=NIGHT, channel="gyro_x")
-    for choice, units in FACTORS["gyro"].items():
+    for choice in choices:
+        units = FACTORS["gyro"][choice]
         reader.page.get_by_label("Gyroscopes in").select_option(choice)
         for kind, symbol in (("allan", "adev"), ("spectrum", "psd"), ("series", "signal")):
             figure = reader.figure(kind, channel="gyro_x")

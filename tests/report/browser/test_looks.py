@@ -44,12 +44,13 @@ def picture(reader: Reader, **how: Any) -> Image.Image:
 @pytest.mark.parametrize(
     ("drawn", "written"),
     few(
-        [(("compare", "recordings/alpha/night 1"), WRITTEN)],
+        [(("compare",), ("recordings.html", "datasheets", "recordings/alpha/night 1"))],
         [
+            (("compare", "recordings/alpha/night 1"), WRITTEN),
             (
                 ("index", "sensors/alpha", "devices/"),
                 ("made", "sensors/gamma", "recordings/alpha/night 2", "recordings/beta/run_1"),
-            )
+            ),
         ],
     ),
     ids=str,
@@ -96,6 +97,7 @@ def test_there_is_something_to_see(width: int, read: Open, bench: Report) -> Non
         show()
         seen = picture(reader)
         assert seen.width == width and len(seen.getcolors(1 << 20) or []) > 50
+        assert reader.page.evaluate(TOO_WIDE) == []
 
 
 def test_a_page_is_dark_by_night(read: Open, bench: Report) -> None:
@@ -107,9 +109,18 @@ def test_a_page_is_dark_by_night(read: Open, bench: Report) -> None:
     reader.page.wait_for_function(f"({INK})() !== '{light}'")
     dark = ink(reader)
     assert background(reader) < 0.1 and luminance(dark) > 0.7
-    assert ink(read(bench.folder, OF_NIGHT, scheme="dark")) == dark
     pixels = picture(reader).resize((64, 64)).convert("L").tobytes()
     assert sorted(pixels)[len(pixels) // 2] < 60
+
+
+@pytest.mark.release  # every day a page turns dark while it is open
+def test_a_page_that_is_opened_by_night_is_dark_at_once(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, OF_NIGHT)
+    light = ink(reader)
+    reader.page.emulate_media(color_scheme="dark")
+    reader.page.wait_for_function(f"({INK})() !== '{light}'")
+    dark = ink(reader)
+    assert ink(read(bench.folder, OF_NIGHT, scheme="dark")) == dark
 
 
 @pytest.mark.parametrize("scheme", few(["dark"], ["light"]))
@@ -130,6 +141,7 @@ def test_a_page_is_printed_light_and_whole(scheme: str, read: Open, bench: Repor
     assert luminance(ink(reader)) < 0.2
 
 
+@pytest.mark.release  # every day a recording is printed
 def test_no_figure_is_cut_off_on_paper(read: Open, bench: Report) -> None:
     reader = read(bench.folder, "compare.html", width=718)  # of a sheet of A4 between its margins
     reader.draw_all()

@@ -4,7 +4,7 @@ import pytest
 
 from tests.report.browser import made
 from tests.report.browser.made import Report
-from tests.report.browser.reader import Open, traces
+from tests.report.browser.reader import Open, Reader, traces
 
 OF_NIGHT = f"recordings/alpha/{made.NIGHT.recording}.html"
 VISIBLE = """() => [...document.querySelectorAll("section.channel")]
@@ -44,8 +44,8 @@ def test_every_channel_is_printed(read: Open, bench: Report) -> None:
     assert reader.page.evaluate(VISIBLE) == ["gyro_x"]
 
 
-def test_bars_of_a_budget_are_its_parts(read: Open, bench: Report) -> None:
-    figure = read(bench.folder, OF_NIGHT).figure("budget")
+def test_bars_of_a_budget_are_its_parts(night: Reader, bench: Report) -> None:
+    figure = night.figure("budget")
     names = figure.locator(".canvas").evaluate("canvas => canvas.layout.yaxis.ticktext")
     rows = {
         row["source"]: row["sigma"]
