@@ -154,7 +154,7 @@ def test_the_half_towards_the_expected_value_counts() -> None:
 
 
 @pytest.mark.parametrize(
-    ("spread", "ratio"), few([(1.0, 3.0), (30.0, 10.0)], [(0.0, 1.0), (3.0, 1.0)])
+    ("spread", "ratio"), few([(1.0, 3.0)], [(30.0, 10.0), (0.0, 1.0), (3.0, 1.0)])
 )
 def test_false_alarms(rng: np.random.Generator, spread: float, ratio: float) -> None:
     # 24 tests a night for 20 nights of 15 devices: 255 recordings are judged. With 1 % of false
@@ -197,6 +197,7 @@ def test_a_step_is_flagged_once(rng: np.random.Generator) -> None:
         assert (found[:, 30:].sum(axis=1) > 1).mean() <= 0.05
 
 
+@pytest.mark.release  # test_a_step_is_flagged_once has steps of six and eight every day
 def test_a_step_of_five_deviations_of_all_of_a_parameter_is_flagged(
     rng: np.random.Generator,
 ) -> None:

@@ -118,6 +118,7 @@ def test_a_longer_tau_asks_for_more() -> None:
     assert long.model.allan_variance(tau) > truth
 
 
+@pytest.mark.release  # test_the_band_can_be_narrower allows such a walk every day
 def test_where_a_walk_must_be_far_too_large_white_noise_does_not_make_room() -> None:
     found = overbound(measured(GYRO), GYRO, RATE, longest=4000.0, most_excess=math.inf).model
     assert found.K > 5.0 * GYRO.K
@@ -161,7 +162,7 @@ def test_a_random_walk_far_too_large_is_refused_with_what_to_take() -> None:
     assert "beyond 2 T_B = 40 s" in str(error.value)
 
 
-@pytest.mark.release  # test_where_a_walk_must_be_far_too_large allows it every day
+@pytest.mark.release  # test_the_band_can_be_narrower allows it every day
 def test_a_random_walk_far_too_large_is_given_where_it_is_allowed() -> None:
     curve = measured(PROCESS, 1e9)
     allowed = overbound(curve, PROCESS, RATE, horizon=150.0, most_excess=20.0)
@@ -191,7 +192,7 @@ def test_the_density_is_bounded_above_the_band_s_lowest_frequency_only() -> None
     assert same.passed_below is None
 
 
-@pytest.mark.parametrize(("logs", "least"), few([(75, 0.89)], [(150, 0.91)]))
+@pytest.mark.parametrize(("logs", "least"), few([(25, 0.83)], [(75, 0.89), (150, 0.91)]))
 def test_limits_for_all_tau_together_hold_in_so_many_logs(logs: int, least: float) -> None:
     """Pointwise limits leave out the true curve in a quarter of the logs and more."""
     rng = np.random.default_rng(7)

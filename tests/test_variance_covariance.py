@@ -8,7 +8,6 @@ from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.noise.variance_covariance import variance_covariance
-from tests.conftest import few
 
 MTI_7 = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 
@@ -98,12 +97,10 @@ def test_random_walk_has_the_degrees_of_freedom_of_greenhall_and_riley() -> None
     np.testing.assert_allclose(np.sqrt(found), np.sqrt(expected), rtol=0.015)
 
 
+@pytest.mark.release  # the exact double sums of all of them are made every day
 @pytest.mark.parametrize(
     "model",
-    few(
-        [NoiseModel(N=1.0, B=0.5, T_B=30.0)],  # beside the exact sums of all of them
-        [NoiseModel(N=1.0), NoiseModel(N=1.0, K=0.05)],
-    ),
+    [NoiseModel(N=1.0, B=0.5, T_B=30.0), NoiseModel(N=1.0), NoiseModel(N=1.0, K=0.05)],
 )
 def test_the_covariance_is_that_of_simulated_logs(model: NoiseModel) -> None:
     samples, members = 9000, 500

@@ -63,7 +63,7 @@ def _elsewhere(way: Trajectory, every: int) -> tuple[np.ndarray, np.ndarray, np.
 
 
 @pytest.mark.parametrize(
-    ("name", "drive"), few([("drone", 30.0)], [("car", 60.0), ("drone", 60.0), ("field", 60.0)])
+    ("name", "drive"), few([("drone", 12.0)], [("car", 60.0), ("drone", 60.0), ("field", 60.0)])
 )
 def test_another_program_gets_as_far(name: str, drive: float) -> None:
     # Its steps are of first order: the limit of small ones, by Richardson from 10 and 5 ms.

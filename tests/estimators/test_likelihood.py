@@ -148,7 +148,7 @@ def assert_same(one: Likelihood, other: Likelihood, rel: float = 1e-5, **scale: 
     assert others.goodness.deviance == pytest.approx(best.goodness.deviance, rel=1e-4)
 
 
-@pytest.mark.parametrize(("truth", "logs"), few([(FLICKER, 3)], [(MTI_7, 6)]))
+@pytest.mark.parametrize(("truth", "logs"), few([(FLICKER, 1)], [(FLICKER, 3), (MTI_7, 6)]))
 def test_estimates_lie_within_a_few_cramer_rao_bounds(truth: dict[str, float], logs: int) -> None:
     bound = bounds(truth, RATE, SAMPLES)
     off = np.array(
@@ -162,24 +162,26 @@ def test_estimates_lie_within_a_few_cramer_rao_bounds(truth: dict[str, float], l
     )
     assert np.abs(off).max() < 4
     rms = np.sqrt(np.mean(off**2, axis=0))
-    # chi-squared of 3 to 6 degrees of freedom
-    assert ((rms > 0.25) & (rms < 1.7)).all(), rms
+    # chi-squared of 3 to 6 degrees of freedom; one log tells nothing of its scatter
+    assert logs == 1 or ((rms > 0.25) & (rms < 1.7)).all(), rms
 
 
-@pytest.mark.parametrize(("logs", "least"), few([(3, 14)], [(6, 25)]))
+@pytest.mark.parametrize(("logs", "least"), few([(1, 4)], [(3, 14), (6, 25)]))
 def test_intervals_hold_the_truth_as_often_as_they_say(logs: int, least: int) -> None:
-    """Of 18 intervals 95 % are 17.1, of 30 28.5.
+    """Of 6 intervals 95 % are 5.7, of 18 17.1, of 30 28.5.
 
-    Fewer than 14, and than 25, have probabilities of 0.2 and 0.3 %.
+    Fewer than 4, 14 and 25 have probabilities of 0.2, 0.2 and 0.3 %.
     """
     held = [holds(found_in(NoiseModel(**MTI_7), i), name, MTI_7[name])
             for i in range(logs) for name in ALL]  # fmt: skip
     held += [holds(found_in(NoiseModel(**FLICKER), i), name, FLICKER[name])
-             for i in range(3) for name in FLICKER]  # fmt: skip
+             for i in range(min(logs, 3)) for name in FLICKER]  # fmt: skip
     assert sum(held) >= least, held
 
 
-@pytest.mark.parametrize(("truth", "logs"), few([(MTI_7, 3), (FLICKER, 3)], [(MTI_7, 6)]))
+@pytest.mark.parametrize(
+    ("truth", "logs"), few([(MTI_7, 1)], [(MTI_7, 3), (FLICKER, 3), (MTI_7, 6)])
+)
 def test_intervals_are_as_narrow_as_the_bound_allows(truth: dict[str, float], logs: int) -> None:
     # An interval that always holds the truth because it is wide would pass any test of coverage.
     method = "likelihood_gm" if "T_B" in truth else "likelihood"
@@ -191,13 +193,13 @@ def test_intervals_are_as_narrow_as_the_bound_allows(truth: dict[str, float], lo
 @pytest.mark.parametrize(
     ("truth", "name", "logs"),
     few(
-        [(MTI_7, "N+GM+K", 3), (FLICKER, "N+F", 3), ({"N": 1e-3}, "N", 2)],
-        [(MTI_7, "N+GM+K", 6)],
+        [(MTI_7, "N+GM+K", 1), (FLICKER, "N+F", 1), ({"N": 1e-3}, "N", 1)],
+        [(MTI_7, "N+GM+K", 3), (FLICKER, "N+F", 3), ({"N": 1e-3}, "N", 2), (MTI_7, "N+GM+K", 6)],
     ),
 )
 def test_the_right_model_is_chosen(truth: dict[str, float], name: str, logs: int) -> None:
     chosen = [found_in(NoiseModel(**truth), i).candidates[0].terms.name for i in range(logs)]
-    assert chosen.count(name) >= logs - 1, chosen
+    assert chosen.count(name) >= max(1, logs - 1), chosen
 
 
 def test_flicker_noise_has_a_bias_instability_but_no_correlation_time() -> None:
@@ -207,7 +209,7 @@ def test_flicker_noise_has_a_bias_instability_but_no_correlation_time() -> None:
     assert "no correlation time" in (of(found, "T_B").reason or "")
 
 
-@pytest.mark.parametrize("number", range(2))
+@pytest.mark.parametrize("number", few([0], [1]))
 def test_what_is_not_there_is_absent(number: int) -> None:
     found = found_in(NoiseModel(N=1e-3), number)
     for name in ("Q", "B", "T_B", "K", "R"):
@@ -414,6 +416,7 @@ def found_with_holes() -> Likelihood:
     return fit(log_with_holes(), RATE)
 
 
+@pytest.mark.release  # test_blocks_of_a_log_with_holes_do_not_matter is one more fit of the log
 def test_the_same_log_gives_the_same_result() -> None:
     np.random.seed(1)  # noqa: NPY002  # the global state must not matter
     again = fit(log_with_holes(), RATE)
@@ -432,18 +435,31 @@ def test_other_draws_are_within_the_noise_of_the_intervals() -> None:
             assert np.log(a / b) == pytest.approx(0.0, abs=0.15 * width(one, name))
 
 
-@pytest.mark.release  # the next test has a list every day
+def test_unit_rate_constant_direction_and_type_change_what_they_must_alone() -> None:
+    # In one fit: the variance of a sample is N^2 / T, and that of a step of the walk K^2 T.
+    unit, faster = 1e-7, 37.0
+    log = unit * (log_of(SHORT, samples=SHORT_SAMPLES)[::-1] - 4e3)
+    root = np.sqrt(faster)
+    scale = {"N": 1 / root, "B": 1.0, "K": root, "Q": 1 / faster, "R": faster}
+    other = fit(log.tolist(), RATE * faster)
+    scale = {name: unit * factor for name, factor in scale.items()} | {"T_B": 1 / faster}
+    assert_same(found_in(SHORT, samples=SHORT_SAMPLES), other, **scale, time=1 / faster)
+
+
+@pytest.mark.release  # the test before this has a list every day
 def test_lists_are_taken_as_they_are() -> None:
     log = log_of(SHORT, samples=SHORT_SAMPLES)
     assert fit(log.tolist(), RATE).estimates == found_in(SHORT, samples=SHORT_SAMPLES).estimates
 
 
+@pytest.mark.release  # the test of all of them at once is run every day
 def test_lists_and_single_precision_are_taken() -> None:
     log = log_of(SHORT, samples=SHORT_SAMPLES).astype(np.float32)
     assert_same(found_in(SHORT, samples=SHORT_SAMPLES), fit(list(log), RATE))
 
 
-@pytest.mark.parametrize("scale", few([1e-7], [3e8]))
+@pytest.mark.release  # the test of all of them at once is run every day
+@pytest.mark.parametrize("scale", [1e-7, 3e8])
 def test_parameters_scale_with_the_unit(scale: float) -> None:
     other = fit(scale * log_of(SHORT, samples=SHORT_SAMPLES), RATE)
     same = dict.fromkeys(("Q", "N", "B", "K", "R"), scale)
@@ -456,13 +472,15 @@ def test_parameters_of_a_log_with_holes_scale_with_the_unit() -> None:
     assert_same(found_with_holes(), fit(1e-6 * log_with_holes(), RATE), rel=1e-4, **same)
 
 
+@pytest.mark.release  # the test of all of them at once is run every day
 def test_a_constant_is_no_noise() -> None:
     # A million standard deviations of a sample.
     other = fit(log_of(SHORT, samples=SHORT_SAMPLES) - 4e3, RATE)
     assert_same(found_in(SHORT, samples=SHORT_SAMPLES), other)
 
 
-@pytest.mark.parametrize("faster", few([37.0], [0.01]))
+@pytest.mark.release  # the test of all of them at once is run every day
+@pytest.mark.parametrize("faster", [37.0, 0.01])
 def test_the_same_samples_at_another_rate_scale_with_time(faster: float) -> None:
     # The variance of a sample is N^2 / T, and that of a step of the walk K^2 T.
     other = fit(log_of(SHORT, samples=SHORT_SAMPLES), RATE * faster)
@@ -471,6 +489,7 @@ def test_the_same_samples_at_another_rate_scale_with_time(faster: float) -> None
     assert_same(found_in(SHORT, samples=SHORT_SAMPLES), other, **scale, time=1 / faster)
 
 
+@pytest.mark.release  # the test of all of them at once is run every day
 def test_a_log_read_backwards_has_the_same_noise() -> None:
     other = fit(log_of(SHORT, samples=SHORT_SAMPLES)[::-1], RATE)
     assert_same(found_in(SHORT, samples=SHORT_SAMPLES), other)
@@ -531,7 +550,8 @@ def test_a_band_beyond_nyquist_is_the_whole_spectrum() -> None:
     assert_same(found_in(SHORT, samples=SHORT_SAMPLES), found)
 
 
-@pytest.mark.parametrize("stated", few([None], [0.8]))
+@pytest.mark.release  # test_joint_cutoff.py takes one out every day
+@pytest.mark.parametrize("stated", [None, 0.8])
 def test_a_filter_that_nobody_states_is_found_and_taken_out(stated: float | None) -> None:
     # White noise behind a first-order filter applied to the samples, whose cut-off is a third of
     # Nyquist: a tenth of it would leave 8 % of N.
@@ -552,7 +572,7 @@ def test_a_filter_that_nobody_states_is_found_and_taken_out(stated: float | None
         assert abs(off) < 0.01 + 4 * bound[name], name
 
 
-# Every day test_cutoff.py finds such a mean, and the test before this takes a filter out.
+# Every day test_cutoff.py finds a mean, and test_joint_cutoff.py takes a filter out.
 @pytest.mark.release
 def test_a_mean_of_two_samples_is_a_filter_and_harms_nothing() -> None:
     # Fitted up to Nyquist without it, N would be 0 and B many times too large.
@@ -617,6 +637,7 @@ def strong() -> np.ndarray:
     )
 
 
+@pytest.mark.release  # test_band.py cuts such a band every day
 def test_where_nothing_explains_the_spectrum_what_is_left_out_is_said() -> None:
     # A resonance: neither a process nor a low-pass; N stands below it.
     rng = np.random.default_rng(8)

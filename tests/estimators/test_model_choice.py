@@ -240,13 +240,13 @@ def test_a_model_with_more_terms_is_never_further_from_the_data(rng) -> None:
                     assert more.cost < fewer.cost + 0.3  # two processes are a local search
 
 
-@pytest.mark.parametrize(("logs", "least"), few([(6, 5)], [(12, 10)]))
+@pytest.mark.parametrize(("logs", "least"), few([(1, 1)], [(6, 5), (12, 10)]))
 def test_white_noise_is_white_noise(rng, logs: int, least: int) -> None:
     names = chosen(lambda: simulate(NoiseModel(N=N), RATE, 50_000, rng), logs)
     assert names["N"] >= least
 
 
-@pytest.mark.parametrize(("logs", "least"), few([(6, 5)], [(12, 10)]))
+@pytest.mark.parametrize(("logs", "least"), few([(1, 1)], [(6, 5), (12, 10)]))
 def test_a_random_walk_shows_no_bias_instability(rng, logs: int, least: int) -> None:
     names = chosen(lambda: simulate(NoiseModel(N=N, K=3e-4), RATE, 50_000, rng), logs)
     assert names["N+K"] >= least
@@ -263,7 +263,7 @@ def test_a_strong_process_is_a_process(rng) -> None:
     assert names["N+GM"] >= 8
 
 
-@pytest.mark.parametrize(("logs", "least"), few([(5, 4)], [(10, 8)]))
+@pytest.mark.parametrize(("logs", "least"), few([(1, 1)], [(5, 4), (10, 8)]))
 def test_all_three_of_the_papers_are_told_where_they_are_strong(rng, logs: int, least: int) -> None:
     model = NoiseModel(N=N, B=6e-3, T_B=3.0, K=6e-4)
     times, levels, names = [], [], Counter[str]()
@@ -279,7 +279,7 @@ def test_all_three_of_the_papers_are_told_where_they_are_strong(rng, logs: int, 
     assert np.median(times) == pytest.approx(3.0, rel=0.15 * np.sqrt(10 / logs))
 
 
-@pytest.mark.parametrize(("logs", "least"), few([(5, 4)], [(10, 8)]))
+@pytest.mark.parametrize(("logs", "least"), few([(2, 2)], [(5, 4), (10, 8)]))
 def test_flicker_noise_is_flicker_noise_and_no_process(rng, logs: int, least: int) -> None:
     B, samples = 2e-3, 100_000
     names, levels, lead = Counter[str](), [], []
@@ -293,11 +293,12 @@ def test_flicker_noise_is_flicker_noise_and_no_process(rng, logs: int, least: in
     assert names["N+F"] >= least
     assert min(lead) > 6
     # B means the same here as in the filter.
-    assert np.mean(levels) == pytest.approx(B, abs=4 * np.std(levels) / np.sqrt(logs))
+    error = max(np.std(levels), 0.02 * B) / np.sqrt(logs)
+    assert np.mean(levels) == pytest.approx(B, abs=4 * error)
     assert np.std(levels) < 0.1 * B
 
 
-@pytest.mark.parametrize(("logs", "least"), few([(3, 2)], [(8, 6)]))
+@pytest.mark.parametrize(("logs", "least"), few([(1, 1)], [(3, 2), (8, 6)]))
 def test_flicker_beside_a_random_walk_is_told(rng, logs: int, least: int) -> None:
     samples = 200_000
 
@@ -334,7 +335,7 @@ def test_a_ramp_is_tried_beside_a_random_walk_only(rng) -> None:
         assert all(c.maximum.ramp == 0 for c in candidates if not c.terms.ramp)
 
 
-@pytest.mark.parametrize("logs", few([3], [5]))
+@pytest.mark.parametrize("logs", few([1], [3, 5]))
 def test_a_ramp_far_beyond_the_random_walk_is_found(rng, logs: int) -> None:
     K, R = 3e-5, -1e-5  # over the log the ramp goes ten times as far as the walk
     with_ramp, without = [], []

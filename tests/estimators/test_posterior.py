@@ -194,21 +194,18 @@ def test_the_same_stream_gives_the_same_draws(rng) -> None:
     assert (np.abs(middle[0] - middle[1]) < 0.35 * spread).all()
 
 
+@pytest.mark.release  # the tests with a grid have quantiles every day
 @pytest.mark.parametrize(
     ("model", "terms"),
-    few(
-        [
-            (NoiseModel(N=1e-3, B=2e-3, T_B=20.0), Terms("NK", 1, True)),
-        ],
-        [
-            (NoiseModel(N=1e-3), PAPERS),
-            (NoiseModel(N=1e-3, B=3e-3, T_B=3.0, further=[GaussMarkov(9e-3, 60.0)]), Terms("N", 2)),
-            (MTI_7, PAPERS),
-            (NoiseModel(N=1e-3), Terms("NFK")),
-            (NoiseModel(N=1e-3, B=1e-3, T_B=20.0), Terms("QNK", 1)),
-            (NoiseModel(N=1e-3, B=1e-3, K=1e-5), Terms("NF", 1)),
-        ],
-    ),
+    [
+        (NoiseModel(N=1e-3, B=2e-3, T_B=20.0), Terms("NK", 1, True)),
+        (NoiseModel(N=1e-3), PAPERS),
+        (NoiseModel(N=1e-3, B=3e-3, T_B=3.0, further=[GaussMarkov(9e-3, 60.0)]), Terms("N", 2)),
+        (MTI_7, PAPERS),
+        (NoiseModel(N=1e-3), Terms("NFK")),
+        (NoiseModel(N=1e-3, B=1e-3, T_B=20.0), Terms("QNK", 1)),
+        (NoiseModel(N=1e-3, B=1e-3, K=1e-5), Terms("NF", 1)),
+    ],
     ids=["no ramp", "nothing but N", "two processes", "MTi-7", "no flicker", "weak Q", "flicker"],
 )
 def test_quantiles_are_those_of_a_long_chain(monkeypatch, model: NoiseModel, terms: Terms) -> None:
@@ -270,7 +267,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say(rng) -> None:
     assert inside.mean() / logs == pytest.approx(0.96, abs=0.025), inside / logs
 
 
-@pytest.mark.parametrize("K", few([1e-1], [4e-2]))
+@pytest.mark.release  # likelihood and grids have such limits every day
+@pytest.mark.parametrize("K", [1e-1, 4e-2])
 def test_white_noise_that_hardly_shows_has_an_upper_limit_above_it(rng, K: float) -> None:
     # Under a strong random walk N is known to 20 % here, or not at all: its limit must say so.
     above, logs = 0, 20

@@ -255,8 +255,8 @@ def searched(whittle: Whittle, terms: Terms, rng: np.random.Generator, starts: i
 @pytest.mark.parametrize(
     "terms",
     few(
-        [PAPERS, Terms("NK", 1, True)],
-        [Terms("NFK"), Terms("K"), Terms("QNF"), Terms("NK", 0, True), Terms("N", 1)],
+        [Terms("NK", 1, True)],
+        [PAPERS, Terms("NFK"), Terms("K"), Terms("QNF"), Terms("NK", 0, True), Terms("N", 1)],
     ),
 )
 def test_no_general_minimiser_finds_a_better_fit(rng, terms: Terms) -> None:
@@ -319,7 +319,7 @@ def raw_likelihood(log: np.ndarray, rate: float) -> Callable[[np.ndarray], float
     return cost
 
 
-@pytest.mark.parametrize("samples", [20_000, 300_000])
+@pytest.mark.parametrize("samples", few([20_000], [300_000]))
 def test_nothing_is_lost_by_bins_and_by_two_resolutions(rng, samples: int) -> None:
     # Correlation times far below the length of the log: its ends do not matter.
     model = NoiseModel(N=1e-3, B=2e-3, T_B=5.0, K=1e-4)

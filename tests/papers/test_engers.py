@@ -94,6 +94,7 @@ def test_what_he_says_of_axes_and_datasheets() -> None:
     assert "at 0.87 s" in of_figure(54)["found_words"]  # (0.014/0.015)^2
 
 
+@pytest.mark.release  # test_confidence.py has the limits of curves every day
 def test_one_curve_in_twenty_is_less_in_its_band() -> None:
     # White noise, whose curve is known: points of a curve go together, and so leave a band at once.
     rng = np.random.default_rng(1)

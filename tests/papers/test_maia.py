@@ -192,6 +192,7 @@ def single() -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     ]  # fmt: skip
 
 
+@pytest.mark.release  # test_table_3_lies_in_the_spread has the draws themselves every day
 def test_single_draws_spread_as_full_length_logs_do(single: Any) -> None:
     taus, (measured, *drawn) = single
     short = np.outer([1, 10], np.arange(1, 10)).ravel() / 100.0  # only N there
@@ -210,6 +211,7 @@ def test_single_draws_spread_as_full_length_logs_do(single: Any) -> None:
             assert beyond == pytest.approx(spread.beyond[place], abs=0.12)
 
 
+@pytest.mark.release  # the test of a curve read by the closed form is run every day
 def test_single_curves_are_read_as_full_length_logs_are(single: Any) -> None:
     taus, (measured, *_) = single
     kept = taus <= 4000
@@ -303,7 +305,7 @@ def test_the_discrete_model(lines: dict[str, Any]) -> None:
     assert lines["Equation 10"][0]["found"] == 7.0
 
 
-@pytest.mark.parametrize(("members", "known"), few([(100, 0.2)], [(200, 0.15)]))
+@pytest.mark.parametrize(("members", "known"), few([(50, 0.3)], [(200, 0.15)]))
 def test_the_weight_of_equation_25(members: int, known: float) -> None:
     """The standard deviation of the Allan variance over that of many logs, of a tenth the rate."""
     rng = np.random.default_rng(4)
@@ -315,7 +317,7 @@ def test_the_weight_of_equation_25(members: int, known: float) -> None:
     relative = variances.std(axis=0) / variances.mean(axis=0)
     for tau, spread in zip(taus, relative / (2 * np.sqrt(taus / 72_000.0)), strict=True):
         meant, printed = spread_over_weight(tau)
-        assert spread == pytest.approx(meant, rel=known)  # of 100 to 7 %, of 200 to 5
+        assert spread == pytest.approx(meant, rel=known)  # of 50 to 10 %, of 200 to 5
         assert 0.7 < meant < 1.1  # the weight meant takes about what is there
         assert printed < 1e-3  # in rad/s; in degrees it would be 57 times that
 

@@ -39,6 +39,7 @@ def test_the_four_numbers_do_not_fit_each_other() -> None:
     assert read["found"] == pytest.approx(55.5, abs=0.5) and read["verdict"] == "differs"
 
 
+@pytest.mark.release  # logs of weeks; test_maia.py reads curves every day
 def test_a_week_shows_k_by_reading_and_two_days_seldom_do() -> None:
     of_weeks, of_days = silva_weeks.read_values(168), silva_weeks.read_values(48)
     assert len(of_days["K"]) <= silva_weeks.LOGS // 2 < len(of_weeks["K"])
@@ -105,7 +106,7 @@ def test_each_hypothesis_is_possible_or_refuted() -> None:
     assert len(verdicts) == 8 and set(verdicts.values()) == {"possible", "refuted"}
 
 
-@pytest.fixture(scope="module", params=few([25], [silva_settling.RUNS]))
+@pytest.fixture(scope="module", params=few([9], [25, silva_settling.RUNS]))
 def runs(request: pytest.FixtureRequest) -> Iterator[int]:
     """The number of simulated runs: less than what the page has, every day."""
     with pytest.MonkeyPatch.context() as patch:

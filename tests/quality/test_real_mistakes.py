@@ -83,7 +83,7 @@ def unfit(found: Rows) -> dict[str, dict[str | None, float]]:
 
 
 @pytest.mark.parametrize(
-    ("name", "place"), [("cats_tag", "cats/day1.csv.gz"), ("mpu6050", "mpu6050")]
+    ("name", "place"), few([("mpu6050", "mpu6050")], [("cats_tag", "cats/day1.csv.gz")])
 )
 def test_the_logs_as_they_are(shared: Path, tmp_path: Path, name: str, place: str) -> None:
     found = findings(shared / "logs" / place, CATALOGUE[name], tmp_path)
@@ -105,7 +105,7 @@ UNITS = [
 ]
 
 
-@pytest.mark.parametrize(("gyro", "accel", "factors"), few(UNITS[:2], UNITS[2:]))
+@pytest.mark.parametrize(("gyro", "accel", "factors"), few(UNITS[:1], UNITS[1:]))
 def test_a_log_in_another_unit_than_the_sensor_file_states(
     adis16405: np.ndarray, tmp_path: Path, gyro: str, accel: str, factors: Mapping[str, float]
 ) -> None:
@@ -118,6 +118,7 @@ def test_a_log_in_another_unit_than_the_sensor_file_states(
     }
 
 
+@pytest.mark.release  # the test before this has the same doubt every day
 def test_a_log_in_radians_that_the_sensor_file_takes_for_degrees(
     adis16405: np.ndarray, tmp_path: Path
 ) -> None:

@@ -119,6 +119,8 @@ def test_sensitivity_for_known_noise_is_generalised_least_squares():
     assert ramp == pytest.approx(spectrum.ramp * spectrum.ordinates)
 
 
+# Test_compensation.py takes a sensitivity out and the next test a lag every day.
+@pytest.mark.release
 def test_sensitivity_lag_and_bias_are_found_and_taken_out():
     rng = np.random.default_rng(3)
     s, lag, bias = 4e-5, 200.0, 3e-3
@@ -142,6 +144,22 @@ def test_sensitivity_lag_and_bias_are_found_and_taken_out():
     assert left.lower < NOISE.K < left.upper
     rest = np.concatenate(list(fit.compensate(np.array_split(log, 7))))
     size = np.array([int(2_000 * RATE)])
+    before, after = (allan_variance(x, RATE, cluster_sizes=size).deviation for x in (log, rest))
+    assert after < 0.5 * before
+
+
+def test_a_lag_is_found_and_taken_out():
+    rng = np.random.default_rng(3)
+    day, s, lag, bias = DAY[::4], 1.6e-4, 50.0, 3e-3
+    log = simulate(NOISE, RATE, len(day), rng) + bias + s * (behind(day, lag) - day.mean())
+    fit = fitted(log, day, quadratic=False)
+    assert fit.compensated
+    assert fit.quadratic.status == "absent"
+    assert fit.sensitivity.lower < s < fit.sensitivity.upper
+    assert fit.lag.lower < lag < fit.lag.upper
+    assert fit.bias.lower < bias < fit.bias.upper
+    rest = np.concatenate(list(fit.compensate(np.array_split(log, 7))))
+    size = np.array([int(500 * RATE)])
     before, after = (allan_variance(x, RATE, cluster_sizes=size).deviation for x in (log, rest))
     assert after < 0.5 * before
 
@@ -222,7 +240,7 @@ def test_steps_of_a_temperature_are_no_lines_of_the_noise_that_it_leaves(missing
 
 def test_a_square_is_found_where_there_is_one():
     rng = np.random.default_rng(7)
-    day = DAY[: SAMPLES // 2]
+    day = DAY[: SAMPLES // 2 : 2]
     off = day - day.mean()
     log = simulate(NoiseModel(N=1e-4), RATE, len(day), rng) + 2e-5 * off + 3e-6 * off**2
     fit = fitted(log, day, longest_lag=0.0)
