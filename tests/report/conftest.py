@@ -1,9 +1,31 @@
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
 
+from imubench_pipeline.report import made, site, theory
 from imubench_pipeline.report import publish as publishing
-from imubench_pipeline.report import theory
+
+ONCE = {
+    (module, name): cache(getattr(module, name))
+    for module, names in {
+        publishing: ("environment", "source_digest"),
+        theory: ("theory_figure", "figure_text"),
+        made: ("version",),
+        site: ("version",),
+    }.items()
+    for name in names
+}
+"""What takes long and is the same in every report of a process: templates are compiled, the source
+is read, what a page of every report shows is drawn."""
+
+
+@pytest.fixture(autouse=True, scope="package")
+def _once() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        for (module, name), kept in ONCE.items():
+            patch.setattr(module, name, kept)
+        yield
 
 
 @pytest.fixture(scope="module")

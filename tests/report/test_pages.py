@@ -11,7 +11,7 @@ import pyarrow as pa
 import pytest
 
 from imubench_pipeline import report
-from imubench_pipeline.report.html import environment
+from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Entry, Site
@@ -63,7 +63,7 @@ def test_a_page_reads_no_table_that_it_does_not_declare(entry: Entry, whole: Sit
     assert page.context()
     undeclared = tables.read - {*entry.tables, *of_recordings}
     assert not undeclared, "the page would not be written again when these change"
-    environment(noting.system).get_template(page.template)
+    publishing.environment(noting.system).get_template(page.template)
 
 
 def test_a_page_disappears_with_what_it_shows(tmp_path: Path) -> None:

@@ -15,9 +15,7 @@ import pyarrow.compute as pc
 import pytest
 
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.report import made as made_page
 from imubench_pipeline.report import publish as publishing
-from imubench_pipeline.report import site as site_module
 from imubench_pipeline.report import theory
 from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.publish import one_file, publish, published
@@ -61,9 +59,6 @@ def _quick() -> Iterator[None]:
         patch.setattr(theory, "theory_figure", lambda system: None)
         patch.setattr(publishing, "plotting_script", lambda: PLOTTING)
         patch.setattr(publishing, "source_digest", lambda *modules: "code")
-        patch.setattr(publishing, "environment", cache(publishing.environment))
-        for module in (made_page, site_module):
-            patch.setattr(module, "version", cache(module.version))
         yield
 
 

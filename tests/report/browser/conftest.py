@@ -1,13 +1,11 @@
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, sync_playwright
 
-from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.publish import one_file, publish
 from imubench_pipeline.report.site import Site
 from tests.report.browser import made
@@ -72,14 +70,6 @@ def download(window: Reader) -> Callable[[Locator], bytes]:
         return Path(waiting.value.path()).read_bytes()
 
     return pressed
-
-
-@pytest.fixture(autouse=True, scope="package")
-def _quick() -> Iterator[None]:
-    """Read the source once for all reports."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(publishing, "source_digest", cache(publishing.source_digest))
-        yield
 
 
 def kept(browser: Browser, bench: Report, path: str) -> Iterator[Reader]:

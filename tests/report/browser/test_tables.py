@@ -194,7 +194,14 @@ def test_a_long_table_is_sorted_whole(read: Open, many: Path) -> None:
     assert count(table) == f"the first 100 of {SENSORS * EACH} rows"
 
 
-@pytest.mark.parametrize("script", [False, True], ids=["without JavaScript", "of 2021"])
+@pytest.mark.parametrize(
+    "script",
+    # Every day test_pages.py has a browser that unfolds nothing.
+    [
+        pytest.param(False, id="without JavaScript"),
+        pytest.param(True, id="of 2021", marks=pytest.mark.release),
+    ],
+)
 def test_a_browser_that_unfolds_nothing_says_how_much_is_left_out(
     script: bool, browser: Browser, many: Path
 ) -> None:
