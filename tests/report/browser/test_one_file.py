@@ -7,6 +7,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from imubench_pipeline.report.payload import FOREST
+from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.reader import Open, toggle, traces
 
@@ -18,11 +19,14 @@ def head(page: Page) -> str:
     return page.locator("main h1").inner_text()
 
 
-def test_one_file_needs_no_other(read: Open, alone: Path) -> None:
+@pytest.mark.parametrize("drawn", few([False], [True]))
+def test_one_file_needs_no_other(drawn: bool, read: Open, alone: Path) -> None:
     assert [path.name for path in alone.parent.iterdir()] == [alone.name]
     reader = read(alone.parent, alone.name)
     assert head(reader.page) == made.TITLE
     assert reader.page.locator("figure[data-kind]").count() == 1 + len(FOREST)
+    if drawn:  # every day the first alone
+        assert reader.draw_all() == 1 + len(FOREST)
     figure = reader.figure("overlay")
     toggle(figure, "Other B").uncheck()
     assert {one["name"] for one in traces(figure) if one["name"]} == {
