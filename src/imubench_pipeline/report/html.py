@@ -27,6 +27,7 @@ from imubench_pipeline.report.practical import (
 from imubench_pipeline.report.words import started_text
 
 
+@cache  # compiling the templates takes longer than writing pages of a small report
 def environment(system: System) -> jinja2.Environment:
     """Return the templates, with the units in which the pages open."""
     templates = jinja2.Environment(
