@@ -167,7 +167,7 @@ def test_estimates_are_those_of_an_exact_likelihood(
         assert np.std(wrong) == pytest.approx(np.std(exactly), rel=0.05)
 
 
-@pytest.mark.parametrize("logs", few([10], [25]))
+@pytest.mark.parametrize("logs", few([4], [25]))
 def test_a_correlation_far_longer_than_a_fiftieth_of_the_log_is_estimated_as_well(
     rng, logs: int
 ) -> None:

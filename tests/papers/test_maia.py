@@ -1,6 +1,7 @@
 """The lines of Maia et al. against truth of another source than their own code."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import allantools
@@ -9,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from imubench_pipeline.experiments.papers import maia
+from imubench_pipeline.experiments.papers import maia, maia_printed
 from imubench_pipeline.experiments.papers.claims import rows_of
 from imubench_pipeline.experiments.papers.evidence import Evidence
 from imubench_pipeline.experiments.papers.maia_equations import (
@@ -43,8 +44,22 @@ PRINTED = {
 }
 
 
+@pytest.fixture(scope="module", params=few([60], [maia_printed.MEMBERS]))
+def members(request: pytest.FixtureRequest) -> Iterator[int]:
+    """The number of reconstructions: less than what the page has, every day."""
+    cached = (maia_printed.lottery, maia_printed.readings, maia_printed._draws, maia._held)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(maia_printed, "MEMBERS", request.param)
+        for function in cached:
+            function.cache_clear()
+        yield request.param
+    for function in cached:
+        function.cache_clear()
+
+
 @pytest.fixture(scope="module")
-def lines() -> dict[str, list[dict[str, Any]]]:
+def lines(members: int) -> dict[str, list[dict[str, Any]]]:
+    assert members == maia_printed.MEMBERS
     by_place: dict[str, list[dict[str, Any]]] = {}
     for row in rows_of(maia.PAPER, Evidence()):
         by_place.setdefault(row["place"], []).append(dict(row))
@@ -150,7 +165,7 @@ def test_the_numbers_of_table_1_do_not_fit_equation_26(lines: dict[str, Any]) ->
         assert share < 0.75 and (row["verdict"] == "agrees" or told in row["reason"])
 
 
-def test_table_3_lies_in_the_spread_of_single_draws(lines: dict[str, Any]) -> None:
+def test_table_3_lies_in_the_spread_of_single_draws(lines: dict[str, Any], members: int) -> None:
     drawn = "RMS of one reconstruction, "
     rows = [row for row in lines["Table 3"] if row["quantity"].startswith(drawn)]
     assert len(rows) == 16
@@ -172,7 +187,7 @@ def test_table_3_lies_in_the_spread_of_single_draws(lines: dict[str, Any]) -> No
             assert 0.15 < spread.beats < 0.6  # never the 0 that one draw each seems to show
             assert spread.slow > 0.95
             for low, _, high in (spread.state_space, spread.optimised):
-                assert high / low > 3.0
+                assert high / low > (3.0 if members >= 200 else 2.5)
 
 
 @pytest.fixture(scope="module")

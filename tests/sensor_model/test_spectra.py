@@ -204,7 +204,7 @@ def test_sources_are_what_has_a_density() -> None:
 positive = st.floats(-3.0, 1.0).map(lambda power: 10.0**power)
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(
     N=positive,
     B=positive,

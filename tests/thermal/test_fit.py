@@ -34,6 +34,8 @@ def behind(values, lag):
 def fitted(log, readings, segments=None, rate=RATE, **options):
     rng = np.random.default_rng(11)
     path = temperature_path([readings], segments or [(0, len(log))], rng)
+    # A band that is stated: no filter is looked for, which takes longest.
+    options = {"band": 0.5 * rate} | options
     return fit_temperature(lambda: [log], len(log), rate, path, rng=rng, **options)
 
 
