@@ -48,7 +48,7 @@ def test_it_depends_on_the_seed_and_the_channel_only(rng, tmp_path: Path) -> Non
     curve = allan_variance(simulate(MODEL, 10.0, 5000, rng), 10.0)
 
     def scores(key: Key, seed: int) -> object:
-        settings = ReconstructionSettings(seed=seed)
+        settings = ReconstructionSettings(seed=seed, members=20)
         return reconstruct(key, estimate(MODEL), curve, 10.0, settings, tmp_path).score_row["drawn"]
 
     assert scores(KEY, 1) == scores(KEY, 1)

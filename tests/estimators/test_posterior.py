@@ -81,15 +81,19 @@ def test_a_random_walk_alone_is_flat_in_its_amplitude(rng) -> None:
 
 @pytest.mark.parametrize(
     ("letters", "model"),
-    [
-        ("NK", NoiseModel(N=1e-3, K=2e-3)),
-        ("NK", NoiseModel(N=1e-3, K=1e-4)),
-        ("NK", NoiseModel(N=1e-3)),
-        ("NF", NoiseModel(N=1e-3, B=1e-3)),
-        ("NF", NoiseModel(N=1e-3)),
-        ("QN", NoiseModel(N=1e-3, Q=3e-5)),
-    ],
-    ids=["strong walk", "weak walk", "no walk", "flicker", "no flicker", "quantization"],
+    few(
+        [
+            ("NK", NoiseModel(N=1e-3, K=2e-3)),
+            ("NK", NoiseModel(N=1e-3)),
+            ("NF", NoiseModel(N=1e-3, B=1e-3)),
+        ],
+        [
+            ("NK", NoiseModel(N=1e-3, K=1e-4)),
+            ("NF", NoiseModel(N=1e-3)),
+            ("QN", NoiseModel(N=1e-3, Q=3e-5)),
+        ],
+    ),
+    ids=["strong walk", "no walk", "flicker", "weak walk", "no flicker", "quantization"],
 )
 def test_two_terms_have_the_posterior_of_a_grid(rng, letters: str, model: NoiseModel) -> None:
     whittle = whittle_for(model, 300, rng)

@@ -220,7 +220,7 @@ def test_registers_pile_nothing_up(rng: np.random.Generator, step: float, digit:
     assert "piled_up" not in names(log)
 
 
-@pytest.mark.parametrize("step", few([0.5, 0.7], [0.6, 0.8]))
+@pytest.mark.parametrize("step", few([0.5], [0.6, 0.7, 0.8]))
 def test_the_last_level_of_a_coarse_register_is_no_saturation(
     rng: np.random.Generator, step: float
 ) -> None:
@@ -232,7 +232,7 @@ def test_the_last_level_of_a_coarse_register_is_no_saturation(
 
 
 def test_a_last_block_of_one_sample_is_no_step(rng: np.random.Generator) -> None:
-    for _ in range(20):
+    for _ in range(5):
         log = 0.01 + SIGMA * rng.standard_normal(59 * 256 + 1)
         log[-1] = 0.01 + 1.5 * SIGMA
         assert "step" not in names(log)
@@ -240,7 +240,7 @@ def test_a_last_block_of_one_sample_is_no_step(rng: np.random.Generator) -> None
 
 @pytest.mark.parametrize("step", few([0.1], [0.01, 0.3]))
 def test_ten_levels_are_not_fewer_than_ten(rng: np.random.Generator, step: float) -> None:
-    for first in range(-200, 200, 7):
+    for first in range(-200, 200, 21):
         log = (first + np.clip(np.round(4.5 + 1.3 * rng.standard_normal(5000)), 0, 9)) * step
         log[:2] = first * step, (first + 9) * step
         assert "coarse" not in names(log)

@@ -164,7 +164,7 @@ def test_stamps_in_another_unit_than_the_sensor_file_states(
     assert of_noise.factor == pytest.approx(math.sqrt(factor))
 
 
-@pytest.mark.parametrize("clock", ["held_samples", "repeated_samples"])
+@pytest.mark.parametrize("clock", few(["held_samples"], ["repeated_samples"]))
 def test_a_log_that_is_read_faster_than_it_samples(
     adis16405: np.ndarray, tmp_path: Path, rng: np.random.Generator, clock: str
 ) -> None:
