@@ -127,7 +127,7 @@ def test_sensitivity_lag_and_bias_are_found_and_taken_out():
     rng = np.random.default_rng(3)
     s, lag, bias = 4e-5, 200.0, 3e-3
     log = simulate(NOISE, RATE, SAMPLES, rng) + bias + s * (behind(DAY, lag) - DAY.mean())
-    fit = fitted(log, np.round(DAY), quadratic=False)
+    fit = fitted(log, np.round(DAY), quadratic=False, band=None)
     assert fit.compensated
     assert fit.quadratic.status == "absent"
     assert fit.sensitivity.lower < s < fit.sensitivity.upper
@@ -154,7 +154,7 @@ def test_a_lag_is_found_and_taken_out():
     rng = np.random.default_rng(3)
     day, s, lag, bias = DAY[::4], 1.6e-4, 50.0, 3e-3
     log = simulate(NOISE, RATE, len(day), rng) + bias + s * (behind(day, lag) - day.mean())
-    fit = fitted(log, day, quadratic=False)
+    fit = fitted(log, day, quadratic=False, band=None)
     assert fit.compensated
     assert fit.quadratic.status == "absent"
     assert fit.sensitivity.lower < s < fit.sensitivity.upper
@@ -177,7 +177,7 @@ def half_bic(likelihood, ordinates):
 @pytest.mark.release  # test_compensation.py has such a log every day
 def test_a_temperature_that_does_nothing_is_left_in():
     rng = np.random.default_rng(4)
-    fit = fitted(simulate(NOISE, RATE, SAMPLES, rng), np.round(DAY))
+    fit = fitted(simulate(NOISE, RATE, SAMPLES, rng), np.round(DAY), band=None)
     assert not fit.compensated
     assert fit.sensitivity.lower < 0.0 < fit.sensitivity.upper
     assert fit.lag.status == "not_identified"
@@ -259,7 +259,7 @@ def test_a_square_is_found_where_there_is_one():
 def test_gyro_y_of_the_tag_follows_its_temperature(shared):
     log = pd.read_csv(shared / "logs/cats/day1.csv.gz")
     values = log["gyro_y_mrad_s"].to_numpy() * 1e-3
-    fit = fitted(values, log["temperature_degC"].to_numpy(), rate=1.0)
+    fit = fitted(values, log["temperature_degC"].to_numpy(), rate=1.0, band=None)
     s = fit.sensitivity
     assert s.value == pytest.approx(0.46e-3, abs=0.01e-3)
     assert 0.35e-3 < s.lower < s.value < s.upper < 0.55e-3
