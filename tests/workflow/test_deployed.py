@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -224,6 +225,18 @@ def using(place: Path, ways: Ways, snakefile: str, wanted: str) -> Path:
     return place
 
 
+def test_a_wheel_goes_on_where_a_checkout_has_ended(ways: Ways) -> None:
+    lab = ways.folder / "on"
+    ended(ways.imubench("init", lab), ways.folder)
+    with_logs(lab, ways.logs)
+    for name in ("results", ".snakemake"):
+        shutil.copytree(ways.checkout / name, lab / name)
+    said = ended(ways.imubench("run", lab, "-c2", "--", "-n", "--config", *GIVEN), ways.folder)
+    rules = set(re.findall(r"rule (\w+):", said))
+    assert rules == {"figures", "report", "all"}, said  # what the checkout was not asked for
+
+
+@pytest.mark.release  # every day: that it takes what a checkout has made for its own
 def test_a_wheel_analyses_a_folder_of_logs_as_a_checkout_does(ways: Ways) -> None:
     lab = ways.folder / "lab"
     ended(ways.imubench("init", lab), ways.folder)

@@ -15,7 +15,8 @@ from tests.calibration.recordings import BIAS, SCALE, STEPS, UP, on_table
 from tests.earth_rate.runs import turned
 from tests.workflow.project import TOGETHER, Job, Project, linked
 
-pytestmark = pytest.mark.workflow
+# Every day, the demonstration has turned gyros, and tests/earth_rate what is computed of them.
+pytestmark = [pytest.mark.workflow, pytest.mark.release]
 
 JOINED: set[Job] = {(rule, "") for rule in TOGETHER}
 WITHOUT_FIGURES = [rule for rule in TOGETHER if rule != "figures"]
@@ -174,7 +175,6 @@ def test_steps_and_directions_run_their_own_again(project: Project) -> None:
         assert changed == {("calibration", f"gyro/{name}"), *JOINED}
 
 
-@pytest.mark.release
 def test_one_core_gives_the_same_tables(project: Project, tmp_path: Path) -> None:
     settings = [one for one in project.settings if not one.startswith("results=")]
     alone = Project(

@@ -53,6 +53,7 @@ def test_nothing_hinders_a_reader(path: str, read: Open, rows: Any) -> None:
     assert hindrances(reader.page, by_night=False) == []
 
 
+@pytest.mark.release
 def test_residuals_have_bars_of_two_sigma_in_the_chosen_unit(read: Open, rows: Any) -> None:
     folder, points, _ = rows
     reader: Reader = read(folder, TABLE)
@@ -67,6 +68,7 @@ def test_residuals_have_bars_of_two_sigma_in_the_chosen_unit(read: Open, rows: A
     assert axis_title(figure, "y") == "reading less line (rad/s)"
 
 
+@pytest.mark.release
 def test_readings_stand_against_the_rate_of_the_table(read: Open, rows: Any) -> None:
     folder, points, _ = rows
     figure = read(folder, TABLE).figure("table_line")
@@ -77,6 +79,7 @@ def test_readings_stand_against_the_rate_of_the_table(read: Open, rows: Any) -> 
     np.testing.assert_allclose(drawn["y"], [math.degrees(one["mean"]) for one in points], rtol=1e-5)
 
 
+@pytest.mark.release
 def test_alignment_over_time_is_that_of_the_tables(read: Open, rows: Any) -> None:
     folder, _, aligned = rows
     figure = read(folder, "earth_rate.html").figure("alignment", sensor="s")

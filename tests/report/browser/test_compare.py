@@ -56,6 +56,7 @@ def words(ratio: Ratio) -> str:
     return {"lower": "A better", "higher": "B better"}.get(ratio.verdict, ratio.verdict)
 
 
+@pytest.mark.release
 def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report) -> None:
     reader = read(bench.folder)
     for first, second, channel in (
@@ -84,6 +85,7 @@ def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report)
     assert "N (3 times)" in reader.page.locator(".answer").inner_text()
 
 
+@pytest.mark.release
 def test_the_curves_and_their_ratio(read: Open, bench: Report) -> None:
     reader = read(bench.folder, address(NIGHT, FIRST, axis="gyro_x"))
     figure = reader.figure("pair")
@@ -111,6 +113,7 @@ def test_the_curves_and_their_ratio(read: Open, bench: Report) -> None:
     assert "tau=31.6" in reader.page.url
 
 
+@pytest.mark.release
 def test_errors_grow_as_the_budget_has_it(read: Open, bench: Report) -> None:
     reader = read(bench.folder, address(NIGHT, SIMULATED, window="60", time="10"))
     budget = {
@@ -162,6 +165,7 @@ def test_errors_grow_as_the_budget_has_it(read: Open, bench: Report) -> None:
     assert "source" not in reader.page.url
 
 
+@pytest.mark.release
 def test_errors_of_the_chosen_axis_are_those_of_their_table(read: Open, bench: Report) -> None:
     reader = read(bench.folder, address(NIGHT, SIMULATED, axis="gyro_x", window="60", time="10"))
     kept = {

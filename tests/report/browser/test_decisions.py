@@ -195,6 +195,7 @@ def test_the_answer_is_on_the_first_screen(
     )
 
 
+@pytest.mark.release
 def test_the_matrix_is_sorted_by_the_keyboard(read: Open, bench: Report) -> None:
     reader = read(bench.folder)
     table = reader.page.locator("[data-decisions]")
@@ -227,6 +228,7 @@ def test_what_is_counted_is_what_is_listed(start: Reader, bench: Report) -> None
     assert page.locator("#warnings h2").inner_text().startswith(f"{len(doubted)} recording")
 
 
+@pytest.mark.release
 def test_curves_that_are_left_out_are_left_out_of_every_figure(start: Reader) -> None:
     reader = start
     figure = reader.figure("overlay")

@@ -84,6 +84,7 @@ def test_the_estimates_over_time_are_those_of_the_tables(read: Open, rows: Any) 
     assert len(traces(figure)) == count - 1
 
 
+@pytest.mark.release
 def test_turning_points_stand_where_they_were_found(read: Open, rows: Any) -> None:
     folder, found = rows
     figure = read(folder, RUN).figure("turning")
@@ -93,6 +94,7 @@ def test_turning_points_stand_where_they_were_found(read: Open, rows: Any) -> No
     assert axis_title(figure, "y") == "gyro x (°/s)" and axis_title(figure, "x") == "time (min)"
 
 
+@pytest.mark.release
 def test_the_best_dwell_is_the_least_of_the_curve(read: Open, rows: Any) -> None:
     folder, found = rows
     figure = read(folder, RUN).figure("bound", over="dwell")
@@ -103,6 +105,7 @@ def test_the_best_dwell_is_the_least_of_the_curve(read: Open, rows: Any) -> None
     assert axis_title(figure, "x") == "data in each dwell (s)"
 
 
+@pytest.mark.release
 def test_published_estimates_are_drawn_in_the_chosen_unit(read: Open, rows: Any) -> None:
     reader: Reader = read(rows[0], "earth_rate.html")
     figure = reader.figure("published_rates")
@@ -112,6 +115,7 @@ def test_published_estimates_are_drawn_in_the_chosen_unit(read: Open, rows: Any)
     assert named(traces(figure), "published")["x"] == [pytest.approx(1.745 / 3600, rel=1e-5)]
 
 
+@pytest.mark.release
 def test_a_gap_in_the_samples_is_left_open(
     read: Open, rows: Any, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

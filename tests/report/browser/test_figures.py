@@ -111,6 +111,7 @@ def test_lines_of_the_datasheet_among_sensors(start: Reader) -> None:
     assert all(A in one["text"] for one in added)
 
 
+@pytest.mark.release
 def test_axis_method_and_recordings_are_chosen(read: Open, bench: Report) -> None:
     reader = read(bench.folder)
     figure, page = reader.figure("overlay"), reader.page
@@ -178,6 +179,7 @@ def test_a_first_look_shows_the_same_curve_before_what_draws_is_there(
     assert reader.figure("allan", channel="gyro_x").locator("svg.sketch").count() == 0
 
 
+@pytest.mark.release
 def test_ticks_follow_the_zoom(night: Reader) -> None:
     figure = night.figure("allan", channel="gyro_x")
     canvas = figure.locator(".canvas")
@@ -210,6 +212,7 @@ def test_parameters_of_all_sensors(start: Reader, bench: Report) -> None:
     model.select_option(before)
 
 
+@pytest.mark.release
 def test_a_parameter_without_a_value_has_another_mark(read: Open, bench: Report) -> None:
     reader = read(bench.folder)
     reader.page.get_by_label("gyro y", exact=True).check()
@@ -270,6 +273,7 @@ def test_the_spectrum(night: Reader, bench: Report) -> None:
     toggle(figure, "line").check()
 
 
+@pytest.mark.release
 def test_samples_over_time_with_findings_and_temperature(night: Reader) -> None:
     figure = night.figure("series", channel="gyro_x")
     low, high, mean, drift, warmth = traces(figure)
@@ -317,6 +321,7 @@ def test_the_histogram(night: Reader) -> None:
     assert max(normal["y"]) == pytest.approx(1 / (spread * math.sqrt(2 * math.pi)), rel=0.1)
 
 
+@pytest.mark.release
 def test_a_device_over_time(read: Open, bench: Report) -> None:
     reader = read(bench.folder, bench.page("devices/"))
     reader.draw_all()
@@ -397,6 +402,7 @@ def test_everything_is_done_by_the_keyboard(read: Open, bench: Report) -> None:
     assert reader.page.get_by_role("combobox", name=MODEL).input_value() == made.METHODS[-1]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     "choices", few([["SI: rad/s"]], [[*FACTORS["gyro"]]]), ids=lambda some: str(len(some))
 )

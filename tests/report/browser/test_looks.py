@@ -80,6 +80,7 @@ SCROLLED = """() => [...document.querySelectorAll("main .scroll")]
 """Of each table that is scrolled aside: its name, and whether caption and names of rows stay."""
 
 
+@pytest.mark.release
 def test_caption_and_first_column_stay_where_a_table_is_scrolled(read: Open, bench: Report) -> None:
     reader = read(bench.folder, width=700)
     tables = []
@@ -90,6 +91,7 @@ def test_caption_and_first_column_stay_where_a_table_is_scrolled(read: Open, ben
     assert [name for name, *stays in tables if stays != [True, True]] == []
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("width", few([390], [1280]))
 def test_there_is_something_to_see(width: int, read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT, width=width)
@@ -123,6 +125,7 @@ def test_a_page_that_is_opened_by_night_is_dark_at_once(read: Open, bench: Repor
     assert ink(read(bench.folder, OF_NIGHT, scheme="dark")) == dark
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("scheme", few(["dark"], ["light"]))
 def test_a_page_is_printed_light_and_whole(scheme: str, read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT, scheme=scheme)

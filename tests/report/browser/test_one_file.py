@@ -43,6 +43,7 @@ def test_one_file_needs_no_other(drawn: bool, read: Open, alone: Path) -> None:
     expect(reader.page.locator("tr.recommended data").first).to_have_text("8.7×10⁻⁵")
 
 
+@pytest.mark.release
 def test_pages_of_one_file_are_turned(read: Open, alone: Path) -> None:
     reader = read(alone.parent, alone.name)
     page = reader.page
@@ -67,6 +68,7 @@ def test_pages_of_one_file_are_turned(read: Open, alone: Path) -> None:
     expect(page.locator("h2#accel_x")).to_be_visible()
 
 
+@pytest.mark.release
 def test_one_file_is_read_where_nothing_is_unfolded(browser: Browser, alone: Path) -> None:
     page = browser.new_page()
     page.add_init_script("delete window.DecompressionStream")
@@ -78,6 +80,7 @@ def test_one_file_is_read_where_nothing_is_unfolded(browser: Browser, alone: Pat
     page.close()
 
 
+@pytest.mark.release
 def test_a_place_in_one_file_has_an_address(read: Open, alone: Path) -> None:
     reader = read(alone.parent, f"{alone.name}#/theory.html#bias-instability")
     page = reader.page

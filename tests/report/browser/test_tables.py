@@ -120,6 +120,7 @@ def test_rows_are_found_and_counted(read: Open, bench: Report) -> None:
     assert count(table) == f"{rows} rows" and len(cells(table, 2)) == rows
 
 
+@pytest.mark.release
 def test_what_is_asked_of_tables_stands_in_the_address(read: Open, bench: Report) -> None:
     reader = read(bench.folder)
     tables = [

@@ -42,6 +42,7 @@ def test_a_term_explains_itself_under_the_keyboard(read: Open, bench: Report) ->
     assert term.get_attribute("aria-describedby") == "tip"
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("width", few([390], [1280]))
 def test_an_explanation_is_seen_whole(width: int, read: Open, bench: Report) -> None:
     path = f"recordings/alpha/{made.NIGHT.recording}.html"

@@ -7,14 +7,14 @@ from tests.report.browser.accessibility import hindrances
 from tests.report.browser.made import Report
 from tests.report.browser.reader import TOO_WIDE, Reader
 
-KINDS = ("index", "compare", "recordings.html", "recordings/alpha/night 1")
+KINDS = ("recordings.html", "recordings/alpha/night 1")
 """Where most of what a page can have stands; accessibility is looked at there, as it takes longer
-than to draw."""
+than to draw: before a release everywhere."""
 
 BY_NIGHT = ("recordings.html",)
 """Of these by night, too, as it is the least. Before a release, all pages by day and by night."""
 
-LARGE = ("index", "recordings/alpha/night 1")
+LARGE = ("recordings/alpha/night 1",)
 """Of these the contrast takes longest: every day it is asked of the others alone."""
 
 DRAWN = ("recordings/alpha/night 1",)
