@@ -57,6 +57,7 @@ def test_warnings_and_rejections_set_the_exit_status(
     assert sorted(path.name for path in logs.rglob("*")) == ["empty.csv", "moved.csv", "one"]
 
 
+@pytest.mark.release
 def test_lines_and_the_band_are_notes(
     logs: Path, rng: np.random.Generator, capsys: pytest.CaptureFixture[str]
 ) -> None:

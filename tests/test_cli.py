@@ -139,6 +139,7 @@ def test_the_command_has_a_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"imubench {version('imubench_pipeline')}\n"
 
 
+@pytest.mark.release
 def test_a_command_has_one_thread() -> None:
     """Each fork of `imubench analyse` had threads of OpenBLAS that took two thirds of its time.
 

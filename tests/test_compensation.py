@@ -200,6 +200,7 @@ def test_a_temperature_that_does_not_vary_is_not_taken_out(tmp_path: Path) -> No
     assert build("temperature", found.temperature).num_rows == 5
 
 
+@pytest.mark.release
 def test_missing_samples_are_missing_in_what_is_left(brief: Brief) -> None:
     found, alone = brief
     sensitivity = figures(found.temperature)["sensitivity"]
@@ -274,6 +275,7 @@ def test_a_log_without_a_filter_has_the_row_that_says_so(found: Estimation) -> N
     }
 
 
+@pytest.mark.release
 def test_a_filter_has_its_cutoff_order_and_the_noise_on_both_sides(tmp_path: Path) -> None:
     # A first-order filter of 0.5 Hz, exactly: an AR(1) sequence of variance N^2 pi f_c.
     rng, N, cutoff = np.random.default_rng(4), 1e-3, 0.5

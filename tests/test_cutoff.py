@@ -156,6 +156,7 @@ def test_the_rounding_of_a_register_does_not_move_the_cutoff(known):
     assert found.floor == pytest.approx(step / math.sqrt(12.0 * 50.0))
 
 
+@pytest.mark.release
 def test_flicker_noise_that_folds_does_not_move_the_cutoff():
     model = SensorModel(noise=NoiseModel(N=1e-4, B=1.2e-3), low_pass=LowPass(10.0))
     found = cutoff_of(simulate_sensor(model, 25.0, 150_000, np.random.default_rng(6)), 25.0)
@@ -254,6 +255,7 @@ def spectrum_with_a_line():
     return spectrum, (spectrum.upper < 29.0) | (spectrum.lower > 31.0)
 
 
+@pytest.mark.release
 def test_bins_that_a_line_touches_are_left_out():
     found = find_cutoff(*spectrum_with_a_line())
     assert found.frequency.value == pytest.approx(20.0, rel=0.02)
@@ -307,6 +309,7 @@ def with_drift(seed, rate, cutoff, samples):
     return noise, 2e-3 * np.sin(2.0 * np.pi * np.arange(samples) / (0.6 * samples) + 0.7)
 
 
+@pytest.mark.release
 def test_beside_a_drift_the_cutoff_is_within_three_standard_errors():
     noise, drift = with_drift(0, 20.0, 7.3, 1 << 17)
     found = cutoff_of(noise + drift, 20.0).frequency

@@ -136,6 +136,7 @@ def test_dead_reckoning_of_simulated_runs(levelled: bool) -> None:
             assert abs(found - expected) < 4.0 * error + 2e-3 * expected, (time, quantity)
 
 
+@pytest.mark.release
 def test_gyrocompassing_on_simulated_windows(rng: np.random.Generator) -> None:
     gyro = NoiseModel(N=1e-3, B=4e-4, K=1e-4, further=(GaussMarkov(1e-3, 8.0),))
     log = logs(gyro, True, rng)

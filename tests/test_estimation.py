@@ -298,6 +298,7 @@ def test_only_what_is_asked_for_is_there_and_the_best_of_it_is_recommended(
         build(name, rows)
 
 
+@pytest.mark.release
 def test_the_papers_model_alone_says_what_it_says_beside_the_others(
     found: Estimation, logs: dict[str, ChannelLog]
 ) -> None:

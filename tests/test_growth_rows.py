@@ -44,6 +44,7 @@ def grown() -> list[dict[str, object]]:
     return list(growth_rows(NAMES, ESTIMATES, times=[10.0, 45.0], window=90.0, **HOW))
 
 
+@pytest.mark.release
 def test_errors_that_grow_are_those_of_the_budget() -> None:
     questions = list(standard([10.0, 45.0], 90.0, 0.8, ["worst"]))
     asked = {

@@ -137,6 +137,7 @@ def test_the_band_can_be_narrower() -> None:
 PROCESS = NoiseModel(N=1e-5, B=2e-4, T_B=20.0)
 
 
+@pytest.mark.release
 def test_a_random_walk_beyond_two_correlation_times_is_warned_of() -> None:
     curve = measured(PROCESS, 1e9)
     assert overbound(curve, PROCESS, RATE, horizon=38.0).warning is None
@@ -170,6 +171,7 @@ def test_a_random_walk_far_too_large_is_given_where_it_is_allowed() -> None:
     assert allowed.warning is not None
 
 
+@pytest.mark.release
 def test_a_log_too_short_for_a_horizon_is_told_from_a_family_that_does_not_suit() -> None:
     with pytest.raises(ValueError, match="no family comes closer than"):
         overbound(measured(GYRO), GYRO, RATE, horizon=2000.0)

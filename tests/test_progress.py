@@ -105,6 +105,7 @@ def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
     assert log.read_text().count("rule ingest:") == 3
 
 
+@pytest.mark.release
 def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
     written, left = in_terminal(folder, FAIL="1", PAUSE="0.4")
     assert re.search(r"first steps: ingest s/(a|b|bad) 0:00", written)

@@ -287,6 +287,7 @@ def test_what_a_script_prints_goes_to_its_log(
 
 
 # The last one here: after it another server would have to begin.
+@pytest.mark.release
 @pytest.mark.skipif(not Path("/proc/self/comm").is_file(), reason="names are set on Linux alone")
 def test_a_script_can_be_told_by_its_name_and_outlives_the_process_that_forked_it(
     steps: Processes, tmp_path: Path

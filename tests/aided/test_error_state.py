@@ -146,6 +146,7 @@ def inside(outcome: Outcome, chosen: np.ndarray, group: str) -> tuple[float, flo
     return float(of_runs.mean()), float(of_runs.std(ddof=1) / np.sqrt(len(of_runs)))
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("group", GROUPS)
 @pytest.mark.parametrize("within", [False, True], ids=["with fixes", "in outages"])
 def test_errors_are_as_large_as_the_true_model_says(

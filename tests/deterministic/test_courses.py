@@ -79,6 +79,7 @@ def test_periodic_drift_is_found_with_its_period() -> None:
     assert drift.time == pytest.approx(1200.0, rel=0.01)
 
 
+@pytest.mark.release
 def test_telegraph_noise_is_named_and_left() -> None:
     log = static_log(9, hours=1.5)
     flips = np.cumsum(np.random.default_rng(1).random(len(log)) < 1.0 / 300.0 / RATE) % 2

@@ -63,6 +63,7 @@ def put_with_limits(folder: Path, spread: float) -> Path:
     return folder
 
 
+@pytest.mark.release
 def test_a_run_says_how_sure_its_sigma_is(tmp_path: Path) -> None:
     turned = put(tmp_path / "run", turned_log())
     widths = []

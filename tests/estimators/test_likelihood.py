@@ -256,7 +256,8 @@ def test_a_weak_bias_instability_has_no_wrong_correlation_time(number: int) -> N
     assert time.duration_needed is None or time.duration_needed > SAMPLES / RATE
 
 
-@pytest.mark.parametrize("name", few(["B", "T_B"], ["K"]))
+@pytest.mark.release
+@pytest.mark.parametrize("name", ["B", "T_B", "K"])
 def test_the_duration_needed_tells_a_parameter_to_a_tenth(name: str) -> None:
     found = found_in(NoiseModel(**MTI_7))
     fitted = {name: value(found, name) for name in ALL}
@@ -508,7 +509,8 @@ def test_a_long_log_read_backwards_has_nearly_the_same_noise() -> None:
         assert abs(np.log(moved)) < 0.25 * width(one, name, "likelihood_gm")
 
 
-@pytest.mark.parametrize("backwards", few([False], [True]))
+@pytest.mark.release
+@pytest.mark.parametrize("backwards", [False, True])
 def test_a_ramp_is_found_with_its_sign(backwards: bool) -> None:
     # Over 4000 s it climbs sixty times as far as the walk and a hundred times the noise.
     ramp, samples = -1e-4, 20_000
@@ -745,12 +747,14 @@ def test_blocks_do_not_matter(rng: np.random.Generator) -> None:
     assert_same(found_in(SHORT, samples=LONG), found)
 
 
+@pytest.mark.release
 def test_blocks_of_a_log_with_holes_do_not_matter(rng: np.random.Generator) -> None:
     pieces, rng_of_fit = in_pieces(log_with_holes(), rng), np.random.default_rng(0)
     found = fit_blocks(lambda: iter(pieces), WITH_HOLES, RATE, holes=True, rng=rng_of_fit)
     assert_same(found_with_holes(), found)
 
 
+@pytest.mark.release
 def test_a_complete_log_that_may_have_holes_is_the_same() -> None:
     log = log_of(SHORT, samples=SHORT_SAMPLES)
     found = fit_blocks(lambda: [log], SHORT_SAMPLES, RATE, holes=True, rng=np.random.default_rng(0))

@@ -45,8 +45,9 @@ def test_a_bias_that_is_zeroed_at_rest_is_told(
     assert finding.value < 0.5
 
 
-@pytest.mark.parametrize("model", few([NoiseModel(N=8.4e-5)], [GYRO, NoiseModel(N=8.4e-5, Q=1e-6)]))
-@pytest.mark.parametrize("logs", few([1], [3]))
+@pytest.mark.release
+@pytest.mark.parametrize("model", [NoiseModel(N=8.4e-5), GYRO, NoiseModel(N=8.4e-5, Q=1e-6)])
+@pytest.mark.parametrize("logs", [3])
 def test_noise_of_a_sensor_has_all_its_slow_part(
     rng: np.random.Generator, model: NoiseModel, logs: int
 ) -> None:

@@ -14,6 +14,7 @@ def found() -> dict[tuple[str, str], dict[str, Any]]:
     return {(row["method"], row["parameter"]): dict(row) for row in panel_rows(LOGS)}
 
 
+@pytest.mark.release
 def test_no_method_is_below_the_bound_but_for_chance(found: dict[Any, Any]) -> None:
     # The bound itself, of 10 h at 10 Hz: of N it is 1 / sqrt(2 L), less what the process hides.
     assert found["paper", "N"]["bound"] == pytest.approx((2 * 360_000) ** -0.5, rel=0.02)

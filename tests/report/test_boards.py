@@ -254,6 +254,7 @@ def test_every_page_leads_to_the_boards(read: dict[str, Read]) -> None:
 # Which pages there are.
 
 
+@pytest.mark.release
 def test_without_boards_there_is_no_page_and_no_way_to_it(tmp_path: Path) -> None:
     few_rows = (of_board("cheap"), recording_rows("cheap", "day1"))
     none = made(*few_rows, boards={})
@@ -314,6 +315,7 @@ def test_two_boards_have_each_their_own_recordings() -> None:
     assert {one["title"] for one in shown} == {"first", "second"}
 
 
+@pytest.mark.release
 def test_the_page_is_written_again_only_if_its_recordings_or_words_change() -> None:
     key = BOARDS.page(made(*some())).key
     changed = some()

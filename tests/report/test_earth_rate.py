@@ -154,6 +154,7 @@ def test_a_report_may_hold_nothing_but_such_runs(tmp_path: Path) -> None:
     assert "1 sensor 1 recording" in " ".join(found["index.html"].text.split())
 
 
+@pytest.mark.release
 def test_turns_that_nothing_shows_are_a_remark(tmp_path: Path) -> None:
     quiet = NoiseModel(N=PAPER.N / 2.0)
     rest = put_at_rest(tmp_path / "night", quiet)

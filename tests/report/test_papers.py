@@ -103,6 +103,7 @@ def test_the_command_prints_the_table(tmp_path: Path, capsys: Any) -> None:
     assert "no table published" in capsys.readouterr().err
 
 
+@pytest.mark.release  # .ci/run asks the command for a paper every day
 def test_without_a_run_it_prints_what_needs_no_log(capsys: Any) -> None:
     assert main(["papers", "--paper", "maia", "--place", "Equation 13"]) == 0
     assert "0,664" in capsys.readouterr().out

@@ -358,6 +358,7 @@ def test_requirements_are_answered_on_the_start_page_and_that_of_each_sensor(
         assert "requirement-robot" in read[f"sensors/{sensor}.html"].ids
 
 
+@pytest.mark.release
 def test_commands_can_be_copied_into_a_shell(tmp_path: Path) -> None:
     publish(run(recording_rows("my imu", "log (1)"), recording_rows("a&b", "r")), tmp_path)
     read = read_pages(tmp_path)
@@ -464,6 +465,7 @@ def test_pages_open_in_si_where_the_settings_say_so(tmp_path: Path) -> None:
     assert "°/h" not in shown.replace("°/h and °/√h", "")
 
 
+@pytest.mark.release
 def test_many_recordings_stand_in_a_table_that_is_made_when_asked_for(tmp_path: Path) -> None:
     names = [f"r{i:03} </script><b>" for i in range(103)]
     publish(run(*(rejected_rows(recording=name, reason=f"why {name}") for name in names)), tmp_path)
@@ -479,6 +481,7 @@ def test_many_recordings_stand_in_a_table_that_is_made_when_asked_for(tmp_path: 
         assert name in row.text
 
 
+@pytest.mark.release
 def test_a_device_that_has_changed_is_named_at_the_top(tmp_path: Path) -> None:
     def known(factor: float) -> dict[str, Parameter]:
         n = factor * MODEL.N
@@ -545,6 +548,7 @@ def test_names_of_any_kind_break_nothing(tmp_path: Path) -> None:
     assert {one.tag for one in whole.elements} <= known
 
 
+@pytest.mark.release
 def test_what_is_not_sold_is_not_said_to_lack_a_recording(tmp_path: Path) -> None:
     board = recording_rows("board", "r", ("gyro_x", "accel_x"), requirements=ASKED)
     (row,) = board["recordings"]
@@ -561,6 +565,7 @@ def test_what_is_not_sold_is_not_said_to_lack_a_recording(tmp_path: Path) -> Non
     assert "It is in no ranking: not sold." in read["sensors/board.html"].text
 
 
+@pytest.mark.release
 def test_a_tie_of_sensors_with_commas_in_their_names_is_told(tmp_path: Path) -> None:
     several = [recording_rows(f"a, {i}", "r", ("gyro_x", "accel_x"), requirements=ASKED)
                for i in range(2)]  # fmt: skip
@@ -655,6 +660,7 @@ def test_a_changed_reason_rewrites_all_pages_that_list_the_recording(old: Path) 
     assert seen == {"datasheets.html"}
 
 
+@pytest.mark.release
 def test_a_new_finding_leaves_the_pages_of_other_recordings_alone(old: Path) -> None:
     after = some()
     finding = {"finding": "step", "severity": "warning", "detail": "moved", "value": 1.0}
@@ -721,12 +727,14 @@ def test_a_device_page_disappears_with_its_device(old: Path) -> None:
     assert "devices/one/unit 7.html" not in files(old)
 
 
+@pytest.mark.release
 def test_another_title_rewrites_every_page(old: Path) -> None:
     written = publish(renamed(), old)
     assert set(written) == set(files(old)) - ASSETS - KEPT
     assert all("New" in page.text for page in read_pages(old).values())
 
 
+@pytest.mark.release
 def test_another_script_or_style_is_written_alone(report: Report, tmp_path: Path) -> None:
     made = report.site
     publish(made, tmp_path)
@@ -744,6 +752,7 @@ def test_changed_samples_rewrite_the_page_of_their_recording_alone(tmp_path: Pat
     assert written == ["recordings/one/day1.html"]
 
 
+@pytest.mark.release
 def test_another_file_with_the_same_samples_rewrites_the_page_of_its_recording(
     tmp_path: Path,
 ) -> None:

@@ -208,6 +208,7 @@ def test_a_term_that_the_log_does_not_tell_is_called_so() -> None:
     assert "not identified: as fitted, 95 % limits" in written(figure)
 
 
+@pytest.mark.release
 def test_a_channel_without_k() -> None:
     view = view_of(parameters=KNOWN | {"K": Parameter(None, "absent", upper=0.3 * HOUR)})
     (axes,) = made(terms_figure(view)).axes
@@ -219,6 +220,7 @@ def test_a_channel_without_k() -> None:
     assert "absent" in found and "no recording has a value" in found
 
 
+@pytest.mark.release
 def test_models_of_the_methods_are_drawn_over_the_curve() -> None:
     figure = made(methods_figure(usual()))
     above, ratio = figure.axes
@@ -232,6 +234,7 @@ def test_models_of_the_methods_are_drawn_over_the_curve() -> None:
     assert methods_figure(without) is None and terms_figure(without) is None
 
 
+@pytest.mark.release
 def test_lines_of_the_datasheet() -> None:
     figure = made(datasheet_figure(usual()))
     (axes,) = figure.axes
@@ -244,6 +247,7 @@ def test_lines_of_the_datasheet() -> None:
     assert datasheet_figure(view_of(printed=False)) is None
 
 
+@pytest.mark.release
 def test_the_terms_of_the_spectrum_make_the_fit(tmp_path: Path) -> None:
     figure = made(spectrum_figure(view_of(found=[2.0, 2.1, 30.0])))
     (axes,) = figure.axes
@@ -285,7 +289,8 @@ def test_a_simulated_log_is_called_so_in_every_figure(step: int) -> None:
     assert step > 1 or "truth of the simulation" in every
 
 
-@pytest.mark.parametrize("recordings", few([6], [1, 30, 60]))
+@pytest.mark.release
+@pytest.mark.parametrize("recordings", [6, 1, 30, 60])
 def test_recordings_of_a_sensor_share_one_entry(recordings: int, tmp_path: Path) -> None:
     views = views_of(
         *(rows_of(recording=f"r{n}", level=1 + 0.01 * n) for n in range(recordings)),
@@ -311,7 +316,8 @@ def test_the_recording_that_stands_for_many_is_the_middle_one() -> None:
     np.testing.assert_allclose(marked.get_ydata(), views[2].adev * TO_PAGE)
 
 
-@pytest.mark.parametrize("sensors", few([9], [33]))
+@pytest.mark.release
+@pytest.mark.parametrize("sensors", [9, 33])
 def test_many_sensors_have_room_below_the_curves(sensors: int) -> None:
     names = [f"a_sensor_with_quite_a_long_name_{n}" for n in range(sensors)]
     views = views_of(*(rows_of(sensor=name, level=1 + n) for n, name in enumerate(names)))
@@ -336,6 +342,7 @@ def test_names_of_the_user_are_no_formulas_and_never_too_wide(tmp_path: Path) ->
     assert figure.texts[0].get_window_extent().x1 <= figure.bbox.x1
 
 
+@pytest.mark.release
 def test_the_characteristic_curve_is_computed(tmp_path: Path) -> None:
     figure = theory_figure()
     (axes,) = figure.axes
@@ -406,6 +413,7 @@ def test_the_command_writes_what_is_asked_for(
     assert "channel 2 of 2: a / r2 gyro_x" in said.err
 
 
+@pytest.mark.release
 def test_the_command_writes_beside_the_tables(results: Path) -> None:
     assert command(results, "--kind", "comparison", "--format", "pdf", "--units", "si") == 0
     assert (results / "figures/allan_gyro_x.pdf").read_bytes().startswith(b"%PDF")

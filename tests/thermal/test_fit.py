@@ -240,6 +240,7 @@ def test_steps_of_a_temperature_are_no_lines_of_the_noise_that_it_leaves(missing
     assert line.frequency == pytest.approx(0.7, abs=1e-3)
 
 
+@pytest.mark.release
 def test_a_square_is_found_where_there_is_one():
     rng = np.random.default_rng(7)
     day = DAY[: SAMPLES // 2 : 2]

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
-from pandas.util import hash_pandas_object
+from pandas.util import hash_array
 
 from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.noise import NoiseModel
@@ -263,19 +263,34 @@ def _channels(view: RecordingView) -> list[ChannelView]:
 def _keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
     """Return a digest of all that the tables say of each recording."""
     digests: dict[Name, hashlib._Hash] = {}
-    for table in BY_RECORDING:
-        # Whether another recording lacks a number must not change how this one's are kept.
-        types = [
-            pa.field(f.name, f.type if pa.types.is_string(f.type) else pa.float64())
-            for f in tables[table].schema
-        ]
-        frame = tables[table].cast(pa.schema(types)).to_pandas(strings_to_categorical=True)
-        values = pa.array(hash_pandas_object(frame, index=False))
-        named = tables[table].select(["sensor", "recording"]).append_column("values", values)
+    for name in BY_RECORDING:
+        table = tables[name]
+        if not table.num_rows:
+            continue
+        named = table.select(["sensor", "recording"]).append_column("rows", pa.array(_rows(table)))
         for (sensor, recording), part in _by(named, "sensor", "recording").items():
             digest = digests.setdefault((sensor, recording), hashlib.sha256())
-            digest.update(f"{table} {part.num_rows}".encode() + part["values"].to_numpy().tobytes())
+            digest.update(f"{name} {part.num_rows}".encode() + part["rows"].to_numpy().tobytes())
     return {name: digest.hexdigest() for name, digest in digests.items()}
+
+
+_FACTOR = np.uint64(0x9E3779B97F4A7C15)
+"""Odd, and of no pattern: the place of a column in a row is part of what the row says."""
+
+
+def _rows(table: pa.Table) -> NDArray[np.uint64]:
+    """Return a digest of each row of a table."""
+    rows = np.zeros(table.num_rows, dtype=np.uint64)
+    for column in table.columns:
+        rows *= _FACTOR
+        if pa.types.is_string(column.type):
+            encoded = column.combine_chunks().dictionary_encode()
+            texts = np.array([*encoded.dictionary.to_pylist(), None], dtype=object)
+            rows += hash_array(texts, categorize=False)[encoded.indices.fill_null(-1).to_numpy()]
+        else:
+            # Whether another recording lacks a number must not change how this one's are kept.
+            rows += hash_array(np.asarray(column.cast(pa.float64()).to_numpy()))
+    return rows
 
 
 def _floats(part: pa.Table, *columns: str) -> dict[str, NDArray[np.float64]]:

@@ -4,7 +4,6 @@ import pytest
 from playwright.sync_api import Locator, expect
 
 from imubench_pipeline.report.glossary import glossary
-from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader
@@ -43,7 +42,7 @@ def test_a_term_explains_itself_under_the_keyboard(read: Open, bench: Report) ->
 
 
 @pytest.mark.release
-@pytest.mark.parametrize("width", few([390], [1280]))
+@pytest.mark.parametrize("width", [390, 1280])
 def test_an_explanation_is_seen_whole(width: int, read: Open, bench: Report) -> None:
     path = f"recordings/alpha/{made.NIGHT.recording}.html"
     reader = read(bench.folder, path, width=width, height=700)
