@@ -1,4 +1,4 @@
-"""Compare the demonstration's N with the truth that it was simulated from."""
+"""Compare the demonstration's N with the truth that it was simulated from, and its filters."""
 
 import sys
 from pathlib import Path
@@ -22,3 +22,18 @@ for row in pq.read_table(tables / "parameters.parquet").to_pylist():
     checked += 1
 if checked != 14:
     sys.exit(f"{checked} channels, expected 14")
+
+# A filter of the drives that has the true model is as sure as it says. The errors of the other
+# sensors grow beyond what a linearised filter can tell, and their rows say so.
+filters = {
+    (row["sensor"], row["tuning"]): row
+    for row in pq.read_table(tables / "navigation.parquet").to_pylist()
+    if row["outage"] is None
+}
+for sensor in ("mti_7", "sirrs01_03", "scc2130_x25"):
+    right, wrong = filters[sensor, "true"], filters[sensor, "times_ten"]
+    print(f"{sensor:12} errors inside their 95 % in {100 * right['nees_inside']:.1f} %")
+    if abs(right["nees_inside"] - 0.95) > 3 * right["nees_error"]:
+        sys.exit("a filter with the true model is not as sure as it says")
+    if not wrong["nees_gyro"] < 0.8 < right["nees_gyro"]:
+        sys.exit("a filter that doubts the gyro tenfold is not told from the right one")

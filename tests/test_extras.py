@@ -20,6 +20,8 @@ from tests.conftest import PROJECT, few
 from tests.test_pins import project
 from tests.workflow.project import put_log
 
+pytestmark = pytest.mark.release
+
 WORKFLOW = "which is not installed: pip install 'imubench_pipeline[workflow]'"
 
 
@@ -147,7 +149,6 @@ STATED = ("--rate", "10 Hz", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
             (("analyse", "logs/mine/run.csv", *STATED), 0, "gyro_x"),
             (("completion", "bash"), 0, "complete"),
         ],
-        # Every day the process of these tests imports what simulates, and `analyse` what computes.
         [
             (("shortlist", "ground_robot"), 0, "mti_7"),
             (("simulate", "bno055", "--hours", "0.01", "--out", "made.csv"), 0, "made.csv"),

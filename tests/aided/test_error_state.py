@@ -24,6 +24,9 @@ from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
 from tests.conftest import few
 
+# The filter takes longest of all to compile; every day, the demonstration has it.
+pytestmark = pytest.mark.release
+
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 ACCEL = NoiseModel(N=9.6e-4, B=3.4e-4, T_B=38.3, K=1.7e-5)
 SPREADS = Spreads(2e-3, 0.03)

@@ -134,6 +134,7 @@ def test_tunings_are_what_is_known_of_the_sensor(folder: Path) -> None:
     assert (bound.allan_variance(tau) >= gyro.allan_variance(tau)).all()
 
 
+@pytest.mark.release  # every day, the demonstration
 def test_every_tuning_runs_on_the_signals_of_the_estimate_and_of_the_log(folder: Path) -> None:
     rows = run(folder, [("field", "20 s")])
     assert {row["signals"] for row in rows} == {"estimate", "log"}
@@ -171,6 +172,7 @@ def test_a_share_is_judged_as_far_as_the_runs_tell(
     assert _consistent(Share(value, error)) is verdict
 
 
+@pytest.mark.release
 def test_a_gyro_alone_has_accelerometers_that_are_assumed_and_said(tmp_path: Path) -> None:
     put(tmp_path / "a", ("gyro_x", "gyro_y"))
     rows = run(tmp_path / "a", [], None)

@@ -16,7 +16,6 @@ from imubench_pipeline.experiments.aided.trajectories import (
     headings,
     trajectory,
 )
-from tests.conftest import few
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -62,9 +61,8 @@ def _elsewhere(way: Trajectory, every: int) -> tuple[np.ndarray, np.ndarray, np.
     return r3f.ecef_to_tangent(r3f.geodetic_to_ecef(at[-1]), origin), velocity[-1], angles[-1]
 
 
-@pytest.mark.parametrize(
-    ("name", "drive"), few([("drone", 12.0)], [("car", 60.0), ("drone", 60.0), ("field", 60.0)])
-)
+@pytest.mark.release
+@pytest.mark.parametrize(("name", "drive"), [("car", 60.0), ("drone", 60.0), ("field", 60.0)])
 def test_another_program_gets_as_far(name: str, drive: float) -> None:
     # Its steps are of first order: the limit of small ones, by Richardson from 10 and 5 ms.
     way = trajectory(name, drive, 200.0)

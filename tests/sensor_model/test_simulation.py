@@ -91,7 +91,8 @@ def test_the_spectrum_of_a_log_is_within_its_chi_squared_limits(simulated) -> No
         assert lower * 0.985 < found < upper * 1.015, f[chosen]
 
 
-@pytest.mark.parametrize("name", few(NAMES[1:2], NAMES[:1] + NAMES[2:]))
+@pytest.mark.release
+@pytest.mark.parametrize("name", NAMES)
 def test_a_log_is_stationary_from_its_first_sample(name: str) -> None:
     noise, low_pass, density = MODELS[name]
     model = SensorModel(noise=noise, low_pass=low_pass)

@@ -119,9 +119,8 @@ def seals(results: Path) -> dict[str, dict]:
 
 @dataclass(frozen=True)
 class Ways:
-    """One log, and what is ready to analyse it; ``checkout`` has done so."""
+    """What is ready to analyse a log; ``checkout`` has done so."""
 
-    logs: Path
     checkout: Path
     commands: Path  # of the environment that has the wheel, and not the checkout
     package: Path  # in it
@@ -133,16 +132,21 @@ class Ways:
 
 
 @pytest.fixture(scope="module")
-def ways(tmp_path_factory: pytest.TempPathFactory) -> Ways:
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("kept")
+    put_log(folder / "mine/run_1.csv", 1, samples=1_200)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def ways(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Ways:
     folder = tmp_path_factory.mktemp("deployed")
-    logs = folder / "kept"
-    put_log(logs / "mine/run_1.csv", 1, samples=1_200)
     checkout = with_logs(in_checkout(folder / "checkout"), logs)
     targets = ["tables", "fusion", "papers", "ranking", "shortlist", "repeatability", "catalogue"]
     targets.append("exports")
     ended(snakemake("-c1", *targets, "--config", *GIVEN), checkout)
     package = installed(built(folder), folder / "venv")
-    return Ways(logs, checkout, folder / "venv/bin", package, hosted(folder), folder)
+    return Ways(checkout, folder / "venv/bin", package, hosted(folder), folder)
 
 
 def in_checkout(place: Path) -> Path:
@@ -216,19 +220,20 @@ def hosted(folder: Path) -> dict[str, str]:
     }
 
 
-def using(place: Path, ways: Ways, snakefile: str, wanted: str) -> Path:
+def using(place: Path, logs: Path, snakefile: str, wanted: str) -> Path:
     """A folder with a workflow of its own that uses this one."""
-    with_logs(place, ways.logs)
+    with_logs(place, logs)
     given = {key: json.loads(value) for key, value in (entry.split("=") for entry in GIVEN)}
     (place / "config/all.yaml").write_text(yaml.safe_dump({"imu": given, "other": 1}))
     (place / "Snakefile").write_text(USING.format(snakefile=snakefile, wanted=wanted))
     return place
 
 
-def test_a_wheel_goes_on_where_a_checkout_has_ended(ways: Ways) -> None:
+@pytest.mark.release
+def test_a_wheel_goes_on_where_a_checkout_has_ended(ways: Ways, logs: Path) -> None:
     lab = ways.folder / "on"
     ended(ways.imubench("init", lab), ways.folder)
-    with_logs(lab, ways.logs)
+    with_logs(lab, logs)
     for name in ("results", ".snakemake"):
         shutil.copytree(ways.checkout / name, lab / name)
     # Snakemake's own notion of the code is where a script lies; the parameters have its digest.
@@ -238,11 +243,11 @@ def test_a_wheel_goes_on_where_a_checkout_has_ended(ways: Ways) -> None:
     assert rules == {"figures", "report", "all"}, said  # what the checkout was not asked for
 
 
-@pytest.mark.release  # every day: that it takes what a checkout has made for its own
-def test_a_wheel_analyses_a_folder_of_logs_as_a_checkout_does(ways: Ways) -> None:
+@pytest.mark.release
+def test_a_wheel_analyses_a_folder_of_logs_as_a_checkout_does(ways: Ways, logs: Path) -> None:
     lab = ways.folder / "lab"
     ended(ways.imubench("init", lab), ways.folder)
-    with_logs(lab, ways.logs)
+    with_logs(lab, logs)
     said = ended(ways.imubench("run", lab, "-c2", "--", "--config", *GIVEN), ways.folder)
     assert "1 recording analysed, 0 rejected" in said and len(said.splitlines()) < 20, said
     assert (lab / "results/report/index.html").is_file()
@@ -253,6 +258,7 @@ def test_a_wheel_analyses_a_folder_of_logs_as_a_checkout_does(ways: Ways) -> Non
     assert made.items() <= seals(lab / "results").items()
 
 
+@pytest.mark.release
 def test_a_wheel_holds_the_files_of_the_checkout(ways: Ways) -> None:
     shipped = ways.package / "project"
     kept = {path.relative_to(shipped): path.read_bytes()
@@ -269,9 +275,11 @@ def test_a_wheel_holds_the_files_of_the_checkout(ways: Ways) -> None:
     assert script.read_bytes() == Path(str(bundle)).read_bytes()
 
 
-@pytest.mark.release  # every day: what another workflow would run, and a wheel that runs
-def test_another_workflow_uses_the_rules_under_other_names_from_a_git_address(ways: Ways) -> None:
-    place = using(ways.folder / "using", ways, GITHUB, "rules.imu_ranking.output")
+@pytest.mark.release
+def test_another_workflow_uses_the_rules_under_other_names_from_a_git_address(
+    ways: Ways, logs: Path
+) -> None:
+    place = using(ways.folder / "using", logs, GITHUB, "rules.imu_ranking.output")
     said = ended(snakemake("-c2", "--configfile", "config/all.yaml"), place, **ways.hub)
     assert "imu_estimate" in said and "1 recording analysed" in said
     results, expected = left(place / "results"), left(ways.checkout / "results")
@@ -282,10 +290,11 @@ def test_another_workflow_uses_the_rules_under_other_names_from_a_git_address(wa
     assert seals(place / "results").items() <= seals(ways.checkout / "results").items()
 
 
-def test_what_another_workflow_finds_damaged_is_made_again(ways: Ways) -> None:
+@pytest.mark.release
+def test_what_another_workflow_finds_damaged_is_made_again(ways: Ways, logs: Path) -> None:
     # Which jobs there are is known by the names of the rules, which are others here.
     snakefile = json.dumps(str(PROJECT / "workflow/Snakefile"))
-    place = using(ways.folder / "again", ways, snakefile, "rules.imu_all.input")
+    place = using(ways.folder / "again", logs, snakefile, "rules.imu_all.input")
     shutil.copytree(ways.checkout / "results", place / "results")
     shutil.copytree(ways.checkout / ".snakemake", place / ".snakemake")
     run = ["-c1", "--quiet", "host", "--configfile", "config/all.yaml"]
@@ -298,8 +307,11 @@ def test_what_another_workflow_finds_damaged_is_made_again(ways: Ways) -> None:
     assert "imu_allan" in again.stdout and "imu_ingest" not in again.stdout
 
 
-def test_two_modules_with_results_of_their_own_do_not_mind_each_other(ways: Ways) -> None:
-    place = with_logs(ways.folder / "twice", ways.logs)
+@pytest.mark.release
+def test_two_modules_with_results_of_their_own_do_not_mind_each_other(
+    ways: Ways, logs: Path
+) -> None:
+    place = with_logs(ways.folder / "twice", logs)
     modules = (
         f'module {name}:\n    snakefile: "{PROJECT}/Snakefile"\n'
         f'    config: {{"results": "{name}"}}\nuse rule * from {name} as {name}_*\n'
@@ -314,21 +326,24 @@ def test_two_modules_with_results_of_their_own_do_not_mind_each_other(ways: Ways
     assert "rule a_ingest" in done.stdout and "rule b_ingest" not in done.stdout
 
 
-def test_a_prefix_of_paths_is_refused_with_what_does_that(ways: Ways) -> None:
+def test_a_prefix_of_paths_is_refused_with_what_does_that(logs: Path, tmp_path: Path) -> None:
     snakefile = json.dumps(str(PROJECT / "Snakefile")) + '\n    prefix: "elsewhere"'
-    place = using(ways.folder / "prefix", ways, snakefile, "rules.imu_all.input")
+    place = using(tmp_path, logs, snakefile, "rules.imu_all.input")
     done = dry_run(place, ["-c1", "--configfile", "config/all.yaml"])
     assert done.returncode == 1 and "expected the folder of the results" in done.stdout
 
 
 @pytest.mark.parametrize("snakefile", ["Snakefile", "workflow/Snakefile"])
-def test_any_folder_is_one_of_logs_for_a_snakefile_elsewhere(ways: Ways, snakefile: str) -> None:
-    place = with_logs(ways.folder / snakefile.replace("/", "_"), ways.logs)
+def test_any_folder_is_one_of_logs_for_a_snakefile_elsewhere(
+    logs: Path, tmp_path: Path, snakefile: str
+) -> None:
+    place = with_logs(tmp_path, logs)
     done = dry_run(place, ["-c1", "--snakefile", str(PROJECT / snakefile)])
     assert done.returncode == 0, done.stderr
     assert "rule figures" in done.stdout and "rule simulate" not in done.stdout
 
 
+@pytest.mark.release
 def test_a_new_folder_says_what_it_holds_and_is_never_written_over(ways: Ways) -> None:
     lab = ways.folder / "new"
     ended(ways.imubench("init", lab, "--demonstration"), ways.folder)
@@ -346,10 +361,10 @@ def test_a_new_folder_says_what_it_holds_and_is_never_written_over(ways: Ways) -
 
 
 @pytest.mark.release
-def test_a_night_in_a_folder_of_logs(ways: Ways) -> None:
+def test_a_night_in_a_folder_of_logs(ways: Ways, logs: Path) -> None:
     lab = ways.folder / "nights"
     ended(ways.imubench("init", lab), ways.folder)
-    with_logs(lab, ways.logs)
+    with_logs(lab, logs)
     said = ended(ways.imubench("nightly", lab, "--settle", "0", "-c2"), ways.folder)
     assert "1 new" in said
     said = ended(ways.imubench("nightly", lab, "--settle", "0", "-c2", "--", "-q"), ways.folder)
@@ -357,11 +372,11 @@ def test_a_night_in_a_folder_of_logs(ways: Ways) -> None:
 
 
 @pytest.mark.release
-def test_what_snakedeploy_writes_runs(ways: Ways) -> None:
+def test_what_snakedeploy_writes_runs(ways: Ways, logs: Path) -> None:
     place = in_checkout(ways.folder / "snakedeploy")
     for name in ("Snakefile", "workflow"):
         (place / name).unlink()
-    with_logs(place, ways.logs)
+    with_logs(place, logs)
     (place / "workflow").mkdir()
     (place / "workflow/Snakefile").write_text(SNAKEDEPLOY.format(snakefile=GITHUB))
     ended(snakemake("-c2", "--config", *GIVEN), place, **ways.hub)
@@ -370,8 +385,8 @@ def test_what_snakedeploy_writes_runs(ways: Ways) -> None:
 
 @pytest.mark.release
 @pytest.mark.parametrize("snakefile", ["Snakefile", "workflow/Snakefile"])
-def test_a_snakefile_elsewhere_runs_in_any_folder(ways: Ways, snakefile: str) -> None:
-    place = with_logs(ways.folder / f"any_{snakefile.replace('/', '_')}", ways.logs)
+def test_a_snakefile_elsewhere_runs_in_any_folder(ways: Ways, snakefile: str, logs: Path) -> None:
+    place = with_logs(ways.folder / f"any_{snakefile.replace('/', '_')}", logs)
     path = str(PROJECT / snakefile)
     ended(snakemake("-c2", "--snakefile", path, "--config", *GIVEN), place)
     assert left(place / "results") == left(ways.checkout / "results")

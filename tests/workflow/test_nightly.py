@@ -209,6 +209,7 @@ def test_a_log_that_is_rewritten_keeps_its_results(project: Project) -> None:
     assert "one/c (new): c.csv: no column 'wx'" in said
 
 
+@pytest.mark.release  # every day, tests/test_nightly.py
 def test_logs_that_settled_are_taken_and_what_is_known_flags_nothing_again(
     project: Project,
 ) -> None:

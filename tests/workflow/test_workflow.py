@@ -128,6 +128,7 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
     assert not list(project.results.rglob("*.part"))
 
 
+@pytest.mark.release  # every day, tests/library/test_estimates.py
 def test_logs_that_are_analysed_at_once_have_the_same_numbers(
     project: Project, tmp_path: Path
 ) -> None:

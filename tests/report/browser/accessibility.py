@@ -31,14 +31,12 @@ def faults(page: Page, **options: Any) -> list[str]:
     ]
 
 
-def hindrances(
-    page: Page, *, by_night: bool = True, whole: bool = False, contrast: bool = True
-) -> list[str]:
+def hindrances(page: Page, *, by_night: bool = True, whole: bool = False) -> list[str]:
     """Return what hinders a reader of a page of which every figure is drawn, by day or by night."""
     page.evaluate(UNFOLD)
     if not whole:
         page.evaluate(ALIKE)
-    found = faults(page, **({} if contrast else {"rules": {"color-contrast": {"enabled": False}}}))
+    found = faults(page)
     if by_night:
         page.emulate_media(color_scheme="dark")
         found += faults(page, runOnly=["color-contrast"])

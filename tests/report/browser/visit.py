@@ -7,15 +7,8 @@ from tests.report.browser.accessibility import hindrances
 from tests.report.browser.made import Report
 from tests.report.browser.reader import TOO_WIDE, Reader
 
-KINDS = ("recordings.html", "recordings/alpha/night 1")
-"""Where most of what a page can have stands; accessibility is looked at there, as it takes longer
-than to draw: before a release everywhere."""
-
-BY_NIGHT = ("recordings.html",)
-"""Of these by night, too, as it is the least. Before a release, all pages by day and by night."""
-
-LARGE = ("recordings/alpha/night 1",)
-"""Of these the contrast takes longest: every day it is asked of the others alone."""
+KINDS = ("recordings.html",)
+"""Accessibility is looked at there, as it takes longer than to draw: elsewhere before a release."""
 
 DRAWN = ("recordings/alpha/night 1",)
 """Where most kinds of figures stand; other tests draw those of other pages one by one. Before a
@@ -48,12 +41,10 @@ class Seen:
 
 def visit(window: Reader, report: Report) -> Seen:
     pages, figures, hinder = {}, {}, {}
-    kinds, dark, large, drawn = (
-        {report.page(kind) for kind in some} for some in (KINDS, BY_NIGHT, LARGE, DRAWN)
-    )
+    kinds, drawn = ({report.page(kind) for kind in some} for some in (KINDS, DRAWN))
     window.begin(report.folder, 1280, 900, "light")
     for path in report.pages:
-        if dark & hinder.keys():
+        if hinder:
             window.page.goto("about:blank")  # or the figures of the page before would turn light
             window.page.emulate_media(color_scheme="light")
         window.open(path)
@@ -61,7 +52,5 @@ def visit(window: Reader, report: Report) -> Seen:
             figures[path] = window.draw_all()
         pages[path] = window.page.evaluate(LOOK)
         if path in kinds:
-            hinder[path] = hindrances(
-                window.page, by_night=path in dark, contrast=path not in large
-            )
+            hinder[path] = hindrances(window.page)
     return Seen(pages, figures, hinder, window.end())
