@@ -25,6 +25,7 @@ def comparison(estimates, loud):
     return imu.compare(estimates, loud, tau=["1 s", 10, "1 h"])
 
 
+@pytest.mark.release
 def test_the_ratio_of_two_logs_is_in_its_interval(comparison) -> None:
     rows = {each.label: each for each in comparison}
     assert rows["N"].ratio.lower < 1.0 / 1.5 < rows["N"].ratio.upper

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.conftest import few
 from tests.report.browser.accessibility import UNFOLD, hindrances
 from tests.report.browser.made import publish_some
 from tests.report.browser.reader import TOO_WIDE, Open, Reader, axis_title, traces
@@ -33,9 +32,10 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Rows, Rows]:
 ALL = (TABLE, "earth_rate.html", "recordings/s/still.html")
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("path", "width"),
-    few([(TABLE, 400)], [(TABLE, 1280), *((path, w) for path in ALL[1:] for w in (400, 1280))]),
+    [(path, width) for path in ALL for width in (400, 1280)],
 )
 def test_nothing_is_too_wide(path: str, width: int, read: Open, rows: Any) -> None:
     reader: Reader = read(rows[0], path, width=width)

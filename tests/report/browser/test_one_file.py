@@ -7,7 +7,6 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from imubench_pipeline.report.payload import FOREST
-from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.reader import Open, toggle, traces
 
@@ -19,7 +18,8 @@ def head(page: Page) -> str:
     return page.locator("main h1").inner_text()
 
 
-@pytest.mark.parametrize("drawn", few([False], [True]))
+@pytest.mark.release
+@pytest.mark.parametrize("drawn", [False, True])
 def test_one_file_needs_no_other(drawn: bool, read: Open, alone: Path) -> None:
     assert [path.name for path in alone.parent.iterdir()] == [alone.name]
     reader = read(alone.parent, alone.name)
