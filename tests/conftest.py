@@ -24,9 +24,9 @@ from tests.scheduling import ByUnit, place
 
 # The first example may have to wait for a compiler; how fast the code is, benchmarks/ tells.
 settings.register_profile("all", deadline=None, database=None)
-# Every day a fourth of the examples, and the same in each run: what passes today passes tomorrow.
+# Every day a few of the examples, and the same in each run: what passes today passes tomorrow.
 # All of them, and others in each run, before a release: HYPOTHESIS_PROFILE=all.
-settings.register_profile("quick", settings.get_profile("all"), max_examples=25, derandomize=True)
+settings.register_profile("quick", settings.get_profile("all"), max_examples=15, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 
 PROJECT = Path(__file__).parents[1]
