@@ -240,6 +240,7 @@ def test_temperature_is_left_alone_beside_the_likelihood(warm: ChannelLog) -> No
     assert found.low_pass
 
 
+@pytest.mark.release
 def test_compensated_beside_the_curve_alone_is_never_recommended(brief: Brief) -> None:
     found, _ = brief
     recommended = {row["method"]: row["recommended"] for row in found.parameters}

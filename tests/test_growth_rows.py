@@ -10,7 +10,6 @@ from imubench_pipeline.navigation.error_growth import growth_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, standard
 from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.navigation.ratios import deviation_rows, ratio_of_deviations
-from tests.conftest import few
 
 NAMES = {"sensor": "alpha", "recording": "night"}
 DRAWS = 9
@@ -66,7 +65,8 @@ def test_errors_that_grow_are_those_of_the_budget() -> None:
             assert row[name] == pytest.approx(of_budget[name], rel=1e-12)
 
 
-@pytest.mark.parametrize("letters", few(["y"], ["xy"]))
+@pytest.mark.release
+@pytest.mark.parametrize("letters", ["y", "xy"])
 def test_an_axis_alone_is_as_if_its_log_had_no_other(letters: str) -> None:
     how = HOW | {"times": [10.0, 45.0], "window": 90.0}
     rows = grown()

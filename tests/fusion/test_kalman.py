@@ -42,6 +42,7 @@ def reference(
     return fused
 
 
+@pytest.mark.release
 def test_it_is_the_kalman_filter_of_the_differences_once_that_has_settled() -> None:
     models = [
         NoiseModel(N=1.0, B=3.0, T_B=2.0),

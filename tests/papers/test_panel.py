@@ -23,6 +23,7 @@ def test_no_method_is_below_the_bound_but_for_chance(found: dict[Any, Any]) -> N
             assert row["ratio_upper"] > 0.8
 
 
+@pytest.mark.release
 def test_the_curve_is_read_where_it_shows_a_slope_alone(found: dict[Any, Any]) -> None:
     assert found["curve", "N"]["given"] == LOGS
     assert found["curve", "T_B"]["given"] < LOGS / 2

@@ -17,6 +17,7 @@ a record, with the stamp of the first.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from datetime import datetime, timedelta
@@ -433,7 +434,9 @@ class _Records:
             self._stamp = np.zeros(1, stamps.dtype)
         table = np.empty((len(columns) + 1, len(self._open)))
         times = np.empty(len(columns) + 1, stamps.dtype)
-        count = _group(columns, values, stamps, self._open, self._stamp, self._state, table, times)
+        # Stamps are passed on, whole or not, and so are their bits: one kernel for both.
+        bits = (each.view(np.int64) for each in (stamps, self._stamp, times))
+        count = _group(columns, values, self._open, self._state, table, *bits)
         if ended and self._state[1]:
             table[count], times[count] = self._open, self._stamp[0]
             count += 1
@@ -444,12 +447,12 @@ class _Records:
 def _group(
     columns: NDArray[np.int64],
     values: NDArray[np.float64],
-    stamps: NDArray[Any],
     row: NDArray[np.float64],
-    row_stamp: NDArray[Any],
     state: NDArray[np.int64],
     table: NDArray[np.float64],
-    times: NDArray[Any],
+    stamps: NDArray[np.int64],
+    row_stamp: NDArray[np.int64],
+    times: NDArray[np.int64],
 ) -> int:
     """Fill records; return how many are complete.
 
@@ -461,11 +464,12 @@ def _group(
         column = columns[i]
         if state[0] < 0:
             state[0] = column
-        if state[1] and (column == state[0] or not np.isnan(row[column])):
-            table[count] = row
+        if state[1] and (column == state[0] or not math.isnan(row[column])):
+            for j in range(row.size):  # an assignment to a slice takes longer to compile than all
+                table[count, j] = row[j]
+                row[j] = math.nan
             times[count] = row_stamp[0]
             count += 1
-            row[:] = np.nan
             state[1] = 0
         if not state[1]:
             row_stamp[0] = stamps[i]

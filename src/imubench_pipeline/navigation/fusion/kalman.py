@@ -5,6 +5,7 @@ Its steady state is found by doubling (`steady_covariance`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -280,9 +281,9 @@ def _run(
             left[i] = seen
             signal += weights[i] * seen
         fused[k] = signal
-        missing = not np.isfinite(signal)
+        missing = not math.isfinite(signal)
         if missing:
-            fused[k] = np.nan
+            fused[k] = math.nan
         for j in range(states):
             total = 0.0
             for e in range(transition[0][j], transition[0][j + 1]):
@@ -292,4 +293,5 @@ def _run(
                 for i in range(sensors):
                     total += gain[j, i] * (left[i] - signal)
             moved[j] = total
-        state[:] = moved
+        for j in range(states):
+            state[j] = moved[j]
