@@ -215,7 +215,7 @@ def test_a_walk_that_cannot_follow_is_refused(tables: dict[str, pa.Table]) -> No
     assert "take a horizon shorter than 150 s" in str(content)
 
 
-@pytest.mark.release  # test_overbound.py has the warning every day
+@pytest.mark.release
 def test_a_walk_that_cannot_follow_is_warned_of(tables: dict[str, pa.Table]) -> None:
     text = made(tables, replace(REQUEST, overbound=True, horizon=150.0))
     assert isinstance(text, str)

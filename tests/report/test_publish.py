@@ -660,7 +660,6 @@ def test_a_changed_reason_rewrites_all_pages_that_list_the_recording(old: Path) 
     assert seen == {"datasheets.html"}
 
 
-@pytest.mark.release
 def test_a_new_finding_leaves_the_pages_of_other_recordings_alone(old: Path) -> None:
     after = some()
     finding = {"finding": "step", "severity": "warning", "detail": "moved", "value": 1.0}
@@ -743,7 +742,7 @@ def test_another_script_or_style_is_written_alone(report: Report, tmp_path: Path
     assert publish(made, tmp_path) == ["assets/report.css", "assets/plotly.min.js"]
 
 
-@pytest.mark.release  # every day another file of them does
+@pytest.mark.release
 def test_changed_samples_rewrite_the_page_of_their_recording_alone(tmp_path: Path) -> None:
     tables = joined(recording_rows("one", "day1"), recording_rows("one", "day2"))
     publish(site(tables, tmp_path), tmp_path / "report")

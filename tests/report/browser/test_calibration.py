@@ -45,7 +45,7 @@ def test_nothing_is_too_wide(path: str, width: int, read: Open, rows: Any) -> No
     assert reader.page.evaluate(TOO_WIDE) == []
 
 
-@pytest.mark.release  # every day it is asked of the recordings at rest
+@pytest.mark.release
 @pytest.mark.parametrize("path", ALL)
 def test_nothing_hinders_a_reader(path: str, read: Open, rows: Any) -> None:
     reader: Reader = read(rows[0], path)

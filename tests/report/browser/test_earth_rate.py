@@ -57,7 +57,7 @@ def test_every_figure_is_drawn_and_nothing_is_too_wide(
     assert reader.page.evaluate(TOO_WIDE) == []
 
 
-@pytest.mark.release  # every day it is asked of the recordings at rest
+@pytest.mark.release
 @pytest.mark.parametrize("path", [RUN, "earth_rate.html"])
 def test_nothing_hinders_a_reader(path: str, read: Open, rows: Any) -> None:
     reader: Reader = read(rows[0], path)

@@ -131,7 +131,7 @@ def test_axis_method_and_recordings_are_chosen(read: Open, bench: Report) -> Non
     assert names(traces(figure)) == {f"{A} (simulated), sim_published", f"{B}, {last}"}
 
 
-@pytest.mark.release  # every day the model of the parameters beside it is chosen
+@pytest.mark.release
 def test_the_model_of_the_curves_is_chosen(read: Open, bench: Report) -> None:
     reader = read(bench.folder)
     figure, page = reader.figure("overlay"), reader.page

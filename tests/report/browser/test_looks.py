@@ -102,7 +102,6 @@ def test_there_is_something_to_see(width: int, read: Open, bench: Report) -> Non
         assert reader.page.evaluate(TOO_WIDE) == []
 
 
-@pytest.mark.release
 def test_a_page_is_dark_by_night(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)
     light = ink(reader)
@@ -145,7 +144,7 @@ def test_a_page_is_printed_light_and_whole(scheme: str, read: Open, bench: Repor
     assert luminance(ink(reader)) < 0.2
 
 
-@pytest.mark.release  # every day a recording is printed
+@pytest.mark.release
 def test_no_figure_is_cut_off_on_paper(read: Open, bench: Report) -> None:
     reader = read(bench.folder, "compare.html", width=718)  # of a sheet of A4 between its margins
     reader.draw_all()
