@@ -17,6 +17,7 @@ from packaging.utils import canonicalize_name
 
 from imubench_pipeline.readers.formats import FILE_FORMATS
 from tests.conftest import PROJECT, few
+from tests.readers.test_formats import LOADED
 from tests.test_pins import project
 from tests.workflow.project import put_log
 
@@ -107,20 +108,6 @@ def imubench(python: Path) -> Iterator[Imubench]:
             return subprocess.CompletedProcess(arguments, status, *said)
 
         yield ran
-
-
-LOADED = """
-import json
-from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.readers.formats import FILE_FORMATS
-said = {}
-for name, file_format in FILE_FORMATS.items():
-    try:
-        file_format.load()
-    except RecordingError as error:
-        said[name] = str(error)
-print(json.dumps(said), flush=True)
-"""
 
 
 def test_each_format_whose_library_is_not_installed_names_it(

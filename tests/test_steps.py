@@ -122,7 +122,6 @@ def test_a_script_that_is_killed_harms_no_other(steps: Processes, tmp_path: Path
     run(steps, "say", tmp_path / "out", size="x")
 
 
-@pytest.mark.release
 def test_a_request_that_dies_with_the_server_is_a_step_that_was_killed(
     steps: Processes, tmp_path: Path
 ) -> None:

@@ -57,10 +57,8 @@ def test_a_log_is_told_by_its_content(file_format: FileFormat, log: Path) -> Non
     assert content_of(renamed) == (file_format, "")
 
 
-WITHOUT = """
-import json, sys
-from pathlib import Path
-sys.modules |= dict.fromkeys(["rosbags", "lz4", "h5py"])
+LOADED = """
+import json
 from imubench_pipeline.readers import RecordingError
 from imubench_pipeline.readers.formats import FILE_FORMATS
 said = {}
@@ -69,8 +67,11 @@ for name, file_format in FILE_FORMATS.items():
         file_format.load()
     except RecordingError as error:
         said[name] = str(error)
-print(json.dumps(said))
+print(json.dumps(said), flush=True)
 """
+"""Says of each format what its library lacks."""
+
+WITHOUT = "import sys\nsys.modules |= dict.fromkeys(['rosbags', 'lz4', 'h5py'])" + LOADED
 
 
 # Every day the same is asked where they are not installed: tests/test_extras.py.
