@@ -19,6 +19,8 @@ TOLERANCE = 1e-7
 """Of the cost."""
 
 _MOST_STEPS = 60
+_NEAR = 0.1
+"""Gain of the cost by a step from which the next ones are Newton's."""
 
 
 class Bins(NamedTuple):
@@ -175,7 +177,11 @@ def _non_negative(gram: Array, target: Array, guess: Array) -> Array:
 def best_powers(
     columns: Array, bins: Bins, with_ramp: bool, tolerance: float
 ) -> tuple[Array, float, float]:
-    """Return the squared parameters, R and the cost that fit best, to a tolerance of the cost."""
+    """Return the squared parameters, R and the cost that fit best, to a tolerance of the cost.
+
+    Scoring, with the expected information, which never leads astray; where little is left to gain,
+    Newton's steps, with the observed one: scoring creeps where the data are not as the model says.
+    """
     nu, density, cross, ramp = bins
     b, p = columns.shape
     R = 0.0
@@ -187,6 +193,7 @@ def best_powers(
     powers, gram, target = np.empty(p), np.empty((p, p)), np.empty(p)
     powers[:] = 1.0
     cost = np.inf
+    observed, allowed = False, True
     for iteration in range(_MOST_STEPS):
         if with_ramp and iteration > 0:
             above, below = 0.0, 0.0
@@ -201,9 +208,16 @@ def best_powers(
         target[:] = 0.0
         for i in range(b):
             weight = nu[i] / (model[i] * model[i])
+            towards = data[i]
+            if observed:
+                ratio = data[i] / model[i]
+                towards = (3.0 * ratio - 2.0) * model[i]
+                curvature = 2.0 * ratio - 1.0
             for j in range(p):
                 left = weight * columns[i, j]
-                target[j] += left * data[i]
+                target[j] += left * towards
+                if observed:
+                    left *= curvature
                 for k in range(j + 1):
                     gram[j, k] += left * columns[i, k]
         for j in range(p):
@@ -234,12 +248,16 @@ def best_powers(
                 break
             step *= 0.5
         if not moved:
-            break
+            if not observed:
+                break
+            observed, allowed = False, False
+            continue
         gain = cost - tried_cost
         powers, cost = tried, tried_cost
         model, tried_model = tried_model, model
         if gain < tolerance:
             break
+        observed = allowed and gain < _NEAR
     return powers, R, cost
 
 

@@ -6,7 +6,10 @@ would compile each level of the search for seconds when it is first used.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from imubench_pipeline.estimators.whittle_kernels import Problem, cost_at
 from imubench_pipeline.typing import Array
@@ -20,33 +23,26 @@ _SCAN_TOLERANCE = 1e-2
 """Of the cost, where correlation times are compared only."""
 
 _POLISH_TOLERANCE = 1e-6
+_CLOSE_ENOUGH = 5e-4
+"""Of the logarithm of a correlation time."""
+
 _MOST_TURNS = 8
-_GOLDEN = 0.6180339887498949
 
 
 def _polish(
     places: Array, which: int, low: float, high: float, problem: Problem
 ) -> tuple[float, float]:
-    """Minimise the cost over one correlation time by golden section."""
+    """Minimise the cost over one correlation time between limits (Brent's method)."""
     tried = places.copy()
-    a, d = low, high
-    b, c = d - _GOLDEN * (d - a), a + _GOLDEN * (d - a)
-    tried[which] = b
-    cost_b = cost_at(tried, problem, _POLISH_TOLERANCE)
-    tried[which] = c
-    cost_c = cost_at(tried, problem, _POLISH_TOLERANCE)
-    while d - a > 5e-4:
-        if cost_b <= cost_c:
-            d, c, cost_c = c, b, cost_b
-            b = d - _GOLDEN * (d - a)
-            tried[which] = b
-            cost_b = cost_at(tried, problem, _POLISH_TOLERANCE)
-        else:
-            a, b, cost_b = b, c, cost_c
-            c = a + _GOLDEN * (d - a)
-            tried[which] = c
-            cost_c = cost_at(tried, problem, _POLISH_TOLERANCE)
-    return (b, cost_b) if cost_b <= cost_c else (c, cost_c)
+
+    def cost(place: float) -> float:
+        tried[which] = place
+        return cost_at(tried, problem, _POLISH_TOLERANCE)
+
+    best = minimize_scalar(
+        cost, bounds=(low, high), method="bounded", options={"xatol": _CLOSE_ENOUGH}
+    )
+    return float(best.x), float(best.fun)
 
 
 def _scan(
@@ -79,11 +75,18 @@ def one_process(problem: Problem) -> Array:
 
 
 def two_processes(problem: Problem) -> Array:
-    """Begin with the best pair of a coarse grid and with the best single process; take the better.
+    """Polish the best pair of a coarse grid and the best single process with another beside it.
 
     A strong process has a sharp correlation time, beside which no pair of a coarse grid shows that
-    it needs another.
+    it needs another. A first turn tells which of them leads lowest.
     """
+    begun = [_descend(pair, cost, problem, turns=1) for pair, cost in _pairs(problem)]
+    pair, cost = min(begun, key=lambda one: one[1])
+    return _descend(pair, cost, problem, turns=_MOST_TURNS)[0]
+
+
+def _pairs(problem: Problem) -> Iterator[tuple[Array, float]]:
+    """Yield pairs of correlation times to begin with, and their costs."""
     first, step, logarithms = problem.table
     last = first + step * (logarithms.shape[0] - 1)
     apart = np.log(_CLOSEST_PAIR)
@@ -99,7 +102,7 @@ def two_processes(problem: Problem) -> Array:
             if cost < lowest:
                 lowest = cost
                 pair = places.copy()
-    pair, lowest = _descend(pair, lowest, problem)
+    yield pair, lowest
     single = one_process(problem)[0]
     for which in (1, 0):
         beside = np.array([single, single])
@@ -107,22 +110,18 @@ def two_processes(problem: Problem) -> Array:
         if high <= low:
             continue
         beside[which], cost = _scan(beside, which, low, high, problem)
-        if cost == np.inf:
-            continue
-        beside, cost = _descend(beside, cost, problem)
-        if cost < lowest:
-            pair, lowest = beside, cost
-    return pair
+        if cost < np.inf:
+            yield beside, cost
 
 
-def _descend(pair: Array, lowest: float, problem: Problem) -> tuple[Array, float]:
+def _descend(pair: Array, lowest: float, problem: Problem, *, turns: int) -> tuple[Array, float]:
     """Polish each of two correlation times in turn."""
     first, step, logarithms = problem.table
     last = first + step * (logarithms.shape[0] - 1)
     apart = np.log(_CLOSEST_PAIR)
     best = pair.copy()
     reach = _PAIR_STEP * step
-    for _ in range(_MOST_TURNS):
+    for _ in range(turns):
         before = lowest
         for g in range(2):
             low, high = max(first, best[g] - reach), min(last, best[g] + reach)
