@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -39,6 +40,12 @@ _FADED = 0.1
 _SAMPLING_SIGMAS = 0.02
 _SCAN = 160
 """Correlation times tried before the search is refined."""
+
+_CHOICES = [list(chosen) for p in (1, 2, 3) for chosen in combinations(range(3), p)]
+_RIDGE = 1e-13
+"""Of columns that are 1 long: two that look alike must not divide by nothing."""
+
+_NOTHING = 1e-300
 
 _ABSENT = 1e-9
 """A term below this part of the variance at every tau is not there."""
@@ -256,11 +263,31 @@ class _Search:
         solution, residual = nnls(columns / size, self._target)
         return solution / size, float(residual)
 
+    def _costs(self, shapes: Array) -> Array:
+        """Return the costs of processes of shapes (t, m), shape (t,), as `_solved` would.
+
+        What fits best with no density below 0 is what fits best with some of the three columns
+        and has none below 0: of all such choices, that of the lowest cost.
+        """
+        columns = np.empty((len(shapes), 3, len(self._tau)))
+        columns[:, 0], columns[:, 1], columns[:, 2] = self._white, shapes, self._walk
+        columns *= self._root_weight
+        columns /= np.maximum(np.linalg.norm(columns, axis=2, keepdims=True), _NOTHING)
+        products = columns @ columns.transpose(0, 2, 1)
+        target = columns @ self._target
+        cost = np.full(len(shapes), self._target @ self._target)
+        for chosen in _CHOICES:
+            part = products[:, chosen][:, :, chosen] + _RIDGE * np.eye(len(chosen))
+            solution = np.linalg.solve(part, target[:, chosen, None])[..., 0]
+            left = self._target @ self._target - (solution * target[:, chosen]).sum(axis=1)
+            cost = np.where((solution >= 0.0).all(axis=1), np.minimum(cost, left), cost)
+        return cost
+
     def estimate(self) -> Estimate:
         """Return the estimate at the best T_B."""
         scan = np.geomspace(self.shortest, self.longest, _SCAN)
-        costs = [self._solved(shape)[1] for shape in self._shapes(scan)]
-        best = int(np.argmin(costs))
+        best = int(np.argmin(self._costs(self._shapes(scan))))
+        cost = self._solved(self._shape(float(scan[best])))[1]
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN - 1)]
         minimum = minimize_scalar(
             lambda u: self.densities(math.exp(u))[1],
@@ -268,7 +295,7 @@ class _Search:
             method="bounded",
             options={"xatol": 1e-10},
         )
-        T_B = math.exp(minimum.x) if minimum.fun < costs[best] else float(scan[best])
+        T_B = math.exp(minimum.x) if minimum.fun < cost else float(scan[best])
         return self._described(T_B)
 
     def _described(self, T_B: float) -> Estimate:

@@ -16,6 +16,8 @@ _SERIES_BELOW = 2.0
 """Below, the recurrence of phi and the sum of `squared_response` cancel; their series do not."""
 
 _LONGEST_SERIES = 48
+_NO_MORE = 1e-18
+"""Part of a sum that is below its last digit, as all are that follow."""
 
 _ARRAY_SERIES = 28
 """Terms for arrays: the next is below 2^28 / 28! = 9e-22 of the first."""
@@ -39,11 +41,13 @@ def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray
     if isinstance(z, np.ndarray):
         return _phi_of_array(order, z)
     if abs(z) < _SERIES_BELOW:
-        term: complex = complex(1.0 / math.factorial(order))
+        term: complex = 1.0 / math.factorial(order)
         total = term
         for n in range(1, _LONGEST_SERIES):
             term *= z / (n + order)
             total += term
+            if abs(term) < _NO_MORE * abs(total):
+                break
         return total
     value = cmath.exp(z)
     for j in range(order):
@@ -86,10 +90,13 @@ def squared_response(order: int, x: float | Array) -> float | Array:
     """
     if isinstance(x, np.ndarray):
         small = x < _SERIES_BELOW
-        near = np.polynomial.polynomial.polyval(np.where(small, x, 0.0), _squared_series(order))
-        return np.where(small, near, _squared_sum(order, np.where(small, _SERIES_BELOW, x)))
+        close = np.polynomial.polynomial.polyval(np.where(small, x, 0.0), _squared_series(order))
+        return np.where(small, close, _squared_sum(order, np.where(small, _SERIES_BELOW, x)))
     if x < _SERIES_BELOW:
-        return float(np.polynomial.polynomial.polyval(x, _squared_series(order)))
+        near = 0.0
+        for coefficient in reversed(_squared_series(order)):
+            near = near * x + coefficient
+        return near
     return _squared_sum(order, x)
 
 
@@ -109,4 +116,4 @@ def _squared_series(order: int) -> tuple[float, ...]:
     powers = np.arange(_LONGEST_SERIES)
     single = [(-1.0) ** n / math.factorial(n + order + 1) for n in powers]
     square = np.convolve(single, single)[:_LONGEST_SERIES]
-    return tuple(square / (2 * order + 3 + powers))
+    return tuple((square / (2 * order + 3 + powers)).tolist())

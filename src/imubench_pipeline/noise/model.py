@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -82,7 +83,7 @@ class NoiseModel:
             for parameter in term.parameters:
                 parameter.check(getattr(term, parameter.symbol))
 
-    @property
+    @cached_property
     def terms(self) -> Sequence[Term]:
         """The terms that are not zero."""
         terms: list[Term] = []
@@ -98,7 +99,7 @@ class NoiseModel:
         if self.R != 0:
             terms.append(Ramp(self.R))
         terms.extend(self.sinusoids)
-        return terms
+        return tuple(terms)
 
     @property
     def name(self) -> str:

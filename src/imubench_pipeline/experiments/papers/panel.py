@@ -19,7 +19,7 @@ from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate
 from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.estimators.model_choice import PAPERS
 from imubench_pipeline.estimators.spectrum import spectra
-from imubench_pipeline.estimators.whittle import whittle_of
+from imubench_pipeline.estimators.whittle import Whittle, whittle_of
 from imubench_pipeline.experiments.papers.maia_printed import DURATION, MTI_GYRO
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.typing import Row
@@ -41,8 +41,10 @@ def panel_rows(logs: int = LOGS) -> Iterator[Row]:
     model = MTI_GYRO.table_2
     bounds = bounds_of(model, _RATE, DURATION, _RATE / 2.0)
     found: dict[str, list[Values]] = {}
+    whittle: Whittle | None = None
     for number in range(logs):
-        for method, values in _estimates(number).items():
+        estimates, whittle = _estimates(number, whittle)
+        for method, values in estimates.items():
             found.setdefault(method, []).append(values)
     for method, of_logs in found.items():
         for name in PARAMETERS:
@@ -67,22 +69,25 @@ def panel_rows(logs: int = LOGS) -> Iterator[Row]:
             }
 
 
-def _estimates(number: int) -> dict[str, Values]:
-    """Return what each method finds in a log; None where it gives no value."""
+def _estimates(number: int, before: Whittle | None) -> tuple[dict[str, Values], Whittle]:
+    """Return what each method finds in a log, None where it gives no value, and its likelihood.
+
+    That of the log `before` has the same bins, and with them the shapes of its terms.
+    """
     samples = round(DURATION * _RATE)
     rng = channel_rng(1, MTI_GYRO.sensor, MTI_GYRO.channel, f"panel {number}")
     log = simulate(MTI_GYRO.table_2, _RATE, samples, rng)
     curve = allan_variance(log, _RATE, overlap="octave")
     estimates = [reading.read(curve), *(least_squares.solve(curve, method=m) for m in _FITS)]
     spectrum, _ = spectra([log], samples, _RATE)
-    best = whittle_of(spectrum, _RATE / 2.0).maximum(PAPERS)
+    whittle = before.of(spectrum) if before else whittle_of(spectrum, _RATE / 2.0)
+    best = whittle.maximum(PAPERS)
     powers = [best.parameter("N"), float(best.biases[0]), float(best.times[0]), best.parameter("K")]
-    return {estimate.method: _values(estimate) for estimate in estimates} | {
-        "likelihood_gm": {
-            name: value if value > 0.0 else None
-            for name, value in zip(PARAMETERS, powers, strict=True)
-        }
+    by_likelihood = {
+        name: value if value > 0.0 else None for name, value in zip(PARAMETERS, powers, strict=True)
     }
+    of_curve = {estimate.method: _values(estimate) for estimate in estimates}
+    return of_curve | {"likelihood_gm": by_likelihood}, whittle
 
 
 def _values(estimate: Estimate) -> Values:

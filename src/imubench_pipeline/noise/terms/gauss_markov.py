@@ -52,6 +52,7 @@ _SERIES = [(-1) ** (k + 1) * (2.0**k - 4.0) / (2.0 * math.factorial(k)) for k in
 """The bracket of 000 eq. 26 cancels for tau << T_B; its power series over tau/T_B does not."""
 
 _WALK_BELOW = 1e-3
+_ROWS = 256
 """Cluster length over T_B below which a Gauss-Markov process is a random walk to a thousandth, and
 the second differences of its sum's covariance begin to cancel."""
 
@@ -174,10 +175,12 @@ class GaussMarkov(Term):
         decayed = -np.expm1(-n * x)
         gain, variance = decayed / (n * lost), self._variance
         covariance = np.empty((len(n), len(n)))
-        for later in range(len(n)):  # row by row: there may be thousands, and one matrix is enough
-            lag = blocks.start[later] - blocks.stop[:later] + 1
-            covariance[later, :later] = variance * gain[later] * gain[:later] * np.exp(-x * lag)
-            covariance[:later, later] = covariance[later, :later]
+        for first in range(0, len(n), _ROWS):  # there may be thousands, and one matrix is enough
+            rows = slice(first, first + _ROWS)
+            after = np.subtract.outer(blocks.start[rows] + 1.0, blocks.stop)
+            before = np.subtract.outer(blocks.start + 1.0, blocks.stop[rows]).T
+            lag = np.maximum(np.maximum(after, before), 0.0)  # 0 on the diagonal, which is below
+            covariance[rows] = variance * np.outer(gain[rows], gain) * np.exp(-x * lag)
         p = math.exp(-x)
         own = (n * (1.0 + p) / lost - 2.0 * p * decayed / lost**2) / n**2
         np.fill_diagonal(covariance, variance * own)
