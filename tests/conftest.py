@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import gc
 import os
-import subprocess
-import sys
+import tempfile
 
 # A worker of pytest-xdist has one processor: the threads of the linear algebra would wait for each
 # other on it, which takes half as long again.
@@ -20,6 +19,7 @@ import pytest
 from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
+from imubench_pipeline.run.kernels import compile_once
 from tests.scheduling import ByUnit, place
 
 # The first example may have to wait for a compiler; how fast the code is, benchmarks/ tells.
@@ -34,18 +34,31 @@ SHARED = PROJECT.parent / "shared"
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Have each worker begin to collect elsewhere, where all tests are run.
+    """Have one worker compile for all, and each begin to collect elsewhere, where all are run.
 
     On a fresh checkout the first who imports a module of tests rewrites it and keeps that, for a
     minute in all: so they share it.
     """
     own = getattr(config, "workerinput", None)
-    if own is None or [Path(argument).name for argument in config.args] != ["tests"]:
+    if own is None:
+        return
+    compile_once(_locks(own).open("a+b"))
+    if [Path(argument).name for argument in config.args] != ["tests"]:
         return
     parts = [str(path) for path in sorted((PROJECT / "tests").iterdir())
              if (path / "__init__.py").is_file() or path.match("test_*.py")]  # fmt: skip
     first = int(own["workerid"].removeprefix("gw")) * len(parts) // own["workercount"]
     config.args = parts[first:] + parts[:first]
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    if own := getattr(config, "workerinput", None):
+        _locks(own).unlink(missing_ok=True)
+
+
+def _locks(own: dict[str, Any]) -> Path:
+    """The file that the workers of a run have in common."""
+    return Path(tempfile.gettempdir(), f"imubench-kernels-{own['testrunuid']}")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -66,37 +79,6 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.freeze()
         gc.enable()
-
-
-_KERNELS = """
-import tempfile
-from pathlib import Path
-import numpy as np
-from imubench_pipeline.run.cli import main
-with tempfile.TemporaryDirectory() as folder:
-    log = Path(folder, "log.csv")
-    walk = np.cumsum(np.random.default_rng(1).normal(0.0, 1e-3, 20_000))
-    rows = "".join(f"{k / 100},{value:.6f}\\n" for k, value in enumerate(walk))
-    log.write_text("t [s],gz [deg/s]\\n" + rows)
-    main(["analyse", str(log), "--output", folder])
-"""
-"""Compiles what an analysis needs, where nothing has yet."""
-
-_COMPILING = pytest.StashKey[subprocess.Popen[bytes]]()
-
-
-def pytest_xdist_setupnodes(config: pytest.Config) -> None:
-    """Compile once, on a fresh checkout, what each worker would compile at the same time."""
-    if config.args_source is not pytest.Config.ArgsSource.TESTPATHS:
-        return
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": PROJECT}
-    if not any(PROJECT.glob("src/**/*.nbi")):
-        config.stash[_COMPILING] = subprocess.Popen([sys.executable, "-c", _KERNELS], **quiet)
-
-
-def pytest_unconfigure(config: pytest.Config) -> None:
-    if compiling := config.stash.get(_COMPILING, None):
-        compiling.wait()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:

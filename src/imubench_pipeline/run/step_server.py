@@ -18,6 +18,7 @@ import traceback
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from types import FrameType
 from typing import Any
 
@@ -25,6 +26,7 @@ from numba import njit
 
 from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.run.kernels import compile_once
 from imubench_pipeline.run.processes import BEGUN, DONE, FAILED, KILLED, LENGTH, Job
 from imubench_pipeline.run.sealing import sealed
 
@@ -175,5 +177,6 @@ def _trace(error: BaseException, script: str) -> str:
 
 
 if __name__ == "__main__":
-    with socket.socket(fileno=int(sys.argv[1])) as given_requests:
+    with socket.socket(fileno=int(sys.argv[1])) as given_requests, TemporaryFile() as given_locks:
+        compile_once(given_locks)
         serve(given_requests)
