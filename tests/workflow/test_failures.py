@@ -140,6 +140,7 @@ def test_what_did_not_fail_is_complete(project: Project) -> None:
     assert not list(project.results.rglob("*.part"))
 
 
+@pytest.mark.release  # every day, tests/test_faults.py
 def test_what_failed_is_tried_again_and_nothing_else(project: Project) -> None:
     jobs = project.job_list()
     of = {step: {name for rule, name in jobs if rule == step} for step, _ in jobs}

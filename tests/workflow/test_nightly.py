@@ -177,6 +177,7 @@ def test_the_next_run_puts_it_right_and_skips_what_grows(project: Project) -> No
     assert b"\x1b" not in log and b" steps, about " not in log
 
 
+@pytest.mark.release  # every day, tests/test_nightly.py
 def test_a_log_that_is_rewritten_keeps_its_results(project: Project) -> None:
     put_log(project.log("b.csv"), 2, SAMPLES + 500)
     lines = project.log("b.csv").read_text().splitlines(keepends=True)
