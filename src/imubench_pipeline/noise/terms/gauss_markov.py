@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -149,10 +148,8 @@ class GaussMarkov(Term):
 
         h = T_B (1 - e^(-s/T_B)) and h = T_B s - T_B^2 (1 - e^(-s/T_B)).
         """
-        T_B = self.T_B
-        first = _squared(lambda s: -T_B * np.expm1(-s / T_B), time)
-        second = _squared(lambda s: T_B**2 * _second_response(s / T_B), time)
-        return self.density * first, self.density * second
+        first, second = _squared_responses(time / self.T_B)
+        return self.density * self.T_B**3 * first, self.density * self.T_B**5 * second
 
     def block_covariance(self, lags: Array, block: float) -> Array:
         """V ((1 - e^-x) / x)^2 e^(-(k-1) x), and 2 v (x - 1 + e^-x) / x^2 at k = 0.
@@ -270,17 +267,22 @@ def _grown(order: int, time: float, T_B: float, start: SensorStart) -> float:
     return driven + constant**2 * (in_window + T_B * lost**2 / 2.0)
 
 
-def _second_response(x: Array) -> Array:
-    """Return x - 1 + e^(-x), which cancels for small x."""
-    series = x**2 / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0))))
-    return np.where(x < 1e-2, series, x + np.expm1(-x))
-
-
-def _squared(response: Callable[[Array], Array], time: Array) -> Array:
-    """Integrate the square of a response from 0 to each time."""
-    total = np.zeros_like(time)
+def _squared_responses(time: Array) -> tuple[Array, Array]:
+    """Integrate the squares of 1 - e^(-x) and x - 1 + e^(-x) from 0 to each time, in T_B."""
+    first, second = np.zeros_like(time), np.zeros_like(time)
     for start, stop in pairwise(_PIECES):
         half = (stop - start) / 2.0
-        at = time[:, None] * (start + half * (1.0 + _NODES))
-        total += time * half * (response(at) ** 2 @ _WEIGHTS)
-    return total
+        x = time[:, None] * (start + half * (1.0 + _NODES))
+        decayed = np.expm1(-x)
+        first += time * half * (decayed**2 @ _WEIGHTS)
+        second += time * half * (_second_response(x, decayed) ** 2 @ _WEIGHTS)
+    return first, second
+
+
+def _second_response(x: Array, decayed: Array) -> Array:
+    """Return x - 1 + e^(-x), which cancels for small x; `decayed` is e^(-x) - 1."""
+    small = x < 1e-2
+    if not small.any():
+        return x + decayed
+    series = x**2 / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0))))
+    return np.where(small, series, x + decayed)
