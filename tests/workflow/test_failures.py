@@ -98,13 +98,18 @@ REASONS = {
 NO_REST = "the step outlook failed: ZeroDivisionError: no rest"
 
 
-def test_the_report_says_which_recordings_a_step_failed_for(
-    project: Project, faulty: dict[str, str]
-) -> None:
+@pytest.fixture(scope="module")
+def run(project: Project, faulty: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    """The run in which steps fail."""
     project.environment = faulty
-    done = project.run("report", "tables")  # without printed figures, which take a third of it
-    said = done.stdout + done.stderr
-    assert done.returncode == 1, said
+    return project.run("report", "tables")  # without printed figures, which take a third of it
+
+
+def test_the_report_says_which_recordings_a_step_failed_for(
+    project: Project, run: subprocess.CompletedProcess[str]
+) -> None:
+    said = run.stdout + run.stderr
+    assert run.returncode == 1, said
     assert "2 recordings analysed, 0 rejected, 4 failed" in said, said
     recordings = {(row["sensor"], row["recording"]): row for row in project.table("recordings")}
     failed = {name: row["reason"] for (_, name), row in recordings.items() if row["reason"]}
@@ -114,7 +119,7 @@ def test_the_report_says_which_recordings_a_step_failed_for(
     for name, reason in REASONS.items():
         assert failed[name].startswith(reason)
         assert recordings["one", name]["status"] == "failed"
-        assert f"one/{name} is left out: {reason}" in done.stderr
+        assert f"one/{name} is left out: {reason}" in run.stderr
         (line,) = (line for line in page.splitlines() if f">{name}</a>: {reason}" in line)
         assert page.index(line) < page.index('id="comparison"')
         step = "ingest" if name == "unread" else "estimate"
@@ -122,7 +127,7 @@ def test_the_report_says_which_recordings_a_step_failed_for(
         own = (project.results / f"report/recordings/one/{name}.html").read_text()
         assert reason in html.unescape(own)
     assert 'raise ValueError("need at least' in (logs / "raises/estimate.log").read_text()
-    assert "Traceback" in done.stderr and "<li>V two: " + NO_REST in page
+    assert "Traceback" in run.stderr and "<li>V two: " + NO_REST in page
     fatal = {row["recording"] for row in project.table("findings") if row["severity"] == "fatal"}
     assert fatal == REASONS.keys()
     failures = {(row["sensor"], row["recording"], row["step"]) for row in project.table("failures")}
@@ -132,6 +137,7 @@ def test_the_report_says_which_recordings_a_step_failed_for(
     }
 
 
+@pytest.mark.usefixtures("run")
 def test_what_did_not_fail_is_complete(project: Project) -> None:
     whole = {("one", "good"), ("two", "a")}
     for name in ("allan", "parameters", "reconstruction", "scores", "error_budget", "datasheet"):
@@ -141,6 +147,7 @@ def test_what_did_not_fail_is_complete(project: Project) -> None:
 
 
 @pytest.mark.release  # every day, tests/test_faults.py
+@pytest.mark.usefixtures("run")
 def test_what_failed_is_tried_again_and_nothing_else(project: Project) -> None:
     jobs = project.job_list()
     of = {step: {name for rule, name in jobs if rule == step} for step, _ in jobs}
