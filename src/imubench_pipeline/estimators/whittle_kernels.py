@@ -255,6 +255,9 @@ def best_powers(
         gain = cost - tried_cost
         powers, cost = tried, tried_cost
         model, tried_model = tried_model, model
+        if observed and step < 1.0:  # far from the information: no step to end with
+            observed, allowed = False, False
+            continue
         if gain < tolerance:
             break
         observed = allowed and gain < _NEAR

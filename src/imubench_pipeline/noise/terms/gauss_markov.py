@@ -51,9 +51,11 @@ _SERIES = [(-1) ** (k + 1) * (2.0**k - 4.0) / (2.0 * math.factorial(k)) for k in
 """The bracket of 000 eq. 26 cancels for tau << T_B; its power series over tau/T_B does not."""
 
 _WALK_BELOW = 1e-3
-_ROWS = 256
 """Cluster length over T_B below which a Gauss-Markov process is a random walk to a thousandth, and
 the second differences of its sum's covariance begin to cancel."""
+
+_ROWS = 256
+"""Rows of a covariance that are made at a time."""
 
 
 @dataclass(frozen=True)
