@@ -42,10 +42,10 @@ _SCAN = 160
 """Correlation times tried before the search is refined."""
 
 _CHOICES = [list(chosen) for p in (1, 2, 3) for chosen in combinations(range(3), p)]
-_RIDGE = 1e-13
-"""Of columns that are 1 long: two that look alike must not divide by nothing."""
+"""Of the columns of N, B and K, those that are not 0."""
 
-_NOTHING = 1e-300
+_RIDGE, _NOTHING = 1e-13, 1e-300
+"""Of columns that are 1 long: two that look alike, and one that is 0, must divide by something."""
 
 _ABSENT = 1e-9
 """A term below this part of the variance at every tau is not there."""
@@ -264,10 +264,11 @@ class _Search:
         return solution / size, float(residual)
 
     def _costs(self, shapes: Array) -> Array:
-        """Return the costs of processes of shapes (t, m), shape (t,), as `_solved` would.
+        """Return the squared costs of `_solved` for processes of shapes (t, m), shape (t,).
 
-        What fits best with no density below 0 is what fits best with some of the three columns
-        and has none below 0: of all such choices, that of the lowest cost.
+        All at once, which takes a fifth of the time. What fits best with no density below 0 is
+        what fits best with some of the three columns and has none below 0: of all such choices,
+        that of the lowest cost.
         """
         columns = np.empty((len(shapes), 3, len(self._tau)))
         columns[:, 0], columns[:, 1], columns[:, 2] = self._white, shapes, self._walk
