@@ -24,7 +24,10 @@ extensions = [
 ]
 exclude_patterns = ["_build"]
 nitpicky = False
-suppress_warnings = ["ref.python"]  # a type of a docstring that several modules have
+suppress_warnings = [
+    "ref.python",  # a type of a docstring that several modules have
+    "myst-nb.lexer",  # a notebook that is not run does not say in what language it is
+]
 
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4

@@ -26,7 +26,7 @@ from tests.scheduling import ByUnit, place
 settings.register_profile("all", deadline=None, database=None)
 # Every day a few of the examples, and the same in each run: what passes today passes tomorrow.
 # All of them, and others in each run, before a release: HYPOTHESIS_PROFILE=all.
-settings.register_profile("quick", settings.get_profile("all"), max_examples=15, derandomize=True)
+settings.register_profile("quick", settings.get_profile("all"), max_examples=10, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 
 PROJECT = Path(__file__).parents[1]

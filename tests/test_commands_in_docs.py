@@ -292,7 +292,7 @@ def test_the_parser_knows_its_options(command: str) -> None:
     assert given.command == own[0]
 
 
-# Every day the same command is that of tests/workflow/test_workflow.py.
+# Every day such a command is that of tests/workflow/test_failures.py.
 @pytest.mark.release
 def test_what_it_runs_on_was_analysed(analysed: Path) -> None:
     assert (analysed / "results/report/sensors/mti_7.html").is_file()

@@ -176,6 +176,7 @@ def test_the_tables_give_estimate_and_curve_back(
     assert curve.limits()[1] == pytest.approx([row["upper"] for row in found.allan_compensated])
 
 
+@pytest.mark.release
 def test_a_log_whose_temperature_does_nothing_is_left_as_it_is(tmp_path: Path) -> None:
     columns = {"gyro_x": samples(0.0)[SHORT], "temperature": TEMPERATURE[SHORT]}
     found = estimated(recorded(tmp_path, columns))

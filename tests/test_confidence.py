@@ -87,6 +87,7 @@ def test_limits_are_chi_squared(rng: np.random.Generator) -> None:
     assert np.mean(lower > 1.0) == pytest.approx(0.025, abs=0.004)
 
 
+@pytest.mark.release
 def test_limits_cover_the_truth(rng: np.random.Generator) -> None:
     sizes = [1, 10, 50, 100]
     inside = []

@@ -7,7 +7,6 @@ import pytest
 import yaml
 from hypothesis import example, given
 from hypothesis import strategies as st
-from snakemake.cli import parse_config
 
 from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor, merged_log, read_sensors
@@ -15,6 +14,14 @@ from imubench_pipeline.settings.simulated_recordings import read_simulated
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 from tests.conftest import PROJECT
+
+
+def told_to_snakemake(settings: list[str]) -> dict[str, Any]:
+    """Return what Snakemake takes ``--config`` for."""
+    from snakemake.cli import parse_config  # a worker without these tests need not load it
+
+    return dict(parse_config(settings))
+
 
 SENSOR: dict[str, Any] = {
     "vendor": "V",
@@ -109,7 +116,7 @@ def test_what_a_run_was_given_beside_its_file_is_told_as_snakemake_takes_it(tmp_
     assert "logs=/data/logs" in told and "simulated=false" in told
     assert 'allan={"per_decade": 5}' in told
     # What it takes is that run again, but for what matters to no recording.
-    again = read_yaml(file) | parse_config(told)
+    again = read_yaml(file) | told_to_snakemake(told)
     again["allan"] = {"overlap": "full"} | again["allan"]
     assert read_run(again) == read_run(
         {key: value for key, value in given.items() if key not in ("held_back", "report")}
@@ -192,4 +199,4 @@ def test_simulated_recordings_name_known_sensors_and_channels(tmp_path: Path) ->
 def test_a_folder_of_any_name_is_told_as_snakemake_takes_it(name: str) -> None:
     folder = "r" if name in ("", ".") else name
     told = given_beside(Run(results=Path(folder)), Path("none.yaml"))
-    assert parse_config(told) == {"results": str(Path(folder))}
+    assert told_to_snakemake(told) == {"results": str(Path(folder))}

@@ -28,6 +28,7 @@ def found() -> Likelihood:
     return fit(LOG, 1.0)
 
 
+@pytest.mark.release
 def test_the_degrees_are_those_of_the_fitted_model(found: Likelihood) -> None:
     curve = allan_variance(LOG, 1.0)
     limited = with_fitted_limits(curve, found)

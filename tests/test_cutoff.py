@@ -163,6 +163,7 @@ def test_flicker_noise_that_folds_does_not_move_the_cutoff():
     assert found.frequency.lower < 10.0 < found.frequency.upper
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("seed", few([1], [2, 3, 4]))
 def test_where_folds_of_other_filters_look_alike_none_is_told(seed):
     model = SensorModel(noise=NoiseModel(N=1e-4), low_pass=LowPass(28.4, 2))
@@ -171,6 +172,7 @@ def test_where_folds_of_other_filters_look_alike_none_is_told(seed):
     assert found.frequency.lower < 28.4 < found.frequency.upper
 
 
+@pytest.mark.release
 def test_a_bend_that_is_no_filter_of_these_is_not_identified():
     # The mean of means over three samples and more, which falls with three zeros.
     white = 1e-3 * np.random.default_rng(6).standard_normal(80_000)
@@ -272,6 +274,7 @@ def test_a_spectrum_of_few_bins_shows_nothing():
     assert "bins only" in found.frequency.reason
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     "part, status", few([(1.0, "not_identified")], [(0.6, "absent"), (3.0, "absent")])
 )

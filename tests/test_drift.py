@@ -183,6 +183,7 @@ def test_limits_of_what_is_expected_hold_95_percent(rng: np.random.Generator) ->
     assert inside == pytest.approx(0.95, abs=0.02)
 
 
+@pytest.mark.release
 def test_a_step_is_flagged_once(rng: np.random.Generator) -> None:
     # Of 6 standard deviations, in three of 24, after 30 nights: found in 94 %; of 8 in all.
     for size, least in ((6.0, 0.8), (8.0, 0.97)):
@@ -413,6 +414,7 @@ series = st.lists(
 )
 
 
+@pytest.mark.release
 @given(series, st.randoms(use_true_random=False), st.sampled_from([1e-7, 0.3, 3600.0]))
 def test_order_of_the_rows_and_unit_do_not_matter(drawn, random, scale: float) -> None:
     listed = names(len(drawn))
@@ -440,6 +442,7 @@ def test_order_of_the_rows_and_unit_do_not_matter(drawn, random, scale: float) -
             assert other["p_value"] == pytest.approx(one["p_value"], rel=1e-5, abs=1e-12)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("repeats", few([3000], [2, 30]))
 def test_time_is_linear(rng: np.random.Generator, repeats: int) -> None:
     values = np.exp(rng.normal(0.0, 0.2, (300, 24))).tolist()

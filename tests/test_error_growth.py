@@ -120,6 +120,7 @@ def test_quantization_by_parseval(order: int, start: SensorStart) -> None:
     assert found == pytest.approx(total, rel=3e-3)
 
 
+@pytest.mark.release
 @given(orders, st.floats(0.01, 100.0), st.floats(0.0, 300.0))
 @settings(max_examples=8)
 def test_flicker_since_switch_on_by_its_covariance(order: int, time: float, on_time: float) -> None:

@@ -331,6 +331,7 @@ def test_the_seed_and_the_name_of_the_channel_make_the_draws(
     assert other != first
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("settings", "bandwidth", "band", "source"),
     few(
@@ -433,6 +434,7 @@ def test_a_log_too_short_for_the_band_has_rows_with_reasons(tmp_path: Path) -> N
         build(name, rows)
 
 
+@pytest.mark.release
 def test_a_short_log_behind_a_slow_filter_has_rows(tmp_path: Path) -> None:
     # The shortest log that is taken, 100 samples at 10 Hz, has 19 ordinates up to 1 Hz.
     (log,) = recorded(tmp_path, {"gyro_x": samples_of("gyro_x", 100)}).values()

@@ -28,6 +28,7 @@ def test_every_format_is_fuzzed() -> None:
     assert set(READERS) == set(FILE_FORMATS), f"_SEEDS of tests/fuzz/inputs.py lacks {lacks}"
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("bad", "faults"),
     few(

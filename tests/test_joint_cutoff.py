@@ -54,6 +54,7 @@ def test_n_and_its_cutoff_are_not_off_together_behind_a_filter_beside_a_process(
         assert (np.abs(off) < 2.8).all()
 
 
+@pytest.mark.release
 def test_each_model_of_the_noise_has_a_cutoff_of_its_own():
     found = behind_a_filter(0)
     models = found.low_pass.models

@@ -108,6 +108,7 @@ def test_an_ingest_that_mended_a_recording_is_not_run_once_more(results: Path) -
     assert attempt == run.attempt(OF) == Faults(results).attempt(OF) == 1
 
 
+@pytest.mark.release
 def test_no_bit_of_the_samples_changes_unseen(results: Path) -> None:
     folder = results / "recordings/s/r"
     log = folder / "log.parquet"

@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 KERNEL = """
 from numba import njit
 
@@ -50,6 +52,7 @@ def started(folder: Path) -> "subprocess.Popen[str]":
     return process
 
 
+@pytest.mark.release
 def test_one_process_compiles_what_another_needs_at_the_same_time(tmp_path: Path) -> None:
     (tmp_path / "kernel.py").write_text(KERNEL)
     processes = [started(tmp_path) for _ in range(2)]

@@ -156,6 +156,7 @@ def test_the_path_goes_through_means_without_white_noise(rng) -> None:
     assert np.abs(path[~there] - mean[~there]).max() > 1e-3
 
 
+@pytest.mark.release
 def test_the_path_has_the_conditional_distribution(rng) -> None:
     n, draws, step = 40, 2000, BLOCK / RATE
     model = NoiseModel(N=4e-2, B=6e-2, T_B=12.0, K=8e-3)

@@ -30,6 +30,7 @@ def slow(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.release
 def test_a_log_that_takes_too_long_is_rejected(tmp_path: Path) -> None:
     quality = QualitySettings(opening=0.05)
     given = {"log": layout(ON_TOPIC).model_dump(), "quality": quality.model_dump()}

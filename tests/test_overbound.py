@@ -156,6 +156,7 @@ def test_a_random_walk_beyond_two_correlation_times_is_warned_of() -> None:
     assert overbound(curve, PROCESS, RATE, horizon=60.0, family="N+GM").warning is None
 
 
+@pytest.mark.release
 def test_a_random_walk_far_too_large_is_refused_with_what_to_take() -> None:
     curve = measured(PROCESS, 1e9)
     with pytest.raises(ValueError, match=r"N\+GM is 1 times.*at most 3 times is allowed") as error:
@@ -262,6 +263,7 @@ def expected_over_true(model: NoiseModel, truth: NoiseModel, start: float) -> fl
     return least
 
 
+@pytest.mark.release
 def test_a_filter_that_loads_it_is_not_overconfident() -> None:
     start = GaussMarkov(GYRO.B, GYRO.T_B or 0.0).density * (GYRO.T_B or 0.0) / 2.0
     assert expected_over_true(GYRO, GYRO, start) == pytest.approx(1.0, abs=0.02)
@@ -293,6 +295,7 @@ def test_draws_of_the_fit_widen_what_is_fitted_by_what_they_leave_open(rng) -> N
         assert limit.value / fitted == pytest.approx(math.exp(2 * 1.645 * spread), rel=5e-3)
 
 
+@pytest.mark.release
 def test_limits_from_draws_lie_above_as_many_of_them_at_every_place_at_once(rng) -> None:
     steps = 0.3 * rng.standard_normal((400, 3))
     drawn = [

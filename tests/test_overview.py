@@ -141,6 +141,7 @@ def test_a_log_of_several_row_groups(tmp_path: Path, rng: np.random.Generator) -
     assert counts[[0, -1]].max() < 20
 
 
+@pytest.mark.release
 @given(
     values=arrays(
         np.float64,

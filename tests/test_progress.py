@@ -90,7 +90,7 @@ def seen(text: str) -> str:
 
 
 # Every day: the line of a run in which a step fails, below, and the same said in a pipe by a run
-# of tests/workflow/test_workflow.py.
+# of tests/workflow/test_failures.py.
 @pytest.mark.release
 def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
     written, left = in_terminal(folder)
@@ -133,7 +133,7 @@ def test_who_asks_for_more_or_less_gets_what_snakemake_says(
     assert ("rule ingest:" in left) == (flags == ("--verbose",))
 
 
-@pytest.mark.release  # every day: what a run says in tests/workflow/test_workflow.py
+@pytest.mark.release  # every day: what a run says in tests/workflow/test_failures.py
 def test_a_pipe_gets_a_line_for_each_recording(folder: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "snakemake", "-c1", "--logger", "imubench"], cwd=folder,

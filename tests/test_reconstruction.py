@@ -73,6 +73,7 @@ def test_without_a_value_there_is_a_reason_and_no_score(rng, tmp_path: Path) -> 
     assert row["reason"] == "no term has a value: no such slope"
 
 
+@pytest.mark.release
 def test_the_square_root_of_the_mean_of_members(rng, tmp_path: Path) -> None:
     curve = allan_variance(simulate(NoiseModel(N=1.0), 1.0, 4000, rng), 1.0)
     model = estimate(NoiseModel(N=1.0))

@@ -122,6 +122,7 @@ def test_a_script_that_is_killed_harms_no_other(steps: Processes, tmp_path: Path
     run(steps, "say", tmp_path / "out", size="x")
 
 
+@pytest.mark.release
 def test_a_request_that_dies_with_the_server_is_a_step_that_was_killed(
     steps: Processes, tmp_path: Path
 ) -> None:
@@ -212,6 +213,7 @@ def until_there(process: subprocess.Popen[bytes], path: Path, words: int = 0) ->
     return path.read_text().split()
 
 
+@pytest.mark.release
 @pytest.mark.skipif(sys.platform != "linux", reason="a fork learns of it on Linux alone")
 def test_scripts_end_at_once_with_the_run_that_started_them(tmp_path: Path) -> None:
     put(tmp_path, "wait", WAIT)

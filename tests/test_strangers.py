@@ -22,6 +22,7 @@ from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
+from tests.conftest import few
 from tests.workflow.project import put_log, put_sensor
 
 STAMPED = {
@@ -51,7 +52,7 @@ SQUARE: dict[str, tuple[Callable[[], str], str]] = {
 }
 
 
-@pytest.mark.parametrize("kind", SQUARE)
+@pytest.mark.parametrize("kind", few(["digits", "base 60"], ["keys of one hash"]))
 def test_figures_that_take_the_square_of_their_length_are_refused(
     tmp_path: Path, kind: str
 ) -> None:
@@ -168,6 +169,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     return found
 
 
+@pytest.mark.release
 def test_a_good_recording_beside_them_is_read(said: dict[str, dict[str, Any]]) -> None:
     assert said["good"]["status"] == "ok"
     assert all(about["status"] == "rejected" for name, about in said.items() if name != "good")

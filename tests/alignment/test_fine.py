@@ -139,6 +139,7 @@ def test_turning_tells_biases_from_attitude():
     assert np.all(sigmas[2] < 0.1 * sigmas[0])
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("runs", few([4], [20]))
 def test_the_gyro_of_the_paper_needs_turns(runs):
     # Its bias is many times the Earth's rate: in one position nothing is known of the heading.

@@ -110,6 +110,7 @@ def test_where_there_is_no_heading_the_words_say_why(tmp_path: Path) -> None:
     assert "biases is more than the horizontal part" in said[1] and "takes longer" in said[2]
 
 
+@pytest.mark.release
 def test_the_biases_are_printed_or_assumed(tmp_path: Path) -> None:
     folder = put_triad(tmp_path / "night", six())
     printed = {"gyro": {"offset": [{"value": 3, "unit": "deg/s", "kind": "max"},

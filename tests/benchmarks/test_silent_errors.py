@@ -100,6 +100,7 @@ def own(log: Log, tables: dict) -> dict[str, str]:
     return {one.parameter: one.judgement for one in rows if one.recommended}
 
 
+@pytest.mark.release
 def test_right_values_of_the_workflow_are_right(walk):
     found = own(*walk)
     assert found == {"N": "right", "K": "right"} | dict.fromkeys(("B", "T_B", "Q", "R"), "none")

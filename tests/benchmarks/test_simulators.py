@@ -47,6 +47,7 @@ def test_gauss_markov_process_is_stationary_and_peaks_at_its_bias_instability(rn
     assert np.var(starts) == pytest.approx(B**2 * sim.VARIANCE, rel=0.1)
 
 
+@pytest.mark.release
 def test_flicker_noise_of_both_kinds_has_the_plateau_and_its_own_density_at_nyquist(rng):
     B = 1e-3
     plain = sim.flicker(LENGTH, RATE, B, rng)
@@ -99,6 +100,7 @@ def test_low_pass_has_lost_half_of_the_power_at_its_cutoff(rng, kind, order):
     )
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("cutoff", few([0.3], [2.0, 4.0]))
 def test_folds_of_first_order_are_those_of_the_sampled_process(rng, cutoff):
     # White noise behind it is a Gauss-Markov process, sampled an AR(1) sequence.
@@ -121,6 +123,7 @@ def test_folds_add_up_to_the_variance_before_the_sampling(order):
     assert sampled == pytest.approx(whole, rel=1e-5)
 
 
+@pytest.mark.release
 def test_slow_noise_passes_an_analogue_low_pass(rng):
     walk = sim.analogue(
         lambda n, rate: 7.0 + sim.random_walk(n, rate, 1e-2, rng), 0.0, 100_000, RATE, 1.0, 2, rng

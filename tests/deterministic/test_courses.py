@@ -15,6 +15,7 @@ def courses_of(log: Array, segments: tuple[tuple[int, int], ...] | None = None) 
     return find_courses(lambda: [log[:70_000], log[70_000:]], len(log), RATE, segments=segments)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("walk", few([K], [0.0, 3e-5]))
 def test_a_log_of_noise_alone_has_none(walk: float) -> None:
     log = static_log(3, walk=walk)
@@ -34,6 +35,7 @@ def test_flicker_noise_has_none() -> None:
     assert courses_of(log + 1e-5 * rng.standard_normal(len(log))).courses == ()
 
 
+@pytest.mark.release
 def test_steps_are_found_with_their_sizes_and_places() -> None:
     log = static_log(5)
     truth = [(2500.0, 4.0 * SIGMA), (6000.0, -5.0 * SIGMA)]

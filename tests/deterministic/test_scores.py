@@ -55,6 +55,7 @@ def test_leverages_sum_up_to_the_number_of_amplitudes() -> None:
     assert ordinates.fit(regressors).leverage.sum() == pytest.approx(3.0)
 
 
+@pytest.mark.release
 def test_the_threshold_of_a_step_counts_the_places_that_noise_tells_apart() -> None:
     log = static_log(3, hours=0.5)
     ordinates = Ordinates(means_of([log], len(log), RATE))

@@ -131,6 +131,7 @@ def test_errors_and_innovations_are_as_large_as_the_filter_says(name):
     np.testing.assert_allclose(error.std(axis=0), 1.0, atol=0.08)
 
 
+@pytest.mark.release
 @given(experiments(), st.sampled_from([*MODELS.values()]), st.sampled_from([0.0, 0.1, 1.0]))
 @settings(max_examples=40, deadline=None)
 def test_it_never_claims_more_than_white_noise_allows(experiment, model, bias):

@@ -106,6 +106,7 @@ def test_sixty_seconds_never_know_the_rate_better_than_white_noise_allows(
                if one["quantity"] == "rate" and one["sigma"] is not None)  # fmt: skip
 
 
+@pytest.mark.release
 def test_the_sign_of_the_latitude_changes_nothing(tmp_path: Path, rest: Path) -> None:
     folder = put(tmp_path / "a", {"gyro_x": turned_log()["gyro_x"][: round(120 * RATE)]})
     north, south = (
@@ -117,6 +118,7 @@ def test_the_sign_of_the_latitude_changes_nothing(tmp_path: Path, rest: Path) ->
         assert row.get("sigma") == south[method].get("sigma")
 
 
+@pytest.mark.release
 def test_a_known_bias_and_a_drift_enter_the_filter(tmp_path: Path, rest: Path) -> None:
     folder = put(tmp_path / "a", {"gyro_x": turned_log()["gyro_x"][: round(90 * RATE)]})
     plain, known, drifting = (
@@ -134,6 +136,7 @@ def test_a_sense_that_is_not_known_is_said(tmp_path: Path, rest: Path) -> None:
     assert any("assumed" in one["doubts"] for one in found["turning"] if one["what"] == "doubt")
 
 
+@pytest.mark.release
 def test_turns_that_the_schedule_alone_says_are_a_doubt(
     tmp_path: Path, rest: Path, found: Found
 ) -> None:
@@ -164,6 +167,7 @@ def test_the_column_with_the_position_decides(tmp_path: Path, rest: Path) -> Non
     assert next(one for one in found["turning"] if one["what"] == "dwell")["sense"] == -1
 
 
+@pytest.mark.release
 def test_times_count_from_the_first_sample_of_the_recording(tmp_path: Path, rest: Path) -> None:
     log = {"gyro_x": turned_log()["gyro_x"][: round(120 * RATE)]}
     plain = briefly(put(tmp_path / "a", log), [rest])

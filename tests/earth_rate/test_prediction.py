@@ -64,6 +64,7 @@ def test_the_filter_reaches_the_bound(bias):
     np.testing.assert_allclose(found[4:], cramer_rao(blocks, model, bias)[4:], rtol=1e-5)
 
 
+@pytest.mark.release
 def test_a_longer_run_is_extrapolated_as_it_is():
     model = NoiseModel(N=PAPER_MODEL.N, B=PAPER_MODEL.B, T_B=238.1, K=10 * PAPER_MODEL.K)
     outlook = Outlook(model, LATITUDE, 2.0, 32.0)
@@ -97,6 +98,7 @@ def test_what_is_reached_is_the_end_of_the_course(turns):
     )
 
 
+@pytest.mark.release
 def test_long_dwells_reach_more_than_was_asked_for():
     outlook = Outlook(PAPER_MODEL, LATITUDE, 2.0, 8.0)
     rows = list(prediction_rows(outlook, 3600.0, [1.0], 1e4))
@@ -114,6 +116,7 @@ def test_with_white_noise_one_turn_is_best():
     )
 
 
+@pytest.mark.release
 def test_drift_asks_for_turns_and_turns_cost_time():
     drifting = NoiseModel(N=PAPER_MODEL.N, K=20 * PAPER_MODEL.K)
     curve = Outlook(drifting, LATITUDE, 2.0, 32.0).over_dwell(600.0)

@@ -314,6 +314,7 @@ def test_noise_that_is_not_the_models_is_a_doubt() -> None:
     assert any("noise of the log" in doubt for doubt in found.doubts)
 
 
+@pytest.mark.release
 def test_an_odd_number_of_turns_too_many_is_a_doubt() -> None:
     starts = 20.0 * np.arange(1, 200)
     log = turned(np.delete(starts, 100), 4000.0, peak=3.0, noise=GOOD)

@@ -8,6 +8,7 @@ from imubench_pipeline.experiments.earth_rate.bound import whiten
 from imubench_pipeline.experiments.earth_rate.covariance import of_means
 from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, paper_run
 from imubench_pipeline.noise import NoiseModel
+from tests.conftest import few
 from tests.earth_rate.brute import MODELS, of_blocks
 from tests.earth_rate.test_experiment import experiments
 
@@ -29,7 +30,7 @@ def test_it_is_the_root_of_the_covariance_of_the_samples(name, experiment, longe
 
 @pytest.mark.parametrize(
     "model",
-    [PAPER_MODEL, NoiseModel(N=PAPER_MODEL.N, B=PAPER_MODEL.B, K=PAPER_MODEL.K)],
+    few([PAPER_MODEL], [NoiseModel(N=PAPER_MODEL.N, B=PAPER_MODEL.B, K=PAPER_MODEL.K)]),
     ids=["GM", "flicker"],
 )
 def test_many_blocks_lose_no_digits(model):

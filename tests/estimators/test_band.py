@@ -66,6 +66,7 @@ def test_a_log_that_no_filter_bends_keeps_the_full_band(
         assert band == Band(NYQUIST, "found: the spectrum follows its model up to Nyquist")
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("model", "logs", "most"),
     few(
@@ -122,6 +123,7 @@ def test_a_band_ends_where_what_a_filter_takes_is_less_than_what_is_known(
     assert np.mean(parts) > 0.01
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     "coefficients", few([TWO_TAPS], [(low_pass(20.0),)]), ids=["two taps", "20 Hz"]
 )

@@ -31,6 +31,7 @@ def test_white_noise_shows_nothing_but_n(rng) -> None:
             assert estimate.parameters[name].reason
 
 
+@pytest.mark.release
 def test_without_a_random_walk_no_k_is_read(rng) -> None:
     model = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=20.0)
     for _ in range(20):

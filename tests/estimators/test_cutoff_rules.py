@@ -18,6 +18,7 @@ from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.joint_cutoff import worth_joining
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
+from tests.conftest import few
 from tests.estimators.test_filter_fits import RATE, trial, white
 
 
@@ -87,7 +88,7 @@ def test_models_that_may_be_the_best_get_a_cutoff_of_their_own() -> None:
     assert found == [best, near, likely, asked]
 
 
-@pytest.mark.parametrize(("duration", "told"), [(20.0, False), (30.0, True)])
+@pytest.mark.parametrize(("duration", "told"), few([(20.0, False)], [(30.0, True)]))
 def test_a_cutoff_is_told_where_its_limits_are_a_fifth_apart(duration: float, told: bool) -> None:
     flat = ideal_spectrum(RATE, duration, RATE / 2.0)
     scatter = np.random.default_rng(3).chisquare(flat.ordinates) / flat.ordinates

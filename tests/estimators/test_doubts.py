@@ -43,6 +43,7 @@ def test_a_ramp_that_passes_for_a_walk_is_doubted(seed: int) -> None:
     assert found.estimates[0].parameters["K"].status in ("doubtful", "not_identified")
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("seeds", few([(0, 6)], [(range(12),)]))
 def test_a_process_joined_to_a_walk_is_doubted_where_aic_has_others(seeds: Iterable[int]) -> None:
     # Process and walk pass for one slower process, and AIC sees that they are two.
@@ -69,6 +70,7 @@ def test_with_b_the_figures_of_the_curve_are_doubted() -> None:
     assert {one.status for one in found.curve.values()} == {"ok"}
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("seed", few([0], [1]))
 def test_bias_instability_that_a_walk_hides_is_no_plain_value(seed: int) -> None:
     # The walk is the stronger below a tenth of the frequency at which the process begins.
@@ -80,6 +82,7 @@ def test_bias_instability_that_a_walk_hides_is_no_plain_value(seed: int) -> None
         assert found.estimates[0].curve["B_curve"].status == "doubtful"
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("seed", few([1], [7, 8]))
 def test_a_ramp_beside_a_walk_that_hardly_needs_it_is_doubted(seed: int) -> None:
     log = simulate(NoiseModel(N=1e-4, K=1e-5), RATE, SAMPLES, np.random.default_rng(seed))

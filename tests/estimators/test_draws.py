@@ -135,6 +135,7 @@ def test_lines_are_drawn_beside_the_noise(rng) -> None:
     assert {model.sinusoids[0].frequency for model in models} == {2.0}
 
 
+@pytest.mark.release
 def test_the_draws_of_a_log_know_its_error_growth_better_than_its_parameters(rng) -> None:
     # N and the GM process trade off; what they add up to after 10 s is known much better.
     truth = NoiseModel(N=1e-4, B=6e-5, T_B=60.0, K=1e-6)

@@ -51,6 +51,7 @@ def place(text: str) -> tuple[float, float, int, float]:
     return float(match[1]), float(match[2]), side, float(match[4])
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("logs", few([1000], [2000]))
 @pytest.mark.parametrize(
     "nu",
@@ -108,6 +109,7 @@ def test_parameters_that_were_fitted_are_taken_off(rng, nu: float) -> None:
     assert np.mean(kept) == pytest.approx(0.9, abs=4 * np.std(kept) / np.sqrt(logs) + 0.02)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("model", "terms"),
     few(

@@ -16,6 +16,7 @@ def fitted(model: NoiseModel, seed: int) -> Likelihood:
     return fit(simulate(model, RATE, SAMPLES, np.random.default_rng(seed)), RATE)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("seed", few([0], [1, 3]))
 def test_a_process_that_is_taken_for_a_walk_is_within_the_limits(seed: int) -> None:
     # Two hours of a correlation time of five minutes: BIC with its unit root takes the walk.

@@ -125,6 +125,7 @@ def test_a_model_has_a_part_in_the_interval_from_a_share_of_a_twentieth_on(
     assert (found.lower < 0.99 * alone.frequency.lower) is counts
 
 
+@pytest.mark.release
 def test_a_filter_is_told_with_n_and_the_limits_of_both(profile: Profile) -> None:
     spectrum = profile.spectrum
     found = find_cutoff(spectrum)

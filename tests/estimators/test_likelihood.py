@@ -166,6 +166,7 @@ def test_estimates_lie_within_a_few_cramer_rao_bounds(truth: dict[str, float], l
     assert logs == 1 or ((rms > 0.25) & (rms < 1.7)).all(), rms
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("logs", "least"), few([(1, 4)], [(3, 14), (6, 25)]))
 def test_intervals_hold_the_truth_as_often_as_they_say(logs: int, least: int) -> None:
     """Of 6 intervals 95 % are 5.7, of 18 17.1, of 30 28.5.
@@ -353,6 +354,7 @@ def one_hole_that_divides_the_log(samples: int) -> np.ndarray:
     return missing
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("lose", few([bursts], [one_hole_that_divides_the_log, singles, one_hole]))
 def test_holes_leave_the_estimates_inside_their_intervals(
     lose: Callable[[int], np.ndarray],
@@ -397,6 +399,7 @@ def test_a_jump_of_level_between_segments_does_not_matter() -> None:
         assert holds(found, name, MTI_7[name], "likelihood_gm")
 
 
+@pytest.mark.release
 def test_segments_without_holes_do_not_share_a_level() -> None:
     # No sample is missing: the clock alone says that the sensor was restarted.
     log = log_of(SHORT, samples=SHORT_SAMPLES)
@@ -528,6 +531,7 @@ def test_a_ramp_is_found_with_its_sign(backwards: bool) -> None:
         assert value(reverse, "R") == pytest.approx(-value(found, "R"), rel=1e-6)
 
 
+@pytest.mark.release
 def test_what_lies_beyond_a_stated_band_does_not_matter() -> None:
     band = 0.3
     log = log_of(NoiseModel(**MTI_7))
@@ -547,6 +551,7 @@ def test_what_lies_beyond_a_stated_band_does_not_matter() -> None:
     assert holds(clean, "N", MTI_7["N"], "likelihood_gm")
 
 
+@pytest.mark.release
 def test_a_band_beyond_nyquist_is_the_whole_spectrum() -> None:
     found = fit(log_of(SHORT, samples=SHORT_SAMPLES), RATE, band=1e3)
     assert found.band is not None and found.band.highest == RATE / 2
@@ -600,6 +605,7 @@ def process_and_walk(T_B: float, rate: float, seed: int, N: float = 1e-4) -> np.
     return np.asarray(white + lfilter([1.0], [1.0, -decay], driven) + walk)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("T_B", few([2.0], [5.0, 8.0]))
 def test_a_process_of_few_samples_is_not_taken_for_the_sensors_filter(T_B: float) -> None:
     found = fit(process_and_walk(T_B, 10.0, 3), 10.0)
@@ -623,6 +629,7 @@ def test_white_noise_below_a_process_as_fast_as_a_filter_is_not_told() -> None:
     assert N.lower < 1e-4 < N.upper
 
 
+@pytest.mark.release
 def test_what_a_process_hides_is_not_taken_for_white_noise_before_a_filter() -> None:
     # 30 samples long and so strong that white noise does not show at Nyquist.
     hidden = fit(3e3 * process_and_walk(3.0, 10.0, 5, N=1e-4 / 3e3) + strong(), 10.0)

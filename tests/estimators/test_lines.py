@@ -112,6 +112,7 @@ def test_lines_come_with_their_amplitudes_in_the_order_of_their_frequencies(rng)
         assert line.amplitude == pytest.approx(A, rel=0.15)
 
 
+@pytest.mark.release
 def test_means_of_blocks_do_not_damp_the_amplitude_of_a_slow_line(rng) -> None:
     # Over a block of 64 samples a line of 0.0475 Hz turns by 0.19 rad: its mean has lost 0.15 %.
     noise = DEVIATION * rng.standard_normal(LONG)
@@ -186,6 +187,7 @@ def test_a_resonance_is_wider_than_a_sinusoid(rng) -> None:
             assert 0.6 * same < strongest.amplitude < 1.2 * same
 
 
+@pytest.mark.release
 def test_a_resonance_far_wider_than_the_resolution_is_no_line(rng) -> None:
     alarms = 0
     for _ in range(15):

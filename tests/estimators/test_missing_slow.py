@@ -35,6 +35,7 @@ def high_pass(log: np.ndarray) -> np.ndarray:
     return np.asarray((log - slow)[1000:])
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("spoil", few([zeroed], [high_pass]))
 def test_a_bias_that_is_zeroed_at_rest_is_told(
     rng: np.random.Generator, spoil: Callable[[np.ndarray], np.ndarray]

@@ -161,6 +161,7 @@ def test_the_exact_density_of_a_model_gives_its_parameters_back(
         assert found.times[0] == pytest.approx(model.T_B, rel=1e-2)
 
 
+@pytest.mark.release
 def test_the_exact_density_of_two_processes_gives_both_back() -> None:
     model = NoiseModel(N=1e-3, B=3e-3, T_B=2.5, further=[GaussMarkov(4e-3, 25.0)])
     found = noiseless(model, 1500).maximum(Terms("N", 2))
@@ -278,6 +279,7 @@ def test_no_general_minimiser_finds_a_better_fit(rng, terms: Terms) -> None:
         assert found.cost < searched(whittle, terms, rng, 2) + 0.02
 
 
+@pytest.mark.release
 def test_two_processes_are_not_fitted_worse_than_by_a_general_minimiser(rng) -> None:
     model = NoiseModel(N=1e-3, B=3e-3, T_B=3.0, further=[GaussMarkov(3e-3, 100.0)])
     whittle = whittle_for(model, 20_000, rng)
@@ -286,6 +288,7 @@ def test_two_processes_are_not_fitted_worse_than_by_a_general_minimiser(rng) -> 
     assert found.cost < searched(whittle, Terms("N", 2), rng, 4) + 0.05
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("logs", few([15], [40]))
 def test_the_fit_is_never_less_likely_than_the_truth(rng, logs: int) -> None:
     ordinates = []

@@ -207,6 +207,7 @@ def test_the_head_of_an_overbound_says_where_its_density_holds(
     )
 
 
+@pytest.mark.release
 def test_a_walk_that_cannot_follow_is_refused(tables: dict[str, pa.Table]) -> None:
     settings = ExportSettings(targets=("kalibr",), overbound=True, horizon="150 s", most_excess=1.2)
     ((place, content),) = exports(tables, settings)

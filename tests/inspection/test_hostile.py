@@ -158,6 +158,7 @@ def most_kb() -> int:
     return int(Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0])
 
 
+@pytest.mark.release
 def test_a_long_log_is_not_read_to_its_end(tmp_path: Path, si: Columns) -> None:
     names, scales = NAMED["an x-io logger"]
     lines = logged(si, names, scales).encode()

@@ -34,6 +34,7 @@ def of_workflow(drop_zone: Path, tmp_path_factory: pytest.TempPathFactory):
     return estimation(folder / "quality.json", folder / "allan.parquet", *names, asked)
 
 
+@pytest.mark.release
 def test_the_truth_is_in_the_intervals(estimates) -> None:
     gyro, accel = estimates["gyro_x"], estimates["accel_z"]
     for parameter, truth in (
@@ -61,6 +62,7 @@ def test_a_log_has_the_numbers_of_the_workflow(estimates, of_workflow) -> None:
     assert [finding.finding for finding in estimates.findings][-len(found) or 99 :] == found
 
 
+@pytest.mark.release
 def test_another_method_has_its_numbers_too(log, of_workflow) -> None:
     """With what the likelihood makes doubtful of them."""
     own = imu.estimate(log, method="curve", channels="gyro_x").to_pandas()
@@ -72,6 +74,7 @@ def test_another_method_has_its_numbers_too(log, of_workflow) -> None:
     pd.testing.assert_frame_equal(own, pd.DataFrame(rows).drop(columns="recommended"))
 
 
+@pytest.mark.release
 def test_an_array_is_judged_as_a_file_is(log, estimates) -> None:
     degrees = np.degrees(log["gyro_x"])
     degrees[10_000] += 5.0  # a knock

@@ -38,6 +38,7 @@ def test_a_log_is_shown_and_given_as_a_table(log) -> None:
         np.testing.assert_allclose(again[name].variance, expected[name].variance, rtol=1e-9)
 
 
+@pytest.mark.release
 def test_a_sensor_is_a_file_a_name_a_mapping_or_a_draft(drop_zone: Path, log) -> None:
     run = drop_zone / "logs/sensor_1/run.csv"
     columns = {"gyro_x": {"column": "wx", "unit": "deg/s"}}

@@ -81,6 +81,7 @@ def test_chance_repeats_of_coarse_registers_are_none(
     assert stretches(coarse) == []
 
 
+@pytest.mark.release
 def test_a_real_log_is_free_of_copies(shared: Path) -> None:
     assert warnings(adis16405(shared)) == []
 

@@ -34,6 +34,7 @@ def another(values: np.ndarray, step: float, times: float, offset: float) -> np.
     return np.round(moved / step) * step
 
 
+@pytest.mark.release
 def test_halves_of_two_sensors(shared: Path) -> None:
     log = adis16405(shared)
     half = 70_000
@@ -101,6 +102,7 @@ def test_a_knock_makes_no_second_sensor(rng: np.random.Generator) -> None:
     assert list(interleaved("gyro_x", column)) == []
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("every", few([10], [3, 100]))
 def test_samples_of_a_real_log_that_are_held_in_turn(shared: Path, every: int) -> None:
     log = adis16405(shared)

@@ -269,6 +269,7 @@ EVERY = {
 STAMPED = {"column": "stamp", "format": "iso8601"}
 
 
+@pytest.mark.release
 def test_cut_files_are_refused(whole: list[Path]) -> None:
     for path in whole[:-1]:
         assert cut_everywhere(path, log(EVERY, time=STAMPED)) == 0

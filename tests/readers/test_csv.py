@@ -159,6 +159,7 @@ def test_a_compressed_file_cut_short_is_read_as_far_as_it_goes(
     assert "truncated_file" in [note.finding for note in file.findings]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("kept", few([0.6], [0.0, 0.1, 1.0]))
 def test_every_line_of_a_file_cut_short_that_can_be_read_is_kept(
     tmp_path: Path, rng: np.random.Generator, kept: float

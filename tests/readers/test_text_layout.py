@@ -141,6 +141,7 @@ def test_any_way_of_writing_is_the_same_log(
     np.testing.assert_array_equal(time, truth[:, 0] - truth[0, 0])
 
 
+@pytest.mark.release
 def test_thousands_of_columns(tmp_path: Path, rng: np.random.Generator) -> None:
     data = rng.standard_normal((30, 5000))
     names = [f"c{n}" for n in range(5000)]
@@ -176,6 +177,7 @@ def test_a_header_in_the_middle_is_counted(
     assert (finding.finding, finding.value) == ("restarted_log", restarts)
 
 
+@pytest.mark.release
 def test_restarts_and_comments_in_a_long_log(tmp_path: Path) -> None:
     lines = ["wx,ax"]
     for row in range(100_000):

@@ -156,6 +156,7 @@ def test_stamps_since_1970_say_when_the_log_began(
     assert read_stamps(tmp_path, [stamp], {"column": "t", "unit": unit})[1].started == started
 
 
+@pytest.mark.release
 def test_counters_that_start_again(tmp_path: Path, rng: np.random.Generator) -> None:
     count = np.arange(150_000)
     kept = np.sort(rng.choice(count, 145_000, replace=False))
@@ -189,6 +190,7 @@ def test_bad_stamps_are_named(tmp_path: Path, stamps: list[str], time: str, mess
         read_stamps(tmp_path, stamps, source)
 
 
+@pytest.mark.release
 def test_a_bad_stamp_late_in_a_log_is_named_by_its_line(tmp_path: Path) -> None:
     lines = (
         ["t;wx;ax", "# c"] + ["10:00:00;1;2"] * 100_000 + ["", "  ", "10:00;1;2", "10:00:01;1;2"]

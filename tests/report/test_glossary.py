@@ -248,6 +248,7 @@ def emitted() -> dict[str, str]:
     return found
 
 
+@pytest.mark.release
 def test_the_scan_finds_what_is_emitted_directly_and_through_helpers() -> None:
     assert emitted().keys() >= {
         "knocks",  # itself

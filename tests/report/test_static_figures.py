@@ -159,6 +159,7 @@ def legend_is_clear(figure: Figure) -> bool:
     return bool(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0 and box.y1 <= lowest)
 
 
+@pytest.mark.release
 def test_the_curve_alone_has_its_units_and_says_what_it_is(tmp_path: Path) -> None:
     figure = allan_figure(usual())
     found = texts(figure, tmp_path)
@@ -170,6 +171,7 @@ def test_the_curve_alone_has_its_units_and_says_what_it_is(tmp_path: Path) -> No
     assert "Allan deviation (µg)" in written(allan_figure(view_of(channel="accel_z")))
 
 
+@pytest.mark.release
 def test_terms_pass_through_the_points_where_they_are_read() -> None:
     figure = made(terms_figure(usual()))
     (axes,) = figure.axes
@@ -332,6 +334,7 @@ def test_many_sensors_have_room_below_the_curves(sensors: int) -> None:
     assert all(text.get_window_extent().x0 >= 0 for text in forest.axes[0].get_yticklabels())
 
 
+@pytest.mark.release
 def test_names_of_the_user_are_no_formulas_and_never_too_wide(tmp_path: Path) -> None:
     long = "x" * 150
     views = views_of(rows_of(sensor="a$b$"), rows_of(sensor=long, recording="_$"))

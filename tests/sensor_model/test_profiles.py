@@ -134,6 +134,7 @@ def test_a_file_is_interpolated_in_blocks_of_any_size(
     np.testing.assert_allclose(motion["gyro_x"].at(times[:3]), wanted[:3], atol=1e-11)  # back
 
 
+@pytest.mark.release
 def test_a_long_csv_file_is_read_as_a_stream(tmp_path: Path) -> None:
     path = tmp_path / "long.csv"
     rows = 300_000

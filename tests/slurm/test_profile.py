@@ -11,6 +11,7 @@ from tests.workflow.project import Project, linked, put_log, put_sensor
 pytestmark = pytest.mark.workflow
 
 
+@pytest.mark.release
 def test_the_profile_runs_the_jobs_of_a_local_run(tmp_path: Path) -> None:
     put_sensor(tmp_path / "sensors/one.yaml")
     for seed, name in enumerate(("a", "b")):

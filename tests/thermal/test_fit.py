@@ -150,6 +150,7 @@ def test_sensitivity_lag_and_bias_are_found_and_taken_out():
     assert after < 0.5 * before
 
 
+@pytest.mark.release
 def test_a_lag_is_found_and_taken_out():
     rng = np.random.default_rng(3)
     day, s, lag, bias = DAY[::4], 1.6e-4, 50.0, 3e-3
@@ -185,6 +186,7 @@ def test_a_temperature_that_does_nothing_is_left_in():
     assert not fit.effect.any()
 
 
+@pytest.mark.release
 def test_temperature_that_cannot_be_told_from_time_is_said():
     samples = SAMPLES // 4
     readings = 20.0 + 8.0 * TIME[:samples] / TIME[samples]
@@ -198,6 +200,7 @@ def test_temperature_that_cannot_be_told_from_time_is_said():
     assert not fit.compensated
 
 
+@pytest.mark.release
 def test_a_constant_temperature_is_refused_before_holes_are_filled_again(monkeypatch):
     rng = np.random.default_rng(13)
     samples = SAMPLES // 4

@@ -59,6 +59,7 @@ def test_a_temperature_that_does_not_jump_is_left_as_it_is(kind):
     assert cut_at_jumps(read) is read
 
 
+@pytest.mark.release
 def test_a_path_jumps_within_a_sample():
     jumps = np.array([20_003, 50_010, 90_000])
     truth = stepping(jumps, LEVELS[:4])
@@ -107,6 +108,7 @@ def test_the_bit_of_a_register_is_found_of_few_levels():
     assert step_of(np.array([20.0, 21.0]), 10_000) == pytest.approx(1.0)
 
 
+@pytest.mark.release
 def test_means_over_blocks_are_those_of_the_samples():
     jumps = np.array([20_003, 70_010])
     path = path_of(np.round(stepping(jumps, LEVELS[:3]) * 100.0) / 100.0)

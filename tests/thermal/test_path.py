@@ -44,6 +44,7 @@ def test_moments_in_a_cell_are_those_of_quadrature(m, v, low, high, noise):
     assert variance == pytest.approx(second / total - (first / total) ** 2, rel=1e-4)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("truth", few([WARM_UP], [(DAY,)]), ids=["warm-up", "day"])
 def test_whole_degrees_are_smoothed_within_their_cells(truth):
     path = path_of(np.round(truth))
@@ -122,12 +123,14 @@ def test_means_over_blocks_are_integrals_of_lines_between_knots(first, block, co
             assert mean == pytest.approx(np.trapezoid(heights, places) / block, rel=1e-12)
 
 
+@pytest.mark.release
 def test_draws_spread_as_the_deviation_says():
     path = path_of(np.round(DAY))
     spread = np.sqrt(np.mean((path.draws - path.value) ** 2, axis=0) / path.deviation**2)
     assert np.mean(spread) == pytest.approx(1.0, abs=0.2)
 
 
+@pytest.mark.release
 def test_knots_are_bounded_and_blocks_do_not_matter():
     values = np.round(DAY, 1)
     values[100:3000] = np.nan

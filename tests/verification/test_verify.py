@@ -73,6 +73,7 @@ def test_results_of_a_run_are_as_they_were_left(
     assert len(lines) == 1 and lines[0].endswith(": all as they were left")
 
 
+@pytest.mark.release
 @given(data=st.data())
 def test_a_flipped_bit_is_named_in_any_file(
     done: Finished, whole: dict[str, bytes], data: st.DataObject

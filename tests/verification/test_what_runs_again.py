@@ -202,6 +202,7 @@ def test_an_edit_of_the_overbound_runs_the_exports(project: Project, code: Path)
     assert project.job_list() == {("exports", "")}
 
 
+@pytest.mark.release
 def test_an_edit_of_a_template_runs_the_report(project: Project, code: Path) -> None:
     replace(code / "report/templates/index.html.jinja", "<h2", '<h2 class="again"')
     assert project.job_list() == {("report", "")}

@@ -55,6 +55,14 @@ FEW = [
 """Few models for an interval: what is looked at here is what runs, and not how wide it is."""
 
 
+BAD = {
+    "corrupt": "line ",
+    "empty": "the file is empty",
+    "text": "line 2002, column 'ax': found 'abc', expected a number",
+}
+"""Logs that cannot be used, and what their reasons say."""
+
+
 @dataclass
 class Project:
     """Logs and sensor files in a folder, and the results of their runs.
@@ -148,3 +156,12 @@ def put_sensor(path: Path, **changes: object) -> None:
     sensor = {"vendor": "V", "model": path.stem, "log": {"rate": "100 Hz", "channels": CHANNELS}}
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(yaml.safe_dump(sensor | {"datasheet": DATASHEET} | changes))
+
+
+def put_bad_logs(folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    good = "wx,ax\n" + "0.5,9.81\n0.25,9.82\n" * 1000
+    middle = len(good) // 2
+    (folder / "corrupt.csv").write_text(good[:middle] + "\x01\x02garbage\n" + good[middle:])
+    (folder / "empty.csv").write_text("")
+    (folder / "text.csv").write_text(good + "0.5,abc\n" + "0.5,9.81\n")

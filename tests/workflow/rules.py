@@ -5,9 +5,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from snakemake.api import SnakemakeApi
-from snakemake.settings.types import ConfigSettings, OutputSettings, Quietness, ResourceSettings
-
 from imubench_pipeline.run.resources import Cost, OfMany, OfRecording
 from tests.conftest import PROJECT
 
@@ -19,6 +16,15 @@ _COST = re.compile(r"\*\*cost\((.*?)\),\n    \w", re.DOTALL)
 
 def rules(place: Path) -> list[Any]:
     """The rules of the demonstration but `all`, as Snakemake reads them in a folder."""
+    # A worker without these tests need not load it.
+    from snakemake.api import SnakemakeApi
+    from snakemake.settings.types import (
+        ConfigSettings,
+        OutputSettings,
+        Quietness,
+        ResourceSettings,
+    )
+
     for name in ("Snakefile", "config", "workflow"):
         (place / name).symlink_to(PROJECT / name)
     with SnakemakeApi(OutputSettings(quiet={Quietness.ALL})) as api:

@@ -1,4 +1,4 @@
-"""Steps that fail for one recording or sensor, in real runs: the report is made all the same."""
+"""Logs that cannot be used and steps that fail, in real runs: the report is made all the same."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import imubench_pipeline
-from tests.workflow.project import Project, linked, put_log, put_sensor
+from tests.workflow.project import BAD, Project, linked, put_bad_logs, put_log, put_sensor
 
 pytestmark = pytest.mark.workflow
 
@@ -54,6 +54,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
     for seed, name in enumerate(("good", "raises", "sleeps", "dies", "unread")):
         put_log(folder / f"logs/one/{name}.csv", seed, samples=5000)
     put_log(folder / "logs/two/a.csv", 9, samples=5000)
+    put_bad_logs(folder / "logs/two")
     settings = ["logs=logs", "sensors=sensors", "results=results", "requirements=false",
                 'estimate={"methods": ["weighted"]}', 'limits={"recording": "12 s"}']  # fmt: skip
     return Project(folder, folder / "results", folder, settings)
@@ -110,15 +111,18 @@ def test_the_report_says_which_recordings_a_step_failed_for(
 ) -> None:
     said = run.stdout + run.stderr
     assert run.returncode == 1, said
-    assert "2 recordings analysed, 0 rejected, 4 failed" in said, said
+    assert "2 recordings analysed, 3 rejected, 4 failed" in said, said
+    assert "\none/good: 0.0139 h at 100 Hz, 2 channels" in said
+    assert "\ntwo/empty: rejected: empty.csv: the file is empty" in said
     recordings = {(row["sensor"], row["recording"]): row for row in project.table("recordings")}
-    failed = {name: row["reason"] for (_, name), row in recordings.items() if row["reason"]}
+    failed = {
+        name: row["reason"] for (_, name), row in recordings.items() if row["status"] == "failed"
+    }
     assert failed.keys() == REASONS.keys()
     page = html.unescape((project.results / "report/index.html").read_text())
     logs = project.results / "logs/recordings/one"
     for name, reason in REASONS.items():
         assert failed[name].startswith(reason)
-        assert recordings["one", name]["status"] == "failed"
         assert f"one/{name} is left out: {reason}" in run.stderr
         (line,) = (line for line in page.splitlines() if f">{name}</a>: {reason}" in line)
         assert page.index(line) < page.index('id="comparison"')
@@ -129,12 +133,30 @@ def test_the_report_says_which_recordings_a_step_failed_for(
     assert 'raise ValueError("need at least' in (logs / "raises/estimate.log").read_text()
     assert "Traceback" in run.stderr and "<li>V two: " + NO_REST in page
     fatal = {row["recording"] for row in project.table("findings") if row["severity"] == "fatal"}
-    assert fatal == REASONS.keys()
+    assert fatal == REASONS.keys() | BAD.keys()
     failures = {(row["sensor"], row["recording"], row["step"]) for row in project.table("failures")}
     assert failures == {("one", name, "estimate") for name in ("raises", "sleeps", "dies")} | {
         ("one", "unread", "ingest"),
         ("two", None, "outlook"),
     }
+
+
+@pytest.mark.usefixtures("run")
+def test_bad_logs_are_rejected_with_their_reasons(project: Project) -> None:
+    rejected = {
+        row["recording"]: row["reason"]
+        for row in project.table("recordings")
+        if row["status"] == "rejected"
+    }
+    assert rejected.keys() == BAD.keys()
+    page = html.unescape((project.results / "report/index.html").read_text())
+    assert "3 rejected" in page
+    for name, text in BAD.items():
+        assert text in rejected[name]
+        (line,) = (line for line in page.splitlines() if f">{name}</a>:" in line)
+        assert line.startswith("<li>V two, <a ") and text in line
+        assert page.index(line) < page.index('id="comparison"')
+        assert f"recordings/two/{name}.html" in project.pages()
 
 
 @pytest.mark.usefixtures("run")
@@ -171,7 +193,7 @@ def test_a_nightly_run_tries_again_and_says_in_its_exit_status_what_failed(
     assert f"two: {NO_REST}" in done.stderr
     summary = json.loads((project.results / "nightly/latest.json").read_text())
     assert summary["outcome"] == "failed" and summary["failure"] == []
-    assert summary["recordings"] == 6 and len(summary["failed"]) == 5
+    assert summary["recordings"] == 9 and len(summary["failed"]) == 5
     log = Path(summary["log"]).read_text()
     assert "Traceback" in log and "ValueError: need at least\none array" in log
 
@@ -182,7 +204,7 @@ def test_a_run_of_mended_code_makes_it_good(project: Project) -> None:
     project.settings.pop()
     done = project.run()
     assert done.returncode == 0, done.stdout + done.stderr
-    assert {row["status"] for row in project.table("recordings")} == {"ok"}
+    assert {row["status"] for row in project.table("recordings")} == {"ok", "rejected"}
     assert project.table("failures") == []
     assert "failed" not in {row["finding"] for row in project.table("findings")}
     assert project.job_list() == set()

@@ -14,30 +14,24 @@ import yaml
 
 from imubench_pipeline.run.cli import main
 from tests.workflow.project import (
+    BAD,
     CHANNELS,
     FEW,
     STEPS,
     TOGETHER,
     Project,
     linked,
+    put_bad_logs,
     put_log,
     put_sensor,
 )
 
-pytestmark = pytest.mark.workflow
+pytestmark = pytest.mark.release  # every day test_failures.py, and the demonstration
 
 STEPS_OF_A_RECORDING = dict.fromkeys(STEPS, 1)
 GLOBAL_STEPS = dict.fromkeys(("sensor_tables", *TOGETHER), 1)
 
 METHODS = ['estimate={"methods": ["likelihood", "weighted"]}']
-
-BAD = {
-    "corrupt": "line ",
-    "empty": "the file is empty",
-    "text": "line 2002, column 'ax': found 'abc', expected a number",
-}
-"""Logs that cannot be used, and what their reasons say."""
-
 
 RADIAN = np.pi / 180.0
 REASON = "c does not decide: suspicious unit (gyro_x)"
@@ -49,15 +43,6 @@ def put_log_times(path: Path, seed: int, factor: float) -> None:
     wx, ax = np.loadtxt(path, delimiter=",", skiprows=1).T
     rows = "".join(f"{w:.9g},{a:.9g}\n" for w, a in zip(factor * wx, ax, strict=True))
     path.write_text("wx,ax\n" + rows)
-
-
-def put_bad_logs(folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    good = "wx,ax\n" + "0.5,9.81\n0.25,9.82\n" * 1000
-    middle = len(good) // 2
-    (folder / "corrupt.csv").write_text(good[:middle] + "\x01\x02garbage\n" + good[middle:])
-    (folder / "empty.csv").write_text("")
-    (folder / "text.csv").write_text(good + "0.5,abc\n" + "0.5,9.81\n")
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +113,6 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
     assert not list(project.results.rglob("*.part"))
 
 
-@pytest.mark.release  # every day, tests/library/test_estimates.py
 def test_logs_that_are_analysed_at_once_have_the_same_numbers(
     project: Project, tmp_path: Path
 ) -> None:
@@ -242,7 +226,6 @@ def test_a_second_run_has_nothing_to_do(project: Project) -> None:
     assert project.jobs() == {}
 
 
-@pytest.mark.release
 def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path) -> None:
     both = Project(project.folder, tmp_path / "results", linked(tmp_path), METHODS)
     rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "papers", "catalogue")
@@ -253,7 +236,6 @@ def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path)
         assert path.read_bytes() == (project.results / "tables" / path.name).read_bytes(), path.name
 
 
-@pytest.mark.release
 def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Project) -> None:
     density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
     put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
@@ -270,7 +252,6 @@ def analysed(project: Project) -> int:
     return sum(row["status"] == "ok" for row in project.table("recordings"))
 
 
-@pytest.mark.release
 def test_one_more_log_runs_its_own_steps_and_the_global_ones(project: Project) -> None:
     put_log(project.folder / "logs/two/b.csv", 4)
     assert project.jobs() == STEPS_OF_A_RECORDING | GLOBAL_STEPS | {"outlook": 1}
@@ -284,7 +265,6 @@ def test_one_more_log_runs_its_own_steps_and_the_global_ones(project: Project) -
     assert same >= of_others | {"recordings/two/a.html", "theory.html", "made.html"}
 
 
-@pytest.mark.release
 def test_a_removed_log_runs_the_global_steps(project: Project) -> None:
     (project.folder / "logs/two/b.csv").unlink()
     assert project.jobs() == GLOBAL_STEPS | {"outlook": 1}
@@ -300,7 +280,6 @@ def test_a_wrong_setting_stops_the_run_before_it_begins(project: Project) -> Non
     assert "Traceback" not in done.stdout + done.stderr
 
 
-@pytest.mark.release
 def test_steps_that_were_killed_after_an_edit_are_run_again(project: Project) -> None:
     sensor = project.folder / "sensors/one.yaml"
     written = yaml.safe_load(sensor.read_text())
@@ -323,7 +302,6 @@ def test_steps_that_were_killed_after_an_edit_are_run_again(project: Project) ->
     assert project.job_list() == to_do
 
 
-@pytest.mark.release
 def test_who_includes_it_has_it_decide(project: Project) -> None:
     project.settings = [*METHODS, "decide={include: [one/c]}"]
     done = project.run()

@@ -196,6 +196,7 @@ def test_errors_of_the_chosen_axis_are_those_of_their_table(read: Open, bench: R
         assert curve["y"][at] == pytest.approx(math.degrees(expected), rel=DRAWN)
 
 
+@pytest.mark.release
 def test_what_is_chosen_stands_in_the_address(
     read: Open, bench: Report, download: Callable[[Locator], bytes]
 ) -> None:

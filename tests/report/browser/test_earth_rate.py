@@ -65,6 +65,7 @@ def test_nothing_hinders_a_reader(path: str, read: Open, rows: Any) -> None:
     assert hindrances(reader.page) == []
 
 
+@pytest.mark.release
 def test_the_estimates_over_time_are_those_of_the_tables(read: Open, rows: Any) -> None:
     folder, found = rows
     figure = read(folder, RUN).figure("earth_rate", part="whole")

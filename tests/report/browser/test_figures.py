@@ -252,6 +252,7 @@ def test_the_curve_of_a_channel_with_its_methods(read: Open, bench: Report) -> N
     assert len({one["name"] for one in chosen(traces(figure), mode="lines")} - {None}) == 5 + 3 + 3
 
 
+@pytest.mark.release
 def test_the_spectrum(night: Reader, bench: Report) -> None:
     figure = night.figure("spectrum", channel="gyro_x")
     drawn = traces(figure)

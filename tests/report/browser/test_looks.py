@@ -41,6 +41,7 @@ def picture(reader: Reader, **how: Any) -> Image.Image:
     return Image.open(io.BytesIO(reader.page.screenshot(**how))).convert("RGB")
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("drawn", "written"),
     few(

@@ -159,6 +159,7 @@ def test_a_sensor_without_a_datasheet_says_so(seen: Seen) -> None:
     assert "No figures of a datasheet" in seen.pages["sensors/beta.html"]["text"]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("others", few([[]], [OF_ONE]), ids=len)
 def test_a_report_of_one_recording(others: list[str], read: Open, tmp_path: Path) -> None:
     made.publish_some(made.single(tmp_path), tmp_path / "report", ("index.html", *others))

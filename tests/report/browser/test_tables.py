@@ -161,6 +161,7 @@ def test_the_other_method_is_asked_for(read: Open, bench: Report) -> None:
     assert count(table) == f"{2 * best - 1} rows"
 
 
+@pytest.mark.release
 def test_a_long_table_shows_its_first_rows(read: Open, many: Path) -> None:
     reader = read(many)
     table = table_of(reader, "Gyroscope: parameters")
@@ -186,6 +187,7 @@ def test_a_long_table_shows_its_first_rows(read: Open, many: Path) -> None:
     assert "×10⁻⁵" in table.locator("tbody tr").last.inner_text()
 
 
+@pytest.mark.release
 def test_a_long_table_is_sorted_whole(read: Open, many: Path) -> None:
     table = table_of(read(many, "recordings.html"), "All recordings")
     assert table.locator("tbody tr").count() == 100
@@ -195,14 +197,8 @@ def test_a_long_table_is_sorted_whole(read: Open, many: Path) -> None:
     assert count(table) == f"the first 100 of {SENSORS * EACH} rows"
 
 
-@pytest.mark.parametrize(
-    "script",
-    # Every day test_pages.py has a browser that unfolds nothing.
-    [
-        pytest.param(False, id="without JavaScript"),
-        pytest.param(True, id="of 2021", marks=pytest.mark.release),
-    ],
-)
+@pytest.mark.release  # every day test_pages.py has a browser that unfolds nothing
+@pytest.mark.parametrize("script", [False, True], ids=["without JavaScript", "of 2021"])
 def test_a_browser_that_unfolds_nothing_says_how_much_is_left_out(
     script: bool, browser: Browser, many: Path
 ) -> None:

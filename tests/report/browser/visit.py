@@ -3,12 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from tests.report.browser.accessibility import hindrances
 from tests.report.browser.made import Report
 from tests.report.browser.reader import TOO_WIDE, Reader
-
-KINDS = ("recordings.html",)
-"""Accessibility is looked at there, as it takes longer than to draw: elsewhere before a release."""
 
 DRAWN = ("recordings/alpha/night 1",)
 """Where most kinds of figures stand; other tests draw those of other pages one by one. Before a
@@ -35,22 +31,16 @@ class Seen:
 
     pages: dict[str, dict[str, Any]]
     figures: dict[str, int]
-    hindrances: dict[str, list[str]]
     complaints: list[str]
 
 
 def visit(window: Reader, report: Report) -> Seen:
-    pages, figures, hinder = {}, {}, {}
-    kinds, drawn = ({report.page(kind) for kind in some} for some in (KINDS, DRAWN))
+    pages, figures = {}, {}
+    drawn = {report.page(kind) for kind in DRAWN}
     window.begin(report.folder, 1280, 900, "light")
     for path in report.pages:
-        if hinder:
-            window.page.goto("about:blank")  # or the figures of the page before would turn light
-            window.page.emulate_media(color_scheme="light")
         window.open(path)
         if path in drawn:
             figures[path] = window.draw_all()
         pages[path] = window.page.evaluate(LOOK)
-        if path in kinds:
-            hinder[path] = hindrances(window.page)
-    return Seen(pages, figures, hinder, window.end())
+    return Seen(pages, figures, window.end())
