@@ -9,7 +9,8 @@ FIRST = (
     "tests/report/browser",  # a folder: one browser, and one report that is looked at in all of it
     "tests/test_corpus.py",  # logs of every format, together and one by one
     # From here on the kernels of a run are compiled: two runs at once would both do so.
-    "tests/workflow/test_nightly.py",  # runs of one project, each upon those before
+    "tests/workflow/test_workflow.py",  # runs of one project, each upon those before
+    "tests/workflow/test_nightly.py",  # so are these
     "tests/workflow/test_failures.py",  # waits for a step that takes too long
     "tests/workflow/test_deployed.py",  # three runs of one log, and a wheel
     "tests/workflow/test_earth_rate.py",  # a run, and lists of jobs

@@ -40,6 +40,7 @@ def test_the_ratio_of_two_logs_is_in_its_interval(comparison) -> None:
     assert {each.channel for each in comparison} == {"gyro_x"}
 
 
+@pytest.mark.release
 def test_the_other_way_round_is_the_inverse(comparison, estimates, loud) -> None:
     back = imu.compare(loud, estimates, tau=["1 s"])
     for one, other in zip(comparison, back, strict=False):

@@ -48,6 +48,7 @@ def test_without_results_the_command_says_what_to_do(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.release
 def test_results_without_a_table_are_not_those_of_a_finished_run(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

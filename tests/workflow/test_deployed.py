@@ -326,6 +326,7 @@ def test_two_modules_with_results_of_their_own_do_not_mind_each_other(
     assert "rule a_ingest" in done.stdout and "rule b_ingest" not in done.stdout
 
 
+@pytest.mark.release
 def test_a_prefix_of_paths_is_refused_with_what_does_that(logs: Path, tmp_path: Path) -> None:
     snakefile = json.dumps(str(PROJECT / "Snakefile")) + '\n    prefix: "elsewhere"'
     place = using(tmp_path, logs, snakefile, "rules.imu_all.input")

@@ -20,7 +20,7 @@ import pytest
 from tests.conftest import PROJECT
 from tests.workflow.project import FEW, put_log, put_sensor
 
-pytestmark = pytest.mark.workflow
+pytestmark = pytest.mark.release  # every day, tests/test_nightly.py and verification/finished.py
 
 ENTRY = """
 import sys
@@ -186,7 +186,6 @@ def analysed(project: Project) -> Project:
     return project
 
 
-@pytest.mark.release  # every day, tests/test_nightly.py
 def test_a_log_that_is_rewritten_keeps_its_results(analysed: Project) -> None:
     project = analysed
     put_log(project.log("b.csv"), 2, SAMPLES + 500)
@@ -220,7 +219,6 @@ def test_a_log_that_is_rewritten_keeps_its_results(analysed: Project) -> None:
     assert "one/c (new): c.csv: no column 'wx'" in said
 
 
-@pytest.mark.release  # every day, tests/test_nightly.py
 def test_logs_that_settled_are_taken_and_what_is_known_flags_nothing_again(
     project: Project,
 ) -> None:

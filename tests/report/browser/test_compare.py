@@ -239,6 +239,7 @@ def test_what_is_chosen_stands_in_the_address(
     assert b"<svg" in download(again.get_by_role("button", name="as SVG"))[:200]
 
 
+@pytest.mark.release
 def test_what_nobody_can_buy_is_told_where_it_is_chosen(read: Open, tmp_path: Path) -> None:
     tables = joined(recording_rows("bought"), recording_rows("made"))
     made.publish_some(site(tables, not_sold=["made"]), tmp_path, ["compare.html"])
@@ -246,6 +247,7 @@ def test_what_nobody_can_buy_is_told_where_it_is_chosen(read: Open, tmp_path: Pa
     assert first.locator("option").all_inner_texts() == ["V & Co bought", "V & Co made (not sold)"]
 
 
+@pytest.mark.release
 def test_what_is_not_there_is_said(read: Open, bench: Report) -> None:
     reader = read(bench.folder, "compare.html#a=alpha&b=nobody&axis=gyro_y")
     assert "nobody" in reader.page.locator(".unfound").inner_text()

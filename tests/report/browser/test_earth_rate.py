@@ -42,6 +42,7 @@ def named(drawn: list[dict[str, Any]], text: str) -> dict[str, Any]:
     return one
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("path", "figures", "width"),
     few(

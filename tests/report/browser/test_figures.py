@@ -54,6 +54,7 @@ def column(rows: list[dict[str, Any]], name: str) -> list[float]:
     return [row[name] for row in rows]
 
 
+@pytest.mark.release
 def test_the_curves_of_all_sensors(start: Reader, bench: Report) -> None:
     figure = start.figure("overlay")
     drawn = traces(figure)
@@ -76,6 +77,7 @@ def test_the_curves_of_all_sensors(start: Reader, bench: Report) -> None:
     np.testing.assert_allclose(bands[0]["y"], expected, rtol=LEVELS)
 
 
+@pytest.mark.release
 def test_sensors_and_layers_are_switched(start: Reader) -> None:
     figure = start.figure("overlay")
     count = len(traces(figure))

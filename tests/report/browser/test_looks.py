@@ -103,6 +103,7 @@ def test_there_is_something_to_see(width: int, read: Open, bench: Report) -> Non
         assert reader.page.evaluate(TOO_WIDE) == []
 
 
+@pytest.mark.release
 def test_a_page_is_dark_by_night(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)
     light = ink(reader)
