@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.allan import allan_variance, cluster_sizes, of_phase
+from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes, of_phase
 from imubench_pipeline.allan.phase import integrate
 
 
@@ -209,3 +209,9 @@ def test_blocks_must_be_as_long_as_stated() -> None:
         integrate([np.array([0.0, np.nan, 1.0])], 3, holes=False)
     with pytest.raises(ValueError, match="infinite"):
         integrate([np.array([0.0, np.inf, 1.0])], 3, holes=True)
+
+
+def test_a_curve_without_its_log_is_of_two_of_its_largest_clusters() -> None:
+    sizes = np.array([1, 4, 16])
+    curve = AllanCurve(sizes / 100.0, sizes, np.ones(3), np.full(3, 9.0))
+    assert curve.samples == 32

@@ -1,9 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import signal
 
 from imubench_pipeline.estimators.band import Band, find_band
+from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.lines import find, without_lines
+from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
@@ -240,3 +244,13 @@ def test_a_log_too_short_to_tell_keeps_the_full_band(rng) -> None:
     log = filtered(simulate(WHITE, RATE, 1180, rng), TWO_TAPS)
     assert band_of(spectrum_of(log)).highest == NYQUIST
     assert band_of(spectrum_of(log), bandwidth=100.0).highest == 10.0
+
+
+@pytest.mark.parametrize("T_B", [0.2, 0.5])
+def test_a_process_beside_which_white_noise_shows_is_no_filter(T_B: float) -> None:
+    # As dense as the white noise at low frequencies, and far less where the fit ends.
+    exact = ideal_spectrum(RATE, 20_000.0, NYQUIST)
+    shapes = Shapes(exact)
+    process = shapes.gauss_markov(T_B)
+    density = N**2 * (shapes.white() + process / process[0])
+    assert band_of(replace(exact, density=density)).highest == NYQUIST

@@ -172,6 +172,14 @@ def test_weak_bias_is_told_from_none() -> None:
         assert found.upper == pytest.approx(1e-5 * math.exp(1.96 * 0.05), rel=0.01)
 
 
+def test_flicker_that_is_fitted_at_nothing_is_absent_down_to_nothing() -> None:
+    chosen = candidate("NFK", [1e-4, 0.0, 3e-6], [], 0.0)
+    draws = draws_of(candidate("NFK", [1e-4, 1e-5, 3e-6], [], 0.0))
+    found = with_curve(NOTHING, [chosen], [], draws, TAU).curve["B_curve"]
+    assert (found.value, found.status, found.lower) == (None, "absent", 0.0)
+    assert found.upper is not None and 1e-5 < found.upper < 2e-5
+
+
 def test_what_is_known_to_a_factor_is_an_interval() -> None:
     chosen = candidate("NK", [1e-4, 3e-6, 7e-5], [100.0], 0.0)
     found = with_curve(NOTHING, [chosen], [], draws_of(chosen, spread=0.7), TAU).curve["B_curve"]

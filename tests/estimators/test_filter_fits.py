@@ -15,7 +15,9 @@ from imubench_pipeline.estimators.filter_fits import (
 )
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.low_pass import Filter, Frequencies, Kind
+from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 
@@ -225,3 +227,15 @@ def test_a_process_that_explains_all_is_the_only_slow_term(expected: FilterFits)
         fits = FilterFits(replace(spectrum, density=each))
         fits.choose_slow(best)
         assert len(fits.slow) == 1 and abs(fits.slow[0] - place) <= 1
+
+
+def test_rounding_is_tried_beside_a_process_and_a_walk() -> None:
+    terms = Terms("QNK", 1)
+    exact = ideal_spectrum(RATE, 2000.0, 0.5 * RATE)
+    shapes = Shapes(exact)
+    density = 1e-6 * shapes.white() + 4e-9 * shapes.quantization() + 1e-7 * shapes.random_walk()
+    density += 4e-5 * shapes.gauss_markov(2.0)
+    fits = FilterFits(replace(exact, density=density))
+    *_, rising = fits.unfiltered()
+    best = fits.whittle.maximum(terms)
+    assert rising == pytest.approx(best.cost + fits.penalty * terms.parameters, abs=1e-6)

@@ -216,3 +216,18 @@ def test_an_empty_bin_does_not_break_the_judgement(rng) -> None:
     judgement = judged(data)
     assert np.isfinite(judgement.deviance)
     assert 0 <= judgement.chance <= 1
+
+
+@pytest.mark.parametrize("size", [0.17, 0.2, 0.215])
+def test_the_chance_is_that_of_the_deviance_of_residuals_that_alternate(size: float) -> None:
+    nu = np.full(200, 50.0)
+    ratio = 1.0 + size * (-1.0) ** np.arange(len(nu))
+    # Chi-squared over its degrees of freedom, from its density.
+    x = stats.chi2(50.0)
+    mean, square = (
+        x.expect(lambda x, power=power: (x / 50.0 - 1.0 - np.log(x / 50.0)) ** power)
+        for power in (1, 2)
+    )
+    far = (ratio - 1.0 - np.log(ratio) - mean).sum() / np.sqrt(len(nu) * (square - mean**2))
+    expected = min(1.0, 2.0 * stats.norm.sf(far))
+    assert judged(ratio, nu).chance == pytest.approx(expected, rel=1e-3)
