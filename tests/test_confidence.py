@@ -96,3 +96,12 @@ def test_limits_cover_the_truth(rng: np.random.Generator) -> None:
         truth = 1.0 / np.sqrt(sizes)
         inside.append((lower < truth) & (truth < upper))
     np.testing.assert_allclose(np.mean(inside, axis=0), 0.95, atol=0.035)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_missing_clusters_do_not_change_the_noise_type(
+    rng: np.random.Generator, scale: float
+) -> None:
+    present = np.append(0, np.cumsum(rng.random(2000) < 0.8))
+    white = np.append(0.0, np.cumsum(np.diff(present) * scale * rng.standard_normal(2000)))
+    assert noise_exponent(white, present, 1) == 0

@@ -109,6 +109,18 @@ def test_a_filled_log_does_not_depend_on_how_it_is_cut(rng) -> None:
     np.testing.assert_array_equal(np.concatenate(list(one)), np.concatenate(list(other)))
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_the_unit_of_a_log_does_not_matter(rng, unit: float) -> None:
+    mean = 1e-3 * np.cumsum(rng.standard_normal(300))
+    count = np.where(rng.random(300) < 0.3, 0, BLOCK)
+    other = NoiseModel(N=unit * 1e-3, B=unit * 1.5e-3, T_B=30.0, K=unit * 3e-4)
+    one, scaled = (
+        drawn_at_blocks(of_blocks(of, count), [(0, 300 * BLOCK)], model, np.random.default_rng(1))
+        for of, model in ((mean, MODEL), (unit * mean, other))
+    )
+    np.testing.assert_allclose(scaled, unit * one, rtol=1e-6, atol=unit * 1e-9)
+
+
 def test_block_means_are_those_of_the_samples_present(rng) -> None:
     log = rng.standard_normal(1000)
     log[rng.random(1000) < 0.3] = np.nan

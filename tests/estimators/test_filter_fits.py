@@ -7,11 +7,13 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from imubench_pipeline.estimators.filter_fits import (
+    FAMILY,
     FilterFits,
     FilterTrial,
     Reading,
     also_after_sampling,
     draw_factors,
+    highest_cutoff,
 )
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.low_pass import Filter, Frequencies, Kind
@@ -239,3 +241,9 @@ def test_rounding_is_tried_beside_a_process_and_a_walk() -> None:
     *_, rising = fits.unfiltered()
     best = fits.whittle.maximum(terms)
     assert rising == pytest.approx(best.cost + fits.penalty * terms.parameters, abs=1e-6)
+
+
+def test_no_filter_of_the_samples_is_looked_for_beyond_nyquist() -> None:
+    bilinear = [(kind, order) for kind, order in FAMILY if kind == "bilinear"]
+    assert len(bilinear) == 4
+    assert all(0.4 * RATE < highest_cutoff(*each, RATE) < 0.5 * RATE for each in bilinear)
