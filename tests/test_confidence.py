@@ -105,3 +105,12 @@ def test_missing_clusters_do_not_change_the_noise_type(
     present = np.append(0, np.cumsum(rng.random(2000) < 0.8))
     white = np.append(0.0, np.cumsum(np.diff(present) * scale * rng.standard_normal(2000)))
     assert noise_exponent(white, present, 1) == 0
+
+
+def test_clusters_of_few_samples_tell_no_noise_type(rng: np.random.Generator) -> None:
+    counts = np.tile([10, 1], 40)
+    present = np.append(0, np.cumsum(counts))
+    white = np.append(0.0, np.cumsum(np.sqrt(counts) * rng.standard_normal(80)))
+    assert noise_exponent(white[:57], present[:57], 10) is None  # 28 are whole
+    # No neighbour of a whole one is whole.
+    assert noise_exponent(white, present, 10) is None

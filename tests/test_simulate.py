@@ -172,12 +172,12 @@ def test_the_ensemble_has_the_mean_and_the_scatter_of_the_model(rng) -> None:
     np.testing.assert_allclose(drawn.std(axis=0) / scatter, 1.0, atol=0.15)
 
 
-@pytest.mark.release
 def test_the_shortest_clusters_of_a_short_log_are_single_samples(rng) -> None:
     one, two = ensemble(NoiseModel(N=1.0), RATE, 400, np.array([1, 2]), 100, rng).T
     assert 0.2 < np.corrcoef(one, two)[0, 1] < 0.9
 
 
+@pytest.mark.release
 def test_neighbouring_taus_go_together_in_the_ensemble(rng) -> None:
     sizes = np.array([2, 3, 4, 8])
     full = np.array([reconstructed_variance(MODEL, RATE, 4000, sizes, rng) for _ in range(3000)])

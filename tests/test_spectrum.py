@@ -282,3 +282,11 @@ def test_segments_are_as_long_as_they_leave_little_over(lengths: list[int], bloc
         block_of([(int(stop) - n, int(stop)) for stop, n in zip(stops, lengths, strict=True)])
         == block
     )
+
+
+def test_lines_are_looked_for_in_samples_and_in_means_of_blocks(rng) -> None:
+    samples = 1 << 21
+    spectrum, (of_means, of_samples) = spectra([rng.standard_normal(samples)], samples, 50.0)
+    block = int(spectrum.block.max())
+    assert block > 1
+    assert (of_samples.interval, of_means.interval) == (1 / 50.0, block / 50.0)

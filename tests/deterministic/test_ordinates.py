@@ -6,7 +6,11 @@ import scipy.fft
 
 from imubench_pipeline.estimators.deterministic.halves import compare_halves
 from imubench_pipeline.estimators.deterministic.means import Means, Part
-from imubench_pipeline.estimators.deterministic.ordinates import Ordinates, covariance_of_sizes
+from imubench_pipeline.estimators.deterministic.ordinates import (
+    Ordinates,
+    _log_determinant,
+    covariance_of_sizes,
+)
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.whittle import Maximum, Terms
 
@@ -133,3 +137,9 @@ def test_two_halves_have_each_their_slow_noise(rng) -> None:
     for blocks, number in ((256, 2), (255, 0)):
         short = Means(BLOCK, RATE, (Part(0, means.parts[0].mean[:blocks], np.ones(blocks), 0.0),))
         assert len(list(compare_halves(short, noise))) == number
+
+
+def test_the_determinant_of_amplitudes_of_any_unit(rng) -> None:
+    root = rng.standard_normal((3, 3)) * np.array([1e-6, 1.0, 1e3])
+    covariance = root.T @ root
+    assert _log_determinant(covariance) == pytest.approx(np.linalg.slogdet(covariance)[1], abs=1e-3)

@@ -137,7 +137,6 @@ def test_noiseless_curves_of_sampled_logs() -> None:
             assert fitted(estimate, name) == pytest.approx(getattr(model, name), rel=1e-6)
 
 
-@pytest.mark.release
 def test_a_low_pass_in_the_sensor_harms_neither_n_nor_b(rng) -> None:
     log = simulate(MTI_7, 100.0, HOURS_10, rng)
     filtered = (log[1:] + log[:-1]) / 2
