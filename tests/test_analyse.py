@@ -152,6 +152,7 @@ def test_parameters_doubts_and_rejections_are_printed(
 
 # Every day pages are made of one log, in tests/workflow/test_failures.py, and figures in
 # tests/verification/finished.py.
+@pytest.mark.release
 @pytest.mark.parametrize("drawn", few([False], [True]))
 def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
     tmp_path: Path,

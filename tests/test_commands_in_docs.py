@@ -43,7 +43,7 @@ ELSEWHERE = {
     "-e . && .venv/bin/snakemake -c2": INSTALLS,
     "python3 -m venv .venv-test && .venv-test/bin/pip install uv && .venv-test/bin/uv pip install "
     "-p .venv-test -r requirements/test.txt && .venv-test/bin/uv pip install -p .venv-test "
-    "--no-deps --no-build-isolation -e . && .venv-test/bin/python -m pytest -n 3": INSTALLS,
+    "--no-deps --no-build-isolation -e . && .venv-test/bin/python -m pytest -n 2": INSTALLS,
     ".venv-test/bin/uv pip install -p .venv-test -r requirements/docs.txt && "
     ".venv-test/bin/sphinx-build -W -q docs docs/_build/html": INSTALLS,
     ".venv/bin/pip install -r requirements/docs.txt && .venv/bin/sphinx-build -W -q docs "
@@ -59,7 +59,7 @@ ELSEWHERE = {
     ".venv/bin/ruff check . && .venv/bin/ruff format .": "of the whole project: .ci/run",
     ".venv/bin/snakefmt Snakefile workflow": "of the whole project: .ci/run",
     ".venv/bin/mypy": "of the whole project: .ci/run",
-    ".venv/bin/python -m pytest -n 3": "these tests themselves: .ci/run",
+    ".venv/bin/python -m pytest -n 2": "these tests themselves: .ci/run",
     "cyclonedx-py environment --output-reproducible --of JSON -o sbom.json .venv": "an "
     "environment of its own, before a release",
     "pip-audit --disable-pip --require-hashes -r requirements/run.txt": "asks a service",

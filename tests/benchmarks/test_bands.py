@@ -7,6 +7,8 @@ import bands
 from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.noise import NoiseModel
 
+pytestmark = pytest.mark.release  # as what they test is run
+
 MODEL = NoiseModel(N=1e-4, B=1e-4, T_B=60.0, K=1e-6)
 
 

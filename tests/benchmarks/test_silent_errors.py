@@ -9,6 +9,8 @@ import silent_errors
 from silent_cases import CASES, CLEAN, NOTHING, Log, Truth, exactly
 from tests.conftest import few
 
+pytestmark = pytest.mark.release  # as what they test is run
+
 ROW = {"value": 1.0, "lower": 0.9, "upper": 1.1, "status": "ok", "reason": None}
 NONE = {"value": None, "lower": None, "upper": None}
 

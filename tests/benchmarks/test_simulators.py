@@ -9,6 +9,8 @@ from scipy import signal
 import simulators as sim
 from tests.conftest import few
 
+pytestmark = pytest.mark.release  # as what they test is run
+
 RATE = 10.0
 LENGTH = 400_000
 

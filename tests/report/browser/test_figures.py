@@ -161,6 +161,7 @@ def test_the_recordings_of_one_sensor(read: Open, bench: Report) -> None:
     assert len(traces(reader.figure("forest", symbol="B"))) == len(made.DATED) - 1
 
 
+@pytest.mark.release
 def test_a_first_look_shows_the_same_curve_before_what_draws_is_there(
     read: Open, bench: Report
 ) -> None:
@@ -311,6 +312,7 @@ def test_samples_over_time_with_findings_and_temperature(night: Reader) -> None:
         toggle(figure, label).check()
 
 
+@pytest.mark.release
 def test_the_histogram(night: Reader) -> None:
     figure = night.figure("histogram", channel="gyro_x")
     bars, normal = traces(figure)
