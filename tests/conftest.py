@@ -78,6 +78,7 @@ def pytest_collection() -> Generator[None, object, object]:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(20_000)  # what a test makes is gone with it
         gc.enable()
 
 

@@ -11,7 +11,7 @@ import yaml
 
 from imubench_pipeline.run.cli import SCHEMAS, main
 from imubench_pipeline.run.start import ONE_THREAD
-from tests.conftest import PROJECT, few
+from tests.conftest import PROJECT
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
@@ -99,7 +99,8 @@ def test_inspect_refuses_what_is_no_log(
     assert not output.exists()
 
 
-@pytest.mark.parametrize("command", few(["schema"], ["inspect"]))
+@pytest.mark.release
+@pytest.mark.parametrize("command", ["schema", "inspect"])
 def test_a_reader_that_goes_away_is_no_fault(tmp_path: Path, command: str) -> None:
     given = {"inspect": logged(tmp_path, COMPLETE), "schema": "run"}[command]
     code = "import sys; from imubench_pipeline.run.cli import main; sys.exit(main(sys.argv[1:]))"

@@ -103,6 +103,7 @@ def test_snakemake_hands_text_over() -> None:
     assert run.allan.longest == 0.25
 
 
+@pytest.mark.release
 def test_what_a_run_was_given_beside_its_file_is_told_as_snakemake_takes_it(tmp_path: Path) -> None:
     file = tmp_path / "config.yaml"
     file.write_text("results: mine\nallan: {overlap: full}\n")

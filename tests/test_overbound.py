@@ -109,6 +109,7 @@ def test_it_is_close_to_the_truth_where_the_curve_is_lowest() -> None:
         assert 1.0 < found.at_minimum < most
 
 
+@pytest.mark.release
 def test_a_longer_tau_asks_for_more() -> None:
     short = of_gyro("N+GM")
     long = overbound(measured(GYRO), GYRO, RATE, family="N+GM", longest=1000.0)
@@ -178,6 +179,7 @@ def test_a_log_too_short_for_a_horizon_is_told_from_a_family_that_does_not_suit(
         overbound(measured(GYRO), GYRO, RATE, horizon=2000.0)
 
 
+@pytest.mark.release
 def test_the_density_is_bounded_above_the_band_s_lowest_frequency_only() -> None:
     walk = NoiseModel(N=1e-4, K=1e-5)
     found = overbound(measured(walk, 1e9), walk, RATE, family="N+GM")

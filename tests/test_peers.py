@@ -143,6 +143,7 @@ def test_a_printed_minimum_is_made_the_b_that_it_stands_for(log) -> None:
     assert of_hour("kalibr_allan")["B"] is None
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("name", few([*BY_NAME][:1], [*BY_NAME][1:]))
 def test_a_constant_makes_no_difference(name: str, log) -> None:
     expected, found = of_hour(name), of_program(name, log + 9.81)

@@ -42,7 +42,7 @@ def test_roll_and_pitch_are_those_of_gravity_alone():
 
 
 @pytest.mark.parametrize("triad", few([UNLIKE], [ALIKE]))
-@pytest.mark.parametrize("name", POSITIONS)
+@pytest.mark.parametrize("name", few(["four"], ["one", "two"]))
 def test_errors_are_as_large_as_it_says(name, triad):
     positions = POSITIONS[name]
     drawn = simulate_triad(

@@ -125,6 +125,7 @@ def test_the_biases_are_printed_or_assumed(tmp_path: Path) -> None:
     assert {row["latitude"] for rows in changed.values() for row in rows} == {math.radians(60.0)}
 
 
+@pytest.mark.release
 def test_axes_that_are_not_there_are_lent_by_those_that_are(tmp_path: Path) -> None:
     models = {"gyro_x": NoiseModel(N=1e-6), "accel_z": NoiseModel(N=1e-3)}
     row = outlook([put_triad(tmp_path / "night", models)])["alignment"][0]

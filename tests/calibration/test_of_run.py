@@ -80,6 +80,7 @@ def test_a_bend_is_found_where_there_is_one(tmp_path: Path, rest: list[Path]) ->
     assert worst > 5.0
 
 
+@pytest.mark.release
 def test_residuals_scatter_by_their_sigma(tmp_path: Path, rest: list[Path]) -> None:
     ratios = []
     for seed in range(12):

@@ -155,6 +155,7 @@ def test_turns_that_the_schedule_alone_says_are_a_doubt(
     assert seen["status"] == "ok" and "reason" not in seen
 
 
+@pytest.mark.release
 def test_the_column_with_the_position_decides(tmp_path: Path, rest: Path) -> None:
     log = turned_log(peak=0.0, first=-1)
     turns = np.searchsorted(EVERY_30, np.arange(len(log["gyro_x"])) / RATE)
@@ -189,12 +190,14 @@ def test_a_log_without_turns_says_so(tmp_path: Path, rest: Path) -> None:
     assert found["earth_rate_series"] == [] and found["earth_rate_prediction"]
 
 
+@pytest.mark.release
 def test_a_position_that_never_changes_says_so(tmp_path: Path, rest: Path) -> None:
     log = turned_log()
     found = briefly(put(tmp_path / "a", log | {"position": np.ones(len(log["gyro_x"]))}), [rest])
     assert "the log never turns" in found["earth_rate"][0]["reason"]
 
 
+@pytest.mark.release
 def test_a_log_that_is_too_short_says_so(tmp_path: Path, rest: Path) -> None:
     short = {"gyro_x": turned_log()["gyro_x"][: round(40 * RATE)]}
     found = briefly(put(tmp_path / "a", short), [rest])

@@ -178,6 +178,7 @@ def test_without_a_transient_the_schedule_decides_and_the_result_says_so() -> No
     assert found.turns[0].stop - found.turns[0].start == pytest.approx(2.0 * 3.0 + TURN)
 
 
+@pytest.mark.release
 def test_the_level_says_when_the_schedule_began_where_it_alternates_clearly() -> None:
     starts = 30.0 * np.arange(1, 240) + 6.0
     log = turned(starts, 7200.0, peak=0.0)

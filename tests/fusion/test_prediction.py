@@ -183,6 +183,7 @@ def estimated(model: NoiseModel, spread: float) -> Estimate:
     )
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("draws", "known"), few([(1000, 0.1)], [(4000, 0.05)]))
 def test_the_limits_follow_from_those_of_the_parameters(draws: int, known: float) -> None:
     estimate = Estimate("likelihood", {"N": Parameter(1e-4, lower=0.5e-4, upper=2e-4)})
@@ -195,6 +196,7 @@ def test_the_limits_follow_from_those_of_the_parameters(draws: int, known: float
     assert upper == pytest.approx([1e-4], rel=known)
 
 
+@pytest.mark.release
 def test_sensors_of_their_own_estimates_vary_apart() -> None:
     estimates = [estimated(NoiseModel(N=1e-4), 2.0) for _ in range(4)]
     board = Board.alike(NoiseModel(N=1e-4), 4, RATE)

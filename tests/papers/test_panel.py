@@ -6,6 +6,8 @@ import pytest
 
 from imubench_pipeline.experiments.papers.panel import panel_rows
 
+pytestmark = pytest.mark.release
+
 LOGS = 12
 
 
@@ -14,7 +16,6 @@ def found() -> dict[tuple[str, str], dict[str, Any]]:
     return {(row["method"], row["parameter"]): dict(row) for row in panel_rows(LOGS)}
 
 
-@pytest.mark.release
 def test_no_method_is_below_the_bound_but_for_chance(found: dict[Any, Any]) -> None:
     # The bound itself, of 10 h at 10 Hz: of N it is 1 / sqrt(2 L), less what the process hides.
     assert found["paper", "N"]["bound"] == pytest.approx((2 * 360_000) ** -0.5, rel=0.02)
@@ -23,7 +24,6 @@ def test_no_method_is_below_the_bound_but_for_chance(found: dict[Any, Any]) -> N
             assert row["ratio_upper"] > 0.8
 
 
-@pytest.mark.release
 def test_the_curve_is_read_where_it_shows_a_slope_alone(found: dict[Any, Any]) -> None:
     assert found["curve", "N"]["given"] == LOGS
     assert found["curve", "T_B"]["given"] < LOGS / 2

@@ -86,7 +86,7 @@ def test_a_real_log_is_free_of_copies(shared: Path) -> None:
     assert warnings(adis16405(shared)) == []
 
 
-@pytest.mark.parametrize("factor", few([-1.0, np.degrees(1.0)], [1.0, 9.80665]))
+@pytest.mark.parametrize("factor", few([-1.0], [1.0, 9.80665, np.degrees(1.0)]))
 def test_a_gyro_that_is_another_one_in_another_unit(shared: Path, factor: float) -> None:
     log = adis16405(shared)
     log["gyro_y"] = factor * log["gyro_x"]
@@ -134,6 +134,7 @@ def test_a_stretch_that_was_pasted_into_a_real_log(shared: Path) -> None:
     assert found.value == pytest.approx(1000, abs=2 * WINDOW)
 
 
+@pytest.mark.release
 def test_a_stretch_of_one_channel(shared: Path) -> None:
     log = adis16405(shared)
     log["accel_y"][100_000:102_000] = log["accel_y"][3000:5000]

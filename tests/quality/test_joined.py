@@ -76,13 +76,14 @@ def test_samples_of_two_sensors_in_turn(shared: Path) -> None:
     assert set(found) == set(log)
 
 
+@pytest.mark.release
 def test_two_sensors_of_one_make_in_turn_differ_in_level(shared: Path) -> None:
     log = adis16405(shared)
     log["gyro_z"][1::2] += 80 * np.radians(0.05)
     assert ("interleaved", "gyro_z") in warnings(log)
 
 
-@pytest.mark.parametrize("frequency", few([50.0, 24.97], [49.9, 25.0, 12.5]))
+@pytest.mark.parametrize("frequency", few([24.97], [50.0, 49.9, 25.0, 12.5]))
 def test_a_line_is_no_second_sensor(shared: Path, frequency: float) -> None:
     log = adis16405(shared)
     fine(log)

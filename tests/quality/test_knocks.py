@@ -71,6 +71,7 @@ def test_one_step_of_a_coarse_register_is_no_knock(rng: np.random.Generator, oft
     assert first <= 50_000 < last
 
 
+@pytest.mark.release
 def test_steps_of_a_real_log_are_no_knocks(shared: Path) -> None:
     """Its accelerations in steps so wide that nearly all samples are the same."""
     excused = 0

@@ -662,6 +662,7 @@ def test_a_changed_reason_rewrites_all_pages_that_list_the_recording(old: Path) 
     assert seen == {"datasheets.html"}
 
 
+@pytest.mark.release
 def test_a_new_finding_leaves_the_pages_of_other_recordings_alone(old: Path) -> None:
     after = some()
     finding = {"finding": "step", "severity": "warning", "detail": "moved", "value": 1.0}
@@ -702,6 +703,7 @@ def test_what_is_found_out_about_a_datasheet_reaches_all_pages_that_say_so(old: 
     }
 
 
+@pytest.mark.release
 def test_the_page_of_a_removed_recording_disappears(old: Path) -> None:
     after = some()
     del after[0]
@@ -964,6 +966,7 @@ def test_one_file_has_pages_without_fault_each(whole: Read) -> None:
         assert Read(part, fragment=True).faults == []
 
 
+@pytest.mark.release
 def test_nothing_breaks_out_of_one_file() -> None:
     hostile = "</script></template><script>alert(1)</script><!-- <script>"
     finding = {"finding": "missing_samples", "detail": hostile, "channel": "gyro_x"}

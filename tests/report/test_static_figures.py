@@ -310,6 +310,7 @@ def test_recordings_of_a_sensor_share_one_entry(recordings: int, tmp_path: Path)
         "gyro", "N", "practical").per_si)  # fmt: skip
 
 
+@pytest.mark.release
 def test_the_recording_that_stands_for_many_is_the_middle_one() -> None:
     levels = (1.0, 9.0, 3.0, 2.0, 4.0)
     views = views_of(*(rows_of(recording=f"r{n}", level=one) for n, one in enumerate(levels)))
