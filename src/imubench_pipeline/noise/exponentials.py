@@ -57,13 +57,15 @@ def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray
 
 def _phi_of_array(order: int, z: Array | ComplexArray) -> ComplexArray:
     small = np.abs(z) < _SERIES_BELOW
-    series = [1.0 / math.factorial(n + order) for n in range(_ARRAY_SERIES)]
-    near = np.polynomial.polynomial.polyval(np.where(small, z, 0.0), series)
     far = np.where(small, _SERIES_BELOW, z)
     value = np.exp(far)
     for j in range(order):
         value = (value - 1.0 / math.factorial(j)) / far
-    return np.asarray(np.where(small, near, value), dtype=np.complex128)
+    if small.any():
+        series = [1.0 / math.factorial(n + order) for n in range(_ARRAY_SERIES)]
+        near = np.polynomial.polynomial.polyval(np.where(small, z, 0.0), series)
+        value = np.where(small, near, value)
+    return np.asarray(value, dtype=np.complex128)
 
 
 @overload
@@ -90,8 +92,11 @@ def squared_response(order: int, x: float | Array) -> float | Array:
     """
     if isinstance(x, np.ndarray):
         small = x < _SERIES_BELOW
-        close = np.polynomial.polynomial.polyval(np.where(small, x, 0.0), _squared_series(order))
-        return np.where(small, close, _squared_sum(order, np.where(small, _SERIES_BELOW, x)))
+        response = _squared_sum(order, np.where(small, _SERIES_BELOW, x))
+        if not small.any():
+            return response
+        near = np.polynomial.polynomial.polyval(np.where(small, x, 0.0), _squared_series(order))
+        return np.where(small, near, response)
     if x < _SERIES_BELOW:
         near = 0.0
         for coefficient in reversed(_squared_series(order)):

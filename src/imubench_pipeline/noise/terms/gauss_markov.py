@@ -225,11 +225,12 @@ def gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
     """
     ratio = np.asarray(tau, dtype=np.float64) / T_B
     small = ratio < _SERIES_BELOW
-    r = np.where(small, ratio, 0.0)
     x = np.where(small, 1.0, ratio)
-    series = r * np.polynomial.polynomial.polyval(r, _SERIES)
-    closed = (1.0 - (3.0 - 4.0 * np.exp(-x) + np.exp(-2.0 * x)) / (2.0 * x)) / x
-    return T_B * np.where(small, series, closed)
+    shape = (1.0 - (3.0 - 4.0 * np.exp(-x) + np.exp(-2.0 * x)) / (2.0 * x)) / x
+    if small.any():
+        r = np.where(small, ratio, 0.0)
+        shape = np.where(small, r * np.polynomial.polynomial.polyval(r, _SERIES), shape)
+    return T_B * shape
 
 
 def sampled_gauss_markov_shape(n: ArrayLike, interval: float, T_B: float) -> Array:
