@@ -95,8 +95,8 @@ def squared_response(order: int, x: float | Array) -> float | Array:
         response = _squared_sum(order, np.where(small, _SERIES_BELOW, x))
         if not small.any():
             return response
-        near = np.polynomial.polynomial.polyval(np.where(small, x, 0.0), _squared_series(order))
-        return np.where(small, near, response)
+        series = np.polynomial.polynomial.polyval(np.where(small, x, 0.0), _squared_series(order))
+        return np.where(small, series, response)
     if x < _SERIES_BELOW:
         near = 0.0
         for coefficient in reversed(_squared_series(order)):
