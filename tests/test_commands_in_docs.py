@@ -386,10 +386,32 @@ def test_python_of_a_page_runs(page: str, lab: Path, rng: np.random.Generator) -
             exec(compile(part, page, "exec"), names)
 
 
-@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", "SECURITY.md"])
-def test_links_lead_somewhere(page: str) -> None:
-    links = re.findall(r"\]\((?!https?:)([^)#]+)", (PROJECT / page).read_text(encoding="utf-8"))
-    assert links and not [link for link in links if not (PROJECT / link).exists()]
+def sections(page: Path) -> set[str]:
+    """The anchors of the headings of a page, and those that it names itself."""
+    text = re.sub(r"^(```|~~~).*?^\1", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)
+    headings = re.findall(r"^#+ +(.+?) *$", text, re.MULTILINE)
+    plain = (re.sub(r"[^\w\- ]", "", re.sub(r"\]\([^)]*\)", "", each)) for each in headings)
+    return {each.lower().replace(" ", "-") for each in plain} | set(
+        re.findall(r"^\(([\w-]+)\)=$", text, re.MULTILINE)
+    )
+
+
+WITH_LINKS = sorted({
+    *PROJECT.glob("*.md"),
+    *PROJECT.glob("*/README.md"),
+    *(path for path in (PROJECT / "docs").rglob("*.md") if "_build" not in path.parts),
+})  # fmt: skip
+
+
+@pytest.mark.parametrize("page", WITH_LINKS, ids=lambda page: page.relative_to(PROJECT).as_posix())
+def test_links_lead_somewhere(page: Path) -> None:
+    links = re.findall(r"\]\((?!\w+:)([^)#\s]*)(?:#([^)\s]+))?\)", page.read_text(encoding="utf-8"))
+    for path, section in links:
+        there = page.parent / path if path else page
+        assert there.exists(), path
+        made = there.parent.name == "reference"  # the site makes most of its sections
+        if section and there.suffix == ".md" and not made:
+            assert section in sections(there), f"{path}#{section}"
 
 
 def test_the_readme_is_short() -> None:

@@ -345,6 +345,7 @@ def test_bad_gyrocompasses_are_refused() -> None:
 # Uncertainty
 
 
+@pytest.mark.release
 def test_limits_of_drawn_models() -> None:
     estimate = Estimate(
         "likelihood",

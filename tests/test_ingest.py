@@ -214,6 +214,7 @@ def test_too_short_a_recording_is_rejected_and_leaves_nothing(tmp_path: Path) ->
     assert list((tmp_path / "out").iterdir()) == []
 
 
+@pytest.mark.release
 def test_long_holes_are_read_in_bounded_blocks(tmp_path: Path) -> None:
     time = np.concatenate([500.0 * i + np.arange(100) / 1000.0 for i in range(20)])
     wx = 1e-3 * np.sin(np.arange(2000.0))

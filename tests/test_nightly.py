@@ -69,6 +69,7 @@ child.wait()
 """
 
 
+@pytest.mark.release
 def test_the_lock_holds_while_snakemake_lives_and_its_note_stays(tmp_path: Path) -> None:
     path = tmp_path / "lock"
     with subprocess.Popen(

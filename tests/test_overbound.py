@@ -86,6 +86,7 @@ def test_it_lies_above_everything_that_was_measured_and_fitted(
     assert found.touches
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("family", few(["N+GM+K"], ["N+K", "N+GM"]))
 def test_no_term_of_it_can_be_smaller(family: Family) -> None:
     limits = limits_of(measured(GYRO), GYRO, RATE, 60.0, 60.0, (1 / 600, RATE / 2))

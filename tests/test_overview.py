@@ -262,6 +262,7 @@ def test_levels_that_were_written_in_two_ways(tmp_path: Path, rng: np.random.Gen
     smooth(counts)
 
 
+@pytest.mark.release
 def test_samples_that_are_repeated_are_not_taken_for_steps(
     tmp_path: Path, rng: np.random.Generator
 ) -> None:

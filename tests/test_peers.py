@@ -135,6 +135,7 @@ def test_dogleg_reaches_the_minimum_where_its_steps_suffice() -> None:
     assert np.array_equal(peers.dogleg_fit(powers, measured, true, steps=0), true)
 
 
+@pytest.mark.release
 def test_a_printed_minimum_is_made_the_b_that_it_stands_for(log) -> None:
     for name in ("allan_variance_ros", "imu_utils"):
         printed = BY_NAME[name].printed(log, RATE)

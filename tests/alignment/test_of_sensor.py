@@ -99,6 +99,7 @@ def test_errors_of_simulated_triads_are_as_large_as_said(density: float) -> None
             assert np.all(np.abs(one.errors[there] - 1.0) < 0.15), one
 
 
+@pytest.mark.release
 def test_where_there_is_no_heading_the_words_say_why(tmp_path: Path) -> None:
     rows = outlook([put_triad(tmp_path / "night", six(gyro=1e-2))])["alignment"]
     assert len(rows) == 4 * len(TIMES)

@@ -66,6 +66,7 @@ def test_the_covariance_of_blocks_is_that_of_their_means() -> None:
         assert found == pytest.approx(-(0.5**2) / 2.0 * apart.mean(), rel=1e-5)
 
 
+@pytest.mark.release
 def test_the_scatter_of_the_mean_square_is_what_simulated_logs_show() -> None:
     rng, logs, blocks = np.random.default_rng(4), 400, 600
     cut = Window(block=5.0, resting=8, moving=16)

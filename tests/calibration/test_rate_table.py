@@ -126,6 +126,7 @@ def test_white_noise_gives_the_straight_line_of_ordinary_least_squares():
     assert found.linearity.sigma == pytest.approx(sigma, rel=1e-6)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("logs", few([10], [40]))
 def test_logs_of_the_simulator_give_their_scale_factor(logs):
     noise = MODELS["N+GM+K"]

@@ -23,6 +23,7 @@ def experiments(draw):
     return Experiment(tuple(dwells), 4.0, 0.5)
 
 
+@pytest.mark.release
 @given(experiments(), st.integers(1, 50))
 @settings(max_examples=60, deadline=None)
 def test_blocks_fill_their_dwells_and_no_turning(experiment, longest):

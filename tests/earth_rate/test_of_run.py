@@ -128,6 +128,7 @@ def test_a_known_bias_and_a_drift_enter_the_filter(tmp_path: Path, rest: Path) -
     assert known < plain < drifting
 
 
+@pytest.mark.release
 def test_a_sense_that_is_not_known_is_said(tmp_path: Path, rest: Path) -> None:
     found = briefly(put(tmp_path / "a", turned_log(first=-1)), [rest], first=None)
     row = by_method(found["earth_rate"])["pairs"]

@@ -137,6 +137,7 @@ def test_two_positions_of_white_noise_are_the_gyrocompass():
     assert found.shape == (3,)
 
 
+@pytest.mark.release
 def test_longest_blocks_where_nothing_is_lost():
     design = paper_run(12.0)
     assert block_length(design, WHITE) == 896

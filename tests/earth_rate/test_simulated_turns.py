@@ -83,6 +83,7 @@ def test_it_is_turned_by_the_clock(made: tuple[Plan, Path]) -> None:
     assert 2.5 < peaks.min() < peaks.max() < 5.6
 
 
+@pytest.mark.release
 def test_what_is_published_stands_beside_what_noise_allows(made: tuple[Plan, Path]) -> None:
     plan, kept = made
     settings = plan.experiment_settings("s", "sim_run")

@@ -61,6 +61,7 @@ def test_a_log_without_noise_shows_the_rate_and_the_turns():
     assert len(log) == 99
 
 
+@pytest.mark.release
 def test_logs_of_the_simulator_are_what_the_filter_expects():
     # Whole logs come of another program, sample by sample: their NIS must be right, too.
     model = NoiseModel(N=0.02, B=0.05, T_B=8.0, K=0.01)

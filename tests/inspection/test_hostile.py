@@ -70,6 +70,7 @@ def test_what_is_no_log_is_refused(tmp_path: Path, name: str) -> None:
         inspect(path)
 
 
+@pytest.mark.release
 def test_a_thousand_columns_are_looked_at_whatever_they_hold(tmp_path: Path) -> None:
     # Each of dates takes 3 ms, as its pattern is looked for.
     names = ["wx", "ax", *(f"n{place}" for place in range(8000))]

@@ -82,6 +82,7 @@ def test_what_cannot_be_read_says_why(drop_zone: Path, arguments: dict, expected
         imu.read_log(**known | arguments)
 
 
+@pytest.mark.release
 def test_notes_beside_a_log_hold(tmp_path: Path) -> None:
     table = np.random.default_rng(1).normal(0.0, 0.1, (2000, 3))
     table[:, 0] = np.arange(2000) / 100.0

@@ -116,6 +116,7 @@ def runs(request: pytest.FixtureRequest) -> Iterator[int]:
     silva_settling.settling_times.cache_clear()
 
 
+@pytest.mark.release
 def test_runs_settle_after_minutes_and_not_by_the_unit_of_the_start(runs: int) -> None:
     for run, minutes in PAPER_MINUTES.items():
         if "," in run:

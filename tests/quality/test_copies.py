@@ -106,6 +106,7 @@ def test_gyros_that_are_the_accelerometers_columns(shared: Path) -> None:
     assert sorted(filter(None, told)) == sorted(log)
 
 
+@pytest.mark.release
 def test_axes_that_feel_one_vibration_are_two(rng: np.random.Generator, shared: Path) -> None:
     log = adis16405(shared)
     shaking = 0.5 * np.sin(2 * np.pi * 17.3 * np.arange(len(log["accel_x"])) / 100.0)

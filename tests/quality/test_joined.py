@@ -48,6 +48,7 @@ def test_halves_of_two_sensors(shared: Path) -> None:
         assert finding.value == pytest.approx(1.5, rel=0.1)
 
 
+@pytest.mark.release
 def test_halves_of_two_registers_and_levels(shared: Path) -> None:
     log = adis16405(shared)
     other = adis16405(shared)

@@ -52,6 +52,7 @@ def test_what_takes_more_is_ended(
     assert len(np.ones(2 * MEMORY // 8)) == 2 * MEMORY // 8  # not limited here
 
 
+@pytest.mark.release
 def test_what_others_keep_waiting_is_not_ended_for_it() -> None:
     busy, idle = (
         subprocess.Popen([sys.executable, "-c", code])

@@ -636,6 +636,7 @@ def test_a_changed_score_rewrites_its_page_alone(old: Path) -> None:
     assert seen == OF_ALL - {"fusion.html"} | {"sensors/one.html", "compare.html"}
 
 
+@pytest.mark.release
 def test_a_changed_parameter_rewrites_its_page_and_those_that_compare(old: Path) -> None:
     after = some()
     rows = (row for row in after[0]["parameters"] if row["channel"] == "gyro_x")

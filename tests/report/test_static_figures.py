@@ -194,6 +194,7 @@ def test_terms_pass_through_the_points_where_they_are_read() -> None:
     assert "sum: N+GM+K" in found
 
 
+@pytest.mark.release
 def test_a_term_that_the_log_does_not_tell_is_called_so() -> None:
     unsure = KNOWN | {
         "K": Parameter(

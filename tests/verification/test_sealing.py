@@ -15,7 +15,7 @@ from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.seals import Seal, SealedFile, SealError, places, read_seal, seal_file
 from tests.verification.finished import Finished
 
-pytestmark = pytest.mark.workflow
+pytestmark = [pytest.mark.workflow, pytest.mark.release]
 
 A = "recordings/one/a"
 JOINED = "sensors/one/sensor_tables"

@@ -22,7 +22,7 @@ from imubench_pipeline.tables.seals import SealedFile, read_seal, seal_file
 from tests.conftest import few
 from tests.verification.finished import Finished
 
-pytestmark = pytest.mark.workflow
+pytestmark = [pytest.mark.workflow, pytest.mark.release]
 
 LOGS = ("logs", "nightly/lock", "nightly/held_back.yaml")
 """What steps printed, and what stands for the moment: no results."""

@@ -22,7 +22,7 @@ from tests.verification.finished import (
 )
 from tests.workflow.project import STEPS, TOGETHER, Job, Project, put_log, put_sensor
 
-pytestmark = pytest.mark.workflow
+pytestmark = [pytest.mark.workflow, pytest.mark.release]
 
 ONE = ("one/a", "one/b")
 TWO = ("two/f", "two/sim_a")
