@@ -53,6 +53,27 @@ def test_a_model_that_does_not_explain_the_log_only_widens_limits(found: Likelih
     assert set(limited.edf_source) == {FITTED, POWER_LAW}
 
 
+def test_where_few_clusters_are_left_a_walk_may_be_larger_than_its_estimate(
+    found: Likelihood,
+) -> None:
+    curve = allan_variance(LOG, 1.0)
+    limited = with_fitted_limits(curve, found)
+    model = found.estimates[0].model
+    upper = found.estimates[0].parameters["K"].upper
+    assert upper is not None and upper > model.K
+    few = curve.cluster_size * 100 > curve.samples
+    larger = degrees_of_model(
+        replace(model, K=(model.K + upper) / 2.0), 1.0, curve.cluster_size[few], len(LOG)
+    )
+    assert limited.edf_upper is not None
+    np.testing.assert_allclose(limited.edf_upper[few], larger.upper, rtol=0.05)
+    unknown = replace(found.estimates[0], parameters={})
+    alone = with_fitted_limits(curve, replace(found, estimates=[unknown, *found.estimates[1:]]))
+    assert alone.edf_upper is not None
+    np.testing.assert_array_equal(limited.edf_upper[~few], alone.edf_upper[~few])
+    assert (limited.edf_upper[few] < 0.9 * alone.edf_upper[few]).any()
+
+
 def test_a_log_without_a_fit_keeps_its_limits(found: Likelihood) -> None:
     curve = allan_variance(LOG, 1.0)
     assert with_fitted_limits(curve, replace(found, candidates=())) is curve
