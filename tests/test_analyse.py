@@ -150,8 +150,8 @@ def test_parameters_doubts_and_rejections_are_printed(
     assert "short recording: the recording lasts 50 s" in said
 
 
-# Every day pages are made of one log, in tests/workflow/test_failures.py, and figures in
-# tests/verification/finished.py.
+# Every day pages are made of one log, in tests/workflow/test_failures.py, and figures in the
+# demonstration of .ci/run.
 @pytest.mark.release
 @pytest.mark.parametrize("drawn", few([False], [True]))
 def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(

@@ -116,8 +116,8 @@ COSTLY = (
 
 OF_RESULTS = re.compile(r"\bresults\b(?!/)")
 """In what needs a finished run: before a release too. Every day such commands are asked of results
-that are made by hand: tests/report/test_command.py, tests/test_show.py, tests/export,
-tests/shortlist and tests/verification."""
+that are made by hand: tests/report/test_command.py, tests/test_show.py, tests/export and
+tests/shortlist; `verify` of the demonstration, in .ci/run."""
 
 ANALYSE = ".venv/bin/snakemake -c2"
 """What all others find done."""
@@ -406,6 +406,7 @@ WITH_LINKS = sorted({
 @pytest.mark.parametrize("page", WITH_LINKS, ids=lambda page: page.relative_to(PROJECT).as_posix())
 def test_links_lead_somewhere(page: Path) -> None:
     links = re.findall(r"\]\((?!\w+:)([^)#\s]*)(?:#([^)\s]+))?\)", page.read_text(encoding="utf-8"))
+    assert links or page.parent != PROJECT
     for path, section in links:
         there = page.parent / path if path else page
         assert there.exists(), path
