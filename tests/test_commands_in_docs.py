@@ -406,7 +406,7 @@ WITH_LINKS = sorted({
 @pytest.mark.parametrize("page", WITH_LINKS, ids=lambda page: page.relative_to(PROJECT).as_posix())
 def test_links_lead_somewhere(page: Path) -> None:
     links = re.findall(r"\]\((?!\w+:)([^)#\s]*)(?:#([^)\s]+))?\)", page.read_text(encoding="utf-8"))
-    assert links or page.parent != PROJECT or page.name == "CHANGELOG.md"  # the guard of the pattern
+    assert links or page.parent != PROJECT or page.name == "CHANGELOG.md"  # which has none
     for path, section in links:
         there = page.parent / path if path else page
         assert there.exists(), path
