@@ -165,13 +165,12 @@ _NAMES = {"N": "N", "B": "σ_min"}
 
 
 def unusual_rows(
-    parameters: Iterable[Mapping[str, Any]], sensors: Mapping[str, Sensor]
+    parameters: Iterable[Mapping[str, Any]], sensors: Mapping[str, Sensor], usual: UsualFigures
 ) -> Iterator[Mapping[str, Any]]:
     """Yield the rows of the table ``findings`` about estimates far from what vendors print.
 
-    Of rows of the table ``parameters``, and the sensors of the catalogue.
+    Of rows of the table ``parameters``, of ``sensors`` by name; ``usual`` is what a catalogue has.
     """
-    usual = usual_figures(sensors)
     for row in parameters:
         # What vendors print of B is the minimum of the curve.
         figure = {"N": "N", "sigma_min": "B"}.get(row["parameter"])

@@ -20,8 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.estimate import CURVE, SIGMAS, Estimate, Parameter
-from imubench_pipeline.estimators.identifiability import NOT_IDENTIFIED
+from imubench_pipeline.estimators.estimate import BROADBAND_TIME, CURVE, Estimate, Parameter
 from imubench_pipeline.estimators.intervals import as_good, mixture_limits
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
@@ -164,9 +163,10 @@ def with_curve(
 ) -> Estimate:
     """Return an estimate by likelihood with the figures of its curve.
 
-    Values are the geometric means over the models that the log does not rule out, by their weights
-    (BIC), and intervals those of their draws together. (By AIC, two processes of which the slower
-    stands for the random walk count as much as the walk: limits are twice as wide as they need be.)
+    Values are those of the model of the estimate, and intervals those of the draws of all models
+    that the log does not rule out, by their weights (BIC). (By AIC, two processes of which the
+    slower stands for the random walk count as much as the walk: limits are twice as wide as they
+    need be.)
 
     Parameters
     ----------
@@ -179,36 +179,51 @@ def with_curve(
         As `averaging_times` gives them.
     """
     chosen = alike[0]
-    best = [_best(candidate) for candidate in alike]
+    model = models_of(estimate.model)
     drawn = [_drawn(candidate, draws) for candidate in alike]
-    if not best[0].has_bias:
+    if not any(chosen.terms.biases):
         having = [c for c in alike if as_good(c, chosen) and any(c.terms.biases)]
         every = [c for c in wider if any(c.terms.biases)] + having
         bias = _weak_bias([_drawn(c, draws) for c in every], bool(having), float(tau[-1]))
     else:
-        bias = _bias(best, drawn, float(tau[-1]))
-    return replace(estimate, curve={"B_curve": bias} | lowest_parameters(best, drawn, tau))
+        bias = _bias(model, drawn, float(tau[-1]))
+        bias = unless_at_bound(bias, estimate)
+    return replace(estimate, curve={"B_curve": bias} | lowest_parameters(model, drawn, tau))
 
 
-def _bias(best: Sequence[Models], drawn: Sequence[Models], longest: float) -> Parameter:
-    having = [i for i, models in enumerate(best) if models.has_bias]
-    values = [float(bias_of_curve(best[i], longest)[0][0]) for i in having]
-    value = _mean(values, [best[i].weight for i in having])
-    parts = [(bias_of_curve(drawn[i], longest)[0], drawn[i].weight) for i in having]
+def _bias(model: Models, drawn: Sequence[Models], longest: float) -> Parameter:
+    parts = [(bias_of_curve(each, longest)[0], each.weight) for each in drawn if each.has_bias]
+    value, at = (float(of_one[0]) for of_one in bias_of_curve(model, longest))
     lower, upper = _limits(parts, value)
-    first, at = bias_of_curve(best[having[0]], longest)
-    if first[0] == 0.0:
+    if value == 0.0:
         return Parameter(None, "absent", "the data do not ask for it", 0.0, upper)
     reason = None
-    error = math.log(upper / lower) / (2.0 * SIGMAS) if lower > 0.0 else math.inf
-    if best[having[0]].terms.gauss_markov and at[0] >= longest * (1.0 - 1e-9):
+    if model.terms.gauss_markov and at >= longest * (1.0 - 1e-9):
         reason = f"its processes still rise at {longest:.4g} s, a ninth of the log"
-    elif error > NOT_IDENTIFIED:
-        reason = "a log of this length does not tell it to 50 % (standard error)"
+    elif model.terms.gauss_markov and at < PEAK_TAU * BROADBAND_TIME:
+        reason = (
+            f"its highest point, at {at:.2g} s, is a process with a correlation time below "
+            f"{BROADBAND_TIME:g} s: broadband noise, and no bias instability"
+        )
     if reason:
         reason += "; only its interval is given"
         return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
     return Parameter(value, "ok", None, lower, upper)
+
+
+def unless_at_bound(bias: Parameter, estimate: Estimate) -> Parameter:
+    """Return the bias instability of the curve, which is not identified where a T_B is at a bound.
+
+    The amplitude of a process whose correlation time ran into the end of its search is that of the
+    search.
+    """
+    groups = [estimate.parameters, *estimate.further]
+    times = [group["T_B"] for group in groups if group.get("T_B")]
+    bounds = [time.reason for time in times if time.status == "at_bound"]
+    if bias.status != "ok" or not bounds:
+        return bias
+    reason = f"a correlation time is at the bound of its search: {bounds[0]}"
+    return replace(bias, value=None, status="not_identified", reason=reason, fitted=bias.in_model)
 
 
 def _weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parameter:
@@ -232,29 +247,25 @@ def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
     bias = Parameter(None, "absent", "no flicker noise and no Gauss-Markov process")
     if models.has_bias:
         bias = Parameter(float(bias_of_curve(models, float(tau[-1]))[0][0]))
-    return {"B_curve": bias} | lowest_parameters([models], [], tau)
+    return {"B_curve": bias} | lowest_parameters(models, [], tau)
 
 
-def lowest_parameters(
-    best: Sequence[Models], drawn: Sequence[Models], tau: Array
-) -> dict[str, Parameter]:
+def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dict[str, Parameter]:
     """Return ``sigma_min`` and ``tau_min``, at `averaging_times`.
 
-    ``best`` has one model of each set of terms, as it is fitted, the chosen one first; ``drawn``
-    has draws of them, none where the fit gives no limits.
+    ``model`` is the one that is fitted; ``drawn`` has draws of the sets of terms that the log does
+    not rule out, none where the fit gives no limits.
     """
-    points = [lowest_point(models, tau) for models in best]
-    weights = [models.weight for models in best]
-    values = [_mean([float(point[i][0]) for point in points], weights) for i in (0, 1)]
+    (sigma,), (time,), (inside,) = lowest_point(model, tau)
     drawn_points = [lowest_point(models, tau) for models in drawn]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
     if drawn:
         sizes = [models.weight for models in drawn]
         lows = list(zip([point[0] for point in drawn_points], sizes, strict=True))
         times = list(zip([point[1] for point in drawn_points], sizes, strict=True))
-        limits = [_limits(lows, values[0]), _limits(times, values[1])]
-    if not points[0][2][0]:
-        falls = points[0][1][0] > tau[0]
+        limits = [_limits(lows, float(sigma)), _limits(times, float(time))]
+    if not inside:
+        falls = time > tau[0]
         reason = (
             f"no minimum is shown: the curve of the noise {'still falls' if falls else 'rises'} "
             f"{f'at {tau[-1]:.4g} s, a ninth of the log' if falls else 'from its beginning'}"
@@ -262,11 +273,11 @@ def lowest_parameters(
         upper = limits[0][1] if falls else None
         return {
             "sigma_min": Parameter(None, "not_shown", reason, 0.0 if upper else None, upper),
-            "tau_min": Parameter(None, "not_shown", reason, values[1] if falls else None),
+            "tau_min": Parameter(None, "not_shown", reason, float(time) if falls else None),
         }
     return {
-        "sigma_min": Parameter(values[0], "ok", None, *limits[0]),
-        "tau_min": _time_of_lowest(values[1], limits[1], drawn_points, drawn),
+        "sigma_min": Parameter(float(sigma), "ok", None, *limits[0]),
+        "tau_min": _time_of_lowest(float(time), limits[1], drawn_points, drawn),
     }
 
 
@@ -284,36 +295,13 @@ def _time_of_lowest(
     if outside > 0.025 * weight:
         reason = "models that the log does not rule out have no minimum within a ninth of it"
         return Parameter(None, "not_identified", reason, limits[0], None, fitted=value)
-    lower, upper = limits
-    if lower and upper and math.log(upper / lower) > NOT_IDENTIFIED * (2.0 * SIGMAS):
-        # Such as a curve with two minima, of which either may be the lower one.
-        reason = "a log of this length does not tell it to 50 %; only its interval is given"
-        return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
-    return Parameter(value, "ok", None, lower, upper)
+    return Parameter(value, "ok", None, *limits)
 
 
 def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; those of the first lie inside."""
     lower, upper = mixture_limits(parts, [(parts[0][0], 1.0)])
     return min(lower, value), max(upper, value)
-
-
-def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
-    """Return the weighted geometric mean; the first value where it or all weight is 0."""
-    positive = [
-        (value, weight) for value, weight in zip(values, weights, strict=True) if value > 0.0
-    ]
-    total = sum(weight for _, weight in positive)
-    if values[0] == 0.0 or total == 0.0:
-        return values[0]
-    return math.exp(sum(weight * math.log(value) for value, weight in positive) / total)
-
-
-def _best(candidate: Candidate) -> Models:
-    maximum = candidate.maximum
-    return Models(
-        maximum.terms, np.sqrt(maximum.powers)[None], maximum.times[None], candidate.weight
-    )
 
 
 def _drawn(candidate: Candidate, draws: Mapping[Terms, Posterior]) -> Models:

@@ -31,7 +31,8 @@ def _dimension(quantity: str, parameter: TermParameter) -> str:
 
 DIMENSIONS: Mapping[str, Mapping[str, str]] = {
     quantity: {symbol: _dimension(quantity, parameter) for symbol, parameter in PARAMETERS.items()}
+    | {"N_sensor": f"{quantity}_density"}
     | {"B_curve": signal, "sigma_min": signal, "tau_min": "time"}
     for quantity, signal in QUANTITIES.items()
 }
-"""Dimension (`units.SI_UNITS`) of each parameter and figure of the curve, by quantity."""
+"""Dimension (`units.SI_UNITS`) of each parameter and figure beside them, by quantity."""

@@ -8,17 +8,14 @@ believed that is still needed without the lowest cosines, and whose spectrum is 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from imubench_pipeline.estimators.cutoff import Cutoff
-from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter, Status
+from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter
 from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.model_choice import Candidate
-from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 
 _WORSE = 6.0
@@ -47,22 +44,6 @@ for B and T_B to be doubted."""
 _AS_GOOD = 4.0
 """BIC up to which a model without bias instability is about as good as one with it."""
 
-_AS_FAST = 10.0
-"""Sampling intervals: a process as fast may be the sensor's filter."""
-
-_SOME_FLOOR = 0.03
-"""White noise beside a low-pass, parts of the power of that behind it, from which N is doubted."""
-
-_AT_LEAST = 0.5
-"""Part of N that the least density beyond the band must leave for N to be told."""
-
-_GROUP = 4
-_PLATEAU = 1.5
-"""Upper over lower end of a stretch beyond the band that shows white noise of its own."""
-
-_BELOW = 0.7
-"""Part of N^2 below which it is another density."""
-
 _OF_DRIFT = 5
 """Lowest cosines of a log, half a period to two and a half, that a drift is granted."""
 
@@ -81,7 +62,6 @@ _WITHOUT = (0, 4)
 def add_doubts(
     estimate: Estimate,
     papers: Estimate,
-    spectrum: Spectrum,
     frame: Frame,
     candidates: Sequence[Candidate],
     papers_candidate: Candidate,
@@ -93,16 +73,9 @@ def add_doubts(
     model, which is among them; ``drift`` says why the random walk may be a smooth drift.
     """
     chosen = candidates[0]
-    doubt = _of_white_noise(spectrum, frame, chosen)
-    if doubt is not None:
-        estimate, papers = (_with_unknown_white_noise(each, *doubt) for each in (estimate, papers))
     if frame.cut:
         estimate, papers = (
-            _with_doubt_of_the_cut(each, spectrum, frame) for each in (estimate, papers)
-        )
-    if frame.low_pass is not None:
-        estimate, papers = (
-            _with_doubt_of_the_floor(each, frame.low_pass) for each in (estimate, papers)
+            _flag_excluded_band(each, frame.band.highest) for each in (estimate, papers)
         )
     rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
     if rival is not None:
@@ -253,126 +226,17 @@ def cast_doubt(
     )
 
 
-def _of_white_noise(
-    spectrum: Spectrum, frame: Frame, chosen: Candidate
-) -> tuple[str, float, float] | None:
-    """Return why N is not told, and between which values it lies; None where it is."""
-    maximum = chosen.maximum
-    if "N" not in maximum.terms.linear or frame.low_pass is None:
-        return None
-    N = maximum.parameter("N")
-    if frame.low_pass.or_process is not None and frame.low_pass.N_behind is not None:
-        return frame.low_pass.or_process, *_range(N, frame.low_pass.N_behind)
-    fast = maximum.times < _AS_FAST / spectrum.rate
-    if fast.any() and frame.low_pass.behind is None:
-        whole = frame.whole(spectrum)
-        shapes = [whole.gauss_markov(float(time))[0] for time in maximum.times[fast]]
-        before = math.sqrt(N**2 + float(maximum.process_powers[fast] @ np.array(shapes)))
-        time = float(maximum.times[fast].max())
-        reason = (
-            f"a process of T_B = {time:.3g} s, a few samples, may be the sensor's low-pass with "
-            "white noise behind it; bandwidth in the sensor file would tell"
-        )
-        return reason, *_range(N, before)
-    level = _other_level(spectrum, frame, N)
-    if level is not None:
-        reason = (
-            f"beyond {frame.band.highest:.4g} Hz, where no model follows the spectrum, it is flat "
-            "at another level: which of the two is white noise, and which a process, is not told"
-        )
-        return reason, *_range(N, level)
-    return None
-
-
-def _with_doubt_of_the_cut(estimate: Estimate, spectrum: Spectrum, frame: Frame) -> Estimate:
-    """Return an estimate from which frequencies were left out: what is there is not known.
-
-    What is white noise in the band may be a process that falls beyond it, down to the least
-    density there: N lies between the two.
-    """
-    highest = frame.band.highest
-    reason = f"beyond {highest:.4g} Hz neither a process nor a low-pass explains the spectrum"
-    N, B = estimate.parameters["N"], estimate.parameters["B"]
-    least = _least_beyond(spectrum, frame)
-    if N.value is not None and N.lower is not None and least is not None:
-        falls = f"{reason}, and the density falls to {(least / N.value) ** 2:.2g} of that below"
-        lower = min(N.lower, least)
-        status: Status = "ok" if least > _AT_LEAST * N.value else "doubtful"
-        N = replace(N, lower=lower, status=status, reason=falls)
-    if B.status == "absent":
-        unseen = f"{reason}: a process that is faster would not be seen"
-        B = replace(B, status="not_identified", reason=unseen, lower=None, upper=None)
-    return replace(estimate, parameters={**estimate.parameters, "N": N, "B": B})
-
-
-def _with_doubt_of_the_floor(estimate: Estimate, low_pass: Cutoff) -> Estimate:
-    """Return an estimate whose N may be that of all white noise that a low-pass lets stand.
-
-    Samples interpolated between those of a sensor look like white noise behind a filter and beside
-    it, and are both of one N.
-    """
-    N, share = estimate.parameters["N"], low_pass.beside
-    if N.value is None or N.lower is None or N.upper is None or share < _SOME_FLOOR:
+def _flag_excluded_band(estimate: Estimate, highest: float) -> Estimate:
+    """Return an estimate from which frequencies, Hz, were left out: faster processes are unseen."""
+    B = estimate.parameters["B"]
+    if B.status != "absent":
         return estimate
-    times = math.sqrt(1.0 + share)
     reason = (
-        f"white noise of {100 * share:.2g} % of its power stands beside the {low_pass.words}, and "
-        f"not behind it, as in a log of interpolated samples: N may be up to {times:.3g} times this"
+        f"beyond {highest:.4g} Hz neither a process nor a low-pass explains the spectrum: a faster "
+        "process would not be seen"
     )
-    N = replace(N, upper=N.upper * times, status="doubtful", reason=reason)
-    return replace(estimate, parameters={**estimate.parameters, "N": N})
-
-
-def _least_beyond(spectrum: Spectrum, frame: Frame) -> float | None:
-    """Return the root of the least density beyond the band, over a few bins."""
-    part = spectrum.select(frame.clear & (spectrum.lower >= frame.band.highest * (1.0 - 1e-9)))
-    if len(part.density) < _GROUP:
-        return None
-    ones = np.ones(_GROUP)
-    mean = np.convolve(part.density * part.ordinates, ones, "valid") / np.convolve(
-        part.ordinates, ones, "valid"
-    )
-    return math.sqrt(float(mean.min()))
-
-
-def _range(first: float, second: float) -> tuple[float, float]:
-    return min(first, second), max(first, second)
-
-
-def _other_level(spectrum: Spectrum, frame: Frame, N: float) -> float | None:
-    """Return the density of a flat stretch beyond the band, if there is one well below N^2."""
-    beyond = frame.clear & (spectrum.lower > frame.band.highest)
-    if beyond.sum() < 4 or N == 0.0:
-        return None
-    part = spectrum.select(beyond)
-    top = part.select(part.frequency > part.frequency[-1] / _PLATEAU)
-    low = top.frequency < math.sqrt(top.frequency[0] * top.frequency[-1])
-    if not low.any() or low.all():
-        return None
-    halves = [
-        float(np.average(top.density[half], weights=top.ordinates[half])) for half in (low, ~low)
-    ]
-    level = float(np.average(top.density, weights=top.ordinates))
-    flat = abs(halves[0] / halves[1] - 1.0) < 0.1
-    return math.sqrt(level) if flat and level < _BELOW * N**2 else None
-
-
-def _with_unknown_white_noise(
-    estimate: Estimate, reason: str, lower: float, upper: float
-) -> Estimate:
-    """Return an estimate whose N is only known to lie between two values."""
-    known_N = estimate.parameters["N"]
-    ends = [end for end in (known_N.lower, known_N.upper, lower, upper) if end is not None]
-    N = Parameter(
-        None,
-        "not_identified",
-        reason,
-        min(ends),
-        max(ends),
-        known_N.duration_needed,
-        known_N.in_model,
-    )
-    return replace(estimate, parameters={**estimate.parameters, "N": N})
+    B = replace(B, status="not_identified", reason=reason, lower=None, upper=None)
+    return replace(estimate, parameters={**estimate.parameters, "B": B})
 
 
 def instead_of_walk(whittle: Whittle, chosen: Maximum) -> str | None:

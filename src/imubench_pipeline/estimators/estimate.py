@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
+
+import numpy as np
 
 from imubench_pipeline import units
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
@@ -22,11 +24,22 @@ FAMILY = ("Q", "N", "B", "T_B", "K", "R")
 CURVE = ("B_curve", "sigma_min", "tau_min")
 """Figures of the curve, which every model has: see `imubench_pipeline.estimators.curve_bias`."""
 
-SHOWN = ("Q", "N", "B_curve", "sigma_min", "tau_min", "B", "T_B", "K", "R")
+SENSOR = "N_sensor"
+"""Density of the white noise before a low-pass or an interpolation that the spectrum shows, and
+before folding. N is that of the log; this one stands beside it and never in its place."""
+
+SHOWN = ("Q", "N", SENSOR, "B_curve", "sigma_min", "tau_min", "B", "T_B", "K", "R")
 """The order in which parameters are shown."""
 
 COMPARED = ("N", "B_curve", "sigma_min", "K")
 """What is the same quantity of all models, and compared between sensors."""
+
+MAX_LIMIT_RATIO = 4.0
+"""Upper over lower 95 % limit of a value, beyond which only its interval is given."""
+
+BROADBAND_TIME = 1.0
+"""Correlation time below which a Gauss-Markov process is broadband noise, no bias instability, s.
+"""
 
 SIGMAS = 1.96
 """Standard errors on either side of a value in a 95 % interval."""
@@ -57,9 +70,7 @@ class Parameter:
     duration_needed : float or None
         Length of a log that would tell the value to 10 %, s.
     fitted : float or None
-        What the model of the log has, where that is not the value: where there is none to quote,
-        for N before a low-pass, whose folds are in the log, and for K, whose value is the median
-        over all models that the log does not rule out.
+        What the model of the log has where no value is given; a value is what the model has.
     """
 
     value: float | None
@@ -74,6 +85,23 @@ class Parameter:
     def in_model(self) -> float | None:
         """What the model of the log takes."""
         return self.value if self.fitted is None else self.fitted
+
+    def checked(self) -> Parameter:
+        """Return the parameter, ``not_identified`` where its interval is too wide to be ``ok``."""
+        if self.status != "ok" or self.lower is None or self.upper is None:
+            return self
+        near, far = sorted((abs(self.lower), abs(self.upper)))
+        signs = np.sign(self.lower) * np.sign(self.upper)
+        if signs > 0 and far <= MAX_LIMIT_RATIO * near:
+            return self
+        if signs > 0:
+            where = f"the 95 % limits are {far / near:.2g} times apart"
+        else:
+            where = "the 95 % interval contains 0" if signs < 0 else "the lower 95 % limit is 0"
+        reason = f"{where}; only the interval is given"
+        return replace(
+            self, value=None, status="not_identified", reason=reason, fitted=self.in_model
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,11 +142,15 @@ class JointDraws:
 class Estimate:
     """The parameters of one channel by one method.
 
+    A value is ``ok`` only where its interval is narrow enough (`Parameter.checked`): whatever makes
+    or changes an estimate, this holds.
+
     Attributes
     ----------
     method : str
     parameters : mapping of str to Parameter
-        Q, N, B, T_B, K, R as far as the method knows them.
+        Q, N, B, T_B, K, R as far as the method knows them, and N_sensor where a low-pass or an
+        interpolation shows.
     further : sequence of mapping
         Components beyond the first: B and T_B of a second Gauss-Markov process.
     lines : sequence of mapping
@@ -136,6 +168,13 @@ class Estimate:
     lines: Sequence[Mapping[str, Parameter]] = ()
     curve: Mapping[str, Parameter] = field(default_factory=dict)
     draws: JointDraws | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        # The class is frozen: what is checked of other fields goes this way.
+        for name in ("parameters", "curve"):
+            object.__setattr__(self, name, _checked(getattr(self, name)))
+        for name in ("further", "lines"):
+            object.__setattr__(self, name, [_checked(group) for group in getattr(self, name)])
 
     def components(self) -> Iterator[tuple[int, str, Parameter]]:
         """Yield component number, name and parameter, the first component first."""
@@ -166,6 +205,10 @@ class Estimate:
             further=[GaussMarkov(B, T_B) for B, T_B in pairs if B and T_B],
             sinusoids=[Sinusoid(A, f) for A, f in waves if A and f],
         )
+
+
+def _checked(group: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    return {name: parameter.checked() for name, parameter in group.items()}
 
 
 def not_shown(method: str, reason: str) -> Estimate:

@@ -12,18 +12,6 @@ from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-NOT_IDENTIFIED = 0.3
-"""Relative standard deviation beyond which a B is not given as a number."""
-
-NOT_IDENTIFIED_TIME = 0.3
-"""That of T_B: one of six values with a greater one is more than twice off."""
-
-NOT_IDENTIFIED_WALK = 0.35
-"""That of K: beyond it more than one value of a hundred is more than twice off."""
-
-NOT_IDENTIFIED_LEVEL = 0.9
-"""That of the other parameters: their bound at the fitted value scatters with the value."""
-
 WANTED = 0.1
 """Relative standard deviation that `durations_needed` asks for."""
 

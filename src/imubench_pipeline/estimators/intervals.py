@@ -8,17 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.estimate import FAMILY, SIGMAS, Estimate, Parameter
-from imubench_pipeline.estimators.identifiability import (
-    NOT_IDENTIFIED,
-    NOT_IDENTIFIED_LEVEL,
-    NOT_IDENTIFIED_TIME,
-    NOT_IDENTIFIED_WALK,
-    durations_needed,
-    parameter_names,
-    relative_errors,
-)
+from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
+from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.identifiability import durations_needed, parameter_names
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
@@ -26,13 +18,6 @@ from imubench_pipeline.typing import Array
 
 _AT_BOUND = 0.985
 _ABOUT_AS_GOOD = 2.0
-_MOST_ABOVE = 2.3
-"""Ratio of the upper limit to a value beyond which it is no number to quote. Below, limits go far
-where a model that the log hardly rules out shares the power with another term."""
-
-_LEAST_BELOW = 0.2
-"""Ratio of the lower limit to a value below which it is none either. A random walk is doubted by
-what else explains it."""
 
 _ABSENT = "the data do not ask for it"
 _ABSENT_BELOW = f"{_ABSENT}; with 95 % it is below the upper limit"
@@ -110,34 +95,32 @@ def describe(
     chosen: Candidate,
     alike: Sequence[Candidate],
     draws: dict[Terms, Posterior],
-    band: Band,
+    frame: Frame,
 ) -> Estimate:
     """Describe a fit: values with intervals, what is not identified, and what is absent.
 
     Of all the family's parameters. The intervals go over the models ``alike``, ``chosen`` among
     them, by their shares. K is the median over them: they share the power of the lowest frequencies
     in different ways, and it is a fifth nearer to the truth than that of one of them where it is
-    known badly. The model that stands beside it has its own.
+    known badly.
     """
     maximum = chosen.maximum
     names = parameter_names(maximum.terms)
     values = [*np.sqrt(maximum.powers), *maximum.times] + [maximum.ramp] * maximum.terms.ramp
-    errors = relative_errors(whittle, maximum)
+    if "N" in names:
+        values[names.index("N")] *= math.sqrt(frame.folding)
     needed = durations_needed(
-        maximum, whittle.spectrum.rate, float(whittle.spectrum.duration), band.highest
+        maximum, whittle.spectrum.rate, float(whittle.spectrum.duration), frame.band.highest
     )
     described: dict[str, Parameter] = {}
     for i, (name, value) in enumerate(zip(names, values, strict=True)):
         lower, upper = _interval(name, chosen, alike, draws)
-        error = float(errors[i])
-        if name == "K" and value > 0.0:
-            error = max(error, _spread(_draws_of(name, maximum.terms, draws)))
-        described[name] = _parameter(name, float(value), error, lower, upper, needed[i], whittle)
-    if "K" in described and described["K"].status == "ok":
+        described[name] = _parameter(name, float(value), lower, upper, needed[i], whittle)
+    if "K" in described and described["K"].checked().status == "ok":
         weighted_draws = _over_models("K", chosen, alike, draws)
         if len(weighted_draws) > 1:
-            own, middle = described["K"], mixture_quantile(weighted_draws, 0.5)
-            described["K"] = replace(own, value=middle, fitted=own.value)
+            median = mixture_quantile(weighted_draws, 0.5)
+            described["K"] = replace(described["K"], value=median)
     for number in ("", " 2"):
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
             described[f"T_B{number}"] = replace(
@@ -158,7 +141,6 @@ def describe(
 def _parameter(
     name: str,
     value: float,
-    error: float,
     lower: float,
     upper: float,
     needed: float | None,
@@ -174,24 +156,6 @@ def _parameter(
             if near:
                 reason = f"the {end} correlation time that the log can show is {bound:.4g} s"
                 return Parameter(value, "at_bound", reason, lower, upper, needed)
-    most = NOT_IDENTIFIED_WALK if name == "K" else NOT_IDENTIFIED_LEVEL
-    if name.startswith(("B", "T_B")) and lower > 0.0:
-        # B and T_B trade off along a ridge that the bound, which is local, does not see.
-        error = max(error, math.log(upper / lower) / (2.0 * SIGMAS))
-        most = NOT_IDENTIFIED_TIME if name.startswith("T_B") else NOT_IDENTIFIED
-    if name == "R" and lower < 0.0 < upper:
-        reason = "its interval contains 0; only that is given"
-        return Parameter(None, "not_identified", reason, lower, upper, needed, value)
-    if error > most:
-        reason = (
-            f"a log of this length tells it to {100 * error:.0f} % (standard error); only "
-            "its interval is given"
-        )
-        return Parameter(None, "not_identified", reason, lower, upper, needed, value)
-    below = name not in ("R", "K") and lower < _LEAST_BELOW * value
-    if below or (name != "R" and upper > _MOST_ABOVE * value):
-        reason = "it may be more than twice off; only its interval is given"
-        return Parameter(None, "not_identified", reason, lower, upper, needed, value)
     return Parameter(value, "ok", None, lower, upper, needed)
 
 
@@ -217,12 +181,6 @@ def _over_models(
         for candidate in alike
         if candidate.terms == terms or _comparable(name, terms, candidate.terms)
     ]
-
-
-def _spread(draws: Array) -> float:
-    """Return the standard deviation of the logarithm that the middle of draws stands for."""
-    low, high = np.quantile(draws, (0.16, 0.84))
-    return 0.5 * math.log(high / low) if low > 0.0 else math.inf
 
 
 def mixture_quantile(parts: Sequence[tuple[Array, float]], level: float) -> float:

@@ -6,7 +6,7 @@ It is as sure as the Cramér-Rao bound allows, to a few per cent, and says how s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,15 @@ from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.doubts import add_doubts, instead_of_walk
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
-from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Estimate, JointDraws, Parameter
+from imubench_pipeline.estimators.estimate import (
+    BROADBAND_TIME,
+    CURVE,
+    FAMILY,
+    SENSOR,
+    Estimate,
+    JointDraws,
+    Parameter,
+)
 from imubench_pipeline.estimators.frame import FEWEST_BINS, Frame, frame_of
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
 from imubench_pipeline.estimators.joint_cutoff import worth_joining
@@ -33,7 +41,16 @@ from imubench_pipeline.estimators.missing import (
 )
 from imubench_pipeline.estimators.model_choice import LEAST_SHARE, PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
+from imubench_pipeline.estimators.sensor_density import sensor_density
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
+from imubench_pipeline.estimators.white_level import (
+    WhiteStretch,
+    count_fast_processes,
+    describe_white_level,
+    find_white_stretch,
+    merged_maximum,
+    merged_posterior,
+)
 from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -67,6 +84,8 @@ class Likelihood:
         Density of the chosen model in each bin, its ramp included; NaN where there is none.
     frame : Frame
         What was fitted, and behind what.
+    stretch : WhiteStretch or None
+        Where the Allan deviation of the log has the slope -1/2.
     """
 
     estimates: tuple[Estimate, Estimate]
@@ -78,6 +97,7 @@ class Likelihood:
     used: NDArray[np.bool_]
     fitted: Array
     frame: Frame
+    stretch: WhiteStretch | None = None
 
     @property
     def low_pass(self) -> Cutoff | None:
@@ -126,12 +146,17 @@ def fit(
     1953.
     """
     values = np.asarray(samples, dtype=np.float64)
+    if len(values) < 16:
+        raise ValueError(f"the log has {len(values)} samples, expected 16 or more")
+    holes = not bool(np.isfinite(values).all())
+    curve = of_blocks([values], len(values), rate, holes=holes, segments=segments)
     return fit_blocks(
         lambda: [values],
         len(values),
         rate,
         segments=segments,
-        holes=not bool(np.isfinite(values).all()),
+        holes=holes,
+        stretch=find_white_stretch(curve),
         band=band,
         bandwidth=bandwidth,
         resolution=resolution,
@@ -145,6 +170,7 @@ def fit_blocks(
     rate: float,
     *,
     holes: bool,
+    stretch: WhiteStretch | None,
     segments: Sequence[Span] | None = None,
     band: float | None = None,
     bandwidth: float | None = None,
@@ -167,12 +193,14 @@ def fit_blocks(
         As in `fit`.
     holes : bool
         Samples may be missing.
+    stretch : WhiteStretch or None
+        Where the Allan deviation of the log has the slope -1/2: which white noise is N.
     """
     spans = spans_of(segments, samples)
     if not holes:
         spectrum, lines = spectra(blocks(), samples, rate, spans)
         frame = frame_of(spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution)
-        return fit_spectrum(spectrum, frame, rng=rng)
+        return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
     means = block_means(blocks(), spans)
     parts = divide_at_holes(means, spans)
     if not parts:
@@ -190,7 +218,7 @@ def fit_blocks(
             break
         if number < rounds:
             model = model_of(compare(frame.whittle(spectrum), quantization=False)[0].maximum)
-    return fit_spectrum(spectrum, frame, rng=rng)
+    return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
 
 
 def _rounds(missing: float) -> int:
@@ -211,8 +239,17 @@ def _first_model(
         return NoiseModel(N=float(np.std(present)) / math.sqrt(rate))
 
 
-def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) -> Likelihood:
-    """Estimate the noise parameters from what a frame has of a spectrum (see `fit`)."""
+def fit_spectrum(
+    spectrum: Spectrum,
+    frame: Frame,
+    *,
+    rng: np.random.Generator,
+    stretch: WhiteStretch | None,
+) -> Likelihood:
+    """Estimate the noise parameters from what a frame has of a spectrum (see `fit`).
+
+    ``stretch``: where the Allan deviation of the log has the slope -1/2.
+    """
     if frame.used.sum() < FEWEST_BINS:
         return _too_short(spectrum, frame)
     frame, whittle, candidates = fit_models(spectrum, frame)
@@ -221,41 +258,28 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     alike = [chosen] + [c for c in candidates[1:] if c.share >= LEAST_SHARE and not c.terms.ramp]
     wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms)]
     papers = next(c for c in candidates if c.terms == PAPERS)
-    # As the log shows them, and with N before the sensor's low-pass.
-    shown: dict[Terms, Posterior] = {}
-    draws: dict[Terms, Posterior] = {}
+    posteriors: dict[Terms, Posterior] = {}
     for candidate in (c for c in candidates if c in alike or c in wider or c is papers):
-        terms = candidate.terms
         part = 1.0 if candidate in (papers, chosen) else candidate.share
         number = max(_FEWEST_DRAWS, round(part * DRAWS))
-        shown[terms] = sample(whittle, candidate.maximum, rng, number)
-        draws[terms] = frame.before_the_filter(shown[terms], terms, rng)
-    estimate = describe("likelihood", whittle, chosen, alike, draws, frame.band)
-    estimate = with_upper_limits(estimate, alike, wider, draws)
-    tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
-    estimate = with_curve(estimate, alike, wider, draws, tau)
-    gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, frame.band)
-    gauss_markov = with_curve(gauss_markov, [papers], (), draws, tau)
+        posteriors[candidate.terms] = sample(whittle, candidate.maximum, rng, number)
+    of_data = _InTheLog(whittle, frame, posteriors, stretch, alike, wider)
+    estimate = of_data.estimate("likelihood")
+    sensor = sensor_density(frame, chosen.maximum, posteriors[chosen.terms], spectrum, rng)
+    if sensor is not None:
+        estimate = replace(estimate, parameters={**estimate.parameters, SENSOR: sensor})
+    of_papers = _InTheLog(whittle, frame, posteriors, stretch, [papers], [])
+    gauss_markov = of_papers.estimate("likelihood_gm")
     fitted = frame.whole(spectrum).density(chosen.maximum) + chosen.maximum.ramp**2 * spectrum.ramp
     drift = instead_of_walk(whittle, chosen.maximum)
-    estimate, gauss_markov = add_doubts(
-        estimate, gauss_markov, spectrum, frame, candidates, papers, drift
-    )
-    estimate, gauss_markov = (_with_folds(each, frame) for each in (estimate, gauss_markov))
+    estimate, gauss_markov = add_doubts(estimate, gauss_markov, frame, candidates, papers, drift)
     sinusoids = carried_sinusoids(frame.lines)
-    bins = len(whittle.spectrum.density)
-
-    def drawn(parts: Sequence[tuple[Candidate, float]]) -> JointDraws:
-        posteriors = [(c.terms, frame.in_the_log(shown[c.terms], c.terms), s) for c, s in parts]
-        return joint_draws(posteriors, whittle.longest)
-
-    of_all = drawn([(candidate, drawn_share(candidate, bins)) for candidate in alike])
-    estimate = replace(estimate, lines=sinusoids, draws=of_all)
+    estimate = replace(estimate, lines=sinusoids, draws=of_data.joint_draws())
     gauss_markov = replace(
         gauss_markov,
         parameters=papers_only(gauss_markov.parameters),
         lines=sinusoids,
-        draws=drawn([(papers, 1.0)]),
+        draws=of_papers.joint_draws(),
     )
     return Likelihood(
         (estimate, gauss_markov),
@@ -267,7 +291,72 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
         frame.used,
         fitted,
         frame,
+        stretch,
     )
+
+
+class _InTheLog:
+    """Models that the log does not rule out, with N as its Allan deviation shows it.
+
+    That is N below any low-pass, fast processes that count into it included.
+
+    Parameters
+    ----------
+    posteriors : mapping of Terms to Posterior
+        Draws of each model, as it is fitted.
+    stretch : WhiteStretch or None
+    alike, wider : sequence of Candidate
+        As of `imubench_pipeline.estimators.intervals.with_upper_limits`.
+    """
+
+    def __init__(
+        self,
+        whittle: Whittle,
+        frame: Frame,
+        posteriors: Mapping[Terms, Posterior],
+        stretch: WhiteStretch | None,
+        alike: Sequence[Candidate],
+        wider: Sequence[Candidate],
+    ) -> None:
+        self._whittle, self._frame, self._stretch = whittle, frame, stretch
+        self._fastest = alike[0].maximum.times
+        self._number = count_fast_processes(alike[0].maximum, frame.folding, stretch)
+        self.draws: dict[Terms, Posterior] = {}
+        self._posteriors = posteriors
+        self.alike = list(self._merged(alike))
+        self.wider = list(self._merged(wider))
+
+    def _merged(self, candidates: Sequence[Candidate]) -> Iterator[Candidate]:
+        """Yield models without the processes that count into N, each once; their draws are kept."""
+        merged: set[Terms] = set()
+        for candidate in candidates:
+            terms, times = candidate.terms, candidate.maximum.times
+            number = min(self._number, int(np.sum(times < BROADBAND_TIME)))
+            maximum = merged_maximum(candidate.maximum, number, self._frame.folding)
+            if maximum.terms in merged:
+                continue
+            merged.add(maximum.terms)
+            if maximum.terms not in self.draws:
+                in_the_log = self._frame.in_the_log(self._posteriors[terms], terms)
+                self.draws[maximum.terms] = merged_posterior(in_the_log, terms, number)
+            yield replace(candidate, maximum=maximum)
+
+    def estimate(self, method: str) -> Estimate:
+        """Return the parameters, the figures of the curve, and their intervals."""
+        chosen, spectrum = self.alike[0], self._whittle.spectrum
+        estimate = describe(method, self._whittle, chosen, self.alike, self.draws, self._frame)
+        estimate = with_upper_limits(estimate, self.alike, self.wider, self.draws)
+        tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
+        estimate = with_curve(estimate, self.alike, self.wider, self.draws, tau)
+        N, counted = estimate.parameters["N"], self._fastest[: self._number]
+        reason = N.reason or describe_white_level(self._stretch, counted.tolist())
+        return replace(estimate, parameters={**estimate.parameters, "N": replace(N, reason=reason)})
+
+    def joint_draws(self) -> JointDraws:
+        """Return draws over all models that the log does not rule out."""
+        bins = len(self._whittle.spectrum.density)
+        parts = [(c.terms, self.draws[c.terms], drawn_share(c, bins)) for c in self.alike]
+        return joint_draws(parts, self._whittle.longest)
 
 
 def _too_short(spectrum: Spectrum, frame: Frame) -> Likelihood:
@@ -294,15 +383,6 @@ def _too_short(spectrum: Spectrum, frame: Frame) -> Likelihood:
         np.full(len(frame.used), np.nan),
         frame,
     )
-
-
-def _with_folds(estimate: Estimate, frame: Frame) -> Estimate:
-    """Return an estimate whose model has the white noise that the log shows."""
-    N = estimate.parameters["N"]
-    if frame.folding == 1.0 or N.in_model is None:
-        return estimate
-    N = replace(N, fitted=N.in_model * math.sqrt(frame.folding))
-    return replace(estimate, parameters={**estimate.parameters, "N": N})
 
 
 def fit_models(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[Candidate]]:

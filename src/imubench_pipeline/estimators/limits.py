@@ -24,7 +24,7 @@ from imubench_pipeline.estimators.curve_bias import (
     lowest_point,
     models_of,
 )
-from imubench_pipeline.estimators.estimate import SIGMAS, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import BROADBAND_TIME, SIGMAS, Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
@@ -224,10 +224,14 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
             parameters[name] = replace(
                 parameters[name], lower=parameter.value * low, upper=parameter.value * high
             )
+    bias = parameters["B"]
+    if bias.status == "ok" and model.T_B is not None and model.T_B < BROADBAND_TIME:
+        reason = f"a process with a correlation time of {model.T_B:.2g} s is no bias instability"
+        bias = replace(bias, value=None, status="not_identified", reason=reason, fitted=model.B)
     return Estimate(
         estimate.method,
         parameters,
-        curve={"B_curve": parameters["B"]} | _lowest_point(model, errors, curve),
+        curve={"B_curve": bias} | _lowest_point(model, errors, curve),
     )
 
 
@@ -236,7 +240,7 @@ def _lowest_point(model: NoiseModel, errors: Errors, curve: AllanCurve) -> dict[
     tau = averaging_times(curve.rate, curve.samples / curve.rate)
     best = models_of(model)
     at = [getattr(model, name) for name in errors.names]
-    lowest = lowest_parameters([best], [], tau)
+    lowest = lowest_parameters(best, [], tau)
     finite = bool(np.isfinite(errors.covariance).all())
     if not finite or any(parameter.value is None for parameter in lowest.values()):
         return lowest

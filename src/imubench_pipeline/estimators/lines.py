@@ -16,9 +16,9 @@ which keeps the variance of the signal, and of its integral.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -355,13 +355,13 @@ def strongest(amplitudes: Sequence[float]) -> list[int]:
     return sorted(order[:number])
 
 
-def joined_finding(channel: str, quantity: str, sinusoids: Sequence[Mapping[str, Any]]) -> Finding:
+def joined_finding(channel: str, quantity: str, sinusoids: Sequence[Line]) -> Finding:
     """Return the warning about a channel with more sinusoids than a model carries on.
 
-    The quantity is gyro or accel; the sinusoids, more than `MOST`, have ``amplitude``, SI.
+    The quantity is gyro or accel; there are more sinusoids than `MOST`.
     """
-    single = set(strongest([sinusoid["amplitude"] for sinusoid in sinusoids]))
-    powers = [0.5 * sinusoid["amplitude"] ** 2 for sinusoid in sinusoids]
+    single = set(strongest([sinusoid.amplitude for sinusoid in sinusoids]))
+    powers = [0.5 * sinusoid.amplitude**2 for sinusoid in sinusoids]
     rest = math.fsum(power for place, power in enumerate(powers) if place not in single)
     share = rest / math.fsum(powers)
     number = len(sinusoids) - len(single)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from scipy.special import chdtr
 
-from imubench_pipeline.estimators.lines import MOST, joined_finding
+from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.lines import MOST, Line, joined_finding
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import Finding
@@ -37,40 +37,52 @@ _APART = 1.4
 """Ratio of the ordinates in one sum and in the next that is looked at."""
 
 
-def line_findings(
-    lines: Iterable[Mapping[str, Any]], white: Mapping[str, float] | None = None
-) -> list[Finding]:
-    """Return a note for each channel with lines, from rows of the table ``lines``.
+def spectral_findings(channel: str, frame: Frame, white: float | None) -> list[Finding]:
+    """Return what the spectrum of a channel shows: lines, and where its band ends.
 
-    There is a warning where they are too many for a noise model to carry each on, and where one is
-    so strong beside N of its channel that it is a good part of an error budget: a sensor seldom
-    makes such a line itself.
+    Parameters
+    ----------
+    channel : str
+    frame : Frame
+        What of the spectrum was fitted.
+    white : float or None
+        N that the estimate of the channel has, SI; None: it has none.
     """
-    by_channel: dict[str, list[Mapping[str, Any]]] = {}
-    for line in lines:
-        if line["kind"] != "alias":
-            by_channel.setdefault(line["channel"], []).append(line)
-    findings = []
-    for channel, group in by_channel.items():
-        strongest = max(group, key=lambda line: line["ratio"])
-        sinusoids = [line for line in group if line["kind"] == "sinusoid"]
-        number = len(sinusoids)
-        detail = (
-            f"{channel} has {number} sinusoids and {len(group) - number} bands of noise, the "
-            f"strongest at {strongest['frequency']:.5g} Hz, {strongest['ratio']:.3g} times the "
-            "noise there; they are left out of the likelihood"
-        )
-        findings.append(Finding("lines", "note", detail, strongest["frequency"], channel))
-        strong = _strong(channel, sinusoids, (white or {}).get(channel))
-        findings += [strong] if strong else []
-        if number > MOST:
-            findings.append(joined_finding(channel, quantity_of(channel), sinusoids))
+    band = frame.band
+    findings = line_findings(channel, frame.lines, white)
+    if band.source.startswith(("found: beyond", "default")):
+        detail = f"{channel}: {band.source}"
+        findings.append(Finding("band_limit", "note", detail, band.highest, channel))
     return findings
 
 
-def _strong(
-    channel: str, sinusoids: Iterable[Mapping[str, Any]], white: float | None
-) -> Finding | None:
+def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> list[Finding]:
+    """Return a note on a channel with lines.
+
+    There is a warning where they are too many for a noise model to carry each on, and where one is
+    so strong beside N that it is a good part of an error budget: a sensor seldom makes such a line
+    itself.
+    """
+    group = [line for line in lines if line.kind != "alias"]
+    if not group:
+        return []
+    strongest = max(group, key=lambda line: line.ratio)
+    sinusoids = [line for line in group if line.kind == "sinusoid"]
+    number = len(sinusoids)
+    detail = (
+        f"{channel} has {number} sinusoids and {len(group) - number} bands of noise, the "
+        f"strongest at {strongest.frequency:.5g} Hz, {strongest.ratio:.3g} times the "
+        "noise there; they are left out of the likelihood"
+    )
+    findings = [Finding("lines", "note", detail, strongest.frequency, channel)]
+    strong = _strong(channel, sinusoids, white)
+    findings += [strong] if strong else []
+    if number > MOST:
+        findings.append(joined_finding(channel, quantity_of(channel), sinusoids))
+    return findings
+
+
+def _strong(channel: str, sinusoids: Iterable[Line], white: float | None) -> Finding | None:
     """Return a warning of the sinusoid that integrates to most in a second.
 
     Its integral A / (2 pi f) differs by A sin(pi f t) / (pi f sqrt(2)) rms after t; the sine is
@@ -79,29 +91,19 @@ def _strong(
     if not white:
         return None
     parts = {
-        line["amplitude"] / (math.sqrt(2.0) * max(1.0, math.pi * line["frequency"])) / white: line
+        line.amplitude / (math.sqrt(2.0) * max(1.0, math.pi * line.frequency)) / white: line
         for line in sinusoids
     }
     most = max(parts, default=0.0)
     if most < _STRONG:
         return None
-    frequency = parts[most]["frequency"]
+    frequency = parts[most].frequency
     detail = (
         f"a sinusoid of {channel} at {frequency:.5g} Hz integrates to {most:.3g} times what its "
         "white noise does in a second, and is in the error budgets: if it is a vibration of the "
         "place, and not of the sensor, record elsewhere, or on softer ground"
     )
     return Finding("strong_line", "warning", detail, most, channel)
-
-
-def band_finding(channel: str, highest: float, source: str) -> list[Finding]:
-    """Return a note where the band of a channel ends before Nyquist by what its spectrum shows.
-
-    ``highest`` is in Hz, ``source`` that of `imubench_pipeline.estimators.band.Band`.
-    """
-    if not source.startswith(("found: beyond", "default")):
-        return []
-    return [Finding("band_limit", "note", f"{channel}: {source}", highest, channel)]
 
 
 def slow_noise_missing(

@@ -17,12 +17,14 @@ from imubench_pipeline.library.given import Channels, Units, columns_of, rate_of
 from imubench_pipeline.library.logs import Log, log_of
 from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.recordings.fitness import Doubt, doubts
 from imubench_pipeline.report.practical import System, interval_text, page_unit, symbol_text
 from imubench_pipeline.settings.config import AllanSettings, EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.steps.sensor_tables import findings_of
+from imubench_pipeline.tables.findings import Finding, finding_of
 from imubench_pipeline.tables.keys import Key
 
 if TYPE_CHECKING:
@@ -97,7 +99,9 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
         What they are of: files and arrays alike are judged before.
     method : str
     findings : tuple of Finding
-        What was found of the log, and by the estimation.
+        What was found of the log, and by the estimation: as in a run of the log alone.
+    doubts : tuple of Doubt
+        Why values may be wrong, likewise.
     left_out : dict of str to str
         Channels without an estimate, and why.
     """
@@ -108,11 +112,13 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
         log: Log,
         method: str,
         findings: Sequence[Finding],
+        doubts: Sequence[Doubt],
         left_out: Mapping[str, str],
     ) -> None:
         self._estimates = {estimate.channel: estimate for estimate in estimates}
         self.log, self.method = log, method
-        self.findings, self.left_out = tuple(findings), dict(left_out)
+        self.findings, self.doubts = tuple(findings), tuple(doubts)
+        self.left_out = dict(left_out)
 
     def __getitem__(self, channel: str) -> ChannelEstimate:
         return self._estimates[channel]
@@ -204,9 +210,9 @@ def estimate(
     Parameters
     ----------
     data : Log, array_like, DataFrame, or mapping of str to array_like
-        As `imubench_pipeline.allan_variance` takes it, but of an array of shape (L,) the channel
-        must be named. Arrays are judged as files are: knocks are left out, and findings say what
-        is wrong.
+        As `imubench_pipeline.allan_variance` takes it; an array of shape (L,) is gyro_x unless
+        ``channels`` says otherwise. Arrays are judged as files are: knocks are left out, and
+        findings say what is wrong.
     rate : float or str, optional
         Sampling rate, Hz, or with its unit: ``"100 Hz"``. A log has its own.
     method : str
@@ -253,7 +259,7 @@ def estimate(
         log = data
     else:
         log = log_of(columns_of(data, channels, units), rate_of(rate, data), name)
-    chosen = log.chosen(channels)
+    chosen = log.chosen(channels if log is data else None)
     if method == "compensated" and not any(kept.temperature for kept in chosen.values()):
         raise ValueError(f"{log.name} has no readings of the temperature; expected another method")
     # What other methods find wrong of a curve is doubted by the likelihood: it is always asked.
@@ -277,11 +283,16 @@ def estimate(
         raise ValueError(
             f"{log.name}: no channel is estimated by {method}: {'; '.join(left_out.values())}"
         )
-    names = [each.name for each in fields(Finding)]
-    rows = [{name: row[name] for name in names} for row in into.estimate_findings]
-    return Estimates(
-        estimates, log, method, [*log.findings, *(Finding(**row) for row in rows)], left_out
+    recommended = [row for row in into.parameters if row["recommended"]]
+    rows = findings_of(
+        [log.quality],
+        into.deterministic,
+        into.estimate_findings,
+        recommended,
+        {} if log.declared is None else {log.sensor: log.declared},
     )
+    doubted = list(doubts(rows, recommended, into.models))
+    return Estimates(estimates, log, method, list(map(finding_of, rows)), doubted, left_out)
 
 
 def _why_not(into: Estimation, channel: str) -> str:

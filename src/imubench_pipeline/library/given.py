@@ -93,8 +93,9 @@ def columns_of(
     data : array_like, DataFrame or mapping of str to array_like
         Shape (L,), (L, 3) or (L, 6), rows are samples; or a column a channel.
     channels : str or sequence of str, optional
-        What the columns of an array are; ``"gyro"`` and ``"accel"`` are three axes. By default six
-        are gyro_x to accel_z. Of a table or mapping, those to take.
+        What the columns of an array are; ``"gyro"`` and ``"accel"`` are three axes, and the x axis
+        of shape (L,). By default six are gyro_x to accel_z, and shape (L,) is gyro_x. Of a table or
+        mapping, those to take.
     units : mapping of str to str, optional
         By ``gyro``, ``accel``, or channel. By default SI, but that of a table must be stated.
 
@@ -191,6 +192,8 @@ def _positions(data: object, names: list[str] | None, units: Units) -> Iterator[
     count = table.shape[1]
     if names is None and count == len(CHANNELS):
         names = list(CHANNELS)
+    if array.ndim == 1 and (names is None or names in _AXES.values()):
+        names = [names[0] if names else CHANNELS[0]]
     if names is None or len(names) != count:
         turned = table.shape[0] in (3, 6) and count > len(CHANNELS)
         if turned:

@@ -7,7 +7,6 @@ import shutil
 import tempfile
 import weakref
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
@@ -39,7 +38,7 @@ from imubench_pipeline.settings.sensor import (
 )
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import RecordingError, finding_of
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS, in_si, quantity_to_si
 
@@ -68,6 +67,10 @@ class Log(Shown):
         span.
     bandwidth : float or None
         Stated cut-off of the sensor's own low-pass, Hz.
+    quality : Quality
+        What the ingest found.
+    declared : Sensor or None
+        The sensor file that the log was read by; None: it was drafted.
     """
 
     def __init__(
@@ -76,14 +79,14 @@ class Log(Shown):
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         self._logs = channel_logs(folder)
         self._about = quality.recording
+        self.quality, self.declared = quality, sensor
         self.sensor = str(self._about["sensor"])
         self.recording = str(self._about["recording"])
         self.bandwidth = bandwidth
         self.channels = tuple(self._logs)
         self._at_rest = was_at_rest(folder)
         rows = [*quality.findings, *implausible_of(quality, sensor)]
-        names = [field.name for field in fields(Finding)]
-        self.findings = tuple(Finding(**{name: row[name] for name in names}) for row in rows)
+        self.findings = tuple(map(finding_of, rows))
 
     @property
     def name(self) -> str:

@@ -72,7 +72,7 @@ def growth_rows(
 
     @cache
     def models(channel: str) -> Sequence[NoiseModel]:
-        stream = channel_rng(seed, *names.values(), channel, "budget")
+        stream = channel_rng(seed, repr(estimates[channel].model), channel, "budget")
         return draw_models(estimates[channel], draws, stream)
 
     @cache

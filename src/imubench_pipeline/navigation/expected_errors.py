@@ -197,7 +197,7 @@ def error_rows(
     axes = axes_of(estimates, figures)
 
     def drawn_of(channel: str) -> list[AxisErrors]:
-        stream = partial(channel_rng, seed, *names.values(), channel)
+        stream = partial(channel_rng, seed, repr(estimates[channel].model), channel)
         models = draw_models(estimates[channel], draws, stream("budget"))
         of_use = _drawn(axes[channel].figures, draws, stream("temperature of the budget"))
         return [AxisErrors(*pair) for pair in zip(models, of_use, strict=True)]

@@ -148,7 +148,7 @@ def ratio_of_deviations(
 
 
 def _drawn(channel: FusionChannel, draws: int, seed: int) -> list[NoiseModel]:
-    stream = channel_rng(seed, channel.sensor, channel.recording, channel.channel, "ratio")
+    stream = channel_rng(seed, repr(channel.model), channel.channel, "ratio")
     return channel.drawn(draws, stream)
 
 

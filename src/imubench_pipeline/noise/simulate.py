@@ -34,7 +34,11 @@ _BLOCKS_IN_CLUSTER = 16
 
 
 def channel_rng(seed: int, *names: str) -> np.random.Generator:
-    """Return the random stream of a channel: it depends on the seed and the names only."""
+    """Return the random stream of a channel: it depends on the seed and the texts only.
+
+    Of a simulated log these are its names; of what is computed from a log, texts that its samples
+    decide (such as ``repr`` of a model), so that copies of a log have the same limits.
+    """
     digest = hashlib.sha256("/".join(names).encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
     return np.random.default_rng([seed, *words])

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -184,12 +185,17 @@ class ChannelLog:
 
     def mean(self) -> float:
         """Return the mean of the samples present, SI."""
-        total, number = 0.0, 0
-        for values in self.blocks():
-            present = values[np.isfinite(values)]
-            total += float(present.sum(dtype=np.float64))
-            number += len(present)
-        return total / number
+        return mean_of(self.blocks())
+
+
+def mean_of(blocks: Iterable[Array]) -> float:
+    """Return the mean of the samples present in consecutive blocks; NaN of none."""
+    total, number = 0.0, 0
+    for values in blocks:
+        present = values[np.isfinite(values)]
+        total += float(present.sum(dtype=np.float64))
+        number += len(present)
+    return total / number if number else math.nan
 
 
 @contextlib.contextmanager

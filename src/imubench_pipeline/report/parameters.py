@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
+from imubench_pipeline.estimators.estimate import PARAMETERS, SENSOR, SHOWN
 from imubench_pipeline.estimators.model_choice import LEAST_SHARE, relative
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
@@ -23,9 +23,12 @@ from imubench_pipeline.typing import Row
 
 
 def shown_symbols(rows: Iterable[Row]) -> list[str]:
-    """Return the parameters of the papers' model, and those others that estimates have."""
+    """Return the parameters of the papers' model, and those others that estimates have.
+
+    N_sensor stands with the low-pass.
+    """
     estimated = {row["parameter"] for row in rows if row["status"] != "absent"}
-    return [symbol for symbol in SHOWN if symbol in PARAMETERS or symbol in estimated]
+    return [s for s in SHOWN if s in PARAMETERS or (s in estimated and s != SENSOR)]
 
 
 def methods_table(

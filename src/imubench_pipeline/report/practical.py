@@ -75,7 +75,7 @@ def _signs(
 ) -> dict[str, str]:
     """Return the signs of all symbols; ``level`` is that of B and of the Allan deviation."""
     return {
-        **{"Q": Q, "N": N, "B": level, "B_curve": level, "sigma_min": level},
+        **{"Q": Q, "N": N, "N_sensor": N, "B": level, "B_curve": level, "sigma_min": level},
         **{"T_B": "s", "tau_min": "s", "K": K, "R": R},
         **{"adev": level, "psd": psd, "signal": signal or level},
         **{"sensitivity": f"{level}/K", "quadratic": f"{level}/K²"},
@@ -108,6 +108,7 @@ _OF_DIMENSION: dict[System, dict[str, str]] = {
 
 
 _SYMBOL_TEXTS = {
+    "N_sensor": "N (sensor)",
     "B_curve": "B (curve)",
     "sigma_min": "σ_min",
     "tau_min": "τ_min",

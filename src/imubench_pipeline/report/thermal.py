@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.estimators.estimate import SENSOR
 from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import sentence
-from imubench_pipeline.typing import Row
 
 _TEMPERATURE = (
     ("sensitivity", "temperature_sensitivity", "sensitivity"),
@@ -18,9 +18,9 @@ _TEMPERATURE = (
     ("lag", "thermal_lag", "lag"),
     ("bias", "bias_at_reference", "bias at T₀"),
 )
-_LOW_PASS = (("cutoff", "cutoff", "cut-off"), ("N", "N_before_low_pass", "N before the low-pass"))
+_LOW_PASS = (("cutoff", "cutoff", "cut-off"), (SENSOR, SENSOR, "N before the low-pass"))
 _TRUTHS = {"bias": None}
-_SWITCHED = {"sensitivity": "sensitivity", "quadratic": "quadratic", "bias": "signal", "N": "N"}
+_SWITCHED = {"sensitivity": "sensitivity", "quadratic": "quadratic", "bias": "signal", SENSOR: "N"}
 """Unit of the page of what is shown in the units that the reader chooses."""
 
 _FIXED = {"lag": "s", "cutoff": "Hz"}
@@ -36,13 +36,16 @@ _SEEN = 1.05
 
 def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table: temperature's, where its effect was sought; the low-pass's."""
+    estimated = channel.parameters.get("likelihood", ())
+    before = {row["parameter"]: row for row in estimated if row["parameter"] == SENSOR}
+    low_pass = channel.low_pass | before
     entries = (
         *((channel.temperature, *names) for names in _TEMPERATURE),
-        *((channel.low_pass, *names) for names in _LOW_PASS),
+        *((low_pass, *names) for names in _LOW_PASS),
     )
     for rows, name, term, words in entries:
         row = rows.get(name)
-        if row is None or row["status"] == "absent" or _without_filter(name, rows):
+        if row is None or row["status"] == "absent":
             continue
         truth = channel.truth.get(_TRUTHS.get(name, name) or "")
         yield {
@@ -58,10 +61,6 @@ def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
             "truth": truth["value"] if truth else None,
             "why": sentence(row["reason"] or ""),
         }
-
-
-def _without_filter(name: str, rows: Mapping[str, Row]) -> bool:
-    return name == "N" and rows["cutoff"]["status"] == "absent"
 
 
 def answer(channel: ChannelView, system: System) -> list[str]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.estimators.frame import FEWEST_BINS, frame_of
 from imubench_pipeline.estimators.likelihood import fit_models
-from imubench_pipeline.estimators.spectral_findings import band_finding, line_findings
+from imubench_pipeline.estimators.spectral_findings import spectral_findings
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.recordings.drop_zone import Recording
 from imubench_pipeline.recordings.ingest import ingest_as_planned
@@ -45,12 +44,12 @@ def _checked(plan: Plan, sensor: str, name: str, recording: Recording) -> Qualit
         )
         quality.findings.extend(implausible_of(quality, plan.sensors.get(sensor)))
         for channel, log in static_logs(Path(folder)).items():
-            for finding in spectral_findings(channel, log, plan.bandwidth(sensor, name)):
+            for finding in findings_of_channel(channel, log, plan.bandwidth(sensor, name)):
                 quality.findings.append(dict(finding.row(sensor, name)))
     return quality
 
 
-def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) -> list[Finding]:
+def findings_of_channel(channel: str, log: ChannelLog, bandwidth: float | None) -> list[Finding]:
     """Return lines and the end of the band of a channel, if its spectrum can be taken.
 
     `bandwidth`: cut-off of the sensor's own filter, where it is known, Hz.
@@ -62,5 +61,4 @@ def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) ->
     frame = frame_of(spectrum, line_spectra, bandwidth=bandwidth)
     if frame.used.sum() >= FEWEST_BINS:
         frame, _, _ = fit_models(spectrum, frame)
-    rows = [asdict(line) | {"channel": channel} for line in frame.lines]
-    return [*line_findings(rows), *band_finding(channel, frame.band.highest, frame.band.source)]
+    return spectral_findings(channel, frame, None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,6 +14,7 @@ from pydantic import Field, model_validator
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.positions import InPositions
 from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.settings.shipped import CATALOGUE, folders
 from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import (
     Between,
@@ -376,6 +378,13 @@ def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | Conf
         If there is no folder.
     """
     return read_folder(Sensor, folders, "sensor")
+
+
+@cache
+def shipped_sensors() -> Mapping[str, Sensor]:
+    """Return the sensors of the catalogue that comes with the package."""
+    declared = read_sensor_files(folders(CATALOGUE, "sensors"))
+    return {name: sensor for name, sensor in declared.items() if isinstance(sensor, Sensor)}
 
 
 def sensors_of(catalogue: str) -> dict[str, Sensor]:

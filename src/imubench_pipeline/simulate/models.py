@@ -84,19 +84,17 @@ class TrueFigure:
 def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[TrueFigure]:
     """Yield the true figures of an axis, in a log of a rate in Hz.
 
-    N is the density before the low-pass; ``N in the log``, that its low frequencies show, stands
-    beside it where there is one.
+    N is the density that the low frequencies of the log show; N_sensor, that before the low-pass,
+    stands beside it where there is one.
     """
     quantity = quantity_of(channel)
     units, plain = SI_UNITS[quantity], SI_UNITS[quantity]["B"]
     model = axis_model(settings, channel)
     for name, value in settings.si(channel).items():
         if name == "N":
-            shown = in_the_log(model, rate)
-            N = model.noise.N if model.low_pass is not None else shown
-            yield TrueFigure(name, N, units[name], name)
+            yield TrueFigure(name, in_the_log(model, rate), units[name], name)
             if model.low_pass is not None:
-                yield TrueFigure("N in the log", shown, units[name], name)
+                yield TrueFigure("N_sensor", model.noise.N, units[name], name)
         elif name in ("Q", "K", "R"):
             yield TrueFigure(name, value, units[name], name)
         elif name == "bias":

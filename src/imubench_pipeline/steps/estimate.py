@@ -28,14 +28,15 @@ from imubench_pipeline.estimators.estimate import (
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.estimators.rows import allan_rows, draw_rows, limit_rows, parameter_rows
-from imubench_pipeline.estimators.spectral_findings import slow_noise_missing
+from imubench_pipeline.estimators.spectral_findings import slow_noise_missing, spectral_findings
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
 from imubench_pipeline.estimators.thermal.register import step_of
 from imubench_pipeline.estimators.thermal.result import ThermalFit, shift_by_effect
+from imubench_pipeline.estimators.white_level import find_white_stretch
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.kept import kept_static_logs
-from imubench_pipeline.recordings.recording import ChannelLog
+from imubench_pipeline.recordings.recording import ChannelLog, mean_of
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.steps.kept_curves import curves
@@ -110,7 +111,11 @@ def estimate_channel(
             into.estimates.setdefault(key.channel, {})[method] = estimate
             into.parameters += parameter_rows(key, estimate, recommended=method == best)
             into.draws += draw_rows(key, estimate)
-    into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": channel.unit})
+    if channel.fitted is not None:
+        recommended = into.estimates[key.channel].get(best)
+        N = recommended.parameters["N"].value if recommended else None
+        into.add_findings(key, spectral_findings(key.channel, channel.fitted.frame, N))
+    into.fixed_bias.append(asdict(key) | {"value": channel.mean, "unit": channel.unit})
 
 
 class _Channel:
@@ -127,6 +132,7 @@ class _Channel:
         self.key, self.log, self.curve = key, log, curve
         self.settings = settings
         self.unit = SI_UNITS[quantity_of(key.channel)]["B"]
+        self.mean = log.mean()
         self._bandwidth = bandwidth
         self._band = quantity_to_si(settings.band, "frequency") if settings.band else None
         unfiltered = _unfiltered(self._band, bandwidth)
@@ -134,6 +140,7 @@ class _Channel:
             log.blocks, log.grid, log.rate, segments=log.segments, highest=unfiltered
         )
         self._bare = self._curve_of(self._blocks()) if self.courses.courses else curve
+        self.fitted: Likelihood | None = None
 
     def by_curve(self) -> dict[str, Estimate]:
         """Return the estimates that are read from the Allan variance, or fitted to it."""
@@ -151,7 +158,7 @@ class _Channel:
     def by_likelihood(self, into: Estimation) -> dict[str, Estimate]:
         """Return the estimates from the spectrum; the rows that go with them are taken."""
         key, log = self.key, self.log
-        fitted = self._fitted(self._blocks)
+        self.fitted = fitted = self._fitted(self._blocks)
         estimates = {estimate.method: estimate for estimate in fitted.estimates}
         compensating = log.temperature and "compensated" in self.settings.methods
         warm = self._temperature(fitted, into) if compensating else None
@@ -188,9 +195,10 @@ class _Channel:
 
     def _temperature(self, fitted: Likelihood, into: Estimation) -> ThermalFit:
         """Return what temperature explains of the channel."""
-        key, log = self.key, self.log
+        log = self.log
         if log.path not in into.paths:
-            rng = channel_rng(self.settings.seed, key.sensor, key.recording, log.path.name)
+            of_clock = f"{log.path.name} {mean_of(log.temperatures())!r}"
+            rng = channel_rng(self.settings.seed, of_clock, "temperature")
             into.paths[log.path] = temperature_path(log.temperatures(), log.segments, rng)
         # A warm-up is what temperature explains: it stays in the log that they are fitted to.
         plain = self._fitted(log.blocks) if self.courses.courses else fitted
@@ -214,6 +222,7 @@ class _Channel:
             samples=log.grid,
             rate=log.rate,
             holes=log.holes,
+            stretch=find_white_stretch(self._bare),
             segments=log.segments,
             band=self._band,
             bandwidth=self._bandwidth,
@@ -226,7 +235,8 @@ class _Channel:
         return self.courses.less(self.log.blocks())
 
     def _stream(self, use: str) -> np.random.Generator:
-        return channel_rng(self.settings.seed, *asdict(self.key).values(), use)
+        """Return a random stream that depends on the samples, and on no name of a file."""
+        return channel_rng(self.settings.seed, f"{self.mean!r}", f"{self.log.grid}", use)
 
 
 def _unfiltered(band: float | None, bandwidth: float | None) -> float | None:
@@ -320,17 +330,13 @@ def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[Row]:
 
 
 def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
-    """Yield the rows of the table ``low_pass``: none where a band was asked for.
-
-    N is that of the estimate, the density before the filter.
-    """
+    """Yield the rows of the table ``low_pass``: none where a band was asked for."""
     low_pass = fit.low_pass
     if low_pass is None:
         return
     density = SI_UNITS[quantity_of(key.channel)]["N"]
     about = asdict(key) | {"kind": low_pass.kind, "order": low_pass.order}
     yield about | _figure("cutoff", low_pass.frequency, "Hz")
-    yield about | _figure("N", fit.estimates[0].parameters["N"], density)
     if low_pass.order is not None:
         yield about | _figure("floor", Parameter(low_pass.floor), density)
 

@@ -91,7 +91,7 @@ def from_static(
             every = {estimate.method: estimate for estimate in estimates(parameters)[name]}
             papers = every.get("likelihood_gm", best[name]).model
             words = f"{_words(row, own, name, channel)}; method {best[name].method}"
-            rng = channel_rng(_SEED, row["sensor"], row["recording"], name)
+            rng = channel_rng(_SEED, repr(best[name].model), name)
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, words, drawn)
     return None

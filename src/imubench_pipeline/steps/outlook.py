@@ -144,7 +144,7 @@ def _aligned(
         "gyros": ", ".join(gyros),
         "accelerometers": ", ".join(accelerometers),
     }
-    rng = channel_rng(_SEED, sensor, noise.recording, "alignment")
+    rng = channel_rng(_SEED, repr(triad), "alignment")
     for accuracy in accuracies(triad, site, noise.rate, TIMES, runs=_RUNS, rng=rng):
         roll, pitch, heading = (float(value) for value in accuracy.sigma)
         row = about | {

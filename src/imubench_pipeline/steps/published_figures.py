@@ -52,11 +52,11 @@ def published_rows(
             units = SI_UNITS[quantity]
             for figure in settings.published:
                 key = (entry.sensor, entry.recording, str(channel), figure.parameter)
-                estimate = _as_shown(best.get(key, {}))
+                estimate = best.get(key, {})
                 sheet = [
                     value for kind, value in printed.get(key, []) if figure.kind in (None, kind)
                 ]
-                shown = true.get((*key[:3], f"{figure.parameter} in the log"), true.get(key, {}))
+                shown = true.get(key, {})
                 yield {
                     "sensor": entry.sensor,
                     "recording": entry.recording,
@@ -75,15 +75,6 @@ def published_rows(
                     "datasheet_upper": max(sheet) if len(set(sheet)) > 1 else None,
                     "reason": figure.why,
                 }
-
-
-def _as_shown(row: Row) -> Row:
-    """Return an estimate as the log shows it: what is printed was read off the curve of a log."""
-    if row.get("parameter") != "N" or row.get("fitted") is None or not row["value"]:
-        return row
-    factor = row["fitted"] / row["value"]
-    limits = {name: row[name] and row[name] * factor for name in ("lower", "upper")}
-    return {**row, **limits, "value": row["fitted"]}
 
 
 def _place(row: Row, parameter: str | None = None) -> _Place:

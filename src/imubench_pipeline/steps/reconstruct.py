@@ -63,7 +63,7 @@ def reconstruct(
     sizes, samples = measured.cluster_size, measured.samples
 
     def stream(use: str) -> np.random.Generator:
-        return channel_rng(settings.seed, *names.values(), use)
+        return channel_rng(settings.seed, repr(model), key.channel, use)
 
     if settings.keep_series:
         _keep(model, rate, samples, stream("member 1"), series)

@@ -85,7 +85,7 @@ def samples_of_models(folder: Path, sensor: str, recording: str, seed: int) -> I
             temperature = None
             if of == "after" and warm:
                 model, temperature = _warmed(model, known["temperature"], log)
-            rng = channel_rng(seed, *asdict(key).values(), f"samples {of}")
+            rng = channel_rng(seed, repr(noise), channel, f"samples {of}")
             blocks = simulate_blocks(model, log.rate, samples, rng, temperature=temperature)
             yield from _rows(key, of, log.rate, samples, blocks)
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
-from imubench_pipeline.datasheets.suspicion import unusual_rows
-from imubench_pipeline.estimators.spectral_findings import band_finding, line_findings
+from imubench_pipeline.datasheets.suspicion import unusual_rows, usual_figures
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.pooled import pooled_rows
@@ -25,11 +24,10 @@ from imubench_pipeline.recordings.fitness import (
 )
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.copies import recorded_twice
-from imubench_pipeline.settings.sensor import sensors_of
+from imubench_pipeline.settings.sensor import Sensor, sensors_of, shipped_sensors
 from imubench_pipeline.steps.published_figures import published_rows, truth_rows
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures, without
-from imubench_pipeline.tables.keys import divided
 from imubench_pipeline.typing import Row
 
 
@@ -61,21 +59,15 @@ def joined_tables(
     recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
     estimated, biases = recommended.to_pylist(), joined["fixed_bias"].to_pylist()
     joined["drift"] = build("drift", drift_rows(estimated, biases, about))
-    of_logs = without_doubles(
-        (row for quality in qualities for row in quality.findings),
-        joined["deterministic"],
-        {(row["sensor"], row["recording"]): row.get("duration") or 0.0 for row in about},
-    )
     sensors = sensors_of(catalogue)
-    of_levels = (
-        row
-        for quality in qualities
-        for row in implausible_of(quality, sensors.get(quality.recording["sensor"]))
+    findings = findings_of(
+        qualities,
+        joined["deterministic"].to_pylist(),
+        joined.pop("estimate_findings").to_pylist(),
+        estimated,
+        sensors,
     )
-    unusual = unusual_rows(estimated, sensors)
-    of_estimates = joined.pop("estimate_findings").to_pylist()
-    twins = recorded_twice(joined["models"].to_pylist(), biases)
-    findings = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual, *twins]
+    findings += recorded_twice(joined["models"].to_pylist(), biases)
     if "backtest" in joined:
         findings += comparison.findings(joined["backtest"].to_pylist())
     joined["findings"] = build("findings", findings)
@@ -107,9 +99,43 @@ _NEAR = 1 / 100
 """Part of a recording within which two steps are one."""
 
 
+def findings_of(
+    qualities: Sequence[Quality],
+    deterministic: Sequence[Row],
+    of_estimates: Iterable[Row],
+    estimated: Sequence[Row],
+    sensors: Mapping[str, Sensor],
+) -> list[Row]:
+    """Return the rows of the table ``findings`` about recordings, each by itself.
+
+    Parameters
+    ----------
+    qualities : sequence of Quality
+        What the ingest found of each recording.
+    deterministic, of_estimates, estimated : sequence of mapping
+        Rows of the tables ``deterministic``, ``estimate_findings``, and ``parameters`` of the
+        recommended methods.
+    sensors : mapping of str to Sensor
+        Those whose files are known; figures that are usual follow from the shipped ones, too.
+    """
+    about = [quality.recording for quality in qualities]
+    of_logs = without_doubles(
+        (row for quality in qualities for row in quality.findings),
+        deterministic,
+        {(row["sensor"], row["recording"]): row.get("duration") or 0.0 for row in about},
+    )
+    of_levels = (
+        row
+        for quality in qualities
+        for row in implausible_of(quality, sensors.get(quality.recording["sensor"]))
+    )
+    usual = usual_figures({**shipped_sensors(), **sensors}) if estimated else {}
+    return [*of_logs, *of_levels, *of_estimates, *unusual_rows(estimated, sensors, usual)]
+
+
 def without_doubles(
     findings: Iterable[Row],
-    deterministic: pa.Table,
+    deterministic: Iterable[Row],
     durations: Mapping[tuple[str, str], float],
 ) -> Iterator[Row]:
     """Yield the findings of the ingest that the table ``deterministic`` does not tell better.
@@ -117,7 +143,7 @@ def without_doubles(
     `durations`: of each sensor and recording, s.
     """
     by_place: dict[tuple[str, str, str], list[Row]] = {}
-    for row in deterministic.to_pylist():
+    for row in deterministic:
         by_place.setdefault((row["sensor"], row["recording"], row["channel"]), []).append(row)
     for finding in findings:
         kind = _OF_LOGS.get(finding["finding"])
@@ -129,19 +155,3 @@ def without_doubles(
         near = _NEAR * durations.get((finding["sensor"], finding["recording"]), 0.0)
         if not any(abs(row["start"] - (finding["start"] or 0.0)) <= near for row in same):
             yield finding
-
-
-def spectral_rows(tables: Mapping[str, pa.Table]) -> Iterator[Row]:
-    """Yield the rows of the table ``findings`` that the tables ``lines`` and ``models`` tell."""
-    white: dict[tuple[str, str], dict[str, float]] = {}
-    for row in tables["parameters"].filter(tables["parameters"]["recommended"]).to_pylist():
-        if row["parameter"] == "N" and row["value"] is not None:
-            white.setdefault((row["sensor"], row["recording"]), {})[row["channel"]] = row["value"]
-    for (sensor, recording), lines in divided(tables["lines"], "sensor", "recording").items():
-        for finding in line_findings(lines.to_pylist(), white.get((sensor, recording))):
-            yield finding.row(sensor, recording)
-    models = tables["models"]
-    for row in models.filter(models["chosen"]).to_pylist():
-        if row["band"] is not None:
-            for finding in band_finding(row["channel"], row["band"], row["band_source"] or ""):
-                yield finding.row(row["sensor"], row["recording"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 LEFT_OUT = ("rejected", "failed")
@@ -36,6 +36,11 @@ class Finding:
     def row(self, sensor: str, recording: str) -> Mapping[str, Any]:
         """Return the row of the table ``findings``."""
         return {"sensor": sensor, "recording": recording, **asdict(self)}
+
+
+def finding_of(row: Mapping[str, Any]) -> Finding:
+    """Return the finding that a row of the table ``findings`` stands for."""
+    return Finding(**{field.name: row[field.name] for field in fields(Finding)})
 
 
 class RecordingError(ValueError):

@@ -33,7 +33,7 @@ from imubench_pipeline.tables.of_navigation import (
 )
 from imubench_pipeline.tables.of_papers import ACCURACY, PUBLISHED
 
-_FITTED = number("fitted", "as in unit", "what the model has where that is not value; no estimate")
+_FITTED = number("fitted", "as in unit", "what the model has where there is no value; no estimate")
 _DOUBTED = text("doubts", "of the recording; empty: none", required=False)
 _METHOD = text("method", "estimation method")
 _SI = "rad/s or m/s^2"
@@ -100,7 +100,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
         text("model", "the terms of the model, such as N+GM+K"),
         count("component", "number of a repeated term, from 1", required=True),
         *figure(
-            "Q, N, B, T_B, K, R; amplitude and frequency of a line; of the curve of the model: "
+            "Q, N, B, T_B, K, R; N_sensor (white density before a low-pass or an interpolation "
+            "that shows); amplitude and frequency of a line; of the curve of the model: "
             "B_curve (bias instability of the curve: highest Allan deviation of all F and GM "
             "terms over 0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)"
         ),
@@ -194,7 +195,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         *KEYS,
         text("kind", "analogue, bilinear or boxcar; null: none shows", required=False),
         count("order", "of the filter: 1, or that of Butterworth; null: none shows"),
-        *figure("cutoff (-3 dB), N (before the filter), floor (white, behind the filter)"),
+        *figure("cutoff (-3 dB), floor (white noise that does not pass the filter)"),
         _FITTED,
     ),
     "drift": (

@@ -124,6 +124,7 @@ def fit_temperature(
             samples,
             rate,
             holes=True,
+            stretch=None,
             segments=path.segments,
             band=band,
             bandwidth=bandwidth,
@@ -140,7 +141,7 @@ def fit_temperature(
             model, effect = model_of(settled.noise), settled.regressors.effect(settled.regression)
     else:
         fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
-        plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng)
+        plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng, stretch=None)
     if not fit.possible:
         return _nothing(plain, path, fit, "too short a log")
     if not varies:
@@ -364,7 +365,9 @@ def _described(
         left = regressors.without(fit.spectrum, settled.regression, weights)
         left = without_errors(left, fit.used, settled.whittle, best.terms, verdict.path_errors)
         effect = regressors.effect(settled.regression)
-        without = likelihood.fit_spectrum(left, find_frame(left, lines), rng=rng)
+        without = likelihood.fit_spectrum(
+            left, find_frame(left, lines), rng=rng, stretch=plain.stretch
+        )
     added = [path.means(*place, effect) for place in fit.series.places]
     shift = float(np.concatenate(added).mean())
     candidates = settled.candidates if verdict.compensated else fit.of_the_log

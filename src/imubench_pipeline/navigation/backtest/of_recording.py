@@ -106,7 +106,9 @@ def _of_channel(
     }
     lengths = {cut.block for cut in cuts.values() if cut}
     means = block_means(log.blocks(), log.segments, log.rate, lengths)
-    drawn = draw_models(estimate, draws, channel_rng(seed, *names.values(), channel, "backtest"))
+    drawn = draw_models(
+        estimate, draws, channel_rng(seed, repr(estimate.model), channel, "backtest")
+    )
     jointly = drawn_jointly(estimate)
     for about, asked in listed:
         if not isinstance(asked, DeadReckoning):

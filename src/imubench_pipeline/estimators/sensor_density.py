@@ -1,0 +1,86 @@
+"""N_sensor: the density of a sensor's white noise before its low-pass, or an interpolation.
+
+N is what the log shows, folds included. What stood before the filter is another quantity, of use to
+whoever compares sensors at other settings of their filters.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.posterior import Posterior
+from imubench_pipeline.estimators.spectrum import Spectrum
+from imubench_pipeline.estimators.whittle import Maximum
+
+_AS_FAST = 10.0
+"""Sampling intervals: a process as fast may be the sensor's filter."""
+
+_SOME_FLOOR = 0.03
+"""White noise beside a low-pass, parts of the power of that behind it, from which it matters."""
+
+
+def sensor_density(
+    frame: Frame,
+    maximum: Maximum,
+    posterior: Posterior,
+    spectrum: Spectrum,
+    rng: np.random.Generator,
+) -> Parameter | None:
+    """Return N_sensor of the best model; None where the spectrum shows no filter.
+
+    Parameters
+    ----------
+    frame : Frame
+    maximum : Maximum
+        The best fit behind the filter of the frame.
+    posterior : Posterior
+        Its draws, behind that filter.
+    spectrum : Spectrum
+        The whole spectrum of the log.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Parameter or None
+        rad/s/sqrt(Hz) or m/s²/sqrt(Hz), with the filters that the log does not rule out in the
+        interval. ``not_identified`` where the filter may be a process; ``doubtful`` where a part of
+        the noise did not pass it.
+    """
+    low_pass, terms = frame.low_pass, maximum.terms
+    if low_pass is None or "N" not in terms.linear:
+        return None
+    N = maximum.parameter("N")
+    if low_pass.or_process is not None and low_pass.N_behind is not None:
+        return _between(low_pass.or_process, N, low_pass.N_behind)
+    if low_pass.behind is None:
+        fast = maximum.times < _AS_FAST / spectrum.rate
+        if not fast.any():
+            return None
+        whole = frame.whole(spectrum)
+        shapes = [whole.gauss_markov(float(time))[0] for time in maximum.times[fast]]
+        before = math.sqrt(N**2 + float(maximum.process_powers[fast] @ np.array(shapes)))
+        reason = (
+            f"a process with a correlation time of {maximum.times[fast].max():.3g} s, a few "
+            "samples, may be the low-pass of the sensor; bandwidth in the sensor file would tell"
+        )
+        return _between(reason, N, before)
+    draws = frame.before_the_filter(posterior, terms, rng).parameters[:, terms.linear.index("N")]
+    lower, upper = np.quantile(draws, (0.025, 0.975)).tolist()
+    lower, upper, share = min(lower, N), max(upper, N), low_pass.beside
+    if share < _SOME_FLOOR:
+        return Parameter(N, lower=lower, upper=upper)
+    times = math.sqrt(1.0 + share)
+    reason = (
+        f"white noise of {100 * share:.2g} % of its power does not pass the {low_pass.words}, as "
+        f"in an interpolated log: N_sensor may be up to {times:.3g} times as high"
+    )
+    return Parameter(N, "doubtful", reason, lower, upper * times)
+
+
+def _between(reason: str, first: float, second: float) -> Parameter:
+    low, high = sorted((first, second))
+    return Parameter(None, "not_identified", reason, low, high)

@@ -1,0 +1,161 @@
+"""N as the Allan deviation shows it: the level of its first -1/2 stretch.
+
+White noise has sigma(tau) sqrt(tau) = N at every tau. A log whose white noise stands beside a
+Gauss-Markov process faster than a second has two such levels: N of the white noise alone at tau far
+below T_B, and above it that of both together,
+
+    N^2 = N_0^2 + S_B T_B^2,
+
+since for tau >> T_B the process is white noise, too. A log shows the one that lasts, and a filter
+that runs slower than the process needs it. N is the level that the curve has; a process that counts
+into it leaves the model, so that nothing counts twice.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.estimators.estimate import BROADBAND_TIME
+from imubench_pipeline.estimators.posterior import Posterior
+from imubench_pipeline.estimators.whittle import Maximum, Terms
+from imubench_pipeline.noise.terms import driving_density
+from imubench_pipeline.typing import Array
+
+MIN_DECADES = 0.7
+"""Length of a stretch."""
+
+MIN_CLUSTER = 3
+"""Samples in the first cluster of a stretch: below, the register and the sensor's filter rule."""
+
+MAX_ERROR = 0.03
+"""Relative standard error of the deviation up to which a point belongs to a stretch."""
+
+FLAT_WITHIN, MAX_FLAT_WITHIN = 0.03, 0.06
+"""Part by which all points of a stretch are within their median; two standard errors where that is
+more, up to the second."""
+
+
+@dataclass(frozen=True)
+class WhiteStretch:
+    """The first stretch of slope -1/2 of an Allan deviation."""
+
+    level: float  # median of sigma sqrt(tau), SI
+    first: float
+    last: float
+    """Its tau, s."""
+
+
+def find_white_stretch(curve: AllanCurve) -> WhiteStretch | None:
+    """Return the first -1/2 stretch of an Allan deviation; None where it has none.
+
+    That is the first 0.7 decade or more, from clusters of 3 samples on, whose points all lie within
+    3 % of their median (or two standard errors, at most 6 %), as far as the standard error is below
+    3 %.
+    """
+    n, averaged = curve.cluster_size.astype(np.float64), curve.averaged
+    degrees = 1.5 * curve.samples / (2.0 * n) * 4.0 * n**2 / (4.0 * n**2 + 5.0) - 1.0
+    error = 0.5 * np.sqrt(2.0 / np.maximum(degrees, 1.0))
+    # Where samples are missing, white noise is averaged over fewer than n: as at a shorter tau.
+    level = curve.deviation * np.sqrt(averaged / curve.rate)
+    within = np.clip(2.0 * error, FLAT_WITHIN, MAX_FLAT_WITHIN)
+    for start in np.flatnonzero(n >= MIN_CLUSTER):
+        stop = start
+        while stop < len(n) and error[stop] < MAX_ERROR:
+            part = level[start : stop + 1]
+            middle = np.median(part)
+            if not middle > 0.0 or np.any(np.abs(part / middle - 1.0) > within[start : stop + 1]):
+                break
+            stop += 1
+        if stop > start and math.log10(n[stop - 1] / n[start]) >= MIN_DECADES:
+            return WhiteStretch(
+                float(np.median(level[start:stop])),
+                float(curve.tau[start]),
+                float(curve.tau[stop - 1]),
+            )
+    return None
+
+
+def count_fast_processes(maximum: Maximum, folding: float, stretch: WhiteStretch | None) -> int:
+    """Return how many of the fastest processes of a fit count into N.
+
+    So many that N is nearest to the level of the stretch; none without a stretch.
+
+    Parameters
+    ----------
+    maximum : Maximum
+    folding : float
+        Density of white noise in the log over that before the low-pass.
+    stretch : WhiteStretch or None
+    """
+    if stretch is None or "N" not in maximum.terms.linear:
+        return 0
+    fast = int(np.sum(maximum.times < BROADBAND_TIME))
+    densities = _white_densities(maximum.process_powers[:fast], maximum.times[:fast])
+    squared = folding * maximum.parameter("N") ** 2 + np.append(0.0, np.cumsum(densities))
+    away = np.abs(np.log(np.maximum(squared, 1e-300) / stretch.level**2))
+    return int(np.argmin(away))
+
+
+def merged_maximum(maximum: Maximum, number: int, folding: float) -> Maximum:
+    """Return a fit whose fastest processes, so many, are part of its white noise."""
+    if number == 0:
+        return maximum
+    linear, powers = len(maximum.terms.linear), maximum.powers.copy()
+    densities = _white_densities(maximum.process_powers[:number], maximum.times[:number])
+    powers[maximum.terms.linear.index("N")] += float(np.sum(densities)) / folding
+    return replace(
+        maximum,
+        terms=_without(maximum.terms, number),
+        powers=np.delete(powers, np.s_[linear : linear + number]),
+        times=maximum.times[number:],
+    )
+
+
+def merged_posterior(posterior: Posterior, terms: Terms, number: int) -> Posterior:
+    """Return draws of a model in the log whose fastest processes are part of its white noise."""
+    if number == 0:
+        return posterior
+    linear, parameters = len(terms.linear), posterior.parameters.copy()
+    densities = _white_densities(
+        parameters[:, linear : linear + number] ** 2, posterior.times[:, :number]
+    )
+    place = terms.linear.index("N")
+    parameters[:, place] = np.sqrt(parameters[:, place] ** 2 + densities.sum(axis=1))
+    return replace(
+        posterior,
+        parameters=np.delete(parameters, np.s_[linear : linear + number], axis=1),
+        times=posterior.times[:, number:],
+    )
+
+
+def describe_white_level(stretch: WhiteStretch | None, times: Sequence[float]) -> str | None:
+    """Return what N is, where that is not the white noise of the model on a stretch of the curve.
+
+    ``times`` are the correlation times of the processes that count into it, s.
+    """
+    if stretch is None:
+        return (
+            "the Allan deviation has no -1/2 stretch of 0.7 decade: N is the white noise of the "
+            "fitted model"
+        )
+    if not times:
+        return None
+    listed = " and ".join(f"{time:.3g} s" for time in times)
+    return (
+        f"N is the level of the Allan deviation from {stretch.first:.3g} to {stretch.last:.3g} s: "
+        f"it includes a process with a correlation time of {listed}"
+    )
+
+
+def _white_densities(squares: Array, times: Array) -> Array:
+    """Return the density of Gauss-Markov processes of B^2 and T_B far below 1 / T_B."""
+    return np.asarray(squares * driving_density(1.0, 1.0) * times)
+
+
+def _without(terms: Terms, number: int) -> Terms:
+    return replace(terms, gauss_markov=terms.gauss_markov - number)
