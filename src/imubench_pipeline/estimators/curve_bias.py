@@ -38,7 +38,7 @@ _POINTS = 16
 _BETWEEN = 49
 """Averaging times between the peaks of several processes."""
 
-_DRAWS = 1000
+_DRAWS = 16_000
 """Draws of each model that are used."""
 
 _PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])

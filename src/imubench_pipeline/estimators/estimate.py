@@ -37,6 +37,9 @@ COMPARED = ("N", "B_curve", "sigma_min", "K")
 MAX_LIMIT_RATIO = 4.0
 """Upper over lower 95 % limit of a value, beyond which only its interval is given."""
 
+_A_DECADE = 10.0
+"""Upper over lower 95 % limit of what is not identified, beyond which the lower one is 0."""
+
 BROADBAND_TIME = 1.0
 """Correlation time below which a Gauss-Markov process is broadband noise, no bias instability, s.
 """
@@ -99,8 +102,15 @@ class Parameter:
         else:
             where = "the 95 % interval contains 0" if signs < 0 else "the lower 95 % limit is 0"
         reason = f"{where}; only the interval is given"
+        # Draws that reach so far down say where the prior is, and not the data.
+        lower = 0.0 if signs > 0 and self.lower > 0.0 and far > _A_DECADE * near else self.lower
         return replace(
-            self, value=None, status="not_identified", reason=reason, fitted=self.in_model
+            self,
+            value=None,
+            status="not_identified",
+            reason=reason,
+            lower=lower,
+            fitted=self.in_model,
         )
 
 

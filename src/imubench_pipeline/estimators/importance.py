@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import chdtri, ndtri
 from scipy.stats import qmc
 
 from imubench_pipeline.estimators.importance_kernels import fit, set_densities
@@ -44,14 +44,13 @@ class Mixture:
 
     def draw(self, number: int, rng: np.random.Generator) -> Array:
         """Return a power of 2 of points, shape (number, d)."""
-        ends = np.floor(np.cumsum(self.weights) * number + rng.random()).astype(np.int64)
-        ends[-1] = number
-        which = np.repeat(np.arange(len(ends)), np.diff(np.minimum(ends, number), prepend=0))
-        which = rng.permutation(which)
-        uniform = qmc.Sobol(self.means.shape[1], seed=rng).random(number)
-        normal = ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12))
+        uniform = qmc.Sobol(self.means.shape[1] + 2, seed=rng).random(number)
+        uniform = np.clip(uniform, 1e-12, 1.0 - 1e-12)
+        ends = np.cumsum(self.weights)
+        which = np.minimum(np.searchsorted(ends / ends[-1], uniform[:, 0]), len(ends) - 1)
+        normal = ndtri(uniform[:, 2:])
         freedom = _freedom(self.means.shape[1])
-        normal /= np.sqrt(rng.chisquare(freedom, number) / freedom)[:, None]
+        normal /= np.sqrt(chdtri(freedom, uniform[:, 1]) / freedom)[:, None]
         roots = np.linalg.cholesky(self.scales)
         return np.asarray(self.means[which] + np.einsum("nij,nj->ni", roots[which], normal))
 

@@ -40,7 +40,7 @@ from imubench_pipeline.estimators.missing import (
     slow_part,
 )
 from imubench_pipeline.estimators.model_choice import LEAST_SHARE, PAPERS, Candidate, compare
-from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
+from imubench_pipeline.estimators.posterior import Posterior, sample
 from imubench_pipeline.estimators.sensor_density import sensor_density
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.white_level import (
@@ -55,7 +55,6 @@ from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_FEWEST_DRAWS = 4_000
 _FLEXIBLE = Terms("NFK", 1)
 """Model with which the cut-off is fitted where none explains the spectrum."""
 
@@ -260,9 +259,7 @@ def fit_spectrum(
     papers = next(c for c in candidates if c.terms == PAPERS)
     posteriors: dict[Terms, Posterior] = {}
     for candidate in (c for c in candidates if c in alike or c in wider or c is papers):
-        part = 1.0 if candidate in (papers, chosen) else candidate.share
-        number = max(_FEWEST_DRAWS, round(part * DRAWS))
-        posteriors[candidate.terms] = sample(whittle, candidate.maximum, rng, number)
+        posteriors[candidate.terms] = sample(whittle, candidate.maximum, rng)
     of_data = _InTheLog(whittle, frame, posteriors, stretch, alike, wider)
     estimate = of_data.estimate("likelihood")
     sensor = sensor_density(frame, chosen.maximum, posteriors[chosen.terms], spectrum, rng)

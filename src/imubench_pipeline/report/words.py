@@ -37,13 +37,13 @@ _VERDICTS = (
 
 
 def untold(row: Row, unit: PageUnit, duration: float | None) -> str:
-    """Return in a sentence why a parameter has no plain value; empty where it has one.
+    """Return in a sentence why a parameter has no plain value, or what it is of; may be empty.
 
     Of a row of ``parameters``, and the length of the recording, s.
     """
     symbol, status = symbol_text(row["parameter"]), row["status"]
     if status == "ok":
-        return ""
+        return f"{symbol}: {row['reason'].rstrip('.')}." if row["reason"] else ""
     if status == "absent":
         below = ""
         if row["upper"] is not None:

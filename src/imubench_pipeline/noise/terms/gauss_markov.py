@@ -226,11 +226,12 @@ def gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
     ratio = np.asarray(tau, dtype=np.float64) / T_B
     small = ratio < _SERIES_BELOW
     x = np.where(small, 1.0, ratio)
-    shape = (1.0 - (3.0 - 4.0 * np.exp(-x) + np.exp(-2.0 * x)) / (2.0 * x)) / x
+    decayed = np.exp(-x)
+    shape = np.asarray((1.0 - (3.0 - decayed * (4.0 - decayed)) / (2.0 * x)) / x)
     if small.any():
-        r = np.where(small, ratio, 0.0)
-        shape = np.where(small, r * np.polynomial.polynomial.polyval(r, _SERIES), shape)
-    return T_B * shape
+        r = ratio[small]
+        shape[small] = r * np.polynomial.polynomial.polyval(r, _SERIES)
+    return np.asarray(T_B * shape)
 
 
 def sampled_gauss_markov_shape(n: ArrayLike, interval: float, T_B: float) -> Array:
