@@ -26,11 +26,9 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate, Parameter
-from imubench_pipeline.estimators.frame import frame_of
 from imubench_pipeline.estimators.identifiability import bounds_of
-from imubench_pipeline.estimators.likelihood import fit_spectrum
+from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import PAPERS
-from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import whittle_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -62,8 +60,8 @@ def of_log(case: Case, others: int, number: int) -> tuple[Found, str, float]:
     """Return the estimates of one simulated log by method, the chosen model, and the band, Hz."""
     rng = np.random.default_rng([number, CASES.index(case)])
     log = simulate(case.model, case.rate, round(case.hours * 3600 * case.rate), rng)
-    spectrum, lines = spectra([log], len(log), case.rate)
-    result = fit_spectrum(spectrum, frame_of(spectrum, lines), rng=rng)
+    result = fit(log, case.rate, rng=rng)
+    spectrum = result.spectrum
     found: Found = {estimate.method: dict(estimate.parameters) for estimate in result.estimates}
     if number < others:
         limit = _LIMITED * case.rate

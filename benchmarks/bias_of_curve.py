@@ -22,9 +22,7 @@ import numpy as np
 from bands import bounds_over, highest, what_is_cut
 from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.estimators.frame import frame_of
-from imubench_pipeline.estimators.likelihood import fit_spectrum
-from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.noise import NoiseModel
 from simulators import gauss_markov, random_walk, white
 
@@ -75,8 +73,7 @@ def of_log(case: Case, number: int) -> Found:
     log = white(samples, case.rate, case.N, rng)
     log += gauss_markov(samples, case.rate, case.B, case.T_B, rng)
     log += random_walk(samples, case.rate, case.K, rng)
-    spectrum, lines = spectra([log], samples, case.rate)
-    result = fit_spectrum(spectrum, frame_of(spectrum, lines), rng=rng)
+    result = fit(log, case.rate, rng=rng)
     figures = {one.method: {**one.parameters, **one.curve} for one in result.estimates}
     return Found(figures, result.candidates[0].terms.name, highest(result, case.rate))
 

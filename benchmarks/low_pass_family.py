@@ -88,9 +88,9 @@ def of_log(number: int, place: int) -> Found:
         cutoff = simulators.moving_mean_cutoff(rate, taps)
         log = simulators.moving_mean(make, SAMPLES, rate, taps)
     found = fit(log, rate)
-    white = found.estimates[0].parameters["N"]
-    # Where no value is told, the model has what the log shows, the folds included.
-    value = white.value or (white.in_model or math.nan) / math.sqrt(found.frame.folding)
+    parameters = found.estimates[0].parameters
+    white = parameters.get("N_sensor", parameters["N"])
+    value = white.value or math.nan
     width = math.nan if white.lower is None or white.upper is None else white.upper - white.lower
     told = found.low_pass.frequency if found.low_pass is not None else None
     inside = told is not None and told.lower is not None and told.upper is not None

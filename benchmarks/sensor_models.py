@@ -35,7 +35,7 @@ from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channe
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import TEMPERATURE
 from imubench_pipeline.simulate.imu import ImuModel, simulate_imu
-from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
+from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, in_the_log
 from imubench_pipeline.simulate.profiles import DayCycle, Profile, Steps, Sum, WarmUp
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.tables.keys import Key
@@ -71,7 +71,7 @@ RESOLUTION = (0.05, 0.5)
 
 PROFILES = ("warm-up", "day cycle", "steps", "sum")
 REGISTERS = (1.0 / 340.0, 1.0 / 16.0, 1.0)
-FIGURES = ("N", "B", "T_B", "K", "sensitivity", "lag", "bias", "cutoff", "N before the filter")
+FIGURES = ("N", "B", "T_B", "K", "sensitivity", "lag", "bias", "cutoff", "N_sensor")
 SETTINGS = EstimateSettings(methods=("likelihood", "compensated"))
 LONGEST = 1 / 9
 """Longest tau that is compared, as a part of the log."""
@@ -236,8 +236,7 @@ class Found:
         of_noise = dict(self.noise.parameters)
         if self.noise.further and truth.T_B is not None and self.noise.model.T_B is None:
             of_noise |= self.noise.further[0]
-        of_filter = {"cutoff": self.low_pass["cutoff"], "N before the filter": self.low_pass["N"]}
-        return of_noise | self.thermal | of_filter
+        return of_noise | self.thermal | {"cutoff": self.low_pass["cutoff"]}
 
     def model(self, rate: float) -> SensorModel:
         """Return the model that the estimates make, to simulate the sensor again.
@@ -257,9 +256,11 @@ class Found:
         if cutoff is None or self.order is None:
             return replace(found, noise=noise)
         floor = self.low_pass["floor"].in_model or 0.0
+        before = self.noise.parameters.get("N_sensor")
+        N = before.value if before is not None and before.value is not None else noise.N
         return replace(
             found,
-            noise=replace(noise, N=self.low_pass["N"].in_model or 0.0, Q=0.0),
+            noise=replace(noise, N=N, Q=0.0),
             low_pass=LowPass(cutoff, self.order),
             resolution=floor * math.sqrt(12.0 * rate),
         )
@@ -299,7 +300,7 @@ def true_figures(made: Case, found: Found) -> dict[str, float | None]:
     if at is None:
         at = float(behind(made.truth(), made.rate, drift.lag).mean())
     return {
-        "N": noise.N,
+        "N": in_the_log(model, made.rate),
         "B": noise.B,
         "T_B": noise.T_B,
         "K": noise.K,
@@ -307,7 +308,7 @@ def true_figures(made: Case, found: Found) -> dict[str, float | None]:
         "lag": drift.lag if drift.sensitivity else None,
         "bias": model.bias + drift.sensitivity * (at - drift.reference),
         "cutoff": low_pass.cutoff,
-        "N before the filter": noise.N,
+        "N_sensor": noise.N,
     }
 
 
@@ -387,7 +388,8 @@ def of_model(number: int) -> list[dict[str, object]]:
         "adev_twin": decades(curve_twin.variance, measured.variance),
         "seconds": time.process_time() - began,
     }
-    return [about | _figure(name, truths[name], parameters[name]) for name in FIGURES]
+    unknown = Parameter(None, "absent", "the spectrum shows no low-pass")
+    return [about | _figure(name, truths[name], parameters.get(name, unknown)) for name in FIGURES]
 
 
 def _figure(name: str, truth: float | None, found: Parameter) -> dict[str, object]:

@@ -135,10 +135,26 @@ class Noise:
         return found | ({"B_curve": found["B"]} if "B" in found else {})
 
     def truth(self, **others: Truth) -> dict[str, Truth]:
-        """Return what its parameters are, and others."""
+        """Return what its parameters are, and others.
+
+        A process faster than a second is broadband noise: it may count into N, and is no bias
+        instability.
+        """
         own = {"N": exactly(self.N), "B": exactly(self.B), "K": exactly(self.K)}
         own |= {"B_curve": own["B"], "T_B": exactly(self.T_B)}
+        if 0.0 < self.T_B < 1.0:
+            own = {"N": Truth(self.N, math.sqrt(self.level())), "K": own["K"]}
         return own | {"Q": NOTHING, "R": NOTHING, "cutoff": NOTHING} | others
+
+    def behind(self, cutoff: Truth, gain: float = 1.0, step: float = 0.0) -> dict[str, Truth]:
+        """Return the truth of a log behind a low-pass.
+
+        ``gain``: density of white noise in the log, far below the cut-off, over that before the
+        filter; ``step``: density that a register adds at most, SI^2/Hz.
+        """
+        truth = self.truth(cutoff=cutoff, N_sensor=exactly(self.N))
+        N, root = truth["N"], math.sqrt(gain)
+        return truth | {"N": Truth(N.low * root, math.hypot(N.high * root, math.sqrt(step)))}
 
     def offset(self, rng: Rng) -> float:
         """Return a bias, or gravity and a bias."""
@@ -524,13 +540,19 @@ def _for_filter(rng: Rng) -> tuple[int, float, Noise, float]:
 def _analogue(rng: Rng, order: int) -> Log:
     samples, rate, noise, cutoff = _for_filter(rng)
     log = noise.behind_analogue(samples, rate, cutoff, order, rng)
-    return Log(log, rate, noise.truth(cutoff=exactly(cutoff)), noise.quantity)
+    truth = noise.behind(exactly(cutoff), _folded(cutoff, rate, order))
+    return Log(log, rate, truth, noise.quantity)
+
+
+def _folded(cutoff: float, rate: float, order: int) -> float:
+    """Return the density of white noise in a log far below the cut-off, over that before it."""
+    return float(sim.folded(np.zeros(1), rate, cutoff, order)[0])
 
 
 def _digital(rng: Rng, order: int) -> Log:
     samples, rate, noise, cutoff = _for_filter(rng)
     log = sim.digital(noise.make(rng), samples, rate, cutoff, order)
-    return Log(log, rate, noise.truth(cutoff=exactly(cutoff)), noise.quantity)
+    return Log(log, rate, noise.behind(exactly(cutoff)), noise.quantity)
 
 
 def analogue_1(rng: Rng) -> Log:
@@ -569,15 +591,17 @@ def moving_mean(rng: Rng) -> Log:
     taps = int(rng.integers(2, 17))
     log = sim.moving_mean(noise.make(rng), samples, rate, taps)
     cutoff = exactly(sim.moving_mean_cutoff(rate, taps))
-    return Log(log, rate, noise.truth(cutoff=cutoff), noise.quantity)
+    return Log(log, rate, noise.behind(cutoff), noise.quantity)
 
 
 def filtered_and_rounded(rng: Rng) -> Log:
     """An analogue low-pass of any order, then a register of 0.3 to 1.5 sigma of what is left."""
     samples, rate, noise, cutoff = _for_filter(rng)
-    log = noise.behind_analogue(samples, rate, cutoff, int(rng.integers(1, 5)), rng)
+    order = int(rng.integers(1, 5))
+    log = noise.behind_analogue(samples, rate, cutoff, order, rng)
     step = between(rng, 0.3, 1.5) * float(np.std(np.diff(log))) / math.sqrt(2.0)
-    truth = noise.truth(cutoff=exactly(cutoff), N=_rounded(noise.N, step, rate))
+    gain = _folded(cutoff, rate, order)
+    truth = noise.behind(exactly(cutoff), gain, step**2 / (12.0 * rate))
     return Log(sim.rounded(log, step), rate, truth, noise.quantity)
 
 
@@ -588,7 +612,7 @@ def filtered_fast_process(rng: Rng) -> Log:
     noise = any_white(rng).with_process(between(rng, 10.0, 100.0), between(rng, 20.0, 80.0) / rate)
     cutoff = between(rng, 0.1, 0.5) * 0.5 * rate
     log = sim.digital(noise.make(rng), samples, rate, cutoff, 2)
-    return Log(log, rate, noise.truth(cutoff=exactly(cutoff)), noise.quantity)
+    return Log(log, rate, noise.behind(exactly(cutoff)), noise.quantity)
 
 
 def filtered_walk(rng: Rng) -> Log:
@@ -598,8 +622,10 @@ def filtered_walk(rng: Rng) -> Log:
     noise = any_white(rng)
     cutoff = between(rng, 0.1, 0.8) * 0.5 * rate
     noise = replace(noise, K=2.0 * math.pi * between(rng, 0.02, 0.3) * cutoff * noise.N)
-    log = noise.behind_analogue(samples, rate, cutoff, int(rng.integers(1, 5)), rng)
-    return Log(log, rate, noise.truth(cutoff=exactly(cutoff)), noise.quantity)
+    order = int(rng.integers(1, 5))
+    log = noise.behind_analogue(samples, rate, cutoff, order, rng)
+    truth = noise.behind(exactly(cutoff), _folded(cutoff, rate, order))
+    return Log(log, rate, truth, noise.quantity)
 
 
 def filtered_flicker(rng: Rng) -> Log:
@@ -614,7 +640,7 @@ def filtered_flicker(rng: Rng) -> Log:
         return noise.make(rng)(length, inner) + sim.flicker(length, inner, B, rng)
 
     log = sim.digital(make, samples, rate, cutoff, int(rng.integers(1, 5)))
-    truth = noise.truth(B=exactly(B), B_curve=exactly(B), cutoff=exactly(cutoff))
+    truth = noise.behind(exactly(cutoff)) | {"B": exactly(B), "B_curve": exactly(B)}
     truth.pop("T_B")
     return Log(log, rate, truth, noise.quantity)
 
@@ -645,7 +671,7 @@ def decimated_with_filter(rng: Rng) -> Log:
     """Every 4th to 10th sample behind a steep low-pass, of linear phase, at 0.85 of Nyquist."""
     samples, rate, noise, _ = _for_filter(rng)
     log = sim.decimated(noise.make(rng), samples, rate, int(rng.integers(4, 11)))
-    return Log(log, rate, noise.truth(cutoff=Truth(0.4 * rate, 0.44 * rate)), noise.quantity)
+    return Log(log, rate, noise.behind(Truth(0.4 * rate, 0.44 * rate)), noise.quantity)
 
 
 def decimated_without_filter(rng: Rng) -> Log:

@@ -65,7 +65,7 @@ from imubench_pipeline.tables import read
 from silent_cases import CASES, CLEAN, FILTERED, NOTHING, Log, Truth
 from workflow_steps import OneRecording
 
-ALL = frozenset({"N", "B", "B_curve", "T_B", "K", "Q", "R", "cutoff"})
+ALL = frozenset({"N", "N_sensor", "B", "B_curve", "T_B", "K", "Q", "R", "cutoff"})
 SLOW = frozenset({"B", "B_curve", "T_B", "K", "R"})
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
@@ -108,7 +108,7 @@ IDENTIFIED = 0.2
 """Least relative standard error of a parameter, by the Cramér-Rao bound of the true model, up to
 which a log is meant to give it."""
 
-SHOWN = ("N", "B", "B_curve", "T_B", "K", "Q", "R")
+SHOWN = ("N", "N_sensor", "B", "B_curve", "T_B", "K", "Q", "R")
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ def judge(case: str, number: int, log: Log, tables: Mapping[str, list[Any]]) -> 
     for row in tables["parameters"]:
         groups[row["method"], row["parameter"]].append(_upwards(row))
     for row in tables["low_pass"]:
-        if row["parameter"] in ("N", "cutoff"):
+        if row["parameter"] == "cutoff":
             more = {"method": "low_pass", "recommended": False, "component": 1, "model": None}
             groups["low_pass", row["parameter"]].append(row | more)
     for (method, parameter), rows in groups.items():
@@ -457,10 +457,10 @@ def summary(judged: Sequence[Judged]) -> Iterator[str]:
 
 
 def filter_summary(judged: Sequence[Judged]) -> Iterator[str]:
-    """Yield how well N before a low-pass, and its cut-off, are known in the cases with one."""
-    behind = [one for one in judged if one.case in FILTERED]
-    for method in ("likelihood", "low_pass"):
-        found = [one for one in behind if one.method == method and one.parameter == "N"]
+    """Yield how well N, N before a low-pass, and its cut-off, are known in the cases with one."""
+    behind = [one for one in judged if one.case in FILTERED and one.method != "likelihood_gm"]
+    for name in ("N", "N_sensor"):
+        found = [one for one in behind if one.method == "likelihood" and one.parameter == name]
         values = [one.value / one.truth_high - 1.0 for one in found if one.value is not None]
         limited = [one for one in found if one.lower is not None and one.upper is not None]
         if values and limited:
@@ -469,7 +469,7 @@ def filter_summary(judged: Sequence[Judged]) -> Iterator[str]:
                 (one.lower or 0.0) <= one.truth_high <= (one.upper or 0.0) for one in limited
             )
             given, held = share(len(values), len(found)), share(covered, len(limited))
-            yield f"behind a low-pass, N of {method}: given in {given}"
+            yield f"behind a low-pass, {name}: given in {given}"
             yield f"  within 3 % {share(near, len(values))}; covered {held}"
     cutoffs = [one for one in behind if one.parameter == "cutoff"]
     if cutoffs:
