@@ -267,14 +267,11 @@ def test_readings_of_temperature_are_no_channel_and_come_in_the_blocks_of_the_lo
 
 def test_a_log_without_a_filter_has_the_row_that_says_so(found: Estimation) -> None:
     rows = figures(found.low_pass)
-    assert list(rows) == ["cutoff", "N"]
+    assert list(rows) == ["cutoff"]
     assert rows["cutoff"]["status"] == "absent" and rows["cutoff"]["value"] is None
     assert rows["cutoff"]["order"] is None
-    assert rows["N"]["value"] == pytest.approx(NOISE.N, rel=0.03)
-    assert {name: row["unit"] for name, row in rows.items()} == {
-        "cutoff": "Hz",
-        "N": "rad/s/sqrt(Hz)",
-    }
+    assert rows["cutoff"]["unit"] == "Hz"
+    assert not [row for row in found.parameters if row["parameter"] == "N_sensor"]
 
 
 @pytest.mark.release
@@ -292,11 +289,14 @@ def test_a_filter_has_its_cutoff_order_and_the_noise_on_both_sides(tmp_path: Pat
     log += floor * np.sqrt(RATE) * rng.standard_normal(SAMPLES)
     found = estimated(recorded(tmp_path, {"gyro_x": log}), methods=("likelihood",))
     rows = figures(found.low_pass)
-    assert list(rows) == ["cutoff", "N", "floor"]
+    assert list(rows) == ["cutoff", "floor"]
     assert {row["order"] for row in rows.values()} == {1}
-    for name, true in (("cutoff", cutoff), ("N", N)):
+    rows |= {row["parameter"]: row for row in found.parameters if "N" in row["parameter"]}
+    in_the_log = N * np.sqrt(np.pi * cutoff / RATE / np.tanh(np.pi * cutoff / RATE))
+    assert rows["N"]["value"] == pytest.approx(np.hypot(in_the_log, floor), rel=0.05)
+    for name, true in (("cutoff", cutoff), ("N_sensor", N)):
         assert rows[name]["lower"] < true < rows[name]["upper"], name
         assert rows[name]["value"] == pytest.approx(true, rel=0.05), name
     assert rows["floor"]["value"] == pytest.approx(floor, rel=0.1)
     assert rows["floor"]["unit"] == "rad/s/sqrt(Hz)"
-    assert build("low_pass", found.low_pass).num_rows == 3
+    assert build("low_pass", found.low_pass).num_rows == 2

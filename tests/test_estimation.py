@@ -151,7 +151,8 @@ def test_the_estimates_are_those_of_the_simulation(
     of_curve = of_model(truth, averaging_times(RATE, SAMPLES / RATE))
     for name in names:
         (row,) = of(found.parameters, channel, method="likelihood", parameter=name)
-        assert row["status"] == "ok"
+        # Of a walk beside a line the limits are more than four times apart: no value is given.
+        assert row["status"] == ("not_identified" if name == "K" else "ok")
         true = getattr(truth, name, None) or of_curve[name].value
         assert row["lower"] < true < row["upper"]
 

@@ -479,7 +479,7 @@ def test_n_in_the_log_of_the_shipped_board_is_sixty_times_what_the_paper_prints(
         for channel, axis in recording.channels.items():
             key = (recording.sensor, str(channel))
             figures = {f.name: f.value for f in figures_of(axis, channel, rate)}
-            found[key] = figures.get("N in the log", figures["N"])
+            found[key] = figures["N"]
             (density,) = (f for f in axis.published if f.figure == "PSD")
             assert float(density.printed.split()[0]) == printed[key]
             assert density.si("gyro") == pytest.approx(60 * printed[key] * DEGREE)

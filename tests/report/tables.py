@@ -186,8 +186,8 @@ def thermal_rows(key: Key, temperature: str) -> Rows:
         "lag": (None, 0.0, 60.0, "s", "not_identified", "it may be 0"),
         "bias": (5 * HOUR, 4 * HOUR, 6 * HOUR, "rad/s", "ok", None),
     }
-    cutoff = {"cutoff": (64.0, 63.0, 65.0, "Hz", "ok", None),
-              "N": (14 * HOUR, 13 * HOUR, 15 * HOUR, "rad/s/sqrt(Hz)", "ok", None)}  # fmt: skip
+    cutoff = {"cutoff": (64.0, 63.0, 65.0, "Hz", "ok", None)}
+    sensor = {"N_sensor": Parameter(14 * HOUR, lower=13 * HOUR, upper=15 * HOUR)}
     columns = ("value", "lower", "upper", "unit", "status", "reason")
 
     def of(about: Row, given: Mapping[str, tuple[Any, ...]]) -> list[Row]:
@@ -217,8 +217,9 @@ def thermal_rows(key: Key, temperature: str) -> Rows:
         if one.value is not None
     }
     best = parameter_rows(key, Estimate("compensated", half), recommended=False)
+    before = parameter_rows(key, Estimate("likelihood", sensor), recommended=True)
     return {
-        "parameters": list(best) * followed,
+        "parameters": [*list(best) * followed, *before],
         "temperature": of({"compensated": followed}, figures),
         "allan_compensated": left * followed,
         "low_pass": of({"order": 1}, cutoff),

@@ -587,7 +587,7 @@ _FOLDED = math.pi * 0.64 / math.tanh(math.pi * 0.64)
         ("0.0016 °/s, 38 % of the rate",
          [0.0122 / math.sqrt(60), 0.0122 / math.sqrt(60) / math.degrees(EARTH_RATE)], 0.02),
         ("1 % of the Earth's rate stands for 0.57°", [0.01, math.degrees(0.01)], 0.006),
-        ("1.44 N for 64 Hz at 100 Hz", [math.sqrt(_FOLDED)], 0.003),
+        ("1.44 times the density for 64 Hz at 100 Hz", [math.sqrt(_FOLDED)], 0.003),
         ("frequency 0.37/τ", [1.1656 / math.pi], 0.005),
         ("√10 = 3.2 times better", [math.sqrt(10)], 0.02),
         ("0.1 decades are 26 %", [0.1, 10**0.1 - 1], 0.01),

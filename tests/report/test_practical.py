@@ -20,7 +20,21 @@ from imubench_pipeline.report.practical import (
 
 ASCII = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
 SYMBOLS = {
-    *("Q", "N", "B", "T_B", "K", "R", "B_curve", "sigma_min", "tau_min", "adev", "psd", "signal"),
+    *(
+        "Q",
+        "N",
+        "N_sensor",
+        "B",
+        "T_B",
+        "K",
+        "R",
+        "B_curve",
+        "sigma_min",
+        "tau_min",
+        "adev",
+        "psd",
+        "signal",
+    ),
     *("sensitivity", "quadratic"),
 }
 

@@ -121,11 +121,11 @@ def test_a_log_without_temperature_says_nothing_of_it() -> None:
     assert answer(channel(rows), "practical") == [
         "The sensor's own low-pass cuts off at 64 Hz, of first order."
     ]
-    assert set(lines(channel(rows))) == {"cutoff", "N_before_low_pass"}
+    assert set(lines(channel(rows))) == {"cutoff", "N_sensor"}
 
 
 def low_pass(**changes: Any) -> dict[tuple[str, str], dict[str, Any]]:
-    return {("low_pass", name): changes for name in ("cutoff", "N")}
+    return {("low_pass", "cutoff"): changes}
 
 
 def test_the_order_of_a_butterworth_filter_is_said() -> None:
@@ -138,7 +138,7 @@ def test_no_low_pass_is_said_and_has_no_line() -> None:
                                      "status": "absent", "reason": "it shows none"}}  # fmt: skip
     view = warm(changes=none)
     assert answer(view, "practical")[-1] == "The spectrum shows no low-pass of the sensor."
-    assert not {"cutoff", "N_before_low_pass"} & set(lines(view))
+    assert "cutoff" not in lines(view)
 
 
 def test_a_cutoff_that_is_not_known_has_its_limits_and_why() -> None:
@@ -159,19 +159,19 @@ def test_figures_have_units_and_limits() -> None:
     found = lines(warm())
     assert list(found) == [
         "temperature_sensitivity", "thermal_lag", "bias_at_reference", "cutoff",
-        "N_before_low_pass",
+        "N_sensor",
     ]  # fmt: skip
     assert {term: line["unit"] or line["sign"] for term, line in found.items()} == {
         "temperature_sensitivity": "gyro.sensitivity",
         "thermal_lag": "s",
         "bias_at_reference": "gyro.signal",
         "cutoff": "Hz",
-        "N_before_low_pass": "gyro.N",
+        "N_sensor": "gyro.N",
     }
     s = found["temperature_sensitivity"]
     assert (s["value"], s["lower"], s["upper"]) == pytest.approx((90 * HOUR, 81 * HOUR, 99 * HOUR))
     assert s["status"] == "" and s["words"] == "sensitivity"
-    assert found["cutoff"]["value"] == 64.0 and found["N_before_low_pass"]["value"] == 14 * HOUR
+    assert found["cutoff"]["value"] == 64.0 and found["N_sensor"]["value"] == 14 * HOUR
 
 
 def test_a_figure_that_is_not_identified_has_limits_and_reason() -> None:
@@ -201,6 +201,7 @@ def test_the_truth_of_a_simulation_stands_beside_it() -> None:
         "lag": 30.0,
         "cutoff": 60.0,
         "bias": 2 * DEGREE,
+        "N_sensor": 0.8 * MODEL.N,
     }
     rows["simulated_truth"] += [
         NAMES | {"parameter": name, "component": 1, "value": value, "unit": "x", "assumed": False,
@@ -210,8 +211,7 @@ def test_the_truth_of_a_simulation_stands_beside_it() -> None:
     found = lines(channel(rows))
     assert found["temperature_sensitivity"]["truth"] == 91 * HOUR
     assert found["thermal_lag"]["truth"] == 30.0 and found["cutoff"]["truth"] == 60.0
-    # N before the low-pass is that of the parameters.
-    assert found["N_before_low_pass"]["truth"] == MODEL.N
+    assert found["N_sensor"]["truth"] == 0.8 * MODEL.N
     # The true bias is that at the reference of the simulation, not at the mean of the log.
     assert found["bias_at_reference"]["truth"] is None
     assert all(line["truth"] is None for line in lines(warm()).values())

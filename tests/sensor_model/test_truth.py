@@ -50,7 +50,7 @@ def test_every_figure_has_its_si_value_and_unit() -> None:
     rounding = (0.0625 * DEGREE) ** 2 / (12 * 100)
     n = math.sqrt((0.006 * DEGREE) ** 2 * x / math.tanh(x) + rounding)
     expected = {
-        "N": (0.006 * DEGREE, "rad/s/sqrt(Hz)"),
+        "N_sensor": (0.006 * DEGREE, "rad/s/sqrt(Hz)"),
         "Q": (1e-4 * DEGREE, "rad"),
         "K": (2 * DEGREE / 3600 / 60, "rad/s/sqrt(s)"),
         "R": (DEGREE / 3600**2, "rad/s^2"),
@@ -68,7 +68,7 @@ def test_every_figure_has_its_si_value_and_unit() -> None:
         "reference": (25.0, "degC"),
         "lag": (300.0, "s"),
         "cutoff": (64.0, "Hz"),
-        "N in the log": (n, "rad/s/sqrt(Hz)"),
+        "N": (n, "rad/s/sqrt(Hz)"),
     }
     values = {name: one.value for name, one in found.items()}
     assert values == pytest.approx({name: value for name, (value, _) in expected.items()}, rel=1e-4)
@@ -83,7 +83,7 @@ def test_the_setting_of_a_figure_is_one_that_can_be_assumed() -> None:
     settings = {name: one.setting for name, one in named(figures(**AXIS)).items()}
     assert settings["B 1"] == settings["T_B 3"] == "further"
     assert settings["B 2"] == settings["T_B 2"] == "B"
-    assert settings["cutoff"] == "low_pass" and settings["N in the log"] == "N"
+    assert settings["cutoff"] == "low_pass" and settings["N_sensor"] == "N"
     assert settings["sensitivity"] == "drift" and settings["amplitude"] == "sinusoids"
 
 
@@ -106,8 +106,8 @@ def test_the_n_of_the_log_depends_on_its_rate(rate: float) -> None:
     found = named(figures(N="0.6 deg/sqrt(h)", low_pass={"cutoff": "60 Hz"}, rate=rate))
     x = math.pi * 60 / rate
     shown = 0.01 * DEGREE * math.sqrt(x / math.tanh(x))
-    assert found["N in the log"].value == pytest.approx(shown, rel=1e-4)
-    assert found["N"].value == pytest.approx(0.01 * DEGREE, rel=1e-12)
+    assert found["N"].value == pytest.approx(shown, rel=1e-4)
+    assert found["N_sensor"].value == pytest.approx(0.01 * DEGREE, rel=1e-12)
 
 
 def test_flicker_noise_comes_first_then_processes_by_their_time() -> None:

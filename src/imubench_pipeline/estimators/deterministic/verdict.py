@@ -13,7 +13,14 @@ from imubench_pipeline.estimators.deterministic.courses import Course, Courses
 from imubench_pipeline.estimators.deterministic.halves import Halves, compare_halves
 from imubench_pipeline.estimators.deterministic.means import Steadiness, steadiness_of
 from imubench_pipeline.estimators.deterministic.search import MOST
-from imubench_pipeline.estimators.estimate import FAMILY, Estimate, JointDraws, Parameter, Status
+from imubench_pipeline.estimators.estimate import (
+    FAMILY,
+    SIGMAS,
+    Estimate,
+    JointDraws,
+    Parameter,
+    Status,
+)
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Row
 
@@ -36,8 +43,16 @@ class Verdict:
     scatter: float = 0.0
     """Standard deviation of the logarithm of N over the log, where it varies otherwise."""
 
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the logarithm of N over the log."""
+        return math.hypot(self.growth / math.sqrt(12.0), self.scatter)
+
     def applied(self, estimate: Estimate) -> Estimate:
-        """Return an estimate with the caveats on the parameters that have a value."""
+        """Return an estimate with the caveats on the parameters that have a value.
+
+        The interval of N holds for N at any time of the log, as its draws do.
+        """
         if not self.caveats and self.widening == 1.0:
             return estimate
 
@@ -46,8 +61,8 @@ class Verdict:
                 name: _with(parameter, self.caveats.get(name))
                 for name, parameter in parameters.items()
             }
-            if "N" in judged and self.widening > 1.0:
-                judged["N"] = _widened(judged["N"], self.widening)
+            if "N" in judged:
+                judged["N"] = _widened(judged["N"], self.widening, self.spread)
             return judged
 
         slow = [self.caveats[name] for name in ("B", "K") if name in self.caveats]
@@ -96,15 +111,20 @@ def _with(parameter: Parameter, caveat: tuple[Status, str] | None) -> Parameter:
     return replace(parameter, status=status, reason=reason)
 
 
-def _widened(parameter: Parameter, times: float) -> Parameter:
+def _widened(parameter: Parameter, times: float, spread: float) -> Parameter:
+    """Return a parameter with limits so many times as far, and a spread of its logarithm added."""
     value, lower, upper = parameter.value, parameter.lower, parameter.upper
-    if value is None or lower is None or upper is None:
+    if value is None or lower is None or upper is None or (times, spread) == (1.0, 0.0):
         return parameter
+
+    def far(ratio: float) -> float:
+        return math.exp(math.hypot(times * math.log(ratio), SIGMAS * spread))
+
     # On the logarithm: no limit passes 0.
     return replace(
         parameter,
-        lower=value * (lower / value) ** times if lower > 0.0 else lower,
-        upper=value * (upper / value) ** times,
+        lower=value / far(value / lower) if lower > 0.0 else lower,
+        upper=value * far(upper / value),
     )
 
 

@@ -180,7 +180,7 @@ def answer(
     if not noisy:
         return f"no noise model of {sensor}"
     chosen = sorted(noisy, key=lambda channel: channel.variance(tau))[len(noisy) // 2]
-    stream = channel_rng(seed, repr(chosen.model), chosen.channel, "fusion")
+    stream = channel_rng(seed, chosen.sensor, repr(chosen.model), chosen.channel, "fusion")
     own, common = _parts([chosen.model], correlation, tau)
     drawn_own, drawn_common = _parts(chosen.drawn(draws, stream), correlation, tau)
     if chosen.temperature is not None:
