@@ -39,7 +39,7 @@ _BETWEEN = 49
 """Averaging times between the peaks of several processes."""
 
 _DRAWS = 16_000
-"""Draws of each model that are used."""
+"""Draws of each model that are used where each takes many averaging times."""
 
 _PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
@@ -63,6 +63,11 @@ class Models:
     def biases(self) -> Array:
         """B of each Gauss-Markov process, shape (d, g)."""
         return self.parameters[:, len(self.terms.linear) :]
+
+    def fewer(self) -> Models:
+        """Return every n-th of them, some `_DRAWS`."""
+        every = max(1, len(self.parameters) // _DRAWS)
+        return replace(self, parameters=self.parameters[::every], times=self.times[::every])
 
     @property
     def has_bias(self) -> bool:
@@ -257,7 +262,7 @@ def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dic
     not rule out, none where the fit gives no limits.
     """
     (sigma,), (time,), (inside,) = lowest_point(model, tau)
-    drawn_points = [lowest_point(models, tau) for models in drawn]
+    drawn_points = [lowest_point(models.fewer(), tau) for models in drawn]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
     if drawn:
         sizes = [models.weight for models in drawn]
@@ -305,8 +310,7 @@ def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, 
 
 
 def _drawn(candidate: Candidate, draws: Mapping[Terms, Posterior]) -> Models:
-    posterior = draws[candidate.terms]
-    every = max(1, len(posterior.parameters) // _DRAWS)
-    return Models(
-        candidate.terms, posterior.parameters[::every], posterior.times[::every], candidate.weight
-    )
+    posterior, terms = draws[candidate.terms], candidate.terms
+    models = Models(terms, posterior.parameters, posterior.times, candidate.weight)
+    # Of several processes the highest point is looked for at many tau.
+    return models.fewer() if terms.gauss_markov > 1 else models

@@ -24,10 +24,10 @@ from imubench_pipeline.typing import Array
 DRAWS = 80_000
 """Draws that are kept, unless fewer are asked for: the 2.5 % of them in a tail are 2,000."""
 
-_WORTH = 10
+_WORTH = 6
 """Draws for which one independent point is wanted: limits of two seeds then agree within 3 %."""
 
-_LEAST_WORTH = 100
+_LEAST_WORTH = 80
 """Draws for which one independent point must be had: a chain, worth about as much, takes over."""
 
 _ROUNDS = 4
