@@ -27,7 +27,7 @@ def other(method: str = "weighted", **parameters: Parameter) -> Estimate:
             Parameter(1.1, lower=1.05, upper=1.15),
             "doubtful",
         ),  # intervals apart
-        (Parameter(1.9, lower=0.9, upper=3.8), "doubtful"),  # nearly twice, however unsure
+        (Parameter(1.9, lower=0.98, upper=3.8), "doubtful"),  # nearly twice, however unsure
         (Parameter(1.2), "ok"),  # read off a curve, without limits
         (Parameter(1.4), "doubtful"),
         # At most a quarter beyond the limits, and 1.8 times the value.
@@ -35,10 +35,10 @@ def other(method: str = "weighted", **parameters: Parameter) -> Estimate:
         (Parameter(1.28), "doubtful"),
         (Parameter(0.79), "ok"),
         (Parameter(0.78), "doubtful"),
-        (Parameter(1.79, lower=0.9, upper=3.8), "ok"),
-        (Parameter(1.81, lower=0.9, upper=3.8), "doubtful"),
-        (Parameter(0.56, lower=0.2, upper=1.1), "ok"),
-        (Parameter(0.55, lower=0.2, upper=1.1), "doubtful"),
+        (Parameter(1.79, lower=1.0, upper=3.8), "ok"),
+        (Parameter(1.81, lower=1.0, upper=3.8), "doubtful"),
+        (Parameter(0.56, lower=0.3, upper=1.1), "ok"),
+        (Parameter(0.55, lower=0.3, upper=1.1), "doubtful"),
         (Parameter(0.95, lower=0.9, upper=0.97), "doubtful"),
         (Parameter(1.0, "at_bound", lower=0.9, upper=1.1), "at_bound"),
         (Parameter(None, "not_shown", "short"), "not_shown"),

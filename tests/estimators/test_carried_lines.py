@@ -1,6 +1,7 @@
 """A comb of lines is carried on as a few, with the power of all."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def test_few_lines_are_carried_as_they_are() -> None:
     lines = [*comb(MOST), *comb(5, "band")]
     found = carried_sinusoids(lines)
     assert [one["frequency"].value for one in found] == [line.frequency for line in lines[:MOST]]
-    assert line_findings([vars(line) | {"channel": "gyro_x"} for line in lines])[1:] == []
+    assert line_findings("gyro_x", lines, None)[1:] == []
 
 
 @pytest.mark.parametrize("number", [MOST + 1, 363, 1000])
@@ -55,25 +56,26 @@ def test_many_lines_keep_their_power_and_that_of_their_integral(number: int) -> 
 
 
 def test_a_comb_is_a_warning_that_says_how_many_and_how_much_power() -> None:
-    rows = [vars(line) | {"channel": "gyro_x"} for line in comb(363)]
-    note, warning = line_findings(rows)
+    lines = comb(363)
+    note, warning = line_findings("gyro_x", lines, None)
     assert (note.finding, warning.finding) == ("lines", "too_many_lines")
     assert warning.severity == "warning" and warning.value == 363
-    powers = np.sort([0.5 * row["amplitude"] ** 2 for row in rows])
+    powers = np.sort([0.5 * line.amplitude**2 for line in lines])
     rest = powers[:-STRONGEST].sum()
     assert "the other 351" in warning.detail
     assert f"{100 * rest / powers.sum():.3g} % of that of all lines" in warning.detail
     assert f"({np.sqrt(rest):.3g} rad/s rms)" in warning.detail
-    assert joined_finding("gyro_x", "gyro", rows) == warning
+    assert joined_finding("gyro_x", "gyro", lines) == warning
 
 
 def test_a_line_that_integrates_to_as_much_as_the_noise_is_warned_of() -> None:
     # A gyro's angle swings by A / (2 pi f), about its value a second before, and walks by N.
     frequency, white = 17.3, 6.6e-4
-    one = {"channel": "gyro_x", "kind": "sinusoid", "frequency": frequency, "ratio": 1e4}
+    one = replace(comb(1)[0], frequency=frequency, ratio=1e4)
     for part, names in ((0.49, ["lines"]), (0.51, ["lines", "strong_line"])):
         amplitude = part * white * math.pi * frequency * math.sqrt(2.0)
-        found = line_findings([one | {"amplitude": amplitude}], {"gyro_x": white})
+        line = replace(one, amplitude=amplitude)
+        found = line_findings("gyro_x", [line], white)
         assert [finding.finding for finding in found] == names
-        assert len(line_findings([one | {"amplitude": amplitude}], {"gyro_y": white})) == 1
+        assert len(line_findings("gyro_x", [line], None)) == 1
     assert found[1].value == pytest.approx(0.51)

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.doubts import add_doubts, instead_of_walk
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.model_choice import Candidate
-from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms, whittle_of
+from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
 
 RATE, DURATION, N = 10.0, 4000.0, 1e-2
 FLAT = ideal_spectrum(RATE, DURATION, RATE / 2.0)
@@ -36,19 +34,17 @@ def estimate() -> Estimate:
     return Estimate("likelihood", parameters, curve={"B_curve": Parameter(1.0)})
 
 
-def frame(highest: float = RATE / 2.0, *, cut: bool = False, low_pass: Cutoff | None = None):
-    return Frame([], EVERY, EVERY, Band(highest, "found"), low_pass, cut=cut)
+def frame(highest: float = RATE / 2.0, *, cut: bool = False) -> Frame:
+    return Frame([], EVERY, EVERY, Band(highest, "found"), cut=cut)
 
 
 def doubted(
     chosen: Candidate,
     *others: Candidate,
-    of: Frame | None = None,
-    spectrum: Spectrum = SPECTRUM,
     papers: Candidate | None = None,
 ) -> tuple[Estimate, Estimate]:
     candidates = [chosen, *others]
-    return add_doubts(estimate(), estimate(), spectrum, of or frame(), candidates, papers or chosen)
+    return add_doubts(estimate(), estimate(), frame(), candidates, papers or chosen)
 
 
 def statuses(found: Estimate) -> set[str]:
@@ -113,79 +109,13 @@ def test_the_only_bias_and_that_of_the_curve_are_as_sure(status: str) -> None:
     known = estimate()
     unsure = Parameter(1.0, status, "why", 0.5, 2.0)
     given = replace(known, parameters={**known.parameters, "B": unsure})
-    found, _ = add_doubts(given, known, SPECTRUM, frame(), [at("N", 1, 0.0, 0.0)], at("N", 1, 0, 0))
+    found, _ = add_doubts(given, known, frame(), [at("N", 1, 0.0, 0.0)], at("N", 1, 0, 0))
     of_curve = found.curve["B_curve"]
     assert (of_curve.status, of_curve.reason, of_curve.fitted) == (status, "why", 1.0)
     assert of_curve.value == (1.0 if status == "doubtful" else None)
     given = replace(given, further=[{"B": Parameter(1.0), "T_B": Parameter(1.0)}])
-    found, _ = add_doubts(given, known, SPECTRUM, frame(), [at("N", 2, 0.0, 0.0)], at("N", 1, 0, 0))
+    found, _ = add_doubts(given, known, frame(), [at("N", 2, 0.0, 0.0)], at("N", 1, 0, 0))
     assert found.curve["B_curve"].status == "ok"
-
-
-def low_pass(floor: float = 0.0, **more: object) -> Cutoff:
-    ones = np.ones(len(EVERY))
-    return Cutoff(
-        Parameter(2.0), 2, Parameter(N), floor, 30.0, kind="analogue",
-        **{"behind": Behind(ones, ones, ones), **more},
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize(("share", "status"), [(0.04, "doubtful"), (0.02, "ok")])
-def test_white_noise_beside_a_low_pass_may_be_of_the_same_n(share: float, status: str) -> None:
-    of = frame(low_pass=low_pass(N * np.sqrt(share + 0.1), rounded=0.1))
-    found = doubted(at("N", 0, 0.0, 0.0), of=of)[0].parameters["N"]
-    assert found.status == status
-    widened = np.sqrt(1.0 + share) if status == "doubtful" else 1.0
-    assert (found.lower, found.upper) == pytest.approx((0.9 * N, 1.1 * N * widened))
-
-
-def test_a_process_that_may_be_a_filter_leaves_n_between_both() -> None:
-    of = frame(low_pass=low_pass(behind=None, or_process="alike", N_behind=3.0 * N))
-    found = doubted(at("N", 0, 0.0, 0.0), of=of)[0].parameters["N"]
-    assert (found.value, found.status, found.reason) == (None, "not_identified", "alike")
-    assert (found.lower, found.upper) == pytest.approx((0.9 * N, 3.0 * N))
-
-
-def test_a_process_of_a_few_samples_may_be_a_filter_before_all_noise() -> None:
-    of = replace(frame(low_pass=low_pass(behind=None)), shortest=3.0 / RATE)
-    for samples, told in ((12.0, True), (8.0, False)):
-        chosen = at("N", 1, 0.0, 0.0)
-        maximum = replace(chosen.maximum, times=np.array([samples / RATE]))
-        chosen = replace(chosen, maximum=maximum)
-        found = doubted(chosen, of=of)[0].parameters["N"]
-        assert (found.status == "ok") is told
-    # Its density at no frequency is that of white noise: B^2 = 1 makes 2 sigma^2 T_B of it.
-    sigma = np.sqrt(np.log(2.0) / np.pi) / 0.4365
-    before = np.sqrt(N**2 + 2.0 * sigma**2 * 0.8)
-    assert found.upper == pytest.approx(before, rel=0.02)
-    assert found.fitted == pytest.approx(N)
-
-
-def falling(share: float, beyond: float = 1.0, last: float = RATE) -> Spectrum:
-    """White noise that has less of its density from a frequency on."""
-    f = SPECTRUM.frequency
-    return replace(SPECTRUM, density=N**2 * np.where((f > beyond) & (f < last), share, 1.0))
-
-
-@pytest.mark.parametrize(
-    ("share", "status", "lower"),
-    [(0.3, "ok", np.sqrt(0.3)), (0.2, "doubtful", np.sqrt(0.2)), (0.95, "ok", 0.9)],
-)
-def test_beyond_a_cut_n_may_be_the_least_density(share: float, status: str, lower: float) -> None:
-    spectrum = falling(share)
-    of = frame(float(spectrum.upper[spectrum.frequency < 1.0].max()), cut=True)
-    found = doubted(at("N", 0, 0.0, 0.0), of=of, spectrum=spectrum)[0].parameters["N"]
-    assert found.status == status
-    assert found.lower == pytest.approx(lower * N)
-
-
-def test_beyond_a_cut_of_three_bins_nothing_is_said_of_n() -> None:
-    for bins in (3, 4):
-        highest = float(SPECTRUM.lower[-bins])
-        spectrum = falling(0.2, highest)
-        of = frame(highest, cut=True)
-        found = doubted(at("N", 0, 0.0, 0.0), of=of, spectrum=spectrum)[0].parameters["N"]
-        assert found.status == ("doubtful" if bins == 4 else "ok")
 
 
 def test_beyond_a_cut_a_process_would_not_be_seen() -> None:
@@ -193,23 +123,9 @@ def test_beyond_a_cut_a_process_would_not_be_seen() -> None:
     absent = Parameter(None, "absent", "none", 0.0, 1.0)
     given = replace(known, parameters={**known.parameters, "B": absent})
     of = frame(1.0, cut=True)
-    found, _ = add_doubts(given, known, SPECTRUM, of, [at("N", 0, 0, 0)], at("N", 0, 0, 0))
+    found, _ = add_doubts(given, known, of, [at("N", 0, 0, 0)], at("N", 0, 0, 0))
     B = found.parameters["B"]
     assert (B.status, B.lower, B.upper) == ("not_identified", None, None)
-
-
-@pytest.mark.parametrize(
-    ("share", "last", "told"), [(0.65, RATE, False), (0.75, RATE, True), (0.65, 4.0, True)]
-)
-def test_a_flat_stretch_of_another_level_leaves_n_between_both(
-    share: float, last: float, told: bool
-) -> None:
-    spectrum = falling(share, 1.0, last)
-    of = frame(1.0, low_pass=low_pass())
-    found = doubted(at("N", 0, 0.0, 0.0), of=of, spectrum=spectrum)[0].parameters["N"]
-    assert (found.status == "ok") is told
-    if not told:
-        assert found.lower == pytest.approx(np.sqrt(share) * N)
 
 
 def of_slope(power: float, bins: float = 8.0) -> tuple[str | None, float]:

@@ -33,7 +33,7 @@ def test_a_curved_ridge_and_an_end_keep_their_quantiles(rng) -> None:
     first = Mixture(
         np.array([0.5, 0.25, 0.25]),
         np.array([[0.0, 0.0], [-0.7, 0.5], [1.5, 2.0]]),
-        np.array([np.eye(2), 0.3 * np.eye(2), np.eye(2)]),
+        np.array([np.eye(2), 0.3 * np.eye(2), 4.0 * np.eye(2)]),
     )
     found = sample_adaptively(logarithm, first, rng, size=2048, wanted=4000, most=40_960)
     assert found.effective >= 4000

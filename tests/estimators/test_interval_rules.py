@@ -1,12 +1,11 @@
 """What an interval is made of, and from where on a value is no number to quote."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.intervals import (
@@ -24,6 +23,7 @@ RATE, DURATION = 1.0, 200_000.0
 N, K, B, T_B, R = 1.0, 1e-2, 1.0, 300.0, 1e-2
 VALUES = {"N": N, "K": K, "F": B}
 EVEN = (np.arange(4000) + 0.5) / 4000
+FRAME = Frame([], np.ones(1, dtype=np.bool_), np.ones(1, dtype=np.bool_), Band(0.5, "set"))
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def draws_of(terms: Terms, **limits: tuple[float, float]) -> Posterior:
 def described(whittle: Whittle, terms: Terms, **limits: tuple[float, float]) -> Estimate:
     chosen = candidate(terms)
     drawn = {terms: draws_of(terms, **limits)}
-    return describe("likelihood", whittle, chosen, [chosen], drawn, Band(0.5, "set"))
+    return describe("likelihood", whittle, chosen, [chosen], drawn, FRAME)
 
 
 def test_limits_are_quantiles_of_the_draws(whittle: Whittle) -> None:
@@ -75,23 +75,20 @@ def test_limits_are_quantiles_of_the_draws(whittle: Whittle) -> None:
 @pytest.mark.parametrize(
     ("name", "limits", "status"),
     [
-        # A log of a ratio of limits that is 2 x 1.96 standard errors of 0.3 apart, or nearly.
-        ("B", (0.6, 0.6 * np.exp(3.92 * 0.29)), "ok"),
-        ("B", (0.6, 0.6 * np.exp(3.92 * 0.31)), "not_identified"),
-        ("T_B", (200.0, 200.0 * np.exp(3.92 * 0.29)), "ok"),
-        ("T_B", (200.0, 200.0 * np.exp(3.92 * 0.31)), "not_identified"),
-        # More than 2.3 times the value, or less than a fifth of it.
-        ("N", (0.9, 2.25), "ok"),
-        ("N", (0.9, 2.35), "not_identified"),
-        ("N", (0.21, 1.1), "ok"),
-        ("N", (0.19, 1.1), "not_identified"),
-        ("K", (0.1 * K, 1.3 * K), "not_identified"),
-        ("K", (0.9 * K, 2.35 * K), "not_identified"),
+        # Limits that are at most four times apart.
+        ("B", (0.6, 2.39), "ok"),
+        ("B", (0.6, 2.41), "not_identified"),
+        ("T_B", (200.0, 799.0), "ok"),
+        ("T_B", (200.0, 801.0), "not_identified"),
+        ("N", (0.3, 1.19), "ok"),
+        ("N", (0.3, 1.21), "not_identified"),
+        ("K", (0.4 * K, 1.59 * K), "ok"),
+        ("K", (0.4 * K, 1.61 * K), "not_identified"),
         ("R", (-1e-4, 5.0 * R), "not_identified"),
-        ("R", (1e-4, 5.0 * R), "ok"),
+        ("R", (0.3 * R, 1.1 * R), "ok"),
     ],
 )
-def test_a_value_that_is_hardly_told_is_none(
+def test_a_value_whose_limits_are_four_times_apart_is_none(
     whittle: Whittle, name: str, limits: tuple[float, float], status: str
 ) -> None:
     found = described(whittle, Terms("NK", 1, ramp=True), **{name: limits}).parameters[name]
@@ -101,24 +98,6 @@ def test_a_value_that_is_hardly_told_is_none(
     if status == "not_identified":
         assert found.value is None
         assert found.fitted == {"N": N, "K": K, "B": B, "T_B": T_B, "R": R}[name]
-
-
-def test_a_walk_is_known_as_well_as_the_middle_of_its_draws(whittle: Whittle) -> None:
-    for error, status in ((0.33, "ok"), (0.37, "not_identified")):
-        normal = np.sqrt(2.0) * np.vectorize(_erfinv)(2.0 * EVEN - 1.0)
-        drawn = draws_of(Terms("NK"))
-        walks = np.minimum(K * np.exp(error * normal), 2.2 * K)
-        drawn = replace(drawn, parameters=np.column_stack([drawn.parameters[:, 0], walks]))
-        chosen = candidate(Terms("NK"))
-        band = Band(0.5, "set")
-        found = describe("likelihood", whittle, chosen, [chosen], {Terms("NK"): drawn}, band)
-        assert found.parameters["K"].status == status
-
-
-def _erfinv(x: float) -> float:
-    from scipy.special import erfinv
-
-    return float(erfinv(x))
 
 
 @pytest.mark.parametrize(
@@ -131,7 +110,7 @@ def test_a_time_at_an_end_of_the_search_is_at_bound(
     chosen = candidate(Terms("N", 1), T_B=at)
     drawn = draws_of(Terms("N", 1), T_B=(0.8 * at, 1.2 * at))
     found = describe(
-        "likelihood", whittle, chosen, [chosen], {Terms("N", 1): drawn}, Band(0.5, "set")
+        "likelihood", whittle, chosen, [chosen], {Terms("N", 1): drawn}, FRAME
     ).parameters["T_B"]
     assert (found.status == "at_bound") is at_bound
     assert found.value == pytest.approx(at) or not at_bound
@@ -141,7 +120,7 @@ def test_terms_that_are_fitted_as_none_are_absent(whittle: Whittle) -> None:
     terms = Terms("NK", 1)
     chosen = candidate(terms, K=0.0, B=0.0)
     found = describe(
-        "likelihood", whittle, chosen, [chosen], {terms: draws_of(terms)}, Band(0.5, "set")
+        "likelihood", whittle, chosen, [chosen], {terms: draws_of(terms)}, FRAME
     ).parameters
     assert (found["K"].status, found["K"].lower) == ("absent", 0.0)
     assert found["K"].upper == pytest.approx(1.3 * K, rel=1e-3)
@@ -155,7 +134,7 @@ def test_two_models_share_an_interval_by_their_aic(whittle: Whittle) -> None:
         Terms("NK"): draws_of(Terms("NK")),
         Terms("NFK"): draws_of(Terms("NFK"), K=(0.5 * K, 0.7 * K), N=(0.6, 0.9)),
     }
-    found = describe("likelihood", whittle, walk, [walk, flicker], drawn, Band(0.5, "set"))
+    found = describe("likelihood", whittle, walk, [walk, flicker], drawn, FRAME)
     # Three to one: what is below 2.5 % of all is below 10 % of the fourth.
     K_found, N_found = found.parameters["K"], found.parameters["N"]
     assert N_found.lower == pytest.approx(0.6 + 0.3 / 0.95 * 0.075, rel=2e-3)
@@ -164,7 +143,7 @@ def test_two_models_share_an_interval_by_their_aic(whittle: Whittle) -> None:
     assert K_found.upper == pytest.approx(1.3 * K, rel=1e-2)
     # A quarter lies below: the median is at a third of the others.
     assert K_found.value == pytest.approx(0.8 * K + 0.5 * K / 0.95 * (1 / 3 - 0.025), rel=2e-3)
-    assert K_found.fitted == K
+    assert K_found.fitted is None
 
 
 def test_b_of_several_terms_is_another_quantity(whittle: Whittle) -> None:
@@ -175,7 +154,7 @@ def test_b_of_several_terms_is_another_quantity(whittle: Whittle) -> None:
         flicker.terms: draws_of(flicker.terms, B=(0.3, 0.4)),
         two.terms: draws_of(two.terms, B=(0.01, 0.02), T_B=(1.0, 2.0)),
     }
-    found = describe("likelihood", whittle, one, [one, flicker, two], drawn, Band(0.5, "set"))
+    found = describe("likelihood", whittle, one, [one, flicker, two], drawn, FRAME)
     assert found.parameters["B"].lower == pytest.approx(0.3 + 0.1 / 0.95 * 0.025, rel=2e-2)
     assert found.parameters["T_B"].lower == pytest.approx(250.0, rel=1e-3)
 

@@ -443,7 +443,7 @@ def test_other_draws_are_within_the_noise_of_the_intervals() -> None:
 
 def test_unit_rate_constant_direction_and_type_change_what_they_must_alone() -> None:
     # In one fit: the variance of a sample is N^2 / T, and that of a step of the walk K^2 T.
-    unit, faster = 1e-7, 37.0
+    unit, faster = 1e-7, 17.0  # T_B stays above a second
     log = unit * (log_of(SHORT, samples=SHORT_SAMPLES)[::-1] - 4e3)
     root = np.sqrt(faster)
     scale = {"N": 1 / root, "B": 1.0, "K": root, "Q": 1 / faster, "R": faster}

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, JointDraws, Parameter
-from imubench_pipeline.estimators.frame import Frame
-from imubench_pipeline.estimators.likelihood import _with_folds, _with_one_more
+from imubench_pipeline.estimators.likelihood import _with_one_more
 from imubench_pipeline.estimators.rows import draw_rows, estimate_of, parameter_rows
-from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms, model_of
+from imubench_pipeline.estimators.whittle import Maximum, Terms, model_of
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.tables.keys import Key
 
@@ -75,17 +70,3 @@ def test_flicker_noise_comes_first_and_processes_by_their_times() -> None:
     assert flicker == NoiseModel(N=1.0, B=2.0, further=further)
     none = model_of(Maximum(Terms("QN", 2), powers * [1, 1, 1, 0], times, 0.0, 0.0))
     assert none == NoiseModel(Q=1.0, N=2.0, B=3.0, T_B=3.0, further=[])
-
-
-def test_the_model_has_the_white_noise_that_the_log_shows_behind_a_filter() -> None:
-    every = np.ones(3)
-    known = Estimate("likelihood", {"N": Parameter(2.0), "K": Parameter(1.0)})
-    frame = Frame([], every > 0.0, every > 0.0, Band(1.0, "found"))
-    assert _with_folds(known, frame) == known
-    low_pass = Cutoff(
-        Parameter(2.0), 1, Parameter(2.0), 0.0, 9.0, behind=Behind(4.0 * every, every, every)
-    )
-    found = _with_folds(known, replace(frame, low_pass=low_pass)).parameters
-    assert (found["N"], found["K"]) == (Parameter(2.0, fitted=4.0), Parameter(1.0))
-    absent = Estimate("likelihood", {"N": Parameter(None, "absent")})
-    assert _with_folds(absent, replace(frame, low_pass=low_pass)) == absent

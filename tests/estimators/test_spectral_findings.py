@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from imubench_pipeline.estimators.band import Band
+from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
-from imubench_pipeline.estimators.spectral_findings import band_finding, slow_noise_missing
+from imubench_pipeline.estimators.spectral_findings import slow_noise_missing, spectral_findings
 from imubench_pipeline.tables.findings import Finding
 
 FLAT = ideal_spectrum(10.0, 1000.0, 5.0)
@@ -67,7 +69,11 @@ def test_nothing_is_said_below_a_low_pass_or_without_n() -> None:
 
 
 def test_a_band_that_ends_before_nyquist_is_told() -> None:
-    assert band_finding("gyro_x", 5.0, "found: the spectrum follows its model") == []
-    (note,) = band_finding("gyro_x", 5.0, "found: beyond 5 Hz the spectrum bends")
+    def found(source: str) -> list[Finding]:
+        every = np.ones(BINS, dtype=np.bool_)
+        return spectral_findings("gyro_x", Frame([], every, every, Band(5.0, source)), None)
+
+    assert found("found: the spectrum follows its model") == []
+    (note,) = found("found: beyond 5 Hz the spectrum bends")
     assert (note.finding, note.severity, note.value) == ("band_limit", "note", 5.0)
-    assert len(band_finding("gyro_x", 5.0, "default: a twentieth of the rate")) == 1
+    assert len(found("default: a twentieth of the rate")) == 1

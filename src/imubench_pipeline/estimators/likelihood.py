@@ -147,7 +147,10 @@ def fit(
     values = np.asarray(samples, dtype=np.float64)
     if len(values) < 16:
         raise ValueError(f"the log has {len(values)} samples, expected 16 or more")
-    holes = not bool(np.isfinite(values).all())
+    present = np.isfinite(values)
+    if not present.any():
+        raise ValueError(f"none of the {len(values)} samples is present")
+    holes = not bool(present.all())
     curve = of_blocks([values], len(values), rate, holes=holes, segments=segments)
     return fit_blocks(
         lambda: [values],
