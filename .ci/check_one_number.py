@@ -87,8 +87,10 @@ def unfolded(path: Path) -> str:
     return text + "".join(zlib.decompress(base64.b64decode(part)).decode() for part in packed)
 
 
-def of_terminal(results: Path, channel: str) -> Iterator[tuple[Channel, Numbers]]:
-    """Yield what `imubench show` prints of a channel, in SI."""
+def of_terminal(
+    results: Path, channel: str, recordings: list[tuple[str, str]]
+) -> Iterator[tuple[Channel, Numbers]]:
+    """Yield what `imubench show` prints of a channel of the recordings, in SI."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         imubench(["show", str(results), "--units=si", "--width=600", f"--channel={channel}"])
@@ -96,13 +98,15 @@ def of_terminal(results: Path, channel: str) -> Iterator[tuple[Channel, Numbers]
     before: list[str] = []
     for line in printed.getvalue().splitlines():
         cells = re.split(r"\s{2,}", line.strip())
-        if cells[0] == "recording":  # and units; the line before has the symbols
+        if cells[0] in ("recording", "channel"):  # and units; the line before has the symbols
             columns = before
         before = cells
-        match = re.match(rf"(\S+) / (\S+) {channel}\b", cells[0])
+        # Where there is one recording only, it is not named.
+        match = re.match(rf"(?:(\S+) / (\S+) )?{channel}\b", cells[0])
         if match and len(cells) == len(columns) + 1:
             numbers = dict(zip(columns, map(number_of, cells[1:]), strict=True))
-            yield (match[1], match[2], channel), numbers
+            sensor, recording = match.groups() if match[1] else recordings[0]
+            yield (sensor, recording, channel), numbers
 
 
 def number_of(text: str) -> float | None:
@@ -157,7 +161,7 @@ def main(results: Path, logs: list[str]) -> int:
                 check("model", channel, symbol, value, getattr(model, symbol))
             check("page", channel, symbol, value, shown.get(symbol))
     for name in {channel[2] for channel in values}:
-        for channel, numbers in of_terminal(results, name):
+        for channel, numbers in of_terminal(results, name, list(pages)):
             for symbol in NAMES:
                 check("terminal", channel, symbol, values[channel][symbol], numbers.get(symbol))
     for channel, numbers in of_exports(results):

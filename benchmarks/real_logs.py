@@ -113,7 +113,6 @@ class Piece:
 
 def recordings(folder: Path) -> Iterator[Recording]:
     """Yield the real recordings of a folder: ADIS16405, CATS and MPU-6050."""
-    import h5py
     import pandas as pd
 
     for path in sorted(folder.glob("adis16405/*.csv.gz")):
@@ -130,6 +129,8 @@ def recordings(folder: Path) -> Iterator[Recording]:
         ("accelerometer", STANDARD_GRAVITY, CHANNELS[3:]),
     ):
         for path in folder.glob(f"mpu6050/mpu6050_{name}.mat"):
+            import h5py
+
             with h5py.File(path) as file:
                 arrays = (np.asarray(entry) for key, entry in file.items() if "#" not in key)
                 matrix = next(array for array in arrays if array.ndim == 2 and 4 in array.shape)

@@ -1,0 +1,170 @@
+"""N is the level of the first -1/2 stretch of the Allan deviation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
+from imubench_pipeline.estimators.estimate import MAX_LIMIT_RATIO, Estimate, Parameter
+from imubench_pipeline.estimators.likelihood import fit
+from imubench_pipeline.estimators.posterior import Posterior
+from imubench_pipeline.estimators.white_level import (
+    WhiteStretch,
+    count_fast_processes,
+    find_white_stretch,
+    merged_maximum,
+    merged_posterior,
+)
+from imubench_pipeline.estimators.whittle import Maximum, Terms, model_of
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.typing import Array
+
+RATE, SAMPLES = 100.0, 360_000
+N, T_B = 1e-4, 0.05
+SIZES = cluster_sizes(SAMPLES)
+TAU = SIZES / RATE
+
+
+def noiseless(variance: Array) -> AllanCurve:
+    return AllanCurve(TAU, SIZES, variance, np.ones(len(SIZES)), SAMPLES)
+
+
+def fast(times: float) -> NoiseModel:
+    """White noise beside a fast process of so many times its density at low frequencies."""
+    unit = NoiseModel(B=1.0, T_B=T_B).psd(np.array([1e-9]))[0]
+    return NoiseModel(N=N, B=N * np.sqrt(times / unit), T_B=T_B)
+
+
+@given(st.floats(1e-9, 1e3), st.floats(0.0, 0.2))
+def test_white_noise_has_its_level_and_a_walk_ends_the_stretch(density: float, part: float) -> None:
+    # The walk is as strong as the white noise at 1 / part s.
+    K = np.sqrt(3.0) * density * part
+    found = find_white_stretch(noiseless(NoiseModel(N=density, K=K).allan_variance(TAU)))
+    assert found is not None
+    assert found.level == pytest.approx(density, rel=0.03)
+    assert found.first == pytest.approx(0.03, rel=0.1)
+    # All of it lies within 3 % of the middle: the variance rises by 12 % at most.
+    assert part * found.last < 0.4
+
+
+def test_a_curve_without_the_slope_has_no_stretch() -> None:
+    assert find_white_stretch(noiseless(NoiseModel(B=1e-4).allan_variance(TAU))) is None
+    assert find_white_stretch(noiseless(NoiseModel(K=1e-4).allan_variance(TAU))) is None
+    assert find_white_stretch(noiseless(np.zeros(len(TAU)))) is None
+
+
+def test_clusters_of_one_and_two_samples_do_not_count() -> None:
+    variance = NoiseModel(N=N).allan_variance(TAU)
+    variance[SIZES < 3] *= 0.5  # as behind a low-pass
+    found = find_white_stretch(noiseless(variance))
+    assert found is not None and found.level == pytest.approx(N, rel=1e-9)
+
+
+def test_missing_samples_leave_the_level() -> None:
+    whole = noiseless(NoiseModel(N=N).allan_variance(TAU))
+    thinned = replace(whole, variance=2.0 * whole.variance, averaged=SIZES / 2.0)
+    found = find_white_stretch(thinned)
+    assert found is not None and found.level == pytest.approx(N, rel=1e-9)
+
+
+def test_beyond_a_fast_process_the_stretch_has_both() -> None:
+    model = fast(3.0)
+    found = find_white_stretch(noiseless(model.allan_variance(TAU)))
+    assert found is not None
+    assert found.level == pytest.approx(2.0 * N, rel=0.04)
+    assert found.first > 5.0 * T_B
+
+
+def maximum(model: NoiseModel) -> Maximum:
+    processes = [(model.B, model.T_B), *((p.B, p.T_B) for p in model.further_processes)]
+    powers = [model.N**2, model.K**2, *(B**2 for B, _ in processes)]
+    times = np.array([time for _, time in processes])
+    return Maximum(Terms("NK", len(processes)), np.array(powers), times, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("folding", [1.0, 1.7])
+def test_as_many_fast_processes_count_as_the_level_asks(folding: float) -> None:
+    model = replace(fast(3.0), K=1e-6, further=[GaussMarkov(1e-4, 30.0)])
+    best = maximum(replace(model, N=model.N / np.sqrt(folding)))
+    for level, number in ((N, 0), (2.0 * N, 1), (9.0 * N, 1)):
+        stretch = WhiteStretch(level, 1.0, 10.0)
+        assert count_fast_processes(best, folding, stretch) == number
+    assert count_fast_processes(best, folding, None) == 0
+    merged = merged_maximum(best, 1, folding)
+    assert merged.terms == Terms("NK", 1)
+    in_the_log = replace(model_of(merged), N=model_of(merged).N * np.sqrt(folding))
+    assert in_the_log.N == pytest.approx(2.0 * N, rel=1e-6)
+    assert (in_the_log.B, in_the_log.T_B, in_the_log.K) == pytest.approx((1e-4, 30.0, 1e-6))
+    # Beyond the process the curve is the same: nothing is lost, and nothing counts twice.
+    late = np.geomspace(5.0, 1000.0, 20)
+    assert in_the_log.allan_variance(late) == pytest.approx(model.allan_variance(late), rel=0.02)
+    assert merged_maximum(best, 0, folding) is best
+
+
+def test_draws_are_merged_one_by_one() -> None:
+    model = fast(3.0)
+    draws = np.array([[N, 0.0, model.B], [2.0 * N, 0.0, 0.0]])
+    posterior = Posterior(draws, np.full((2, 1), T_B), np.zeros(2), 2.0)
+    merged = merged_posterior(posterior, Terms("NK", 1), 1)
+    assert merged.parameters[:, 0] == pytest.approx([2.0 * N, 2.0 * N], rel=1e-6)
+    assert merged.parameters.shape == (2, 2) and merged.times.shape == (2, 0)
+
+
+def test_white_noise_beside_a_fast_process_is_what_the_curve_shows() -> None:
+    model = fast(3.0)
+    log = simulate(model, RATE, SAMPLES, np.random.default_rng(5))
+    found = fit(log, RATE)
+    estimate, stretch = found.estimates[0], found.stretch
+    assert stretch is not None and stretch.level == pytest.approx(2.0 * N, rel=0.05)
+    white = estimate.parameters["N"]
+    assert white.value == pytest.approx(2.0 * N, rel=0.03)
+    assert white.lower is not None and white.upper is not None
+    assert white.lower < 2.0 * N < white.upper and white.upper < 1.1 * white.lower
+    assert "correlation time of 0.05" in (white.reason or "")
+    assert estimate.parameters["B"].value is None
+    late = np.geomspace(5.0, 50.0, 8)
+    assert estimate.model.allan_variance(late) == pytest.approx(
+        model.allan_variance(late), rel=0.06
+    )
+    assert estimate.draws is not None
+    assert estimate.draws.first[:, 1] == pytest.approx(2.0 * N, rel=0.1)
+
+
+def test_where_the_curve_has_no_stretch_n_says_that_it_is_of_the_model() -> None:
+    model = NoiseModel(N=1e-4, K=3e-3)
+    log = simulate(model, 10.0, 40_000, np.random.default_rng(2))
+    curve = allan_variance(log, 10.0)
+    assert find_white_stretch(curve) is None
+    white = fit(log, 10.0).estimates[0].parameters["N"]
+    assert "no -1/2 stretch" in (white.reason or "")
+
+
+numbers = st.one_of(st.none(), st.floats(-1e6, 1e6))
+
+
+@given(numbers, numbers, numbers, st.sampled_from(["ok", "doubtful", "absent", "at_bound"]))
+def test_no_ok_has_limits_more_than_four_times_apart(value, lower, upper, status) -> None:
+    given_one = Parameter(value, status, None, lower, upper)
+    (one,) = Estimate("any", {"N": given_one}).parameters.values()
+    assert one.checked() == one
+    if one.status == "ok" and one.lower is not None and one.upper is not None:
+        near, far = sorted((abs(one.lower), abs(one.upper)))
+        assert one.lower * one.upper > 0.0 or near > 0.0
+        assert far <= MAX_LIMIT_RATIO * near
+    if one == given_one:
+        return
+    assert (one.value, one.status, one.fitted) == (None, "not_identified", value)
+    assert one.upper == upper and one.lower in (lower, 0.0) and one.reason
+
+
+def test_limits_a_decade_apart_are_an_upper_limit() -> None:
+    for lower, kept in ((0.3, 0.3), (0.11, 0.11), (0.09, 0.0), (-0.01, -0.01)):
+        assert Parameter(0.5, lower=lower, upper=1.1).checked().lower == kept
+    assert Parameter(-0.5, lower=-1.0, upper=-0.3).checked().status == "ok"
+    assert Parameter(-0.5, lower=-1.0, upper=-0.2).checked().status == "not_identified"
