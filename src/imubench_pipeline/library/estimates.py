@@ -331,12 +331,13 @@ def _rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
 
 
 def _reasons(estimates: Any) -> list[str]:
-    """Return why values are in doubt."""
+    """Return why values are in doubt, and what N is of where the curve does not show it."""
     reasons = (
         f"{estimate.channel} {symbol_text(symbol)}: {cut(parameter.reason, 150)}"
         for estimate in estimates
         for _, symbol, parameter in estimate.components()
-        if parameter.status == "doubtful" and parameter.reason and symbol not in CURVE
+        if parameter.reason and symbol not in CURVE
+        if parameter.status == "doubtful" or (parameter.status == "ok" and symbol == "N")
     )
     return list(dict.fromkeys(reasons))
 

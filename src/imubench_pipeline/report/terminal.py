@@ -139,7 +139,19 @@ def _parameter_tables(
         if own:
             heads, lines = _parameter_lines(quantity, own, about, system)
             yield fitting(f"{title}: {which}", heads, lines, width, names=0)
+            yield from map(Text, _remarks(own))
             yield Text()
+
+
+def _remarks(rows: Iterable[Row]) -> Iterator[str]:
+    """Yield what values without a doubt are of, where that is said: each remark once."""
+    channels: dict[str, dict[str, None]] = {}
+    for row in rows:
+        if row["status"] == "ok" and row["reason"]:
+            remark = f"{symbol_text(row['parameter'])}: {row['reason']}"
+            channels.setdefault(remark, {})[row["channel"]] = None
+    for remark, of in channels.items():
+        yield one_line(f"{', '.join(of)}: {remark}", _LONGEST_FINDING)
 
 
 def _compared(recordings: Sequence[Row]) -> Text:
