@@ -31,6 +31,7 @@ from imubench_pipeline.estimators.filter_fits import (
     OfModel,
     Reading,
     also_after_sampling,
+    density_in_the_log,
     draw_factors,
     highest_cutoff,
 )
@@ -131,13 +132,18 @@ class Cutoff:
             return 0.0
         return max((self.floor / N) ** 2 - self.rounded, 0.0)
 
-    def factors(self, number: int, rng: np.random.Generator, terms: Terms) -> Array:
-        """Return draws of N over its value for the chosen filter in a model, shape (number,)."""
+    def factors(
+        self, number: int, rng: np.random.Generator, terms: Terms, *, in_the_log: bool = False
+    ) -> Array:
+        """Return draws of N over its value for the chosen filter in a model, shape (number,).
+
+        Of N before the filter, or of the density in the log.
+        """
         of_model = self.models.get(replace(terms, ramp=False))
         readings = self.readings if of_model is None else of_model.readings
         if not readings:
             return np.ones(number)
-        return draw_factors(readings, number, rng)
+        return draw_factors(readings, number, rng, in_the_log=in_the_log)
 
 
 def find_cutoff(
@@ -261,7 +267,9 @@ def _with_filter(
     if gained < _BEYOND_DOUBT and N_alone > 0.0:
         # Of so many filters one may be there by chance.
         alone = math.log(N_alone / N)
-        readings.append(Reading(_WITHOUT, alone, alone, alone))
+        beside = fits.rounded * N**2 + after**2
+        shown_alone = math.log(N_alone / density_in_the_log(best.low_pass, N, beside, fits.rate))
+        readings.append(Reading(_WITHOUT, alone, alone, alone, (shown_alone,) * 3))
     error = SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
     ends = [end for reading in readings for end in (reading.below, reading.above)]
     density = Parameter(
@@ -322,17 +330,20 @@ def _readings(
 ) -> list[Reading]:
     """Return N before each filter that the log allows, over that of the best, and how likely."""
     best = alike[0]
-    N = fits.density(best)[0]
-    readings = [
-        Reading(
-            math.exp(best.cost - trial.cost),
-            *(
-                math.log(max(fits.density(replace(trial, cutoff=cutoff))[0] / N, _LEAST_N))
-                for cutoff in (low, trial.cutoff, high)
-            ),
-        )
-        for trial, (low, high) in zip(alike, limits, strict=True)
-    ]
+
+    def densities(trial: FilterTrial) -> tuple[float, float]:
+        N, after = fits.density(trial)
+        beside = fits.rounded * N**2 + after**2
+        return N, density_in_the_log(trial.low_pass, N, beside, fits.rate)
+
+    N, shown = densities(best)
+    readings = []
+    for trial, (low, high) in zip(alike, limits, strict=True):
+        at = [densities(replace(trial, cutoff=cutoff)) for cutoff in (low, trial.cutoff, high)]
+        below, middle, above = (math.log(max(density / N, _LEAST_N)) for density, _ in at)
+        first, second, third = (math.log(density / shown) for _, density in at)
+        weight = math.exp(best.cost - trial.cost)
+        readings.append(Reading(weight, below, middle, above, (first, second, third)))
     readings += [
         also_after_sampling(reading, trial, fits.rate)
         for reading, trial in zip(readings, alike, strict=True)

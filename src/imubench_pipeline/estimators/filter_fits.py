@@ -392,6 +392,8 @@ class Reading:
     above: float
     """Logarithm of N at the lower limit of the cut-off, at its best and at its upper limit, less
     that of the filter that was chosen."""
+    in_the_log: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """The same three of the density in the log, far below the cut-off."""
 
 
 @dataclass(frozen=True)
@@ -421,19 +423,37 @@ def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Re
     Its shape is the same, and it folds nothing into N.
     """
     gain = 0.5 * math.log(float(trial.low_pass.white(Frequencies(0.0, rate))))
-    return Reading(
-        _TWIN * reading.weight, reading.below + gain, reading.at + gain, reading.above + gain
-    )
+    before = (reading.below + gain, reading.at + gain, reading.above + gain)
+    return Reading(_TWIN * reading.weight, *before, reading.in_the_log)
 
 
-def draw_factors(readings: Sequence[Reading], number: int, rng: np.random.Generator) -> Array:
-    """Return draws of N over its value for the filter that was chosen, shape (number,)."""
+def density_in_the_log(low_pass: Filter, N: float, beside: float, rate: float) -> float:
+    """Return the density of white noise in a log far below the cut-off of a filter.
+
+    Parameters
+    ----------
+    low_pass : Filter
+    N : float
+        Density before the filter, SI.
+    beside : float
+        Squared density of the white noise that does not pass it, SI.
+    rate : float
+        Hz.
+    """
+    return math.sqrt(N**2 * float(low_pass.white(Frequencies(0.0, rate))) + beside)
+
+
+def draw_factors(
+    readings: Sequence[Reading], number: int, rng: np.random.Generator, *, in_the_log: bool = False
+) -> Array:
+    """Return draws of N over its value for the filter that was chosen, shape (number,).
+
+    Of N before the filter, or of the density in the log.
+    """
     weight = np.array([reading.weight for reading in readings])
     which = rng.choice(len(weight), number, p=weight / weight.sum())
-    below, at, above = (
-        np.array([getattr(reading, name) for reading in readings])[which]
-        for name in ("below", "at", "above")
-    )
+    ends = [r.in_the_log if in_the_log else (r.below, r.at, r.above) for r in readings]
+    below, at, above = np.array(ends)[which].T
     normal = rng.standard_normal(number)
     side = np.where(normal < 0.0, at - below, above - at)
     return np.asarray(np.exp(at + normal / SIGMAS * side))

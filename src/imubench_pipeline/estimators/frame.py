@@ -118,9 +118,16 @@ class Frame:
             return 1.0
         return float(self.low_pass.behind.white[0])
 
-    def in_the_log(self, posterior: Posterior, terms: Terms) -> Posterior:
-        """Return draws of a model behind the low-pass with N as the log shows it, at its lowest."""
-        return _scaled(posterior, terms, np.array(math.sqrt(self.folding)))
+    def in_the_log(self, posterior: Posterior, terms: Terms, rng: np.random.Generator) -> Posterior:
+        """Return draws of a model behind the low-pass with N as the log shows it, at its lowest.
+
+        What is not known of the filter bends the spectrum down to there, and is in N.
+        """
+        factors = np.array(math.sqrt(self.folding))
+        if self.low_pass is not None and self.low_pass.readings:
+            number = len(posterior.parameters)
+            factors = factors * self.low_pass.factors(number, rng, terms, in_the_log=True)
+        return _scaled(posterior, terms, factors)
 
     def before_the_filter(
         self, posterior: Posterior, terms: Terms, rng: np.random.Generator

@@ -26,6 +26,7 @@ from imubench_pipeline.estimators.filter_fits import (
     OfModel,
     Reading,
     also_after_sampling,
+    density_in_the_log,
     explains_bend,
     highest_cutoff,
 )
@@ -182,17 +183,29 @@ class _Joint:
         """Return what the filters make of N in a model, over it at a chosen cut-off."""
         terms = fits[0].terms
         common = self.at(chosen.allowed, chosen.x, terms)
+        shown = self._in_the_log(chosen.allowed, chosen.x, common)
         readings = []
         for fit in fits:
             low, high = self.limits(fit)
-            below, at, above = (
-                math.log(self.at(fit.allowed, x, terms).N / common.N) for x in (low, fit.x, high)
+            places = low, fit.x, high
+            states = [self.at(fit.allowed, x, terms) for x in places]
+            below, at, above = (math.log(state.N / common.N) for state in states)
+            first, second, third = (
+                math.log(self._in_the_log(fit.allowed, x, state) / shown)
+                for x, state in zip(places, states, strict=True)
             )
-            readings.append(Reading(math.exp(fits[0].cost - fit.cost), below, at, above))
+            weight = math.exp(fits[0].cost - fit.cost)
+            readings.append(Reading(weight, below, at, above, (first, second, third)))
             best = fit.allowed.at(fit.x)
             if best.is_first_order_analogue:
                 readings.append(also_after_sampling(readings[-1], best, self._spectrum.rate))
         return OfModel(readings, common.cost - fits[0].cost)
+
+    def _in_the_log(self, allowed: Allowed, x: float, state: _State) -> float:
+        """Return the density of white noise in the log, at a logarithm of the cut-off."""
+        beside = self._low_pass.rounded * state.N**2 + state.floor
+        low_pass = allowed.at(x).low_pass
+        return density_in_the_log(low_pass, state.N, beside, self._spectrum.rate)
 
     def explains(self, fit: _Fit) -> bool:
         """Return whether a fit gives the spectrum where it bends."""

@@ -263,12 +263,15 @@ def fit_spectrum(
     posteriors: dict[Terms, Posterior] = {}
     for candidate in (c for c in candidates if c in alike or c in wider or c is papers):
         posteriors[candidate.terms] = sample(whittle, candidate.maximum, rng)
-    of_data = _InTheLog(whittle, frame, posteriors, stretch, alike, wider)
+    in_the_log = {
+        terms: frame.in_the_log(posterior, terms, rng) for terms, posterior in posteriors.items()
+    }
+    of_data = _InTheLog(whittle, frame, in_the_log, stretch, alike, wider)
     estimate = of_data.estimate("likelihood")
     sensor = sensor_density(frame, chosen.maximum, posteriors[chosen.terms], spectrum, rng)
     if sensor is not None:
         estimate = replace(estimate, parameters={**estimate.parameters, SENSOR: sensor})
-    of_papers = _InTheLog(whittle, frame, posteriors, stretch, [papers], [])
+    of_papers = _InTheLog(whittle, frame, in_the_log, stretch, [papers], [])
     gauss_markov = of_papers.estimate("likelihood_gm")
     fitted = frame.whole(spectrum).density(chosen.maximum) + chosen.maximum.ramp**2 * spectrum.ramp
     drift = instead_of_walk(whittle, chosen.maximum)
@@ -303,7 +306,7 @@ class _InTheLog:
     Parameters
     ----------
     posteriors : mapping of Terms to Posterior
-        Draws of each model, as it is fitted.
+        Draws of each model, with N as the log shows it.
     stretch : WhiteStretch or None
     alike, wider : sequence of Candidate
         As of `imubench_pipeline.estimators.intervals.with_upper_limits`.
@@ -337,8 +340,8 @@ class _InTheLog:
                 continue
             merged.add(maximum.terms)
             if maximum.terms not in self.draws:
-                in_the_log = self._frame.in_the_log(self._posteriors[terms], terms)
-                self.draws[maximum.terms] = merged_posterior(in_the_log, terms, number)
+                posterior = self._posteriors[terms]
+                self.draws[maximum.terms] = merged_posterior(posterior, terms, number)
             yield replace(candidate, maximum=maximum)
 
     def estimate(self, method: str) -> Estimate:
