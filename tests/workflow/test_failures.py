@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import imubench_pipeline
+from tests.conftest import PROJECT
 from tests.workflow.project import BAD, Project, linked, put_bad_logs, put_log, put_sensor
 
 pytestmark = pytest.mark.workflow
@@ -63,8 +64,9 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
 @pytest.fixture(scope="module")
 def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The environment of a run with a package that has faults, and is compiled."""
-    place = tmp_path_factory.mktemp("code")
+    place = tmp_path_factory.mktemp("code") / "src"
     package = Path(imubench_pipeline.__file__).parent
+    shutil.copytree(PROJECT / "config", place.parent / "config")  # as beside a checkout's src/
     copy = place / package.name
     shutil.copytree(package, copy)  # with what numba has compiled
     put_fault(

@@ -18,6 +18,11 @@ def digits_by(value: float, lower: float | None, upper: float | None, otherwise:
     half = (upper - lower) / 2.0
     if not math.isfinite(half):
         return 2
-    place = math.floor(math.log10(half))
+    place = _place(half)
     place -= half < 2.0 * 10.0**place
-    return min(max(math.floor(math.log10(abs(value))) - place + 1, 2), _MOST)
+    return min(max(_place(abs(value)) - place + 1, 2), _MOST)
+
+
+def _place(value: float) -> int:
+    """Return the power of ten of the first digit; a rounding error below a power of ten is none."""
+    return math.floor(math.log10(value) + 1e-9)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -153,12 +154,16 @@ def listed(channels: Channels | None) -> list[str] | None:
     Raises
     ------
     ValueError
-        If one is none, or stands twice.
+        If one is none, or stands twice, or they are no names.
     """
     if channels is None:
         return None
-    asked = [channels] if isinstance(channels, str) else list(channels)
-    names = [name for each in asked for name in _AXES.get(each, [each])]
+    asked: list[object] = [channels]
+    with suppress(TypeError):
+        asked = [channels] if isinstance(channels, str) else list(channels)
+    if strange := [name for name in asked if not isinstance(name, str)]:
+        raise ValueError(f"no channel {strange[0]!r}; expected names: 'gyro', ['gyro_z'] and such")
+    names = [name for each in map(str, asked) for name in _AXES.get(each, [each])]
     if unknown := [name for name in names if name not in (*CHANNELS, TEMPERATURE)]:
         raise ValueError(
             f"no channel {unknown[0]!r}; expected of {', '.join(CHANNELS)}, or gyro or accel for "

@@ -303,6 +303,8 @@ def log_of(columns: Mapping[str, Column], rate: float, name: str) -> Log:
     RecordingError
         If no channel can be used.
     """
+    if not name or Path(name).name != name:
+        raise ValueError(f"name is {name!r}; expected the name of a log, without '/'")
     channels, temperature = {}, None
     for place, (channel, column) in enumerate(columns.items(), start=1):
         entry = {"column": place, "unit": column.unit}
