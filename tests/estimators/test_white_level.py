@@ -168,3 +168,11 @@ def test_limits_a_decade_apart_are_an_upper_limit() -> None:
         assert Parameter(0.5, lower=lower, upper=1.1).checked().lower == kept
     assert Parameter(-0.5, lower=-1.0, upper=-0.3).checked().status == "ok"
     assert Parameter(-0.5, lower=-1.0, upper=-0.2).checked().status == "not_identified"
+
+
+@pytest.mark.parametrize("part", [0.2, 0.7])
+def test_noise_of_which_the_low_frequencies_are_taken_has_an_estimate(part: float) -> None:
+    # Far from the papers' model: its share is next to nothing.
+    z = N * np.random.default_rng(1).standard_normal(60_001)
+    white = fit(z[1:] - part * z[:-1], RATE).estimates[0].parameters["N"]
+    assert white.value == pytest.approx((1.0 - part) * N / np.sqrt(RATE), rel=0.05)

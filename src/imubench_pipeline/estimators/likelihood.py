@@ -324,6 +324,10 @@ class _InTheLog:
         self._whittle, self._frame, self._stretch = whittle, frame, stretch
         self._fastest = alike[0].maximum.times
         self._number = count_fast_processes(alike[0].maximum, frame.folding, stretch)
+        self._level = 1.0  # of the curve over N with all of those processes
+        if stretch is not None and np.any(self._fastest < BROADBAND_TIME):
+            merged = merged_maximum(alike[0].maximum, self._number, frame.folding)
+            self._level = stretch.level / (merged.parameter("N") * math.sqrt(frame.folding))
         self.draws: dict[Terms, Posterior] = {}
         self._posteriors = posteriors
         self.alike = list(self._merged(alike))
@@ -334,14 +338,15 @@ class _InTheLog:
         merged: set[Terms] = set()
         for candidate in candidates:
             terms, times = candidate.terms, candidate.maximum.times
-            number = min(self._number, int(np.sum(times < BROADBAND_TIME)))
-            maximum = merged_maximum(candidate.maximum, number, self._frame.folding)
+            fast = int(np.sum(times < BROADBAND_TIME))
+            number, level = min(self._number, fast), self._level if fast else 1.0
+            maximum = merged_maximum(candidate.maximum, number, self._frame.folding, level)
             if maximum.terms in merged:
                 continue
             merged.add(maximum.terms)
             if maximum.terms not in self.draws:
                 posterior = self._posteriors[terms]
-                self.draws[maximum.terms] = merged_posterior(posterior, terms, number)
+                self.draws[maximum.terms] = merged_posterior(posterior, terms, number, level)
             yield replace(candidate, maximum=maximum)
 
     def estimate(self, method: str) -> Estimate:
@@ -358,7 +363,12 @@ class _InTheLog:
     def joint_draws(self) -> JointDraws:
         """Return draws over all models that the log does not rule out."""
         bins = len(self._whittle.spectrum.density)
-        parts = [(c.terms, self.draws[c.terms], drawn_share(c, bins)) for c in self.alike]
+        # Of one model alone the share, which may be next to nothing, does not matter.
+        alone = len(self.alike) == 1
+        parts = [
+            (c.terms, self.draws[c.terms], 1.0 if alone else drawn_share(c, bins))
+            for c in self.alike
+        ]
         return joint_draws(parts, self._whittle.longest)
 
 

@@ -101,13 +101,17 @@ def count_fast_processes(maximum: Maximum, folding: float, stretch: WhiteStretch
     return int(np.argmin(away))
 
 
-def merged_maximum(maximum: Maximum, number: int, folding: float) -> Maximum:
-    """Return a fit whose fastest processes, so many, are part of its white noise."""
-    if number == 0:
+def merged_maximum(maximum: Maximum, number: int, folding: float, level: float = 1.0) -> Maximum:
+    """Return a fit whose fastest processes, so many, are part of its white noise.
+
+    N is times ``level``: of the curve, which may not have reached that of all of them yet.
+    """
+    if (number, level) == (0, 1.0):
         return maximum
     linear, powers = len(maximum.terms.linear), maximum.powers.copy()
     densities = _white_densities(maximum.process_powers[:number], maximum.times[:number])
-    powers[maximum.terms.linear.index("N")] += float(np.sum(densities)) / folding
+    place = maximum.terms.linear.index("N")
+    powers[place] = level**2 * (powers[place] + float(np.sum(densities)) / folding)
     return replace(
         maximum,
         terms=_without(maximum.terms, number),
@@ -116,16 +120,18 @@ def merged_maximum(maximum: Maximum, number: int, folding: float) -> Maximum:
     )
 
 
-def merged_posterior(posterior: Posterior, terms: Terms, number: int) -> Posterior:
-    """Return draws of a model in the log whose fastest processes are part of its white noise."""
-    if number == 0:
+def merged_posterior(
+    posterior: Posterior, terms: Terms, number: int, level: float = 1.0
+) -> Posterior:
+    """Return draws of a model in the log likewise."""
+    if (number, level) == (0, 1.0):
         return posterior
     linear, parameters = len(terms.linear), posterior.parameters.copy()
     densities = _white_densities(
         parameters[:, linear : linear + number] ** 2, posterior.times[:, :number]
     )
     place = terms.linear.index("N")
-    parameters[:, place] = np.sqrt(parameters[:, place] ** 2 + densities.sum(axis=1))
+    parameters[:, place] = level * np.sqrt(parameters[:, place] ** 2 + densities.sum(axis=1))
     return replace(
         posterior,
         parameters=np.delete(parameters, np.s_[linear : linear + number], axis=1),
