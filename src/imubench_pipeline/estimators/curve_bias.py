@@ -219,8 +219,7 @@ def _bias(model: Models, drawn: Sequence[Models], longest: float) -> Parameter:
 def unless_at_bound(bias: Parameter, estimate: Estimate) -> Parameter:
     """Return the bias instability of the curve, which is not identified where a T_B is at a bound.
 
-    The amplitude of a process whose correlation time ran into the end of its search is that of the
-    search.
+    The end of the search decides the amplitude of a process whose correlation time ran into it.
     """
     groups = [estimate.parameters, *estimate.further]
     times = [group["T_B"] for group in groups if group.get("T_B")]

@@ -26,7 +26,7 @@ CURVE = ("B_curve", "sigma_min", "tau_min")
 
 SENSOR = "N_sensor"
 """Density of the white noise before a low-pass or an interpolation that the spectrum shows, and
-before folding. N is that of the log; this one stands beside it and never in its place."""
+before folding. N is the density in the log; N_sensor never replaces it."""
 
 SHOWN = ("Q", "N", SENSOR, "B_curve", "sigma_min", "tau_min", "B", "T_B", "K", "R")
 """The order in which parameters are shown."""
@@ -38,7 +38,7 @@ MAX_LIMIT_RATIO = 4.0
 """Upper over lower 95 % limit of a value, beyond which only its interval is given."""
 
 _A_DECADE = 10.0
-"""Upper over lower 95 % limit of what is not identified, beyond which the lower one is 0."""
+"""Upper over lower 95 % limit of a parameter without a value, beyond which the lower one is 0."""
 
 BROADBAND_TIME = 1.0
 """Correlation time below which a Gauss-Markov process is broadband noise, no bias instability, s.
@@ -102,7 +102,7 @@ class Parameter:
         else:
             where = "the 95 % interval contains 0" if signs < 0 else "the lower 95 % limit is 0"
         reason = f"{where}; only the interval is given"
-        # Draws that reach so far down say where the prior is, and not the data.
+        # The prior, and not the data, decides how far down such draws reach.
         lower = 0.0 if signs > 0 and self.lower > 0.0 and far > _A_DECADE * near else self.lower
         return replace(
             self,

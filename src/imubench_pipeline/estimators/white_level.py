@@ -1,14 +1,12 @@
 """N as the Allan deviation shows it: the level of its first -1/2 stretch.
 
-White noise has sigma(tau) sqrt(tau) = N at every tau. A log whose white noise stands beside a
-Gauss-Markov process faster than a second has two such levels: N of the white noise alone at tau far
-below T_B, and above it that of both together,
+White noise has sigma(tau) sqrt(tau) = N at every tau. White noise of density N_0 with a Gauss-Markov
+process faster than a second has two such levels: N_0 at tau far below T_B, and
 
-    N^2 = N_0^2 + S_B T_B^2,
+    N^2 = N_0^2 + S_B T_B^2
 
-since for tau >> T_B the process is white noise, too. A log shows the one that lasts, and a filter
-that runs slower than the process needs it. N is the level that the curve has; a process that counts
-into it leaves the model, so that nothing counts twice.
+at tau far above it, where the process is white noise, too. N is the level of the first stretch of
+the curve that lasts. A process that counts into N leaves the model, so that nothing counts twice.
 """
 
 from __future__ import annotations
@@ -36,8 +34,8 @@ MAX_ERROR = 0.03
 """Relative standard error of the deviation up to which a point belongs to a stretch."""
 
 FLAT_WITHIN, MAX_FLAT_WITHIN = 0.03, 0.06
-"""Part by which all points of a stretch are within their median; two standard errors where that is
-more, up to the second."""
+"""Largest relative distance of a point from the median of its stretch: the first, or two standard
+errors up to the second."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,7 @@ def count_fast_processes(maximum: Maximum, folding: float, stretch: WhiteStretch
 def merged_maximum(maximum: Maximum, number: int, folding: float, level: float = 1.0) -> Maximum:
     """Return a fit whose fastest processes, so many, are part of its white noise.
 
-    N is times ``level``: of the curve, which may not have reached that of all of them yet.
+    N is multiplied by ``level``: the curve may not have reached the sum of all densities yet.
     """
     if (number, level) == (0, 1.0):
         return maximum

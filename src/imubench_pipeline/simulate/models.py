@@ -84,8 +84,8 @@ class TrueFigure:
 def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[TrueFigure]:
     """Yield the true figures of an axis, in a log of a rate in Hz.
 
-    N is the density that the low frequencies of the log show; N_sensor, that before the low-pass,
-    stands beside it where there is one.
+    N is the density at low frequencies of the log; N_sensor is the density before the low-pass,
+    where there is one.
     """
     quantity = quantity_of(channel)
     units, plain = SI_UNITS[quantity], SI_UNITS[quantity]["B"]
