@@ -38,7 +38,7 @@ MAX_LIMIT_RATIO = 4.0
 """Upper over lower 95 % limit of a value, beyond which only its interval is given."""
 
 _A_DECADE = 10.0
-"""Upper over lower 95 % limit of a parameter without a value, beyond which the lower one is 0."""
+"""Ratio of the limits of a parameter without a value, beyond which the lower one is 0."""
 
 BROADBAND_TIME = 1.0
 """Correlation time below which a Gauss-Markov process is broadband noise, no bias instability, s.
