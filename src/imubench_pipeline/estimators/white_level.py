@@ -1,7 +1,7 @@
 """N as the Allan deviation shows it: the level of its first -1/2 stretch.
 
-White noise has sigma(tau) sqrt(tau) = N at every tau. White noise of density N_0 with a Gauss-Markov
-process faster than a second has two such levels: N_0 at tau far below T_B, and
+White noise has sigma(tau) sqrt(tau) = N at every tau. White noise of density N_0 with a
+Gauss-Markov process faster than a second has two such levels: N_0 at tau far below T_B, and
 
     N^2 = N_0^2 + S_B T_B^2
 
