@@ -12,6 +12,7 @@ from imubench_pipeline.estimators.filter_fits import (
     FilterTrial,
     Reading,
     also_after_sampling,
+    density_in_the_log,
     draw_factors,
     highest_cutoff,
 )
@@ -191,8 +192,27 @@ def test_draws_of_n_lie_about_each_filter_by_its_weight(rng: np.random.Generator
         assert (low, high) == pytest.approx((below, above), abs=0.06)
 
 
+def test_draws_of_the_density_in_the_log_have_their_own_limits(rng: np.random.Generator) -> None:
+    readings = [Reading(3.0, -0.2, 0.0, 0.1, (-0.02, 0.0, 0.04))]
+    drawn = np.log(draw_factors(readings, 40_000, rng, in_the_log=True))
+    assert np.quantile(drawn, [0.025, 0.5, 0.975]) == pytest.approx([-0.02, 0.0, 0.04], abs=2e-3)
+
+
+@pytest.mark.parametrize("cutoff", [1.0, 20.0, 40.0, 300.0])
+def test_the_density_in_the_log_has_the_folds_and_what_passes_no_filter(cutoff: float) -> None:
+    # Of first order the folds add up to x coth x.
+    x = np.pi * cutoff / RATE
+    found = density_in_the_log(Filter("analogue", 1, cutoff), 2.0, 3.0, RATE)
+    assert found == pytest.approx(np.sqrt(4.0 * x / np.tanh(x) + 3.0), rel=1e-6)
+    # What is done to the samples folds nothing.
+    digital = density_in_the_log(Filter("bilinear", 1, min(cutoff, 40.0)), 2.0, 0.0, RATE)
+    assert digital == pytest.approx(2.0, rel=1e-9)
+
+
 def test_a_filter_applied_to_the_samples_folds_nothing_into_n() -> None:
-    found = also_after_sampling(Reading(0.5, -0.1, 0.0, 0.2), trial(CUTOFF), RATE)
+    shown = (-0.01, 0.0, 0.02)
+    found = also_after_sampling(Reading(0.5, -0.1, 0.0, 0.2, shown), trial(CUTOFF), RATE)
+    assert found.in_the_log == shown
     folded = 0.5 * np.log(white(CUTOFF, np.zeros(1), 200_000)[0])
     assert found.weight == pytest.approx(0.05)
     assert (found.below, found.at, found.above) == pytest.approx(
