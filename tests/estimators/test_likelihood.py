@@ -117,6 +117,13 @@ def width(found: Likelihood, name: str, method: str = "likelihood") -> float:
     return float(np.log(upper / lower))
 
 
+def in_model(found: Likelihood, name: str, method: str = "likelihood") -> float:
+    """What the model has, whether the log tells it or not."""
+    parameter = of(found, name, method)
+    assert parameter.in_model is not None, parameter
+    return parameter.in_model
+
+
 def assert_close(found: float | None, before: float | None, factor: float, rel: float) -> None:
     if before is None:
         assert found is None
@@ -134,8 +141,10 @@ def assert_same(one: Likelihood, other: Likelihood, rel: float = 1e-5, **scale: 
         for name, parameter in first.parameters.items():
             twin, factor = second.parameters[name], scale.get(name, 1.0)
             assert (name, twin.status) == (name, parameter.status)
-            assert_close(twin.value, parameter.value, factor, rel)
-            assert_close(twin.fitted, parameter.fitted, factor, rel)
+            # K is a median of draws: the one beside it is up to 2e-5 away.
+            exact = max(rel, 1e-4) if name == "K" else rel
+            assert_close(twin.value, parameter.value, factor, exact)
+            assert_close(twin.fitted, parameter.fitted, factor, exact)
             assert_close(twin.duration_needed, parameter.duration_needed, scale.get("time", 1), rel)
             if not parameter.upper or not parameter.lower:
                 assert (twin.upper is None) == (parameter.upper is None)
@@ -154,7 +163,7 @@ def test_estimates_lie_within_a_few_cramer_rao_bounds(truth: dict[str, float], l
     off = np.array(
         [
             [
-                np.log(value(found_in(NoiseModel(**truth), i), name) / truth[name]) / bound[name]
+                np.log(in_model(found_in(NoiseModel(**truth), i), name) / truth[name]) / bound[name]
                 for name in truth
             ]
             for i in range(logs)
@@ -252,7 +261,7 @@ def test_a_weak_bias_instability_has_no_wrong_correlation_time(number: int) -> N
     assert of(found, "T_B").status in ("not_identified", "absent")
     time = of(found, "T_B", "likelihood_gm")
     assert (time.value, time.status) == (None, "not_identified")
-    assert time.fitted is not None and "standard error" in (time.reason or "")
+    assert time.fitted is not None and "times apart" in (time.reason or "")
     assert holds(found, "T_B", 200.0, "likelihood_gm")
     assert time.duration_needed is None or time.duration_needed > SAMPLES / RATE
 
@@ -486,7 +495,7 @@ def test_a_constant_is_no_noise() -> None:
 
 
 @pytest.mark.release  # the test of all of them at once is run every day
-@pytest.mark.parametrize("faster", [37.0, 0.01])
+@pytest.mark.parametrize("faster", [17.0, 0.01])  # T_B stays above a second
 def test_the_same_samples_at_another_rate_scale_with_time(faster: float) -> None:
     # The variance of a sample is N^2 / T, and that of a step of the walk K^2 T.
     other = fit(log_of(SHORT, samples=SHORT_SAMPLES), RATE * faster)
@@ -622,7 +631,10 @@ def test_a_process_of_few_samples_is_not_taken_for_the_sensors_filter(T_B: float
 def test_white_noise_below_a_process_as_fast_as_a_filter_is_not_told() -> None:
     # Three samples: the sensor's low-pass and white noise behind it would look the same.
     found = fit(process_and_walk(0.3, 10.0, 4), 10.0)
-    N = of(found, "N")
+    # N is that of the log, whatever the process is; the walk leaves the curve no -1/2 slope.
+    white, N = of(found, "N"), of(found, "N_sensor")
+    assert white.status == "ok" and white.value == pytest.approx(1e-4, rel=0.02)
+    assert found.stretch is None and "no -1/2 stretch" in (white.reason or "")
     assert (N.value, N.status) == (None, "not_identified")
     assert N.reason is not None and "low-pass" in N.reason
     assert N.lower is not None and N.upper is not None
@@ -659,10 +671,18 @@ def test_where_nothing_explains_the_spectrum_what_is_left_out_is_said() -> None:
     found = fit(log, RATE)
     assert found.band is not None and found.band.highest < 0.9 and found.frame.cut
     assert "beyond" in found.band.source
-    N, truth = of(found, "N"), 1 / np.sqrt(RATE)
+    # The density at no frequency, over that of the white noise: of the ringing, 1 / (1 - a - b)^2
+    # over its variance (G. Box and G. Jenkins, Time Series Analysis, 3.2.4), and a quarter of it.
+    squared = radius**2
+    variance = (1 + squared) / ((1 - squared) * (1 + squared**2 - 2 * squared * np.cos(2 * angle)))
+    below = 1.0 / (1 - 2 * radius * np.cos(angle) + squared) ** 2 / variance
+    N, truth = of(found, "N"), np.sqrt((1.0 + 0.25 * below) / RATE)
     assert N.lower is not None and N.upper is not None
-    assert N.lower < truth < 1.05 * N.upper
-    assert N.reason is not None and "neither a process nor a low-pass" in N.reason
+    assert N.status == "ok" and N.lower < truth < N.upper
+    assert "N_sensor" not in found.estimates[0].parameters
+    B = of(found, "B")
+    assert (B.value, B.status, B.upper) == (None, "not_identified", None)
+    assert B.reason is not None and "neither a process nor a low-pass" in B.reason
 
 
 @pytest.mark.parametrize("truth", [MTI_7, FLICKER])
@@ -749,23 +769,44 @@ def in_pieces(log: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
 
 @pytest.mark.release  # those of a log with holes are told apart every day
 def test_blocks_do_not_matter(rng: np.random.Generator) -> None:
-    pieces = in_pieces(log_of(SHORT, samples=LONG), rng)
-    found = fit_blocks(lambda: iter(pieces), LONG, RATE, holes=False, rng=np.random.default_rng(0))
-    assert_same(found_in(SHORT, samples=LONG), found)
+    pieces, whole = in_pieces(log_of(SHORT, samples=LONG), rng), found_in(SHORT, samples=LONG)
+    found = fit_blocks(
+        lambda: iter(pieces),
+        LONG,
+        RATE,
+        holes=False,
+        stretch=whole.stretch,
+        rng=np.random.default_rng(0),
+    )
+    assert_same(whole, found)
 
 
 @pytest.mark.release
 def test_blocks_of_a_log_with_holes_do_not_matter(rng: np.random.Generator) -> None:
-    pieces, rng_of_fit = in_pieces(log_with_holes(), rng), np.random.default_rng(0)
-    found = fit_blocks(lambda: iter(pieces), WITH_HOLES, RATE, holes=True, rng=rng_of_fit)
-    assert_same(found_with_holes(), found)
+    pieces, whole = in_pieces(log_with_holes(), rng), found_with_holes()
+    found = fit_blocks(
+        lambda: iter(pieces),
+        WITH_HOLES,
+        RATE,
+        holes=True,
+        stretch=whole.stretch,
+        rng=np.random.default_rng(0),
+    )
+    assert_same(whole, found)
 
 
 @pytest.mark.release
 def test_a_complete_log_that_may_have_holes_is_the_same() -> None:
     log = log_of(SHORT, samples=SHORT_SAMPLES)
-    found = fit_blocks(lambda: [log], SHORT_SAMPLES, RATE, holes=True, rng=np.random.default_rng(0))
     whole = found_in(SHORT, samples=SHORT_SAMPLES)
+    found = fit_blocks(
+        lambda: [log],
+        SHORT_SAMPLES,
+        RATE,
+        holes=True,
+        stretch=whole.stretch,
+        rng=np.random.default_rng(0),
+    )
     for name in ALL:
         expected = value(whole, name, "likelihood_gm")
         assert value(found, name, "likelihood_gm") == pytest.approx(expected, rel=1e-3)

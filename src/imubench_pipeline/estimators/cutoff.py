@@ -341,7 +341,7 @@ def _readings(
     for trial, (low, high) in zip(alike, limits, strict=True):
         at = [densities(replace(trial, cutoff=cutoff)) for cutoff in (low, trial.cutoff, high)]
         below, middle, above = (math.log(max(density / N, _LEAST_N)) for density, _ in at)
-        first, second, third = (math.log(density / shown) for _, density in at)
+        first, second, third = (math.log(max(density / shown, _LEAST_N)) for _, density in at)
         weight = math.exp(best.cost - trial.cost)
         readings.append(Reading(weight, below, middle, above, (first, second, third)))
     readings += [

@@ -258,7 +258,8 @@ def fit_spectrum(
     chosen = candidates[0]
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
     alike = [chosen] + [c for c in candidates[1:] if c.share >= LEAST_SHARE and not c.terms.ramp]
-    wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms)]
+    number = count_fast_processes(chosen.maximum, frame.folding, stretch)
+    wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms, number)]
     papers = next(c for c in candidates if c.terms == PAPERS)
     posteriors: dict[Terms, Posterior] = {}
     for candidate in (c for c in candidates if c in alike or c in wider or c is papers):
@@ -435,13 +436,16 @@ def _explains(fitted: tuple[Frame, Whittle, list[Candidate]]) -> bool:
     return fitted[2][0].goodness.verdict == "explained"
 
 
-def _with_one_more(terms: Terms) -> list[Terms]:
-    """Return the models that have a random walk, or a bias instability, that a model has not."""
+def _with_one_more(terms: Terms, number: int = 0) -> list[Terms]:
+    """Return the models that have a random walk, or a bias instability, that a model has not.
+
+    So many of its processes count into N, and are no bias instability.
+    """
     wider = []
-    terms = replace(terms, ramp=False)
+    terms = replace(terms, ramp=False, gauss_markov=terms.gauss_markov - number)
     if "K" not in terms.linear:
         wider.append(replace(terms, linear=terms.linear + "K"))
     if "F" not in terms.linear and terms.gauss_markov == 0:
         wider.append(replace(terms, linear=terms.linear.replace("N", "NF")))
         wider.append(replace(terms, gauss_markov=1))
-    return wider
+    return [replace(each, gauss_markov=each.gauss_markov + number) for each in wider]

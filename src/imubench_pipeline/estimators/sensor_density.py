@@ -15,6 +15,7 @@ from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Maximum
+from imubench_pipeline.typing import Array
 
 _AS_FAST = 10.0
 """Sampling intervals: a process as fast may be the sensor's filter."""
@@ -53,9 +54,10 @@ def sensor_density(
     low_pass, terms = frame.low_pass, maximum.terms
     if low_pass is None or "N" not in terms.linear:
         return None
-    N = maximum.parameter("N")
+    N, column = maximum.parameter("N"), terms.linear.index("N")
     if low_pass.or_process is not None and low_pass.N_behind is not None:
-        return _between(low_pass.or_process, N, low_pass.N_behind)
+        drawn = posterior.parameters[:, column]
+        return _between(low_pass.or_process, drawn, low_pass.N_behind)
     if low_pass.behind is None:
         fast = maximum.times < _AS_FAST / spectrum.rate
         if not fast.any():
@@ -67,8 +69,8 @@ def sensor_density(
             f"a process with a correlation time of {maximum.times[fast].max():.3g} s, a few "
             "samples, may be the low-pass of the sensor; bandwidth in the sensor file would tell"
         )
-        return _between(reason, N, before)
-    draws = frame.before_the_filter(posterior, terms, rng).parameters[:, terms.linear.index("N")]
+        return _between(reason, posterior.parameters[:, column], before)
+    draws = frame.before_the_filter(posterior, terms, rng).parameters[:, column]
     lower, upper = np.quantile(draws, (0.025, 0.975)).tolist()
     lower, upper, share = min(lower, N), max(upper, N), low_pass.beside
     if share < _SOME_FLOOR:
@@ -81,6 +83,7 @@ def sensor_density(
     return Parameter(N, "doubtful", reason, lower, upper * times)
 
 
-def _between(reason: str, first: float, second: float) -> Parameter:
-    low, high = sorted((first, second))
-    return Parameter(None, "not_identified", reason, low, high)
+def _between(reason: str, drawn: Array, other: float) -> Parameter:
+    """Return that N_sensor lies between the limits of draws of N and another density, SI."""
+    lower, upper = np.quantile(drawn, (0.025, 0.975)).tolist()
+    return Parameter(None, "not_identified", reason, min(lower, other), max(upper, other))

@@ -121,13 +121,19 @@ def merged_maximum(maximum: Maximum, number: int, folding: float, level: float =
 def merged_posterior(
     posterior: Posterior, terms: Terms, number: int, level: float = 1.0
 ) -> Posterior:
-    """Return draws of a model in the log likewise."""
+    """Return draws of a model in the log likewise.
+
+    The processes of a draw are in the order of T_B: where one is merged, all faster than a second
+    are, as a weak process may be faster than the strong one.
+    """
     if (number, level) == (0, 1.0):
         return posterior
     linear, parameters = len(terms.linear), posterior.parameters.copy()
-    densities = _white_densities(
-        parameters[:, linear : linear + number] ** 2, posterior.times[:, :number]
-    )
+    merged = (posterior.times < BROADBAND_TIME) & (number > 0)
+    merged[:, :number] = True
+    biases = parameters[:, linear:]
+    densities = _white_densities(biases**2, posterior.times) * merged
+    biases[merged] = 0.0
     place = terms.linear.index("N")
     parameters[:, place] = level * np.sqrt(parameters[:, place] ** 2 + densities.sum(axis=1))
     return replace(
