@@ -168,8 +168,8 @@ def with_curve(
 ) -> Estimate:
     """Return an estimate by likelihood with the figures of its curve.
 
-    Values are those of the model of the estimate, and intervals those of the draws of all models
-    that the log does not rule out, by their weights (BIC). (By AIC, two processes of which the
+    Values follow from the model of the estimate, intervals from the draws of all models that the
+    log does not rule out, by their weights (BIC). (By AIC, two processes of which the
     slower stands for the random walk count as much as the walk: limits are twice as wide as they
     need be.)
 

@@ -121,7 +121,7 @@ def merged_maximum(maximum: Maximum, number: int, folding: float, level: float =
 def merged_posterior(
     posterior: Posterior, terms: Terms, number: int, level: float = 1.0
 ) -> Posterior:
-    """Return draws of a model in the log likewise.
+    """Return draws of a model whose fastest processes, so many, are part of its white noise.
 
     The processes of a draw are in the order of T_B: where one is merged, all faster than a second
     are, as a weak process may be faster than the strong one.
