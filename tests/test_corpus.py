@@ -19,8 +19,9 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
 from imubench_pipeline.recordings.recording import channel_logs, log_paths
 from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.tables.findings import UnavailableError
 from tests.conftest import few
-from tests.corpus import ENTRIES, Cut, Entry, Kept, Rejected
+from tests.corpus import ENTRIES, Cut, Entry, Kept, Rejected, Unavailable
 
 LIMIT_S = 60
 LIMIT_MB = 500
@@ -40,7 +41,7 @@ sys.exit(status)
 of the process that started this one."""
 
 SAID_OF_ALL = {"short_recording"}
-SAID = re.compile(r"^(\S.*)/[^/\n]+: (ok|warnings|rejected)$", re.MULTILINE)
+SAID = re.compile(r"^(\S.*)/[^/\n]+: (ok|warnings|rejected|failed)$", re.MULTILINE)
 
 
 @contextmanager
@@ -163,6 +164,10 @@ def test_entry(name: str, tmp_path: Path) -> None:
         pytest.skip(entry.skip)  # its reason, such as that root may read every file
     entry.place(tmp_path / "logs", tmp_path / "sensors")
     before = sorted((tmp_path / "logs").rglob("*"))
+    if isinstance(entry.expected, Unavailable):
+        with watched(LIMIT_S), pytest.raises(UnavailableError, match=entry.expected.reason):
+            ingested(plan_of(tmp_path), name, tmp_path / "kept")
+        return
     with watched(LIMIT_S):
         quality = ingested(plan_of(tmp_path), name, tmp_path / "kept")
     check_outcome(entry, quality)
@@ -222,6 +227,7 @@ def test_entries_beside_a_good_recording(tmp_path: Path) -> None:
     for entry in present:
         if not isinstance(entry.expected, Cut):
             assert (said[entry.name] == "rejected") == isinstance(entry.expected, Rejected)
+            assert (said[entry.name] == "failed") == isinstance(entry.expected, Unavailable)
     qualities = []
     for place, kept in ((tmp_path, tmp_path / "among"), (tmp_path / "alone", tmp_path / "kept")):
         qualities.append(ingested(plan_of(place), GOOD, kept))

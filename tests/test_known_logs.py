@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from imubench_pipeline.recordings import known_logs
 from imubench_pipeline.recordings.known_logs import (
     KNOWN,
+    plan_versions,
     read_known,
     read_log,
-    versions,
     write_known,
 )
 from imubench_pipeline.run.plan import Plan
@@ -38,9 +38,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ingested(folder: Path) -> dict[str, str]:
     """Read the log as an ingest does; return what the plan called it."""
     log = folder / "log.bin"
-    said = versions(log, folder)
+    said = plan_versions(log, folder)
     read = read_log(log)
-    write_known({name: replace(one, version=said[name]) for name, one in read.items()}, folder)
+    write_known(read, folder, said)
     (folder / "quality.json").touch()
     return said
 
@@ -51,7 +51,7 @@ def test_no_bit_of_a_large_log_changes_unseen(
 ) -> None:
     log = folder / "log.bin"
     said = ingested(folder)
-    assert versions(log, folder) == said
+    assert plan_versions(log, folder) == said
     date = log.stat().st_mtime_ns
     with log.open("r+b") as file:
         file.seek(place)
@@ -60,7 +60,7 @@ def test_no_bit_of_a_large_log_changes_unseen(
         file.write(bytes([byte ^ 1 << bit]))
     if dated:  # as it was before, as rsync and careful people do
         os.utime(log, ns=(date, date))
-    changed = versions(log, folder)
+    changed = plan_versions(log, folder)
     assert changed != said
     assert ingested(folder) == changed
 
@@ -71,16 +71,16 @@ def test_what_was_touched_alone_is_read_once_and_keeps_its_name(
     log = tmp_path / "log.bin"
     log.write_bytes(bytes(5000))
     said = ingested(tmp_path)
-    monkeypatch.setattr(known_logs, "_TICK", 0)  # what was written just now is old enough
+    monkeypatch.setattr(known_logs, "_STAMP_RESOLUTION", 0)  # none is too young
     time.sleep(0.05)
     os.utime(log, (1e9, 1e9))
     time.sleep(0.05)
-    assert versions(log, tmp_path) == said
-    monkeypatch.setattr(known_logs, "digest_of", lambda path: pytest.fail("it is read again"))
-    assert versions(log, tmp_path) == said
+    assert plan_versions(log, tmp_path) == said
+    monkeypatch.setattr(known_logs, "_digest", lambda *_: pytest.fail("it is read again"))
+    assert plan_versions(log, tmp_path) == said
     log.chmod(0o600)  # another stamp of anything
     with pytest.raises(pytest.fail.Exception):
-        versions(log, tmp_path)
+        plan_versions(log, tmp_path)
 
 
 def test_stamps_that_are_too_young_are_not_trusted(tmp_path: Path) -> None:
@@ -96,19 +96,19 @@ def test_a_log_that_changes_while_it_is_read_is_read_again(
 ) -> None:
     log = tmp_path / "log.bin"
     log.write_bytes(bytes(5000))
-    read = known_logs.digest_of
+    read = known_logs._digest
 
-    def changed_after(path: Path) -> str:
-        digest = read(path)
+    def changed_after(path: Path, *others: Any) -> str | None:
+        digest = read(path, *others)
         path.write_bytes(bytes(5001))
         return digest
 
-    monkeypatch.setattr(known_logs, "digest_of", changed_after)
+    monkeypatch.setattr(known_logs, "_digest", changed_after)
     said = ingested(tmp_path)
     monkeypatch.undo()
-    assert versions(log, tmp_path) != said
+    assert plan_versions(log, tmp_path) != said
     log.write_bytes(bytes(5000))  # and also if it is again what was begun
-    assert versions(log, tmp_path) != said
+    assert plan_versions(log, tmp_path) != said
 
 
 @pytest.mark.parametrize("damage", ["removed", "edited"])
@@ -121,9 +121,9 @@ def test_without_what_is_known_the_log_is_read_again(tmp_path: Path, damage: str
         kept.unlink()
     else:
         kept.write_text(kept.read_text().replace("5000", "5001"))
-    again = versions(log, tmp_path)
-    assert again != said and again == versions(log, tmp_path)
-    assert ingested(tmp_path) == again == versions(log, tmp_path)
+    again = plan_versions(log, tmp_path)
+    assert again != said and again == plan_versions(log, tmp_path)
+    assert ingested(tmp_path) == again == plan_versions(log, tmp_path)
 
 
 @pytest.mark.parametrize("good", [True, False])

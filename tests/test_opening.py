@@ -49,9 +49,10 @@ def test_what_a_log_says_wrong_is_said_as_ever(tmp_path: Path) -> None:
         check_opening(path, layout(ON_COLUMN), 10.0)
 
 
-def test_a_log_that_opens_or_has_vanished_is_left_to_who_reads_it(tmp_path: Path) -> None:
+def test_a_log_that_opens_is_no_error_and_one_that_is_away_is(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("wx\n" + "1\n" * 200)
     check_opening(path, layout(ON_COLUMN), 10.0)
     path.unlink()
-    check_opening(path, layout(ON_COLUMN), 10.0)
+    with pytest.raises(FileNotFoundError):
+        check_opening(path, layout(ON_COLUMN), 10.0)

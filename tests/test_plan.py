@@ -72,7 +72,8 @@ def test_a_broken_sensor_file_rejects_its_logs_only(project: dict[str, Any]) -> 
     plan = Plan(project)
     assert "error" not in json.loads(plan.ingest_settings("s", "a"))
     error = json.loads(plan.ingest_settings("t", "a"))["error"]
-    assert "t.yaml, line 2: not readable as YAML" in error and plan.unusable == {"t": error}
+    assert error.startswith("sensors/t.yaml, line 2: not readable as YAML")
+    assert str(plan.unusable["t"]).endswith(error)
     simulated = Path(project["sensors"]).parent / "simulated.yaml"
     simulated.write_text("recordings: [{sensor: t, recording: a, channels: {}, duration: 1 s}]\n")
     with pytest.raises(ConfigError, match=r"simulated.yaml|t.yaml, line 2"):
@@ -144,7 +145,8 @@ def test_a_link_to_nowhere_rejects_its_log_only(project: dict[str, Any]) -> None
     (Path(project["logs"]) / "s/lost.csv").symlink_to("nowhere.csv")
     (Path(project["logs"]) / "s/empty").mkdir()
     plan = Plan(project)
-    assert "No such file" in json.loads(plan.ingest_settings("s", "lost"))["error"]
+    versions = json.loads(plan.ingest_settings("s", "lost"))["files"]
+    assert versions == {".": "cannot be read (No such file or directory)"}
     assert "has no files" in json.loads(plan.ingest_settings("s", "empty"))["error"]
 
 
@@ -170,24 +172,25 @@ def growing(notes: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "kind", "said"),
     [
-        (pipe, "no regular file"),
-        (lost, "no such file"),
-        (deep, "line 1: not readable as YAML: more than"),
-        (twice, "line 2: not readable as YAML: the key 'device' stands twice"),
-        (growing, "line 6: not readable as YAML: more than"),
+        (pipe, "error", "no regular file"),
+        (lost, "unavailable", "no such file"),
+        (deep, "error", "line 1: not readable as YAML: more than"),
+        (twice, "error", "line 2: not readable as YAML: the key 'device' stands twice"),
+        (growing, "error", "line 6: not readable as YAML: more than"),
     ],
 )
 def test_notes_that_cannot_be_used_reject_their_own_recording_alone(
-    make: Callable[[Path], None], said: str, project: dict[str, Any]
+    make: Callable[[Path], None], kind: str, said: str, project: dict[str, Any]
 ) -> None:
     put(project, "a.csv")
     put(project, "b.csv")
     make(Path(project["logs"]) / "s/b.yaml")
     plan = Plan(project)
     assert set(plan.recordings) == {("s", "a"), ("s", "b")}
-    assert said in json.loads(plan.ingest_settings("s", "b"))["error"]
+    assert json.loads(plan.ingest_settings("s", "b"))[kind].startswith("logs/s/b.yaml")
+    assert said in json.loads(plan.ingest_settings("s", "b"))[kind]
     assert "error" not in json.loads(plan.ingest_settings("s", "a"))
     assert plan.static_of("s") == ["a", "b"] and plan.calibrated == []
 

@@ -29,6 +29,19 @@ class Rejected:
 
 
 @dataclass(frozen=True)
+class Unavailable:
+    """The recording cannot be read now; nothing is concluded about it.
+
+    Attributes
+    ----------
+    reason : str
+        Regular expression that is found in what is said of it.
+    """
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class Kept:
     """The recording is used.
 
@@ -60,7 +73,7 @@ class Entry:
     write : callable
     log : mapping
         As in a sensor file.
-    expected : Rejected, Kept or Cut
+    expected : Rejected, Unavailable, Kept or Cut
     skip : str or None
         Why it cannot be tried here.
     """
@@ -68,7 +81,7 @@ class Entry:
     name: str
     write: Written
     log: Mapping[str, Any]
-    expected: Rejected | Kept | Cut
+    expected: Rejected | Unavailable | Kept | Cut
     skip: str | None = None
 
     def place(self, logs: Path, sensors: Path) -> Path:

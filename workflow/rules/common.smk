@@ -41,7 +41,7 @@ except ConfigError as error:
     raise WorkflowError(str(error)) from None
 
 for reason in plan.unusable.values():
-    logger.warning(reason)
+    logger.warning(str(reason))
 
 # What a rule does is named by its `script:`, and Snakemake calls the function of this name for it.
 # This one forks a process that has the imports. On a cluster what fails is tried again by Snakemake.

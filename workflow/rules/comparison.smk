@@ -26,6 +26,25 @@ rule tables:
         "../scripts/tables.py"
 
 
+rule files:
+    input:
+        recordings=table("recordings"),
+        failures=table("failures"),
+    output:
+        **as_files("files"),
+    log:
+        LOGS + "/files.log",
+    group:
+        "comparison"
+    resources:
+        **cost(OfMany(memory=300, memory_of_each=0.1, time=1, time_of_each=0.001)),
+    params:
+        files=plan.files(),
+        code=plan.code("files"),
+    script:
+        "../scripts/files.py"
+
+
 rule ranking:
     input:
         error_budget=table("error_budget"),

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import errno
+import os
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
+from typing import NoReturn
 
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.bounds import MOST_LOOKED_INTO
@@ -27,6 +30,7 @@ __all__ = [
     "Batch",
     "LogFile",
     "RecordingError",
+    "is_endless",
     "log_files",
     "only_log",
     "read",
@@ -36,18 +40,36 @@ __all__ = [
 def log_files(path: Path) -> list[Path]:
     """Return the files of a recording: the file itself, or the visible files of its folder.
 
+    Links to files that are not there are among them; links to folders are not followed.
+
     Raises
     ------
     OSError
-        If it is a device or a named pipe, which may never end.
+        If it is a device or a named pipe, which may never end, or a folder cannot be listed.
     """
     if path.is_dir():
         return sorted(
-            file for file in path.rglob("*") if file.is_file() and visible(file.relative_to(path))
+            file for file in _inside(path) if visible(file.relative_to(path)) and _is_file(file)
         )
     if is_endless(path):
         raise OSError(errno.EINVAL, "it is neither a file nor a folder")
     return [path]
+
+
+def _inside(folder: Path) -> Iterator[Path]:
+    """Yield what lies in a folder and those below."""
+    for place, folders, files in os.walk(folder, onerror=_raise):
+        folders[:] = [name for name in folders if visible(Path(name))]
+        yield from (Path(place, name) for name in files)
+
+
+def _raise(error: OSError) -> NoReturn:
+    raise error
+
+
+def _is_file(path: Path) -> bool:
+    """Return whether a path is a regular file, or a link to one that may not be there now."""
+    return path.is_file() or (path.is_symlink() and not path.exists())
 
 
 def read(path: Path, log: LogFormat) -> list[LogFile]:

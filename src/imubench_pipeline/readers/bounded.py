@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import resource
@@ -31,7 +32,17 @@ forks meanwhile would keep it open."""
 
 
 class BoundError(Exception):
-    """What was called took more memory or time than it may."""
+    """What was called took more memory or time than it may.
+
+    Attributes
+    ----------
+    is_external : bool
+        The reason lies outside of what was called: it waited, as for a disk, or was killed.
+    """
+
+    def __init__(self, text: str, *, is_external: bool = False) -> None:
+        super().__init__(text)
+        self.is_external = is_external
 
 
 def limit_memory(more: int) -> None:
@@ -118,17 +129,20 @@ class Bounded(Generic[T]):
             If that takes more than ``seconds`` from now on, or as `bounded` counts them where the
             machine is busy, or more memory than it may, or the process is ended by the system.
         """
+        process = psutil.Process(self._process)
         try:
-            answer = _received(self._pipe, seconds, psutil.Process(self._process))
+            answer = _received(self._pipe, seconds, process)
+            was_waiting = answer is None and _time_of_core(process) < seconds / 2.0
         finally:
             self.end()  # it has answered, or it will not
         if answer is None:
-            raise BoundError(f"took more than {seconds:g} s")
+            raise BoundError(f"took more than {seconds:g} s", is_external=was_waiting)
         try:
             returned, value = pickle.loads(answer)
         except (EOFError, pickle.UnpicklingError):
             ended = os.waitstatus_to_exitcode(self._status or 0)
-            raise BoundError(f"ended the process that read it ({ended})") from None
+            reason = f"ended the process that read it ({ended})"
+            raise BoundError(reason, is_external=ended == -signal.SIGKILL) from None
         if returned:
             result: T = value
             return result
@@ -171,8 +185,16 @@ def _received(pipe: int, seconds: float, sender: psutil.Process) -> bytes | None
 def is_kept_waiting(process: psutil.Process, seconds: float) -> bool:
     """Tell whether a process had less time of a core than it may, and would go on if it had one."""
     try:
-        used = process.cpu_times()
         waiting = process.status() in (psutil.STATUS_RUNNING, psutil.STATUS_DISK_SLEEP)
     except psutil.NoSuchProcess:
         return False
-    return waiting and used.user + used.system < seconds
+    return waiting and _time_of_core(process) < seconds
+
+
+def _time_of_core(process: psutil.Process) -> float:
+    """Return the time of a core that a process has used, s; infinite where it has ended."""
+    try:
+        used = process.cpu_times()
+    except psutil.NoSuchProcess:
+        return math.inf
+    return float(used.user + used.system)

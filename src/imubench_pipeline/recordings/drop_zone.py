@@ -1,14 +1,14 @@
-"""What lies in the folder of the logs: recordings, their files, and the content of these."""
+"""The files in the drop zone: each belongs to a recording, or is skipped for a stated reason."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from imubench_pipeline.readers import log_files
+from imubench_pipeline.readers import is_endless, log_files
 from imubench_pipeline.settings.validation import cut
 
 PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
@@ -21,7 +21,10 @@ NO_SENSOR = "(no sensor)"
 """Stands for the sensor of logs that lie beside the folders of the sensors."""
 
 _NOTES = ".yaml"
-_NOT_LOGS = {_NOTES, ".yml", ".md"} | PARTIAL
+_MISNAMED_NOTES = {".yml", _NOTES}
+"""In lower case."""
+
+_NOT_LOGS = {".md"} | _MISNAMED_NOTES | PARTIAL
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
 _LONGEST_NAME, _MOST_BYTES = 120, 160
 """Letters, and bytes: the name of a page is longer, and systems take 255 bytes."""
@@ -68,12 +71,23 @@ class Recording:
         return self.files if self.held_back or self.simulated else []
 
 
+@dataclass(frozen=True)
+class FoundFile:
+    """A file in the drop zone: it belongs to a recording, or is skipped."""
+
+    file: str
+    """Its place in the drop zone."""
+    sensor: str | None = None
+    recording: str | None = None
+    reason: str | None = None
+    """Why it is skipped."""
+
+
 def found_logs(logs: Path) -> list[Recording]:
     """Return the recordings of a drop zone, in order; two logs of one name are there twice.
 
-    What nobody can analyse is among them, with the reason: logs that lie in no folder of a sensor,
-    and notes of which there is no log. Hidden files, backups of editors (``~``), what is written on
-    logs (``.md``) and files that are still being transferred are passed over.
+    Logs in no folder of a sensor, and notes without a log, are among them, with the reason why
+    they cannot be analysed. `account_for` has all other files.
     """
     recordings: list[Recording] = []
     for path in _shown(logs):
@@ -88,27 +102,113 @@ def found_logs(logs: Path) -> list[Recording]:
     return recordings
 
 
+def files_of(recording: Recording) -> list[Path]:
+    """Return the files of a recording as they lie in the drop zone now: its log, and its notes."""
+    try:
+        logs = log_files(recording.path)
+    except OSError:  # the ingest says so
+        logs = [recording.path]
+    return logs + ([recording.notes] if recording.notes else [])
+
+
+def account_for(
+    logs: Path, recordings: Iterable[Recording], held_back: Iterable[Recording] = ()
+) -> list[FoundFile]:
+    """Return every file in the drop zone once, with its recording, or why it is skipped.
+
+    Parameters
+    ----------
+    logs : Path
+        The drop zone.
+    recordings, held_back : iterable of Recording
+        Those of a run; those that it leaves alone because they are still being written.
+    """
+    owners = {file: recording for recording in recordings for file in files_of(recording)}
+    waiting = {file for recording in held_back for file in files_of(recording)}
+    found = []
+    for file in _every_file(logs) if logs.is_dir() else ():
+        place = os.fsencode(file.relative_to(logs)).decode(errors="backslashreplace")
+        if owner := owners.get(file):
+            found.append(FoundFile(place, owner.sensor, owner.name))
+        elif file in waiting:
+            found.append(FoundFile(place, reason="still being written: the next run reads it"))
+        else:
+            found.append(FoundFile(place, reason=_why_skipped(file, logs)))
+    return found
+
+
+_FOLLOWED = 2
+"""Levels of folders of which links are followed: those of sensors, and of recordings."""
+
+
+def _every_file(folder: Path, level: int = 0) -> Iterator[Path]:
+    """Yield all files below a folder, in order, and folders that cannot be listed."""
+    try:
+        paths = sorted(folder.iterdir())
+    except OSError:
+        yield folder
+        return
+    for path in paths:
+        if path.is_dir() and (level < _FOLLOWED or not path.is_symlink()):
+            yield from _every_file(path, level + 1)
+        else:
+            yield path
+
+
+def _why_skipped(file: Path, logs: Path) -> str:
+    """Return why a file of the drop zone belongs to no recording, by its name and place."""
+    name, suffix = file.name, file.suffix.lower()
+    if name.endswith("~"):
+        return "backup of an editor"
+    if suffix in PARTIAL or Path(name.lstrip(".")).suffix.lower() in PARTIAL:
+        return f"still being transferred, by its ending {suffix}"
+    if hidden := next((part for part in file.relative_to(logs).parts if part.startswith(".")), ""):
+        return f"hidden: the name {hidden!a} begins with a dot"
+    if "__MACOSX" in file.parts:
+        return "copy of attributes that macOS adds to archives"
+    if suffix == ".md":
+        return "documentation (.md)"
+    if suffix in _MISNAMED_NOTES:
+        depth = len(file.relative_to(logs).parts)
+        if depth == 1:
+            return "notes or settings beside the folders of the sensors; nothing reads them there"
+        return f"notes that are not read: rename the file to {file.stem}{_NOTES}"
+    if file.is_dir():
+        return "link to a folder, which is not followed: link to its files, or copy it"
+    if is_endless(file):
+        return "neither a file nor a folder"
+    return "no log: it was not there when the run was planned, or belongs to no recording"
+
+
 def _logs_of(folder: Path) -> Iterator[Recording]:
     """Yield the recordings in the folder of a sensor."""
     sensor = sensor_of(folder)
-    used: set[Path] = set()
-    paths = [path for path in _shown(folder) if path.is_dir() or _is_log(path)]
-    for path in paths:
+    try:
+        shown = _shown(folder)
+    except OSError:  # the ingest meets it again, and says so
+        yield _found(sensor, folder, sensor, _fault(folder, folder.name))
+        return
+    logs = [path for path in shown if path.is_dir() or _is_log(path)]
+    notes_of = {path.name: path for path in shown if path.suffix == _NOTES and not path.is_dir()}
+    misnamed: dict[str, Path] = {}
+    for path in sorted({*shown} - {*logs} - {*notes_of.values()}):
+        if path.suffix.lower() in _MISNAMED_NOTES:
+            misnamed.setdefault(path.stem, path)
+    without_log = {*notes_of.values(), *misnamed.values()}
+    for path in logs:
         name = path.name if path.is_dir() else _stem(path)
-        notes, misnamed = folder / f"{name}{_NOTES}", folder / f"{name}.yml"
-        used |= {notes, misnamed}
-        there = os.path.lexists(notes) and not notes.is_dir()
+        notes, other = notes_of.get(f"{name}{_NOTES}"), misnamed.get(name)
+        without_log -= {notes, other}
         fault = _fault(path, name)
-        if fault is None and misnamed.is_file():
-            fault = f"{misnamed.name}: notes end in {_NOTES}; rename it to {notes.name}"
-        yield _found(sensor, path, name, fault, notes if there else None)
-    for path in _shown(folder):
-        if path.suffix in (_NOTES, ".yml") and path not in used and path not in paths:
-            fault = (
-                f"{path.name}: notes of no log; expected one of the name {path.stem} beside them: "
-                "rename the notes, or bring the log; a sensor file belongs to those of the others"
-            )
-            yield _found(sensor, path, path.stem, _fault(path, path.stem) or fault)
+        if fault is None and other:
+            fault = f"{other.name}: notes end in {_NOTES}; rename it to {name}{_NOTES}"
+        yield _found(sensor, path, name, fault, notes)
+    for path in sorted(without_log):
+        fault = _fault(path, path.stem) or (
+            f"{path.name}: notes of no log; expected one of the name {path.stem} beside them: "
+            "rename the notes, or bring the log; a sensor file belongs to those of the others"
+        )
+        yield _found(sensor, path, path.stem, fault)
 
 
 def _shown(folder: Path) -> list[Path]:
@@ -118,7 +218,7 @@ def _shown(folder: Path) -> list[Path]:
 
 
 def _is_log(path: Path) -> bool:
-    """Tell whether a file of the drop zone is to be a log, by its name."""
+    """Return whether a file of the drop zone is to be a log, by its name."""
     return path.suffix.lower() not in _NOT_LOGS
 
 
@@ -155,16 +255,16 @@ def _fault(path: Path, name: str) -> str | None:
                 f"it, and no end that repeats itself: rename the {what}"
             )
     try:
-        if not log_files(path):
-            return f"the folder {shown} has no files"
-        for file in log_files(path):
-            if not _is_text(file.name):
-                return f"{shown} holds a file of the name {file.name!a}: rename it in UTF-8"
-            file.stat()
-            with file.open("rb"):
-                pass
-    except OSError as error:
-        return f"{shown} cannot be read ({error.strerror})"
+        if is_endless(path):
+            return f"{shown} is neither a file nor a folder; expected a log"
+        files = log_files(path)
+    except OSError:  # the ingest meets it again, and says so
+        return None
+    if not files:
+        return f"the folder {shown} has no files"
+    for file in files:
+        if not _is_text(file.name):
+            return f"{shown} holds a file of the name {file.name!a}: rename it in UTF-8"
     return None
 
 

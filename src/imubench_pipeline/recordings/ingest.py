@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import shutil
 import tempfile
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 from imubench_pipeline.readers import read
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.assembly import assemble, counted, names_of
+from imubench_pipeline.recordings.availability import watched
 from imubench_pipeline.recordings.kept import Quality, identified
 from imubench_pipeline.recordings.known_logs import KnownFile, read_log, write_known
 from imubench_pipeline.recordings.opening import check_opening
@@ -32,7 +33,7 @@ from imubench_pipeline.settings.sensor import (
     UsedPart,
 )
 from imubench_pipeline.tables.failures import Failure
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError
 
 
 @dataclass(frozen=True)
@@ -96,9 +97,9 @@ def ingest(
     folder.mkdir(parents=True, exist_ok=True)
     remove_kept(folder)
     scratch = Path(tempfile.mkdtemp(prefix=".ingest.", suffix=".part", dir=folder))
-    # The files are identified while they are read.
-    beside = ThreadPoolExecutor(1)
-    sources = beside.submit(read_log, source)
+    # The files are identified while they are read; to the end only where they can be used.
+    beside, rejected = ThreadPoolExecutor(1), Event()
+    sources = beside.submit(read_log, source, rejected.is_set)
     try:
         whole = _ingest(source, log, notes, settings, folder, scratch, provenance, sources)
         end = max((f.end or 0.0 for f in whole.findings if f.finding == "warm_up"), default=0.0)
@@ -109,6 +110,9 @@ def ingest(
         detail = f"the first {end:.5g} s, a warm-up, are left out (quality.trim_warm_up)"
         note = Finding("warm_up_trimmed", "note", detail, end, start=0.0, end=end)
         return replace(trimmed, findings=[note, *trimmed.findings])
+    except BaseException:
+        rejected.set()
+        raise
     finally:
         beside.shutdown()
         shutil.rmtree(scratch)
@@ -333,32 +337,36 @@ def ingest_as_planned(
     guarded : bool
         A process of its own opens the log first (`opening.check_opening`), so that none that hangs
         or crashes its reader does so here; it takes 0.1 s.
+
+    Raises
+    ------
+    UnavailableError
+        If the log cannot be read now, for a reason outside of it.
     """
     plan = json.loads(settings)
     notes = RecordingNotes.model_validate(plan.get("notes", {}))
     names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}
     names |= {"kind": plan.get("kind", "static"), "simulated": plan["simulated"]}
+    if "unavailable" in plan:
+        raise UnavailableError(plan["unavailable"])
+    sources: dict[str, KnownFile] = {}
     try:
         if "error" in plan:
             raise RecordingError(plan["error"])
         log = LogFormat.model_validate(plan["log"])
         limits = QualitySettings.model_validate(plan["quality"])
-        if guarded:
-            check_opening(source, log, limits.opening)
-        ingested = ingest(source, log, notes, limits, folder, names)
+        with watched(source, plan.get("files", ())):
+            if guarded:
+                check_opening(source, log, limits.opening)
+            ingested = ingest(source, log, notes, limits, folder, names)
+        sources = ingested.sources or {}
     except RecordingError as error:
         remove_kept(folder)
         ingested = rejected(error, notes)
+        if "files" in plan:
+            sources = read_log(source, lambda: True)  # no digests of large files
     if versions := plan.get("files"):
-        read = ingested.sources
-        if read is None:
-            with contextlib.suppress(OSError):  # what is rejected may not be readable at all
-                read = read_log(source)
-        files = {
-            name: replace(file, version=versions.get(name, ""))
-            for name, file in (read or {}).items()
-        }
-        write_known(files, folder)
+        write_known(sources, folder, versions)
     return ingested.quality(names | {"power_cycled": notes.power_cycled})
 
 

@@ -1,9 +1,14 @@
-"""Which logs were read: their digests, and the stamps by which it is known that they still are.
+"""The evidence that the result of an ingest rests on: which files were read, and their identity.
 
-A log may be edited in place without another size, and its date may be set to what it was. Its
-size and the stamps of its last change, of the content (mtime) and of anything (ctime, which nobody
-sets), say cheaply that nothing was done to it. Where they differ, all of it is read: a log that was
-touched alone has the digest that it had.
+The plan must see every change of a log and still be cheap: it looks at sizes, at the stamps of the
+last change of the content (mtime) and of anything (ctime, which nobody can set), and at a few
+blocks of a file. Whole files are read in the ingest, which has limits of time and memory. Only a
+file of moderate size whose stamps changed is read in the plan: where its content is the same, as
+after a restored backup, hours of analysis need not be repeated.
+
+A log may be edited in place, keep its size and get its old date back; it may be away for a moment,
+with a mount or while somebody moves it. Whatever an ingest concluded, an analysis or a rejection,
+is looked at again as soon as the files are no longer those that the conclusion rests on.
 """
 
 from __future__ import annotations
@@ -12,68 +17,80 @@ import contextlib
 import hashlib
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.recordings.drop_zone import Recording
-from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.tables.digests import digest_of, read_sealed_json, write_sealed_json
+from imubench_pipeline.tables.digests import (
+    open_without_waiting,
+    read_sealed_json,
+    write_sealed_json,
+)
 
 KNOWN = "log.json"
-"""What was read, beside ``quality.json``."""
+"""The file of the evidence, beside ``quality.json``."""
 
-_READ_WHOLE = 1 << 20  # bytes; of a larger file that was never read, blocks are
+MAX_DIGESTED_SIZE = 1 << 28
+"""Bytes. A file up to this size is read in the plan where only its stamps may have changed (0.2 s);
+a larger one goes through the ingest again."""
+
+_MAX_WHOLE_GLIMPSE = 1 << 20  # bytes
 _BLOCKS = 16
-_BLOCK = 4096  # bytes
-_TICK = 2_000_000_000
-"""ns; two changes within it may have one stamp (FAT has steps of 2 s, Linux of some ms)."""
+_BLOCK_SIZE = 4096  # bytes
+_CHUNK_SIZE = 1 << 20  # bytes
+_STAMP_RESOLUTION = 2_000_000_000
+"""ns. Two changes within it may have the same stamp (FAT: 2 s, Linux: some ms)."""
+
+Stamps = tuple[int, int]
+"""Last change of the content and of anything, ns since 1970."""
 
 
 @dataclass(frozen=True)
 class KnownFile:
-    """A file of a log as it was read."""
+    """A file of a log as an ingest found it."""
 
-    size: int
-    """Bytes."""
-    sha256: str
-    """Of the content."""
-    steady: bool
-    """Nothing was done to it while it was read."""
-    stamps: tuple[int, int] | None
-    """Last change of the content and of anything, ns since 1970; None: they were too young to tell
-    a later change."""
+    size: int | None
+    """Bytes; None: it was not there."""
+    sha256: str | None
+    """SHA-256 of the content; None: it was not read to its end, or changed meanwhile."""
+    stamps: Stamps | None
+    """None: the file changed while it was read, or so shortly before that a later change might
+    have the same stamps."""
     version: str = ""
-    """What the plan calls this content; another text wherever it is another one."""
+    """The name of this content in the settings of the ingest."""
 
     @classmethod
-    def of(cls, path: Path) -> KnownFile:
-        """Read a file."""
-        begun = time.time_ns()
-        before = path.stat()
-        # Nothing is read of what says that it is empty: a file of the kernel may never end.
-        digest = digest_of(path) if before.st_size else hashlib.sha256().hexdigest()
-        after = path.stat()
-        steady = (before.st_size, _stamps(before)) == (after.st_size, _stamps(after))
-        old = max(_stamps(before)) < begun - _TICK
-        stamps = _stamps(before) if steady and old else None
-        return cls(before.st_size, digest, steady, stamps)
+    def of(cls, path: Path, is_stopped: Callable[[], bool] = lambda: False) -> KnownFile:
+        """Read a file; it may not be there. Of a large one, `is_stopped` ends the reading."""
+        try:
+            begin = time.time_ns()
+            before = path.stat()
+            digest = _digest(path, before.st_size, is_stopped)
+            after = path.stat()
+        except OSError:
+            return cls(None, None, None)
+        if (before.st_size, _stamps(before)) != (after.st_size, _stamps(after)):
+            return cls(before.st_size, None, None)
+        old = all(abs(begin - stamp) > _STAMP_RESOLUTION for stamp in _stamps(before))
+        return cls(before.st_size, digest, _stamps(before) if old else None)
 
-    def same(self, now: KnownFile) -> bool:
-        """Return whether a file has the content that was read."""
-        return self.steady and (self.size, self.sha256) == (now.size, now.sha256)
-
-    def unchanged(self, path: Path) -> bool:
-        """Return whether nothing was done to a file since it was read."""
-        now = path.stat()
-        return (self.size, self.stamps) == (now.st_size, _stamps(now))
+    def is_unchanged(self, about: os.stat_result) -> bool:
+        """Return whether nothing was done to the file, by its status now."""
+        return self.stamps is not None and (self.size, self.stamps) == (
+            about.st_size,
+            _stamps(about),
+        )
 
 
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
-    """Return the files of a log as they were read; None where that is not known.
+    """Read the evidence of the last ingest; None where there is none.
 
-    ``folder``: of the recording.
+    Parameters
+    ----------
+    folder : Path
+        Results of the recording.
     """
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
         return {
@@ -83,110 +100,176 @@ def read_known(folder: Path) -> dict[str, KnownFile] | None:
     return None
 
 
-def write_known(files: Mapping[str, KnownFile], folder: Path) -> None:
-    """Keep the files of a log as they were read.
+def write_known(
+    files: Mapping[str, KnownFile], folder: Path, versions: Mapping[str, str] | None = None
+) -> None:
+    """Write the evidence of an ingest.
 
-    ``files``: by their place in the log.
-    ``folder``: of the recording.
+    Parameters
+    ----------
+    files : mapping of str to KnownFile
+        By their place in the log.
+    folder : Path
+        Results of the recording.
+    versions : mapping of str to str, optional
+        Versions as the plan named them. A file that was planned and is not among `files` was not
+        there.
     """
+    if versions is not None:
+        absent = {name: KnownFile(None, None, None) for name in versions}
+        files = {
+            name: replace(file, version=versions.get(name, ""))
+            for name, file in (absent | dict(files)).items()
+        }
     rows = {name: asdict(file) for name, file in sorted(files.items())}
     write_sealed_json({"files": rows}, folder / KNOWN)
 
 
-def read_log(source: Path) -> dict[str, KnownFile]:
-    """Return the files of a log, all of which is read, by their place in it.
+def read_log(source: Path, is_stopped: Callable[[], bool] = lambda: False) -> dict[str, KnownFile]:
+    """Read all files of a log, and return their identity by their place in the log.
 
-    ``source``: the log file, or the folder of a recording.
+    Parameters
+    ----------
+    source : Path
+        The log file, or the folder of a recording.
+    is_stopped : callable, optional
+        Asked now and then whether digests of large files are not needed any more.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be listed.
     """
-    return {name: KnownFile.of(file) for name, file in _places(source).items()}
+    return {name: KnownFile.of(file, is_stopped) for name, file in _places(source).items()}
 
 
-def versions(source: Path, folder: Path) -> dict[str, str]:
-    """Return what is another text for each file of a log whenever that has another content.
+def identity(source: Path) -> dict[str, tuple[int, ...]]:
+    """Return size, stamps and inode of the files of a log and of their folder, by their place.
+
+    It is another value whenever a file was changed, replaced, renamed, or moved away and back.
+
+    Raises
+    ------
+    OSError
+        If the log is not there, or cannot be listed.
+    """
+    paths = {".": source} | _places(source)
+    return {
+        name: (about.st_size, *_stamps(about), about.st_ino)
+        for name, path in paths.items()
+        for about in [path.stat()]
+    }
+
+
+def plan_versions(source: Path, folder: Path) -> dict[str, str]:
+    """Return a name of the content of each file of a log; an ingest is needed where it changes.
+
+    It is the name that the last ingest was planned with as long as the evidence of that ingest
+    holds, and another one otherwise.
 
     Parameters
     ----------
     source : Path
         The log file, or the folder of a recording.
     folder : Path
-        Of its results. What is known of files that were touched alone is renewed there.
-
-    Returns
-    -------
-    dict of str to str
-        Files that were never read have a digest of some blocks of them: it takes no time, and
-        they are read in any case.
-
-    Raises
-    ------
-    OSError
-        If a file has gone.
+        Its results. New stamps of unchanged files are noted there.
     """
-    files = read_known(folder)
-    result, touched = {}, dict[str, KnownFile]()
-    for name, path in _places(source).items():
-        before = (files or {}).get(name)
-        if before is None:
-            result[name] = glimpse(path)
-        elif before.unchanged(path):
-            result[name] = before.version
-        else:
-            now = KnownFile.of(path)
-            result[name] = f"{now.size} sha256 {now.sha256}"
-            if before.same(now):
-                result[name] = before.version
-                touched[name] = replace(now, version=before.version)
+    known = read_known(folder)
+    try:
+        places = _places(source)
+    except OSError as error:
+        places = {}
+        versions = {".": _unreadable(error)}
+    else:
+        versions = {}
+    touched = dict[str, KnownFile]()
+    for name, path in places.items():
+        before = (known or {}).get(name)
+        try:
+            now = None if before is None else _now(path, before)
+            versions[name] = now.version if now else glimpse(path)
+            if now and now != before:
+                touched[name] = now
+        except OSError as error:
+            versions[name] = _unreadable(error)
+            now = None
+        if before is not None and now is None and versions[name] == before.version:
+            versions[name] += " again"
     quality = folder / "quality.json"
-    if files is None and quality.is_file():
-        # It was read, and what that was is not known any more: it is read again.
+    if known is None and quality.is_file():
+        # There is a result, but its evidence was lost: the log is read again.
         since = quality.stat().st_mtime_ns
-        return {name: f"{version} {since}" for name, version in result.items()}
-    if files and touched:
-        with contextlib.suppress(OSError):  # of results that this user may only read
-            write_known(files | touched, folder)
-    return result
+        return {name: f"{version} {since}" for name, version in versions.items()}
+    if known and touched:
+        with contextlib.suppress(OSError):  # results that this user may only read
+            write_known(known | touched, folder)
+    return versions
+
+
+def _now(path: Path, before: KnownFile) -> KnownFile | None:
+    """Return a file with its present stamps where it has its content of before; None otherwise."""
+    about = path.stat()
+    if before.is_unchanged(about):
+        return before
+    if before.sha256 is None or not before.size == about.st_size <= MAX_DIGESTED_SIZE:
+        return None
+    now = KnownFile.of(path)
+    return replace(now, version=before.version) if now.sha256 == before.sha256 else None
 
 
 def versions_of(recording: Recording, results: Path) -> dict[str, str]:
-    """Return the `versions` of the files of a recording; of one that is to be simulated, none.
-
-    Raises
-    ------
-    ConfigError
-        If one of them has gone.
-    """
+    """Return `plan_versions` of a recording; of one that is to be simulated, none."""
     if recording.simulated:
         return {}
-    path = recording.path
-    try:
-        return versions(path, results / "recordings" / recording.sensor / recording.name)
-    except OSError as error:
-        raise ConfigError(f"{path.name!a} cannot be read ({error.strerror})") from None
+    folder = results / "recordings" / recording.sensor / recording.name
+    return plan_versions(recording.path, folder)
 
 
 def glimpse(path: Path) -> str:
     """Return the size of a file and a digest of it; of a large file, of blocks spread over it.
 
-    The first and the last block are among them. A change that leaves the size and all 16 blocks of
-    4 kB as they are is not seen, in a file above 1 MB.
+    The first and the last block are among them. In a file above 1 MB, a change that leaves the
+    size and all 16 blocks of 4 kB as they are has no effect; the stamps tell that one.
 
-    ``path``: a file.
+    Raises
+    ------
+    OSError
+        If it cannot be read.
     """
     digest = hashlib.sha256()
-    with path.open("rb", buffering=0) as file:
+    with open(path, "rb", buffering=0, opener=open_without_waiting) as file:
         size = os.fstat(file.fileno()).st_size
-        if size <= _READ_WHOLE:
+        if size <= _MAX_WHOLE_GLIMPSE:
             digest.update(file.read(size))
         else:
             for number in range(_BLOCKS):
-                place = (size - _BLOCK) * number // (_BLOCKS - 1)
-                digest.update(os.pread(file.fileno(), _BLOCK, place))
+                place = (size - _BLOCK_SIZE) * number // (_BLOCKS - 1)
+                digest.update(os.pread(file.fileno(), _BLOCK_SIZE, place))
     return f"{size} {digest.hexdigest()[:32]}"
+
+
+def _digest(path: Path, size: int, is_stopped: Callable[[], bool]) -> str | None:
+    """Return the SHA-256 of a file; None where it was stopped.
+
+    At most `size` bytes are read: a file of the kernel says that it is empty, and may never end.
+    """
+    digest, is_large = hashlib.sha256(), size > MAX_DIGESTED_SIZE
+    with open(path, "rb", buffering=0, opener=open_without_waiting) as file:
+        while size > 0 and (chunk := file.read(min(size, _CHUNK_SIZE))):
+            if is_large and is_stopped():
+                return None
+            digest.update(chunk)
+            size -= len(chunk)
+    return digest.hexdigest()
 
 
 def _places(source: Path) -> dict[str, Path]:
     return {file.relative_to(source).as_posix(): file for file in log_files(source)}
 
 
-def _stamps(about: os.stat_result) -> tuple[int, int]:
+def _stamps(about: os.stat_result) -> Stamps:
     return about.st_mtime_ns, about.st_ctime_ns
+
+
+def _unreadable(error: OSError) -> str:
+    return f"cannot be read ({error.strerror})"

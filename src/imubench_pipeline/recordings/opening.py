@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 
 from imubench_pipeline.readers import log_files, read
 from imubench_pipeline.readers.bounded import BoundError, bounded
 from imubench_pipeline.settings.sensor import LogFormat
-from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.tables.findings import RecordingError, UnavailableError
 
 _MEMORY = 1 << 29
 """Bytes; the bounds of the readers take up to half of them."""
@@ -28,17 +27,20 @@ def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
     ------
     RecordingError
         If they cannot be read, or that takes longer or more than 512 MiB, or crashes.
+    OSError
+        If the log is not there, or its disk does not answer in that time.
     """
-    with suppress(OSError):  # a log that has vanished
-        size = sum(path.stat().st_size for path in log_files(source))
-        try:
-            bounded(seconds + size / _SLOWEST, _MEMORY, _read_first_records, source, log)
-        except BoundError as error:
-            raise RecordingError(
-                f"{source.name}: to read its first records {error}; expected the log of an "
-                "inertial sensor: copy what it measured into a file of its own, or allow more in "
-                "quality.opening"
-            ) from None
+    size = sum(path.stat().st_size for path in log_files(source))
+    try:
+        bounded(seconds + size / _SLOWEST, _MEMORY, _read_first_records, source, log)
+    except BoundError as error:
+        if error.is_external:
+            raise UnavailableError(f"{source.name}: to read its first records {error}") from None
+        raise RecordingError(
+            f"{source.name}: to read its first records {error}; expected the log of an "
+            "inertial sensor: copy what it measured into a file of its own, or allow more in "
+            "quality.opening"
+        ) from None
 
 
 def _read_first_records(source: Path, log: LogFormat) -> None:

@@ -17,7 +17,7 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import ChannelLog, static_logs
 from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.tables.failures import Failure
+from imubench_pipeline.tables.failures import Failure, describe_error
 from imubench_pipeline.tables.findings import Finding
 
 
@@ -29,7 +29,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         try:
             quality = _checked(plan, sensor, name, recording)
         except Exception as error:  # the others are checked all the same
-            reason = one_line(f"{recording.path.name}: {type(error).__name__}: {error}")
+            reason = one_line(f"{recording.path.name}: {describe_error(error)}")
             failure = Failure(sensor, name, "check", "error", reason)
             quality = Quality({"status": "failed"}, [dict(failure.finding().row(sensor, name))], {})
         yield sensor, name, quality

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from imubench_pipeline.navigation.suitability.abilities import abilities
-from imubench_pipeline.recordings.drop_zone import Recording, found_logs
+from imubench_pipeline.recordings.drop_zone import Recording, account_for, found_logs
 from imubench_pipeline.recordings.known_logs import versions_of
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.config import Run, given_beside, read_run
@@ -42,7 +42,11 @@ from imubench_pipeline.settings.simulated_recordings import (
     profile_files,
     read_simulated,
 )
-from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.settings.validation import (
+    ConfigError,
+    UnavailableSettingsError,
+    parse,
+)
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables.digests import digest_of
 from imubench_pipeline.tables.provenance import source_digest
@@ -78,14 +82,15 @@ class Plan:
 
     def __init__(self, config: Mapping[str, object]) -> None:
         self.run: Run = read_run(config)
+        _check_places(self.run)
         self.faults = Faults(self.run.results)
         declared = read_sensor_files(folders(self.run.sensors, "sensors"))
         self.sensors: dict[str, Sensor] = {}
-        self.unusable: dict[str, str] = {}
-        """Why a sensor file is of no use, by sensor: all logs of that sensor are rejected."""
+        self.unusable: dict[str, ConfigError] = {}
+        """Why a sensor file cannot be used, by sensor: all logs of that sensor are rejected."""
         for name, sensor in declared.items():
             if isinstance(sensor, ConfigError):
-                self.unusable[name] = str(sensor)
+                self.unusable[name] = sensor
             else:
                 self.sensors[name] = sensor
         self.requirements: dict[str, Requirement] = read_requirements(
@@ -96,6 +101,7 @@ class Plan:
         self._simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
         self._read_notes: dict[Path, object] = {}
+        self._still_written: list[Recording] = []
         self.recordings: dict[tuple[str, str], Recording] = {}
         for recording in [*self._found_logs(), *self._to_simulate()]:
             other = self.recordings.setdefault((recording.sensor, recording.name), recording)
@@ -129,7 +135,9 @@ class Plan:
         for log in found_logs(self.run.logs):
             by_name.setdefault(f"{log.sensor}/{log.name}", []).append(log)
         for key in self.run.held_back:
-            by_name[key] = self._as_it_is(key, by_name.get(key, []))
+            found = by_name.get(key, [])
+            by_name[key] = self._as_it_is(key, found)
+            self._still_written += found if not by_name[key] else []
         return sorted(chain.from_iterable(by_name.values()), key=lambda log: log.path)
 
     def _as_it_is(self, key: str, logs: list[Recording]) -> list[Recording]:
@@ -151,6 +159,12 @@ class Plan:
             Recording(sensor, name, folder / sensor / name, None, simulated=True)
             for sensor, name in self._simulated
         ]
+
+    def files(self) -> str:
+        """Return every file in the drop zone, with its recording or why it is skipped."""
+        found = [log for log in self.recordings.values() if not log.simulated]
+        files = account_for(self.run.logs, found, self._still_written)
+        return _text([asdict(file) for file in files])
 
     def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
         """Return how often a step had failed and was tried again, with this run: what failed is.
@@ -185,8 +199,17 @@ class Plan:
                     raise ConfigError(f"{recording.notes}: {error}") from None
             files = versions_of(recording, self.run.results)
             return settings | of_ingest(log, notes, kind) | {"files": files}
+        except UnavailableSettingsError as error:
+            return settings | {"unavailable": self._without_folders(str(error))}
         except ConfigError as error:
-            return settings | {"error": str(error)}
+            return settings | {"error": self._without_folders(str(error))}
+
+    def _without_folders(self, reason: str) -> str:
+        """Return a reason without the folders above those of the run: it stands in tables."""
+        sensors = self.run.sensors
+        for folder in (self.run.logs, *((sensors,) if isinstance(sensors, Path) else sensors)):
+            reason = reason.replace(str(folder), folder.name)
+        return reason
 
     def kind(self, sensor: str, name: str) -> Kind:
         """Return what was done with the sensor; what its notes were to say, if they are wrong."""
@@ -316,7 +339,7 @@ class Plan:
         if recording.notes:
             notes = parse(RecordingNotes, self._notes(recording), str(recording.notes))
         if recording.sensor in self.unusable:
-            raise ConfigError(self.unusable[recording.sensor])
+            raise self.unusable[recording.sensor]
         if recording.sensor not in self.sensors:
             expected = own_folder(self.run.sensors) / f"{recording.sensor}.yaml"
             raise ConfigError(
@@ -487,6 +510,16 @@ class Plan:
     def code(step: str) -> str:
         """Return the digest of the code that a step runs: the module of its name in ``steps``."""
         return source_digest(f"steps.{step}")
+
+
+def _check_places(run: Run) -> None:
+    """Refuse results that would be taken for logs, and logs that would be taken for results."""
+    logs, results = run.logs.resolve(), run.results.resolve()
+    if logs.is_relative_to(results) or results.is_relative_to(logs):
+        raise ConfigError(
+            f"logs: found {str(run.logs)!r}, and results: {str(run.results)!r}; expected two "
+            "folders, neither of them in the other: name another one for the results"
+        )
 
 
 def _text(value: object) -> str:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import errno
 import json
 import os
 import pickle
@@ -23,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.recordings.availability import OF_RESULTS
 from imubench_pipeline.run.start import ONE_THREAD
 from imubench_pipeline.tables.failures import Cause
 
@@ -42,8 +42,6 @@ _PATIENCE = 60.0
 
 _TO_STOP = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGIO", None)}
 """Signals that end a step because the run ends."""
-
-_OF_THE_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE}
 
 
 class StepError(Exception):
@@ -205,7 +203,7 @@ def _error(name: str, how: bytes, details: Mapping[str, Any], seconds: float | N
         reason = f"ran for longer than {seconds:.4g} s"
         return StepError(f"{name}.py {reason}", "time", reason)
     if how == FAILED:
-        alone = details["imported"] and details["errno"] not in _OF_THE_DISK
+        alone = details["imported"] and details["errno"] not in OF_RESULTS
         cause: Cause | None = "error" if alone else None
         return StepError(f"{name}.py failed", cause, details["error"], details["trace"])
     if how == KILLED and details["signal"] not in _TO_STOP:

@@ -19,6 +19,10 @@ class ConfigError(ValueError):
     """A setting that cannot be used; the text names file, key, value and what was expected."""
 
 
+class UnavailableSettingsError(ConfigError):
+    """A file of settings that cannot be read now, for a reason outside of it."""
+
+
 class Strict(BaseModel):
     """A group of settings in which an unknown key is an error."""
 

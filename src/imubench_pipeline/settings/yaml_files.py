@@ -15,7 +15,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import yaml
 from pydantic import BaseModel
 
-from imubench_pipeline.settings.validation import ConfigError, cut, parse
+from imubench_pipeline.settings.validation import (
+    ConfigError,
+    UnavailableSettingsError,
+    cut,
+    parse,
+)
 
 LARGEST = 4 << 20
 """Bytes of a file."""
@@ -96,9 +101,10 @@ def read_yaml(path: Path) -> object:
     except ConfigError:
         raise
     except FileNotFoundError:
-        raise ConfigError(f"{path}: no such file; expected one of YAML: mend its name") from None
+        reason = f"{path}: no such file; expected one of YAML: mend its name"
+        raise UnavailableSettingsError(reason) from None
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+        raise UnavailableSettingsError(f"{path}: cannot be read ({error.strerror})") from None
     except yaml.MarkedYAMLError as error:
         line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
         problem = cut(error.problem, str)

@@ -39,7 +39,7 @@ def read_sealed_json(path: Path) -> dict[str, Any]:
         If it is not, letter for letter, as it was written.
     """
     # All letters count, and not only what they mean.
-    with open(path, "rb", opener=_without_waiting) as file:
+    with open(path, "rb", opener=open_without_waiting) as file:
         text = file.read().decode()
     seal = _LAST_LINE.search(text)
     rest = text[: seal.start()] + _END if seal else text
@@ -52,7 +52,7 @@ def read_sealed_json(path: Path) -> dict[str, Any]:
     return data
 
 
-def _without_waiting(path: str, flags: int) -> int:
+def open_without_waiting(path: str, flags: int) -> int:
     """Open a file; a pipe that nobody writes to is empty."""
     return os.open(path, flags | os.O_NONBLOCK)
 

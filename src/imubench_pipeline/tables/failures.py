@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import traceback
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from imubench_pipeline.tables.files import build, joined, read_json, read_part, schema, write_arrow
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, UnavailableError
 
 Cause = Literal["error", "killed", "time"]
 QUALITY = "quality.json"
@@ -53,6 +54,13 @@ class Failure:
         """Return the finding about the recording."""
         detail = f"{self.reason}; the recording is left out, and tried again by the next run"
         return Finding("failed", "fatal", detail, 1.0)
+
+
+def describe_error(error: BaseException) -> str:
+    """Return an error in words: with its type, unless it is a log that cannot be read now."""
+    if isinstance(error, UnavailableError):
+        return str(error)
+    return "".join(traceback.format_exception_only(error)).strip()
 
 
 def failure_of(path: Path) -> Failure | None:

@@ -56,3 +56,13 @@ class RecordingError(ValueError):
         if len(reason) > 2 * _HALF_REASON:
             reason = f"{reason[:_HALF_REASON]} [...] {reason[-_HALF_REASON:]}"
         super().__init__(reason)
+
+
+class UnavailableError(OSError):
+    """A log that cannot be read now, for a reason outside of it, such as a mount that is away.
+
+    It says nothing about the log: the ingest fails, and the next run tries again.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"{reason}; nothing is concluded about the log")

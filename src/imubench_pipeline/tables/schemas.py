@@ -60,6 +60,13 @@ TABLES: dict[str, tuple[Column, ...]] = {
         number("temperature_max", "degC", "highest temperature"),
         *JUDGED,
     ),
+    "files": (
+        text("file", "its place in the drop zone"),
+        text("sensor", "null: the file is skipped", required=False),
+        text("recording", "that it belongs to; null: it is skipped", required=False),
+        text("status", "analysed, rejected, failed or skipped"),
+        text("reason", "why it is not analysed", required=False),
+    ),
     "doubts": DOUBTS,
     "findings": (
         SENSOR,

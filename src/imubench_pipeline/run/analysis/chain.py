@@ -36,7 +36,7 @@ from imubench_pipeline.steps.reconstruct import ReconstructionRows, reconstructi
 from imubench_pipeline.steps.sensor_tables import joined_tables
 from imubench_pipeline.steps.tables import tables_of_all
 from imubench_pipeline.tables import build, write, write_arrow
-from imubench_pipeline.tables.failures import Cause, Failure, write_empty
+from imubench_pipeline.tables.failures import Cause, Failure, describe_error, write_empty
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 T = TypeVar("T")
@@ -234,7 +234,7 @@ class Analysis:
             self._leave_out(step, sensor, recording, "time", f"the step {step} {error}")
             return None
         except Exception as error:  # the others go on
-            words = one_line(f"the step {step} failed: {type(error).__name__}: {error}")
+            words = one_line(f"the step {step} failed: {describe_error(error)}")
             self._leave_out(step, sensor, recording, "error", words)
             return None
         if time.monotonic() - begun > _SLOW:

@@ -1,0 +1,101 @@
+"""Whether an error is a property of a log, or of what surrounds it: a mount, a disk, a permission.
+
+A property of a log rejects it, and is true until the log is another one. What surrounds it may be
+different an hour later: the ingest fails, nothing is concluded, and the next run tries again.
+"""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from imubench_pipeline.recordings.known_logs import identity
+from imubench_pipeline.tables.findings import RecordingError, UnavailableError
+
+OF_RESULTS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE})
+"""Errors that any other recording would meet as well: the run stops."""
+
+_OF_SURROUNDINGS = frozenset(
+    {
+        *(errno.EACCES, errno.EPERM, errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.ENOMEM),
+        *(errno.ENODEV, errno.ENXIO, errno.ENOTCONN, errno.EHOSTDOWN, errno.EBUSY, errno.EAGAIN),
+    }
+)
+_ABSENT = frozenset({errno.ENOENT, errno.ENOTDIR})
+
+
+@contextmanager
+def watched(source: Path, planned: Collection[str] = ()) -> Iterator[None]:
+    """Let a `RecordingError` pass only where it is a property of the log.
+
+    Parameters
+    ----------
+    source : Path
+        The log file, or the folder of a recording.
+    planned : collection of str
+        The files that the plan found there, by their place in the log.
+
+    Raises
+    ------
+    RecordingError
+        If the path itself cannot be used, such as a link to itself.
+    UnavailableError
+        If the log is not there, cannot be read for a reason outside of it, or changed while it was
+        rejected.
+    OSError
+        If a disk is full, or there are too many open files.
+    """
+    try:
+        before = identity(source)
+    except OSError as error:
+        if error.errno in _OF_SURROUNDINGS | _ABSENT:
+            raise _unavailable(source, error) from None
+        raise RecordingError(f"{source.name}: cannot be read ({error.strerror})") from None
+    if absent := sorted({*planned} - {*before}):
+        raise UnavailableError(f"{source.name}: {absent[0]} is not there any more")
+    try:
+        yield
+    except (RecordingError, OSError) as raised:
+        for cause in _causes(raised):
+            if cause.errno in OF_RESULTS:
+                raise cause from None
+            if _is_of_surroundings(cause, source, before):
+                raise _unavailable(source, cause) from None
+        if isinstance(raised, RecordingError) and _identity(source) != before:
+            reason = f"{source.name}: changed while it was read, was replaced, or was away"
+            raise UnavailableError(reason) from None
+        raise
+
+
+def _causes(error: BaseException) -> Iterator[OSError]:
+    """Yield the errors of the system that led to an error."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError):
+            yield cause
+        cause = cause.__cause__ or cause.__context__
+
+
+def _is_of_surroundings(error: OSError, source: Path, files: Collection[str]) -> bool:
+    """Return whether a file of a log could not be read for a reason outside of it.
+
+    A file that is not there, and was not before, is no such reason: it may be missing in the log.
+    """
+    if error.errno not in _OF_SURROUNDINGS | _ABSENT:
+        return False
+    if error.filename is None:
+        return True
+    return any(Path(error.filename) == source / name for name in files)
+
+
+def _identity(source: Path) -> dict[str, tuple[int, ...]] | None:
+    try:
+        return identity(source)
+    except OSError:
+        return None
+
+
+def _unavailable(source: Path, error: OSError) -> UnavailableError:
+    return UnavailableError(f"{source.name}: cannot be read ({error.strerror})")
