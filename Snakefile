@@ -27,6 +27,7 @@ rule all:
 onstart:
     from imubench_pipeline.run.progress import follow
 
+    take_lock()
     follow(jobs_of_recordings(workflow.dag), partial(outcome, plan.run.results))
     remove_temporary(plan.run.results, BEGUN)
 

@@ -13,8 +13,8 @@ import psutil
 import pytest
 import yaml
 
+from imubench_pipeline.run.lock import Lock, TakenError, read_note
 from imubench_pipeline.run.nightly import recovery
-from imubench_pipeline.run.nightly.lock import Lock, TakenError, read_note
 from imubench_pipeline.run.nightly.night import Night
 from imubench_pipeline.run.nightly.settling import (
     Skip,
@@ -59,7 +59,7 @@ def test_a_run_may_wait_for_the_one_before(tmp_path: Path) -> None:
 HOLDER = """
 import subprocess, sys
 from pathlib import Path
-from imubench_pipeline.run.nightly.lock import Lock
+from imubench_pipeline.run.lock import Lock
 lock = Lock(Path(sys.argv[1]))
 lock.acquire()
 child = subprocess.Popen(["sleep", "600"], pass_fds=[lock.descriptor])

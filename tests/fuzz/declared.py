@@ -30,7 +30,7 @@ from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.report.publish import _keys
 from imubench_pipeline.run.faults import Faults
-from imubench_pipeline.run.nightly.lock import _holder, read_note
+from imubench_pipeline.run.lock import _holder, read_note
 from imubench_pipeline.run.nightly.recovery import restarted
 from imubench_pipeline.run.nightly.state import State, StateError, read_state
 from imubench_pipeline.settings.config import read_run

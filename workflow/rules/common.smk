@@ -2,12 +2,15 @@
 
 import atexit
 import gc
+import sys
 import time
 from functools import partial
 
 from snakemake.iocontainers import Wildcards
 
 from imubench_pipeline.recordings.kept import outcome
+from imubench_pipeline.report.drop_zone import drop_zone_lines
+from imubench_pipeline.run.lock import Lock, TakenError, lock_of
 from imubench_pipeline.run.nightly.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
@@ -47,6 +50,28 @@ for reason in plan.unusable.values():
 # This one forks a process that has the imports. On a cluster what fails is tried again by Snakemake.
 script = Scripts(plan.faults, None if workflow.remote_exec else limits_of_steps(plan))
 cost = asked(plan)
+
+run_lock = Lock(lock_of(plan.run.results))
+
+
+def take_lock():
+    """Take the lock on the results, as a run begins that has something to do."""
+    try:
+        run_lock.acquire_unless_inherited()
+    except TakenError as error:
+        raise WorkflowError(str(error)) from None
+
+
+def say_if_idle():
+    """Say what became of the files in the drop zone where nothing was to be done."""
+    is_run = workflow.is_main_process and workflow.executor_plugin and not workflow.dryrun
+    if is_run and not len(workflow.dag):
+        for line in drop_zone_lines(plan.run.results):
+            print(line, file=sys.stderr)
+
+
+atexit.register(run_lock.release)
+atexit.register(say_if_idle)
 
 RESULTS = str(plan.run.results)
 KEPT = RESULTS + "/recordings/{sensor}/{recording}"

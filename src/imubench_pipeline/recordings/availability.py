@@ -40,7 +40,7 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[None]:
     Raises
     ------
     RecordingError
-        If the path itself cannot be used, such as a link to itself.
+        If the path itself cannot be used, such as a link to itself or an empty folder.
     UnavailableError
         If the log is not there, cannot be read for a reason outside of it, or changed while it was
         rejected.
@@ -55,6 +55,8 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[None]:
         raise RecordingError(f"{source.name}: cannot be read ({error.strerror})") from None
     if absent := sorted({*planned} - {*before}):
         raise UnavailableError(f"{source.name}: {absent[0]} is not there any more")
+    if before.keys() == {"."} and source.is_dir():
+        raise RecordingError(f"the folder {source.name!a} has no files")
     try:
         yield
     except (RecordingError, OSError) as raised:

@@ -46,6 +46,8 @@ class Recording:
     simulated: bool
     error: str | None = None
     """Why the file cannot be used, where its name or its place says so already."""
+    unavailable: str | None = None
+    """Why it cannot be looked at now; nothing is known about it."""
     held_back: bool = False
     """The log is not read in this run: the results that are there stay."""
 
@@ -56,7 +58,7 @@ class Recording:
             # No such file, but what would be made of it is there: Snakemake takes that as it is,
             # whatever became of the log, the settings or the code since.
             return [self.path / "held back"]
-        if self.error:
+        if self.error or self.unavailable:
             return []
         logs = [self.path] if self.simulated else log_files(self.path)
         return logs + ([self.notes] if self.notes else [])
@@ -86,8 +88,8 @@ class FoundFile:
 def found_logs(logs: Path) -> list[Recording]:
     """Return the recordings of a drop zone, in order; two logs of one name are there twice.
 
-    Logs in no folder of a sensor, and notes without a log, are among them, with the reason why
-    they cannot be analysed. `account_for` has all other files.
+    Logs in no folder of a sensor are among them, with the reason why they cannot be analysed.
+    `account_for` has all other files.
     """
     recordings: list[Recording] = []
     for path in _shown(logs):
@@ -169,9 +171,13 @@ def _why_skipped(file: Path, logs: Path) -> str:
     if suffix == ".md":
         return "documentation (.md)"
     if suffix in _MISNAMED_NOTES:
-        depth = len(file.relative_to(logs).parts)
-        if depth == 1:
-            return "notes or settings beside the folders of the sensors; nothing reads them there"
+        if file.parent == logs:
+            return "settings beside the folders of the sensors; nothing reads them there"
+        if suffix == file.suffix == _NOTES:
+            return (
+                f"notes without a log {file.stem} beside them: rename them, or bring the log; a "
+                "sensor file belongs into the folder of the others"
+            )
         return f"notes that are not read: rename the file to {file.stem}{_NOTES}"
     if file.is_dir():
         return "link to a folder, which is not followed: link to its files, or copy it"
@@ -185,8 +191,9 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
     sensor = sensor_of(folder)
     try:
         shown = _shown(folder)
-    except OSError:  # the ingest meets it again, and says so
-        yield _found(sensor, folder, sensor, _fault(folder, folder.name))
+    except OSError as error:
+        reason = f"the folder {folder.name!a} cannot be listed ({error.strerror})"
+        yield Recording(sensor, sensor, folder, None, simulated=False, unavailable=reason)
         return
     logs = [path for path in shown if path.is_dir() or _is_log(path)]
     notes_of = {path.name: path for path in shown if path.suffix == _NOTES and not path.is_dir()}
@@ -194,21 +201,13 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
     for path in sorted({*shown} - {*logs} - {*notes_of.values()}):
         if path.suffix.lower() in _MISNAMED_NOTES:
             misnamed.setdefault(path.stem, path)
-    without_log = {*notes_of.values(), *misnamed.values()}
     for path in logs:
         name = path.name if path.is_dir() else _stem(path)
         notes, other = notes_of.get(f"{name}{_NOTES}"), misnamed.get(name)
-        without_log -= {notes, other}
         fault = _fault(path, name)
         if fault is None and other:
             fault = f"{other.name}: notes end in {_NOTES}; rename it to {name}{_NOTES}"
         yield _found(sensor, path, name, fault, notes)
-    for path in sorted(without_log):
-        fault = _fault(path, path.stem) or (
-            f"{path.name}: notes of no log; expected one of the name {path.stem} beside them: "
-            "rename the notes, or bring the log; a sensor file belongs to those of the others"
-        )
-        yield _found(sensor, path, path.stem, fault)
 
 
 def _shown(folder: Path) -> list[Path]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from imubench_pipeline.readers import log_files, read
 from imubench_pipeline.readers.bounded import BoundError, bounded
+from imubench_pipeline.recordings.availability import watched
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError, UnavailableError
 
@@ -44,10 +45,11 @@ def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
 
 
 def _read_first_records(source: Path, log: LogFormat) -> None:
-    try:
-        for file in read(source, log):
-            next(iter(file.batches()), None)
-    except (RecordingError, MemoryError):
-        raise
-    except Exception:
-        return  # who reads it meets the same, and says where
+    with watched(source):  # an error loses its causes on its way out of this process
+        try:
+            for file in read(source, log):
+                next(iter(file.batches()), None)
+        except (RecordingError, OSError, MemoryError):
+            raise
+        except Exception:
+            return  # who reads it meets the same, and says where

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from imubench_pipeline.navigation.suitability.conditions import in_words
+from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import LEFT_OUT
@@ -55,6 +56,7 @@ def summary(results: Path) -> str:
     lines[0] += f"; {simulated} of all are simulated, not measured" * (simulated > 0)
     lines += _bounded(f"  failed: {line}" for line in failed)
     lines += _bounded(f"  rejected: {line}" for line in rejected)
+    lines += drop_zone_lines(results)
     if warned:
         lines.append(f"warnings in {len(warned)} of the recordings:")
         lines += _bounded(f"  {line}" for line in warned)

@@ -41,6 +41,7 @@ def _start(site: Site) -> dict[str, Any]:
         "rejected": [
             {"view": view, "reason": folded(view.row["reason"])} for view in views if view.rejected
         ],
+        "skipped": [row for row in site.rows("files") if row["status"] == "skipped"],
         "warned": [
             {
                 "view": view,
@@ -266,7 +267,7 @@ START = Entry(
     file="index.html",
     title="Comparison",
     context=_start,
-    tables=("failures", "pooled", "ranking", "next_steps", "drift", "coverage"),
+    tables=("failures", "files", "pooled", "ranking", "next_steps", "drift", "coverage"),
     views=lambda site: site.views,
 )
 """The page that says which sensor to buy, how sure that is, and what is wrong."""

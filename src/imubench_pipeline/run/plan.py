@@ -335,6 +335,8 @@ class Plan:
         """Return how a log is written, and the notes beside it; ConfigError if it is of no use."""
         if recording.error:
             raise ConfigError(recording.error)
+        if recording.unavailable:
+            raise UnavailableSettingsError(recording.unavailable)
         notes = RecordingNotes()
         if recording.notes:
             notes = parse(RecordingNotes, self._notes(recording), str(recording.notes))
@@ -460,6 +462,7 @@ class Plan:
             {
                 "report": self.run.report.model_dump(mode="json"),
                 "results": str(self.run.results),
+                "logs": str(self.run.logs),
                 "given": given_beside(self.run, Path("config/config.yaml")),
                 "settings": self.run.model_dump(mode="json", include=_SHOWN),
                 "sensors": self._described("vendor", "model", "price_class", "sold"),

@@ -63,6 +63,3 @@ class UnavailableError(OSError):
 
     It says nothing about the log: the ingest fails, and the next run tries again.
     """
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(f"{reason}; nothing is concluded about the log")

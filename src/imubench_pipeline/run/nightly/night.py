@@ -14,8 +14,8 @@ from typing import Any
 
 import yaml
 
+from imubench_pipeline.run.lock import Lock, TakenError, lock_of
 from imubench_pipeline.run.nightly import recovery
-from imubench_pipeline.run.nightly.lock import Lock, TakenError
 from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakemake
 from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, settled
 from imubench_pipeline.run.nightly.state import State, StateError, load_tables, read_state, state_of
@@ -80,7 +80,7 @@ class Night:
             If another run still goes on.
         """
         until = time.monotonic() + wait
-        with Lock(self.folder / "lock") as lock, _stopped_by_signals():
+        with Lock(lock_of(self.results)) as lock, _stopped_by_signals():
             lock.acquire(wait)
             self._began = datetime.now(UTC)
             self._wait_for_others(until)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO
 
 from imubench_pipeline.run.faults import TOLD
-from imubench_pipeline.run.nightly.lock import Lock
+from imubench_pipeline.run.lock import INHERITED, Lock
 from imubench_pipeline.run.nightly.recovery import end_group
 
 _PATIENCE = 60.0  # s; for Snakemake to stop its steps
@@ -42,7 +42,7 @@ def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: L
             stdout=file,
             stderr=terminal.end if terminal else subprocess.STDOUT,
             pass_fds=(lock.descriptor,),
-            env=os.environ | {TOLD: "1"},
+            env=os.environ | {TOLD: "1", INHERITED: str(lock.descriptor)},
             start_new_session=True,  # all its steps can be ended together
         )
         try:

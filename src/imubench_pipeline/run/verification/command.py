@@ -25,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print what is wrong; return the exit status."""
     # Arrow is loaded for this command only: the others answer at once.
+    from imubench_pipeline.report.drop_zone import drop_zone_lines
     from imubench_pipeline.run.verification.results import Results
     from imubench_pipeline.tables.seals import FOLDER
     from imubench_pipeline.tables.texts import printable
@@ -52,6 +53,8 @@ def run(options: argparse.Namespace) -> int:
             number += 1
             line = f"{folder / fault.path}: {fault.found}; to mend: {fault.mend}"
             print(printable(line), flush=True)
+    for line in drop_zone_lines(folder):
+        print(line)
     if waiting := results.waiting():
         print(f"{len(waiting)} steps are still to be done by the next run: {results.run_again}")
     read = f"{results.files} files, {results.size / 1e6:.1f} MB"

@@ -1,4 +1,4 @@
-"""One nightly run at a time, whatever became of the one before."""
+"""One run at a time in a folder of results, whoever starts it, whatever became of the last one."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import fcntl
 import json
 import os
 import platform
+import shlex
+import sys
 import time
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -14,13 +16,23 @@ from typing import Any
 
 import psutil
 
+from imubench_pipeline.run.nightly.recovery import restarted
 from imubench_pipeline.tables import read_json
 
+INHERITED = "IMUBENCH_LOCK"
+"""The environment variable with the descriptor of a lock that a caller holds for this process."""
+
 _PAUSE = 0.5  # s between two attempts
+_MAX_COMMAND = 200  # characters
 
 
 class TakenError(RuntimeError):
-    """Another run goes on; the text says which, and since when."""
+    """Another run works on the results; the text says which, and since when."""
+
+
+def lock_of(results: Path) -> Path:
+    """Return the file of the lock on a folder of results."""
+    return results / "nightly/lock"
 
 
 class Lock:
@@ -41,7 +53,6 @@ class Lock:
     """
 
     def __init__(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
         self.descriptor = -1
         self.since = 0.0
@@ -55,22 +66,51 @@ class Lock:
         TakenError
             If another run still holds it then.
         """
+        self.path.parent.mkdir(parents=True, exist_ok=True)
         self.descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         until = time.monotonic() + wait
         while not self._taken():
             if time.monotonic() >= until:
                 note = read_note(self.path)
                 self._close()
-                raise TakenError(f"another nightly run goes on: {_holder(note)}")
+                raise TakenError(
+                    f"another run works on {self.path.parent.parent}: {_holder(note)}; wait for "
+                    "its end, or use another folder of results"
+                )
             time.sleep(min(_PAUSE, max(until - time.monotonic(), 0.0)))
         self.since = time.time()
         self.left_over = read_note(self.path)
         self.note()
 
+    def acquire_unless_inherited(self) -> None:
+        """Take the lock, unless the caller of this process holds it for it.
+
+        A note of a run that did not reach its end stays only where the machine was restarted since:
+        what was on its way to the disk then is for `imubench nightly` to look at.
+
+        Raises
+        ------
+        TakenError
+            If another run holds it.
+        """
+        if self.descriptor >= 0 or self._is_inherited():
+            return
+        self.acquire()
+        if not restarted(self.left_over):
+            self.left_over = {}
+
+    def _is_inherited(self) -> bool:
+        try:
+            held = os.fstat(int(os.environ.get(INHERITED, "")))
+            return os.path.samestat(held, self.path.stat())
+        except (ValueError, OSError):
+            return False
+
     def note(self, **more: object) -> None:
         """Write who holds the lock, and what else a later run should know."""
         about = {
             "process": os.getpid(),
+            "command": shlex.join(sys.argv)[:_MAX_COMMAND],
             "host": platform.node(),
             "since": datetime.fromtimestamp(self.since, UTC).isoformat(timespec="seconds"),
         }
@@ -123,6 +163,8 @@ def _holder(note: Mapping[str, Any]) -> str:
     if not isinstance(process := note.get("process"), int):
         return "who holds it is not known"
     since = f"since {note.get('since')}"
+    if isinstance(command := note.get("command"), str):
+        since = f"{command}, {since}"
     if note.get("host") != platform.node():
         return f"process {process} on {note.get('host')}, {since}"
     if psutil.pid_exists(process):

@@ -1,0 +1,89 @@
+"""What became of every file in the drop zone, and what has changed there since the last run."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from imubench_pipeline.readers import log_files
+from imubench_pipeline.recordings.drop_zone import Recording, account_for, found_logs
+from imubench_pipeline.recordings.known_logs import read_known
+from imubench_pipeline.report.plurals import counted
+from imubench_pipeline.tables import read
+from imubench_pipeline.tables.texts import printable
+from imubench_pipeline.typing import Row
+
+_OUTCOMES = ("analysed", "rejected", "failed", "skipped")
+_MAX_LINES = 10
+_MAX_NAMES = 5
+
+
+def drop_zone_lines(results: Path) -> list[str]:
+    """Return the balance of the last run, and what has changed in the drop zone since, as lines.
+
+    Parameters
+    ----------
+    results : Path
+        Folder of the results of runs.
+    """
+    try:
+        files = read("files", [results / "tables/files.parquet"]).to_pylist()
+        settings = json.loads((results / "report/settings.json").read_text("utf-8"))
+        logs = Path(settings["logs"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return []  # what is missing or damaged is reported elsewhere
+    if logs.is_dir():
+        return [*balance(files), *_changes(files, logs, results)]
+    absent = f"the drop zone {logs} is not here: its files were not compared with the results"
+    return [*balance(files), absent] if files else []
+
+
+def balance(files: Sequence[Row]) -> Iterator[str]:
+    """Yield how many files were analysed, rejected and skipped, and why files were skipped.
+
+    Parameters
+    ----------
+    files : sequence of mapping
+        Rows of the table ``files``.
+    """
+    if not files:
+        return
+    counts = Counter(row["status"] for row in files)
+    parts = [f"{counts[name]} {name}" for name in _OUTCOMES if counts[name]]
+    yield f"{counted(len(files), 'file')} in the drop zone = {' + '.join(parts)}"
+    skipped = [row for row in files if row["status"] == "skipped"]
+    for row in skipped[:_MAX_LINES]:
+        yield printable(f"  skipped: {row['file']}: {row['reason']}")
+    if (more := len(skipped) - _MAX_LINES) > 0:
+        yield f"  and {more} more in tables/files.csv"
+
+
+def _changes(files: Iterable[Row], logs: Path, results: Path) -> Iterator[str]:
+    """Yield which files were added to the drop zone, removed or changed since the last run."""
+    recordings = found_logs(logs)
+    before = {row["file"] for row in files}
+    now = {found.file for found in account_for(logs, recordings)}
+    changed = {f"{log.sensor}/{log.path.name}" for log in recordings if _is_changed(log, results)}
+    for what, names in (("added", now - before), ("removed", before - now), ("changed", changed)):
+        if names:
+            shown = ", ".join(sorted(names)[:_MAX_NAMES]) + ", ..." * (len(names) > _MAX_NAMES)
+            number = counted(len(names), "file" if what != "changed" else "log")
+            yield printable(f"{number} {what} since the last run: {shown}")
+
+
+def _is_changed(log: Recording, results: Path) -> bool:
+    """Return whether the files of a log are not those that its results rest on."""
+    known = read_known(results / "recordings" / log.sensor / log.name)
+    if known is None:
+        return False
+    try:
+        files = {path.relative_to(log.path).as_posix(): path for path in log_files(log.path)}
+        return known.keys() != files.keys() or any(
+            known[name].size != path.stat().st_size
+            or (known[name].stamps is not None and not known[name].is_unchanged(path.stat()))
+            for name, path in files.items()
+        )
+    except OSError:
+        return True
