@@ -95,11 +95,13 @@ def test_notes_of_no_log_are_told(project: dict[str, Any]) -> None:
     put(project, "b.yaml", "{}")
     put(project, "a.yml", "{}")
     plan = Plan(project)
-    error = json.loads(plan.ingest_settings("s", "b"))["error"]
-    assert "b.yaml: notes of no log" in error
     error = json.loads(plan.ingest_settings("s", "a"))["error"]
     assert "rename it to a.yaml" in error
-    assert list(plan.recordings) == [("s", "a"), ("s", "b")]
+    assert list(plan.recordings) == [("s", "a")]
+    skipped = {file["file"]: file["reason"] for file in json.loads(plan.files()) if file["reason"]}
+    assert skipped.keys() == {"s/a.yml", "s/b.yaml"}
+    assert "rename the file to a.yaml" in skipped["s/a.yml"]
+    assert "notes without a log b" in skipped["s/b.yaml"]
 
 
 def test_a_folder_is_no_file_of_notes(project: dict[str, Any]) -> None:

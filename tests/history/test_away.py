@@ -14,6 +14,8 @@ from tests.history.project import Project, on_access
 from tests.workflow.project import put_log
 
 MAX_ACCESSES = 400
+EVERY = pytest.mark.parametrize("step", few([6], [1]))
+"""The accesses before which something is done: each before a release."""
 
 
 def put(project: Project) -> dict[str, Path]:
@@ -48,10 +50,11 @@ class Mover:
             self.away.rename(self.path)
 
 
-@pytest.mark.parametrize("stays", few([2, MAX_ACCESSES], [1, 5]))
+@EVERY
+@pytest.mark.parametrize("stays", few([2], [1, 5, MAX_ACCESSES]))
 @pytest.mark.parametrize("which", ["file", "folder", "inside", "bad", "notes", "sensor"])
 def test_a_log_that_is_away_for_a_moment_is_looked_at_again(
-    which: str, stays: int, tmp_path: Path
+    which: str, stays: int, step: int, tmp_path: Path
 ) -> None:
     undisturbed = Project(tmp_path / "undisturbed")
     put(undisturbed)
@@ -59,7 +62,7 @@ def test_a_log_that_is_away_for_a_moment_is_looked_at_again(
     assert expected["s/c"][0]["status"] == "rejected"
     first = count = 0
     while first <= count:
-        first += 1 if stays > 1 else 2
+        first += step
         project = Project(tmp_path / f"{first}")
         path = put(project)[which]
         mover = Mover(path, project.logs, first, first + stays)
@@ -99,14 +102,17 @@ class FailingDisk:
                 raise OSError(self.number, os.strerror(self.number), str(path))
 
 
+@EVERY
 @pytest.mark.parametrize("number", few([errno.EIO, errno.ENOENT], [errno.ESTALE, errno.EACCES]))
-def test_an_error_of_the_disk_is_no_property_of_a_log(number: int, tmp_path: Path) -> None:
+def test_an_error_of_the_disk_is_no_property_of_a_log(
+    number: int, step: int, tmp_path: Path
+) -> None:
     undisturbed = Project(tmp_path / "undisturbed")
     put(undisturbed)
     expected = undisturbed.from_nothing()
     at, count = 0, 1
     while at < count:
-        at += 1
+        at += step
         project = Project(tmp_path / f"{at}")
         put(project)
         disk = FailingDisk(project.logs, at, number)

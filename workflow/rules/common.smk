@@ -64,7 +64,9 @@ def take_lock():
 
 def say_if_idle():
     """Say what became of the files in the drop zone where nothing was to be done."""
-    is_run = workflow.is_main_process and workflow.executor_plugin and not workflow.dryrun
+    is_run = (
+        workflow.is_main_process and workflow.executor_plugin and not workflow.dryrun
+    )
     if is_run and not len(workflow.dag):
         for line in drop_zone_lines(plan.run.results):
             print(line, file=sys.stderr)

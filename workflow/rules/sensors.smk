@@ -92,7 +92,8 @@ rule sensor_tables:
         ),
     params:
         truths=lambda w: plan.truths(w.sensor),
-        catalogue=plan.catalogue("price_class", "sold"),
+        sensor=lambda w: plan.sensor_file(w.sensor, "price_class", "sold"),
+        usual=plan.usual,
         decide=plan.settings("decide"),
         code=plan.code("sensor_tables"),
         attempt=tried("sensor_tables"),

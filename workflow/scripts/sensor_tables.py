@@ -8,6 +8,6 @@ from imubench_pipeline.tables import write_arrow
 if __name__ == "__main__":
     parts = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}
     params = snakemake.params
-    tables = joined_tables(parts, params.truths, params.catalogue, params.decide)
+    tables = joined_tables(parts, params.truths, params.sensor, params.usual, params.decide)
     for output in map(Path, snakemake.output):
         write_arrow(tables[output.stem], output)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
 
@@ -65,6 +66,17 @@ class Usual:
 
 
 UsualFigures = Mapping[tuple[str, str], Usual]
+
+
+def usual_as_text(usual: UsualFigures) -> str:
+    """Return usual figures as JSON, for the settings of a step."""
+    rows = [[*key, asdict(value)] for key, value in sorted(usual.items())]
+    return json.dumps(rows, sort_keys=True)
+
+
+def usual_of_text(text: str) -> UsualFigures:
+    """Return the usual figures that `usual_as_text` wrote."""
+    return {(quantity, figure): Usual(**value) for quantity, figure, value in json.loads(text)}
 
 
 def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.threads import available
+from imubench_pipeline.datasheets.suspicion import usual_figures
 from imubench_pipeline.estimators.estimate import CURVE, SHOWN, Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.library.curves import Curve, Curves, measured
@@ -20,7 +21,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import Doubt, doubts
 from imubench_pipeline.report.practical import System, interval_text, page_unit, symbol_text
 from imubench_pipeline.settings.config import AllanSettings, EstimateSettings
-from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.settings.sensor import quantity_of, shipped_sensors
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.steps.sensor_tables import findings_of
@@ -290,6 +291,7 @@ def estimate(
         into.estimate_findings,
         recommended,
         {} if log.declared is None else {log.sensor: log.declared},
+        usual_figures(shipped_sensors()),
     )
     doubted = list(doubts(rows, recommended, into.models))
     return Estimates(estimates, log, method, list(map(finding_of, rows)), doubted, left_out)

@@ -110,7 +110,7 @@ class Lock:
         """Write who holds the lock, and what else a later run should know."""
         about = {
             "process": os.getpid(),
-            "command": shlex.join(sys.argv)[:_MAX_COMMAND],
+            "command": _command(),
             "host": platform.node(),
             "since": datetime.fromtimestamp(self.since, UTC).isoformat(timespec="seconds"),
         }
@@ -158,15 +158,22 @@ def read_note(path: Path) -> Mapping[str, Any]:
     return note if isinstance(note, dict) else {}
 
 
+def _command() -> str:
+    """Return the command of this process, as a user would type it."""
+    program = Path(sys.argv[0])
+    name = program.parent.name if program.name == "__main__.py" else program.name
+    return shlex.join([name, *sys.argv[1:]])[:_MAX_COMMAND]
+
+
 def _holder(note: Mapping[str, Any]) -> str:
     """Return who holds a lock, in words."""
     if not isinstance(process := note.get("process"), int):
         return "who holds it is not known"
     since = f"since {note.get('since')}"
-    if isinstance(command := note.get("command"), str):
-        since = f"{command}, {since}"
+    command = note.get("command")
+    named = f"process {process}" + (f" ({command})" if isinstance(command, str) else "")
     if note.get("host") != platform.node():
-        return f"process {process} on {note.get('host')}, {since}"
+        return f"{named} on {note.get('host')}, {since}"
     if psutil.pid_exists(process):
-        return f"process {process}, {since}"
-    return f"process {process} is gone, but Snakemake ({note.get('snakemake')}) goes on, {since}"
+        return f"{named}, {since}"
+    return f"{named} is gone, but Snakemake ({note.get('snakemake')}) goes on, {since}"

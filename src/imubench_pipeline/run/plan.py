@@ -7,7 +7,7 @@ of what the rule depends on, so that an edit runs again what it touches and noth
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from functools import cached_property
 from itertools import chain
@@ -16,6 +16,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from imubench_pipeline.datasheets.suspicion import usual_as_text, usual_figures
 from imubench_pipeline.navigation.suitability.abilities import abilities
 from imubench_pipeline.recordings.drop_zone import Recording, account_for, found_logs
 from imubench_pipeline.recordings.known_logs import versions_of
@@ -33,6 +34,7 @@ from imubench_pipeline.settings.sensor import (
     merged_log,
     of_ingest,
     read_sensor_files,
+    shipped_sensors,
 )
 from imubench_pipeline.settings.shipped import folders, own_folder
 from imubench_pipeline.settings.simulated_recordings import (
@@ -496,13 +498,28 @@ class Plan:
 
     def catalogue(self, *more: str) -> str:
         """Return the datasheets of all sensor files, with vendor and model, and more keys."""
+        return self._sensor_files(self.sensors, more)
+
+    def sensor_file(self, sensor: str, *more: str) -> str:
+        """Return the datasheet of one sensor, as `catalogue` returns those of all."""
+        return self._sensor_files({sensor} & self.sensors.keys(), more)
+
+    def _sensor_files(self, names: Iterable[str], more: Iterable[str]) -> str:
         keys = {"vendor", "model", "datasheet", *more}
         return _text(
             {
-                name: sensor.model_dump(mode="json", include=keys) | {"log": _ANY_LOG}
-                for name, sensor in self.sensors.items()
+                name: self.sensors[name].model_dump(mode="json", include=keys) | {"log": _ANY_LOG}
+                for name in names
             }
         )
+
+    @cached_property
+    def usual(self) -> str:
+        """What is usual of the figures of sensors, by the catalogue that comes with the package.
+
+        Sensor files of the user have no part in it: an edit of one concerns its own logs alone.
+        """
+        return usual_as_text(usual_figures(shipped_sensors()))
 
     def truths(self, sensor: str) -> str:
         """Return the true parameters of the simulated recordings of a sensor."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
-from imubench_pipeline.datasheets.suspicion import unusual_rows, usual_figures
+from imubench_pipeline.datasheets.suspicion import UsualFigures, unusual_rows, usual_of_text
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.pooled import pooled_rows
@@ -24,7 +24,7 @@ from imubench_pipeline.recordings.fitness import (
 )
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.copies import recorded_twice
-from imubench_pipeline.settings.sensor import Sensor, sensors_of, shipped_sensors
+from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.steps.published_figures import published_rows, truth_rows
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures, without
@@ -32,7 +32,7 @@ from imubench_pipeline.typing import Row
 
 
 def joined_tables(
-    parts: Mapping[str, list[Path]], truths: str, catalogue: str, decide: str
+    parts: Mapping[str, list[Path]], truths: str, sensor: str, usual: str, decide: str
 ) -> dict[str, pa.Table]:
     """Return every table of recordings, joined of those of a sensor.
 
@@ -40,8 +40,9 @@ def joined_tables(
     ----------
     parts : mapping of str to list of Path
         Files of each table, in the order of the recordings; ``quality`` for the JSON files.
-    truths, catalogue : str
-        Those that are simulated, and the sensor files, as the plan wrote them.
+    truths, sensor, usual : str
+        Parameters of the simulated recordings, the sensor file, and figures that are usual of other
+        sensors, as the plan wrote them.
     decide : str
         The section of the configuration that says which recordings decide, as JSON.
     """
@@ -59,13 +60,14 @@ def joined_tables(
     recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
     estimated, biases = recommended.to_pylist(), joined["fixed_bias"].to_pylist()
     joined["drift"] = build("drift", drift_rows(estimated, biases, about))
-    sensors = sensors_of(catalogue)
+    sensors = sensors_of(sensor)
     findings = findings_of(
         qualities,
         joined["deterministic"].to_pylist(),
         joined.pop("estimate_findings").to_pylist(),
         estimated,
         sensors,
+        usual_of_text(usual),
     )
     findings += recorded_twice(joined["models"].to_pylist(), biases)
     if "backtest" in joined:
@@ -105,6 +107,7 @@ def findings_of(
     of_estimates: Iterable[Row],
     estimated: Sequence[Row],
     sensors: Mapping[str, Sensor],
+    usual: UsualFigures,
 ) -> list[Row]:
     """Return the rows of the table ``findings`` about recordings, each by itself.
 
@@ -116,7 +119,9 @@ def findings_of(
         Rows of the tables ``deterministic``, ``estimate_findings``, and ``parameters`` of the
         recommended methods.
     sensors : mapping of str to Sensor
-        Those whose files are known; figures that are usual follow from the shipped ones, too.
+        Those whose files are known.
+    usual : mapping
+        What is usual of the figures of other sensors.
     """
     about = [quality.recording for quality in qualities]
     of_logs = without_doubles(
@@ -129,7 +134,6 @@ def findings_of(
         for quality in qualities
         for row in implausible_of(quality, sensors.get(quality.recording["sensor"]))
     )
-    usual = usual_figures({**shipped_sensors(), **sensors}) if estimated else {}
     return [*of_logs, *of_levels, *of_estimates, *unusual_rows(estimated, sensors, usual)]
 
 

@@ -195,7 +195,8 @@ class Analysis:
             tables = joined_tables(
                 own,
                 plan.truths(sensor),
-                plan.catalogue("price_class", "sold"),
+                plan.sensor_file(sensor, "price_class", "sold"),
+                plan.usual,
                 plan.settings("decide"),
             )
             for name, table in tables.items():
