@@ -112,9 +112,15 @@ class Histories(RuleBasedStateMachine):
         with suppress(DiskFullError):
             self.project.run()
 
-    @rule(at=st.integers(1, 60), fault=st.sampled_from(["kill", "full", "io", "away"]))
-    def run_with_fault(self, at: int, fault: str) -> None:
+    @rule(
+        at=st.integers(1, 60),
+        fault=st.sampled_from(["kill", "full", "io", "away", "moment", "written", "moved"]),
+        name=NAMES,
+    )
+    def run_with_fault(self, at: int, fault: str, name: str) -> None:
         count = 0
+        path_of_log = self.path_of(name)
+        content = path_of_log.read_bytes() if path_of_log.is_file() else b""
 
         def meet(event: str, path: Path, flags: int) -> None:
             nonlocal count
@@ -122,6 +128,10 @@ class Histories(RuleBasedStateMachine):
             if not of_log and self.project.results not in path.parents:
                 return
             count += 1
+            if fault == "written" and count == at + 5 and path_of_log.is_file():
+                path_of_log.write_bytes(content)  # as it was before the run
+            if fault == "moment" and count == at + 5:
+                self.put_back()
             if count != at:
                 return
             if fault == "kill":
@@ -130,8 +140,12 @@ class Histories(RuleBasedStateMachine):
                 raise OSError(errno.ENOSPC, "No space left on device", str(path))
             if fault == "io" and of_log:
                 raise OSError(errno.EIO, "Input/output error", str(path))
-            if fault == "away":
-                self.take_away("a.csv")
+            if fault in ("away", "moment"):
+                self.take_away(name)
+            if fault == "written" and path_of_log.is_file():
+                path_of_log.write_bytes(content[: len(content) // 2] + b"x\n")
+            if fault == "moved" and path_of_log.is_file():
+                path_of_log.rename(path_of_log.with_name("d.csv"))
 
         with suppress(DiskFullError, KilledError, OSError), on_access(meet):
             self.project.run()
@@ -180,7 +194,7 @@ DAILY = settings(
     deadline=None,
     suppress_health_check=list(HealthCheck),
 )
-MANY = settings(DAILY, max_examples=150, stateful_step_count=25)
+MANY = settings(DAILY, max_examples=60, stateful_step_count=25)
 
 
 @pytest.mark.parametrize("machine", [Histories, HistoriesByStamps])
