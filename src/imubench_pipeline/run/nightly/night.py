@@ -14,6 +14,7 @@ from typing import Any
 
 import yaml
 
+from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.run.lock import Lock, TakenError, lock_of
 from imubench_pipeline.run.nightly import recovery
 from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakemake
@@ -188,6 +189,7 @@ class Night:
             logs = {name: log.files for name, log in seen.items() if name not in held_back}
             after = state_of(tables, finished, logs, since)
             fields = compared(before, after, tables, late)
+            fields["files"] = drop_zone_lines(self.results)
             analysed = after.recordings
             after = after.without(late, before)
         fields["skipped"] = [

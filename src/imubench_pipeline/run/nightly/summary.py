@@ -106,6 +106,8 @@ class Summary(BaseModel):
         The end of the run that this one is compared with; None: there is none.
     recordings : int
         How many there are in the tables.
+    files : list of str
+        What became of the files in the drop zone, as lines.
     put_right : list of str
         What an earlier run left behind.
     failure : list of str
@@ -121,6 +123,7 @@ class Summary(BaseModel):
     new: list[str] = []
     changed: list[Changed] = []
     removed: list[str] = []
+    files: list[str] = []
     skipped: list[Skipped] = []
     failed: list[Failed] = []
     rejected: list[Rejected] = []
@@ -221,6 +224,7 @@ def in_words(summary: Summary) -> str:
         + f"; {len(summary.failed)} failed"
         * bool(summary.failed)
     )
+    counts += "".join(f"\n{line}" for line in summary.files)
     since = f"since {_time(summary.since)}" if summary.since else "the first run"
     lines = [
         f"imubench nightly: {summary.outcome}, {_time(summary.finished)}, "
