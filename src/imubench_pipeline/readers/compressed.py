@@ -20,7 +20,8 @@ from imubench_pipeline.readers.bounds import (
     MOST_MEMBERS,
     UNSUSPICIOUS,
 )
-from imubench_pipeline.readers.decompression import OPENED
+from imubench_pipeline.readers.decompression import LONGEST_MAGIC, OPENED, compression_of
+from imubench_pipeline.readers.holes import FileWithoutHoles, ZeroRuns
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _READ = 1 << 16
@@ -79,6 +80,11 @@ class Bytes:
             size -= len(block)
         return b"".join(blocks)
 
+    @property
+    def omitted(self) -> int:
+        """Zero bytes of holes of the log that were passed over so far."""
+        return self._stream.omitted if isinstance(self._stream, FileWithoutHoles) else 0
+
     def close(self) -> None:
         """Close the file."""
         for stream in self._streams:
@@ -129,7 +135,7 @@ _NOT_READ: Mapping[bytes, str] = {
     b"7z\xbc\xaf\x27\x1c": "7z",
     b"Rar!\x1a\x07": "rar",
     b"\x04\x22\x4d\x18": "lz4",
-    b"\x1f\x9d": "compress",
+    b"\x1f\x9d\x90": "compress",
     _ZIP_LOCAL: "zip in another way",
 }
 
@@ -166,24 +172,26 @@ def open_bytes(path: Path) -> Bytes:
     """
     archive = None if path.is_file() else _archive_of(path)
     try:
-        file = (archive or path).open("rb")
+        if archive is None:
+            return _open_file(path, FileWithoutHoles(path))
+        return _open_member(archive, path.relative_to(archive).as_posix(), archive.open("rb"))
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
+
+
+def _open_file(path: Path, file: FileWithoutHoles) -> Bytes:
     try:
-        if archive is not None:
-            return _open_member(archive, path.relative_to(archive).as_posix(), file)
-        begin = file.read(6)
-        file.seek(0)
+        begin = file.read(LONGEST_MAGIC)
+        file.rewind()
         for magic, kind in _NOT_READ.items():
             if begin.startswith(magic):
                 raise RecordingError(
                     f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
                     "zip: unpack it"
                 )
-        opened = next((how for magic, (_, how) in OPENED.items() if begin.startswith(magic)), None)
-        if opened is None:
+        if not (how := compression_of(begin)):
             return Bytes(path.name, file, _UNKNOWN_SIZE)
-        return Bytes(path.name, opened(file), path.stat().st_size, (file,))
+        return Bytes(path.name, OPENED[how](file), path.stat().st_size, (file,))
     except BaseException:
         file.close()
         raise
@@ -298,10 +306,11 @@ class _Archive(io.FileIO):
 def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
     """Return the members of an archive without a directory, which stands at its end."""
     members: list[zipfile.ZipInfo] = []
-    with archive.open("rb") as file:
-        start, data = 0, b""
+    with closing(FileWithoutHoles(archive)) as file:
+        data = b""
         while block := file.read(_SCANNED):
             data += block
+            start = file.tell() - len(data)
             at = data.find(_ZIP_LOCAL)
             while at >= 0 and at + _LONGEST_HEADER <= len(data):
                 members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
@@ -311,8 +320,8 @@ def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
                     f"{archive.name}: an archive without its directory, with more than "
                     f"{MOST_MEMBERS} members; expected the log alone: pack it anew"
                 )
-            keep = at if at >= 0 else max(len(data) - 3, 0)
-            start, data = start + keep, data[keep:]
+            data = data[at if at >= 0 else max(len(data) - 3, 0) :]
+        start = file.tell() - len(data)
         at = data.find(_ZIP_LOCAL)
         while at >= 0:
             members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
@@ -350,6 +359,14 @@ def _local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
 
 
 def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
+    try:
+        return _member(archive, name, file)
+    except BaseException:
+        file.close()
+        raise
+
+
+def _member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     shown = f"{archive.name}/{name}"
     info = _directory(archive).get(name)
     if info is None:
@@ -382,23 +399,34 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
 BLOCK_BYTES = 1 << 20
 
 
-def blocks(path: Path, findings: list[Finding]) -> Iterator[bytes]:
+_LEAST_ZEROS = 512
+"""Bytes of a sector: a shorter run of zeros may be a part of binary data."""
+
+
+def blocks(path: Path, findings: list[Finding], *, text: bool = False) -> Iterator[bytes]:
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
-    ``findings``: what is found goes here: that compressed data end early.
+    ``findings``: what is found goes here: that compressed data end early, and that there are zeros
+    where no logger writes any; in ``text`` every one counts.
 
     Raises
     ------
     RecordingError
         If the file cannot be opened, or compressed data are corrupt.
     """
+    zeros = ZeroRuns(1 if text else _LEAST_ZEROS)
     with closing(open_bytes(path)) as stream:
         while block := stream.filled(BLOCK_BYTES):
+            zeros.add(block)
             yield block
             if len(block) < BLOCK_BYTES:
                 break
     if stream.ended_early:
         findings.append(ended_early(path))
+    byte, line = zeros.first
+    where = f"line {line}" if text else f"byte {byte}"
+    if (finding := zeros.finding(path.name, where, zeros.count + stream.omitted)) is not None:
+        findings.append(finding)
 
 
 def ended_early(path: Path) -> Finding:

@@ -6,17 +6,14 @@ from contextlib import closing
 from pathlib import Path
 
 from imubench_pipeline.readers.compressed import is_member, members, open_bytes
-from imubench_pipeline.readers.decompression import OPENED
+from imubench_pipeline.readers.decompression import LONGEST_MAGIC, compression_of
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.settings.sensor import Reader
 from imubench_pipeline.tables.findings import RecordingError
 
 _SEEN = 1 << 16
-_COMPRESSED = {magic: name for magic, (name, _) in OPENED.items()} | {b"PK\x03\x04": "zip"}
-"""What is inside is text."""
-
-_LONGEST_MAGIC = 6
+_ZIP = b"PK\x03\x04"
 _BY_MARKS = sorted(FILE_FORMATS.values(), key=lambda entry: -len(entry.signature.within))
 """The formats: those first that ask for most within a file."""
 
@@ -87,13 +84,13 @@ def _compression_of(path: Path) -> str:
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
     try:
         with path.open("rb") as file:
-            return _named(file.read(_LONGEST_MAGIC))
+            return _named(file.read(LONGEST_MAGIC))
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
 
 
 def _named(begin: bytes) -> str:
-    return next((name for magic, name in _COMPRESSED.items() if begin.startswith(magic)), "")
+    return "zip" if begin.startswith(_ZIP) else compression_of(begin)
 
 
 def _format_of_bytes(begin: bytes) -> FileFormat:

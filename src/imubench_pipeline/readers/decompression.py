@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import bz2
 import lzma
+import re
 import sys
 import zlib
 from collections.abc import Callable, Mapping
-from typing import IO, Any
+from typing import Any, Protocol
 
 from imubench_pipeline.readers.bounds import LARGEST_WINDOW, LEAST_IN_PART, MOST_PARTS
 
@@ -17,6 +18,16 @@ else:
     from backports import zstd
 
 _READ = 1 << 16
+
+
+class Source(Protocol):
+    """What compressed bytes are read from."""
+
+    def read(self, size: int, /) -> bytes:
+        """Return the next bytes; none at the end."""
+
+    def close(self) -> None:
+        """Close it."""
 
 
 class _Parts:
@@ -29,7 +40,7 @@ class _Parts:
     otherwise what is no part ends the data.
     """
 
-    def __init__(self, file: IO[bytes], new: Callable[[], Any], padded: bool) -> None:
+    def __init__(self, file: Source, new: Callable[[], Any], padded: bool) -> None:
         self._file = file
         self._new = new
         self._padded = padded
@@ -128,10 +139,24 @@ def _unxz() -> lzma.LZMADecompressor:
     return lzma.LZMADecompressor(memlimit=LARGEST_WINDOW)
 
 
-OPENED: Mapping[bytes, tuple[str, Callable[[IO[bytes]], Any]]] = {
-    b"\x1f\x8b": ("gzip", lambda file: _Parts(file, _Gunzip, padded=True)),
-    b"\x28\xb5\x2f\xfd": ("zstd", lambda file: _Parts(file, _unzstd, padded=True)),
-    b"\xfd7zXZ\0": ("xz", lambda file: _Parts(file, _unxz, padded=False)),
-    b"BZh": ("bzip2", lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False)),
+OPENED: Mapping[str, Callable[[Source], Any]] = {
+    "gzip": lambda file: _Parts(file, _Gunzip, padded=True),
+    "zstd": lambda file: _Parts(file, _unzstd, padded=True),
+    "xz": lambda file: _Parts(file, _unxz, padded=False),
+    "bzip2": lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False),
 }
-"""By what a file is compressed that begins so, and how it is opened."""
+"""How a file is opened that is compressed so."""
+
+_MAGIC = re.compile(
+    rb"(?P<gzip>\x1f\x8b\x08[\0-\x1f])|(?P<zstd>\x28\xb5\x2f\xfd)|(?P<xz>\xfd7zXZ\0)"
+    rb"|(?P<bzip2>BZh[1-9](?:1AY&SY|\x17rE8P\x90|.{0,5}\Z))",
+    re.DOTALL,
+)
+LONGEST_MAGIC = 10
+"""Bytes by which compression is told. With fewer of them bytes of chance would be taken for it."""
+
+
+def compression_of(begin: bytes) -> str:
+    """Return how a file is compressed that begins so, as `OPENED` calls it; empty: it is not."""
+    magic = _MAGIC.match(begin[:LONGEST_MAGIC])
+    return "" if magic is None else magic.lastgroup or ""

@@ -180,7 +180,7 @@ def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
     by the end of the recording, which is noted in ``findings``.
     """
     rest = b""
-    for block in blocks(path, findings):
+    for block in blocks(path, findings, text=True):
         text = rest + block
         cut = text.rfind(b"\n") + 1
         rest = text[cut:]

@@ -20,7 +20,7 @@ from imubench_pipeline.readers.text.cells import (
     is_datum,
     is_number,
 )
-from imubench_pipeline.readers.text.complete_lines import first_lines
+from imubench_pipeline.readers.text.complete_lines import describe_missing_text, first_lines
 from imubench_pipeline.readers.text.header import are_units, completed, is_heading, likely_header
 from imubench_pipeline.readers.text.records import Records, are_apart
 from imubench_pipeline.readers.text.refusals import (
@@ -144,9 +144,9 @@ class _Search:
         self._last = max((place for place in self._wanted if isinstance(place, int)), default=1)
         self._comments, self._lines = self._head(path)
         if not self._comments and not self._lines:
+            skipped = f" behind {log.skip_lines} lines (skip_lines)" if log.skip_lines else ""
             raise RecordingError(
-                f"{self._file}: the file is empty, or cut short in its first line; expected lines "
-                "of a log"
+                f"{self._file}: {describe_missing_text(path)}; expected lines of a log{skipped}"
             )
 
     def layout(self) -> TextLayout:
