@@ -22,6 +22,7 @@ from imubench_pipeline.readers.bounds import (
 )
 from imubench_pipeline.readers.decompression import LONGEST_MAGIC, OPENED, compression_of
 from imubench_pipeline.readers.holes import FileWithoutHoles, ZeroRuns
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _READ = 1 << 16
@@ -263,12 +264,24 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
         raise RecordingError(f"{archive.name}: cannot be opened ({error.strerror})") from None
     except _CORRUPT as error:
         raise _corrupt(archive.name, error) from None
-    return {
+    by_name: dict[str, zipfile.ZipInfo] = {}
+    for info in members:
+        if not 0 < len(info.filename) <= _LONGEST_MEMBER_NAME or info.is_dir():
+            continue
         # A name that begins with / would leave the archive.
-        Path(info.filename.lstrip("/")).as_posix(): info
-        for info in members
-        if 0 < len(info.filename) <= _LONGEST_MEMBER_NAME and not info.is_dir()
-    }
+        name = Path(info.filename.lstrip("/")).as_posix()
+        other = by_name.setdefault(name, info)
+        if other is not info and visible(Path(name)):
+            raise RecordingError(
+                f"{archive.name}: {_described(other)} and {_described(info)} have one name; "
+                "expected each name once, since nobody can tell which is meant: pack it anew"
+            )
+    return by_name
+
+
+def _described(info: zipfile.ZipInfo) -> str:
+    size = "unknown size" if info.file_size == _UNKNOWN_SIZE else f"{info.file_size} bytes"
+    return f"{cut(info.filename, str)} ({size}, at byte {info.header_offset})"
 
 
 @contextmanager
@@ -399,22 +412,18 @@ def _member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
 BLOCK_BYTES = 1 << 20
 
 
-_LEAST_ZEROS = 512
-"""Bytes of a sector: a shorter run of zeros may be a part of binary data."""
-
-
-def blocks(path: Path, findings: list[Finding], *, text: bool = False) -> Iterator[bytes]:
+def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[bytes]:
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
-    ``findings``: what is found goes here: that compressed data end early, and that there are zeros
-    where no logger writes any; in ``text`` every one counts.
+    ``findings``: what is found goes here: that compressed data end early, and that ``least_zeros``
+    zero bytes or more stand together, which no logger writes.
 
     Raises
     ------
     RecordingError
         If the file cannot be opened, or compressed data are corrupt.
     """
-    zeros = ZeroRuns(1 if text else _LEAST_ZEROS)
+    zeros = ZeroRuns(least_zeros)
     with closing(open_bytes(path)) as stream:
         while block := stream.filled(BLOCK_BYTES):
             zeros.add(block)
@@ -423,9 +432,8 @@ def blocks(path: Path, findings: list[Finding], *, text: bool = False) -> Iterat
                 break
     if stream.ended_early:
         findings.append(ended_early(path))
-    byte, line = zeros.first
-    where = f"line {line}" if text else f"byte {byte}"
-    if (finding := zeros.finding(path.name, where, zeros.count + stream.omitted)) is not None:
+    total = zeros.count + stream.omitted
+    if (finding := zeros.finding(path.name, f"byte {zeros.first[0]}", total)) is not None:
         findings.append(finding)
 
 

@@ -14,8 +14,17 @@ from imubench_pipeline.tables.findings import RecordingError
 
 _SEEN = 1 << 16
 _ZIP = b"PK\x03\x04"
-_BY_MARKS = sorted(FILE_FORMATS.values(), key=lambda entry: -len(entry.signature.within))
-"""The formats: those first that ask for most within a file."""
+
+
+_NOT_READ = {
+    "a log of PX4 (ULog)": (0, b"ULog\x01\x12\x35", "make CSV of it with 'ulog2csv' (pyulog)"),
+    "a log of ArduPilot (DataFlash)": (
+        *(0, b"\xa3\x95\x80\x80"),
+        "make CSV of it with 'mavlogdump.py --format csv' (pymavlink)",
+    ),
+    "a tar archive": (257, b"ustar", "unpack it"),
+}
+"""Where and by which bytes files are known that people have, and what to do."""
 
 
 def format_of_folder(path: Path) -> FileFormat | None:
@@ -67,6 +76,12 @@ def content_of(path: Path) -> tuple[FileFormat, str]:
             f"{path.name}: is compressed twice, by {packed} and inside by {again}; expected once: "
             "unpack it"
         )
+    for what, (place, mark, advice) in _NOT_READ.items():
+        if begin.startswith(mark, place):
+            raise RecordingError(
+                f"{path.name}: is {what}, which is not read; expected a format that 'imubench "
+                f"formats' lists: {advice}"
+            )
     file_format = _format_of_bytes(begin)
     if packed and not file_format.streamed:
         raise RecordingError(
@@ -97,9 +112,9 @@ def _format_of_bytes(begin: bytes) -> FileFormat:
     for file_format in FILE_FORMATS.values():
         if begin.startswith(file_format.signature.begins):
             return file_format
-    for file_format in _BY_MARKS:
-        marks = file_format.signature.within
-        if marks and all(mark in begin for mark in marks):
+    for file_format in FILE_FORMATS.values():
+        tells = file_format.signature.tells
+        if tells is not None and tells(begin):
             return file_format
     return TEXT
 

@@ -214,7 +214,7 @@ def describe_missing_text(path: Path) -> str:
         begin = file.filled(_SEEN)
     if not begin:
         return (
-            "the compressed file ends before any text" if file.ended_early else "the file is empty"
+            "the compressed data end before any text" if file.ended_early else "the file is empty"
         )
     if not begin.strip(b"\0"):
         return "the file begins with zero bytes and no text: the logger wrote nothing, or lost it"

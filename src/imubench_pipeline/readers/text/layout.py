@@ -25,6 +25,7 @@ from imubench_pipeline.readers.text.header import are_units, completed, is_headi
 from imubench_pipeline.readers.text.records import Records, are_apart
 from imubench_pipeline.readers.text.refusals import (
     refuse_binary,
+    refuse_control_characters,
     refuse_decimals_apart,
     refuse_other_formats,
 )
@@ -153,6 +154,8 @@ class _Search:
         """Return the likeliest layout."""
         if self._lines:
             refuse_other_formats(self._file, self._lines[0].raw)
+            begin = b"\n".join(line.raw for line in self._lines[:_SCORED_LINES])
+            refuse_control_characters(self._file, self._lines[0].number, begin)
         split = max(self._splits(), key=self._likelihood)
         comments, lines = self._parted(split)
         if not lines:
