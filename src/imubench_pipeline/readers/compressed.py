@@ -202,7 +202,9 @@ def _open_file(path: Path, file: FileWithoutHoles) -> Bytes:
 
 
 def is_archive(path: Path) -> bool:
-    """Tell whether a file is a zip archive."""
+    """Tell whether a path is a zip archive; a named pipe, which may never answer, is none."""
+    if not path.is_file():
+        return False
     try:
         with path.open("rb") as file:
             return file.read(4) in (_ZIP_LOCAL, _ZIP_EMPTY)
