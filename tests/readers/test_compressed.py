@@ -93,6 +93,18 @@ def test_streams_one_after_another_are_one_log(tmp_path: Path, text: bytes, way:
     assert file.findings == []
 
 
+@pytest.mark.parametrize("way", STREAMS)
+def test_zeros_may_follow_compressed_data_and_nothing_else(
+    tmp_path: Path, text: bytes, way: str
+) -> None:
+    packed = PACKED[way](text)
+    found, _, file = columns(written(tmp_path, packed + bytes(100_000)), log_format())
+    assert len(found["gyro_x"]) == ROWS
+    assert file.findings == []
+    with pytest.raises(RecordingError, match="what follows the compressed data is not compressed"):
+        columns(written(tmp_path, packed + text), log_format())
+
+
 @pytest.mark.parametrize("kept", few([0.7, -8], [0.3]))
 @pytest.mark.parametrize("way", PACKED)
 def test_what_is_cut_short_is_read_as_far_as_it_goes(

@@ -81,3 +81,8 @@ def test_a_reason_is_the_same_in_another_folder(tmp_path: Path, name: str) -> No
         assert str(tmp_path) not in text and tmp_path.parent.name not in text
         assert not _ADDRESS.search(text)
         assert f"{os.getpid()}" not in text.split()
+
+
+def test_an_address_of_an_object_is_left_out() -> None:
+    error = RecordingError(f"a.npy: cannot read {object()!r}; copy it again")
+    assert str(error) == "a.npy: cannot read <object object>; copy it again"

@@ -36,14 +36,12 @@ class _Parts:
     Parts that hold next to nothing cost time and no bytes of the file to speak of: the libraries
     pass over them by the million before they return.
 
-    ``new`` makes what decompresses one part. ``padded``: zeros may follow a part, and nothing else;
-    otherwise what is no part ends the data.
+    ``new`` makes what decompresses one part. Zeros may follow a part, and nothing else.
     """
 
-    def __init__(self, file: Source, new: Callable[[], Any], padded: bool) -> None:
+    def __init__(self, file: Source, new: Callable[[], Any]) -> None:
         self._file = file
         self._new = new
-        self._padded = padded
         self._part = new()
         self._parts = 1
         self._size = 0
@@ -55,21 +53,17 @@ class _Parts:
             if not packed and (begins or self._part.needs_input):
                 packed = self._file.read(_READ)
             if begins:
-                if self._padded:
-                    while packed and not (packed := packed.lstrip(b"\0")):
-                        packed = self._file.read(_READ)
+                while packed and not (packed := packed.lstrip(b"\0")):
+                    packed = self._file.read(_READ)
                 if not packed:
                     return b""
                 self._part = self._new()
                 self._parts = _counted(self._parts, self._size)
             try:
                 block: bytes = self._part.decompress(packed, size)
-            except (OSError, lzma.LZMAError, EOFError):
-                if begins and not self._padded:
-                    return b""
-                raise
-            except zstd.ZstdError as error:
-                raise OSError(str(error)) from None
+            except (OSError, EOFError, lzma.LZMAError, zlib.error, zstd.ZstdError) as error:
+                why = "what follows the compressed data is not compressed" if begins else error
+                raise OSError(str(why)) from None
             if block:
                 self._size += len(block)
                 return block
@@ -140,10 +134,10 @@ def _unxz() -> lzma.LZMADecompressor:
 
 
 OPENED: Mapping[str, Callable[[Source], Any]] = {
-    "gzip": lambda file: _Parts(file, _Gunzip, padded=True),
-    "zstd": lambda file: _Parts(file, _unzstd, padded=True),
-    "xz": lambda file: _Parts(file, _unxz, padded=False),
-    "bzip2": lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False),
+    "gzip": lambda file: _Parts(file, _Gunzip),
+    "zstd": lambda file: _Parts(file, _unzstd),
+    "xz": lambda file: _Parts(file, _unxz),
+    "bzip2": lambda file: _Parts(file, bz2.BZ2Decompressor),
 }
 """How a file is opened that is compressed so."""
 
