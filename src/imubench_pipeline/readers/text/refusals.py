@@ -13,9 +13,10 @@ _ALONE = (b"{", b"[")
 _UTF_16 = 0.4
 """Part of zero bytes from which a line is text of two bytes a letter."""
 
-_CONTROLS = bytes({*range(1, 32)} - set(b"\t\n\r\f\x1b"))
-_FEW_CONTROLS = 0.05
-"""Part of the bytes of a text that may be control characters; of bytes of chance 1 in 10 is one."""
+_CONTROLS = bytes({*range(1, 32)} - set(b"\t\n\r\f\x1a\x1b"))
+_FEW_CONTROLS, _PART_CONTROLS = 4, 0.05
+"""Control characters that a text may have, and part of its bytes; of bytes of chance 1 in 10 is
+one."""
 
 _WHOLE = re.compile(r"\s*[-+]?\d+")
 
@@ -46,7 +47,7 @@ def refuse_control_characters(file: str, number: int, begin: bytes) -> None:
     ``number``: of its first line, counted from 1.
     """
     controls = len(begin) - len(begin.translate(None, _CONTROLS))
-    if controls > _FEW_CONTROLS * len(begin):
+    if controls > max(_FEW_CONTROLS, _PART_CONTROLS * len(begin)):
         raise RecordingError(
             f"{file}, line {number}: holds binary data of no known format, the bytes "
             f"{begin[:8].hex(' ')} (hexadecimal) and so on; expected text, or a log of a format "
