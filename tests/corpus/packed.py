@@ -131,7 +131,7 @@ ODD = [
         "gzip cut in its header",
         file(lambda: gzip.compress(TEXT)[:7]),
         STAMPED,
-        Rejected("is empty, or cut short"),
+        Rejected("compressed data end before any text"),
     ),
     Entry(
         "gzip in gzip",

@@ -4,7 +4,9 @@ import bz2
 import gzip
 import io
 import lzma
+import re
 import struct
+import warnings
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,6 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError, compressed, log_files, read
+from imubench_pipeline.readers.contents import contents
 from imubench_pipeline.recordings.drop_zone import _stem
 from tests.conftest import few
 from tests.readers.damage import examples
@@ -90,6 +93,18 @@ def test_streams_one_after_another_are_one_log(tmp_path: Path, text: bytes, way:
     assert file.findings == []
 
 
+@pytest.mark.parametrize("way", STREAMS)
+def test_zeros_may_follow_compressed_data_and_nothing_else(
+    tmp_path: Path, text: bytes, way: str
+) -> None:
+    packed = PACKED[way](text)
+    found, _, file = columns(written(tmp_path, packed + bytes(100_000)), log_format())
+    assert len(found["gyro_x"]) == ROWS
+    assert file.findings == []
+    with pytest.raises(RecordingError, match="what follows the compressed data is not compressed"):
+        columns(written(tmp_path, packed + text), log_format())
+
+
 @pytest.mark.parametrize("kept", few([0.7, -8], [0.3]))
 @pytest.mark.parametrize("way", PACKED)
 def test_what_is_cut_short_is_read_as_far_as_it_goes(
@@ -125,7 +140,7 @@ def test_what_is_corrupt_inside_rejects(
         (b"7z\xbc\xaf\x27\x1c", "7z"),
         (b"Rar!\x1a\x07\x01\x00", "rar"),
         (b"\x04\x22\x4d\x18", "lz4"),
-        (b"\x1f\x9d", "compress"),
+        (b"\x1f\x9d\x90", "compress"),
     ],
 )
 def test_what_is_compressed_in_another_way_is_named(
@@ -292,3 +307,54 @@ def test_sizes_of_a_lying_directory(tmp_path: Path, text: bytes) -> None:
 def test_a_recording_has_the_name_of_its_file_without_suffixes(suffix: str) -> None:
     assert _stem(Path(f"day1.csv{suffix}")) == "day1"
     assert _stem(Path(f"day1{suffix}")) == "day1"
+
+
+def archive_of(path: Path, members: list[tuple[str, bytes]], end: bool = True) -> Path:
+    with zipfile.ZipFile(path, "w") as archive, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that a name stands twice
+        for name, data in members:
+            archive.writestr(name, data)
+    if not end:
+        data = path.read_bytes()
+        path.write_bytes(data[: data.index(b"PK\x01\x02")])
+    return path
+
+
+@pytest.mark.parametrize("end", [True, False])
+@pytest.mark.parametrize("second", ["imu.csv", "./imu.csv", "/imu.csv"])
+@pytest.mark.parametrize("stated", [{}, {"file": "imu.csv"}])
+def test_two_members_of_one_name_are_refused(
+    tmp_path: Path, second: str, stated: dict[str, str], end: bool
+) -> None:
+    one, two = b"wx,ax\n1,2\n3,4\n", b"wx,ax\n5,6\n"
+    path = archive_of(tmp_path / "a.zip", [("imu.csv", one), (second, two)], end)
+    channels = {"gyro_x": {"column": "wx", "unit": "rad/s"} | stated}
+    place = 30 + len("imu.csv") + len(one)
+    said = (
+        rf"^a\.zip: imu\.csv \({len(one)} bytes, at byte 0\) and {re.escape(second)} "
+        rf"\({len(two)} bytes, at byte {place}\) have one name; expected each name once"
+    )
+    with pytest.raises(RecordingError, match=said):
+        columns(path, log_format(channels))
+    with pytest.raises(RecordingError, match=said):
+        contents(path)
+
+
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_name_is_found_however_its_accents_are_kept(tmp_path: Path, folder: bool) -> None:
+    text = b"wx,ax\n1,2\n3,4\n"
+    apart, composed = "cafe\u0301.csv", "caf\u00e9.csv"
+    channels = {"gyro_x": {"column": "wx", "unit": "rad/s", "file": composed}}
+
+    def made(names: list[str]) -> Path:
+        if not folder:
+            return archive_of(tmp_path / "a.zip", [(name, text) for name in names])
+        (tmp_path / "a").mkdir(exist_ok=True)
+        for name in names:
+            (tmp_path / "a" / name).write_bytes(text)
+        return tmp_path / "a"
+
+    found, _, _ = columns(made([apart, "b.csv"]), log_format(channels))
+    assert found["gyro_x"].tolist() == [1, 3]
+    with pytest.raises(RecordingError, match=r"2 files .* for gyro_x; the folder has"):
+        columns(made([apart, composed]), log_format(channels))

@@ -409,3 +409,77 @@ def test_damaged_files_never_crash(whole: list[Path], damage: Damage) -> None:
     for path in whole:
         data = damage(path.read_bytes())
         survives(path.with_name("damaged"), data, log_format(EVERY, time=STAMPED))
+
+
+# ------------------------------------------------------------------------------- version 4
+
+
+def version_4(path: Path, made: dict[str, Any], order: str = "<") -> Path:
+    scipy.io.savemat(path, made, format="4")
+    if order == ">":
+        data = bytearray()
+        for name, value in made.items():
+            value = np.atleast_2d(value)
+            data += struct.pack(">5i", 1000, *value.shape, 0, len(name) + 1)
+            data += name.encode() + b"\0" + value.astype(">f8").tobytes("F")
+        path.write_bytes(data)
+    return path
+
+
+@pytest.mark.parametrize("rows_a_block", [7, 1 << 18])
+def test_version_4(
+    tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch, rows_a_block: int
+) -> None:
+    monkeypatch.setattr(arrays, "_BLOCK_ROWS", rows_a_block)
+    unread = {"cell", "cube", "imu", "several", "t"}
+    made = {name: value for name, value in variables(rng, 60).items() if name not in unread}
+    path = version_4(tmp_path / "a.mat", made)
+    truth = scipy.io.loadmat(path)
+    for column, variable, expected in [
+        (2, "m", truth["m"][:, 1]),
+        (4, "turned", truth["turned"][3]),
+        ("counts", None, truth["counts"].ravel()),
+    ]:
+        channels = {"gyro_x": {"column": column, "variable": variable}}
+        found, _ = columns(path, log_format(channels, reader=None))
+        np.testing.assert_array_equal(found["gyro_x"], expected)
+    for variable, said in [
+        ("text", "holds text"),
+        ("complex", "holds complex numbers"),
+        ("sparse", "is sparse"),
+        ("none", "is empty"),
+    ]:
+        channels = {"gyro_x": {"column": 1, "variable": variable}}
+        with pytest.raises(RecordingError, match=f"{variable} for gyro_x {said}"):
+            columns(path, log_format(channels, reader=None))
+
+
+def test_version_4_in_the_order_of_other_machines(tmp_path: Path, rng: np.random.Generator) -> None:
+    matrix = rng.standard_normal((50, 4))
+    path = version_4(tmp_path / "a.mat", {"m": matrix, "n": matrix[:, 0]}, ">")
+    np.testing.assert_array_equal(scipy.io.loadmat(path)["m"], matrix)
+    channels = {"gyro_x": {"column": "m[2]"}, "gyro_y": {"column": "n"}}
+    found, _ = columns(path, log_format(channels, reader=None))
+    np.testing.assert_array_equal(found["gyro_x"], matrix[:, 1])
+    np.testing.assert_array_equal(found["gyro_y"], matrix[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"), [(2000, "VAX D-float"), (3000, "VAX G-float"), (4000, "Cray")]
+)
+def test_version_4_of_machines_without_ieee_figures(tmp_path: Path, kind: int, said: str) -> None:
+    path = tmp_path / "a.mat"
+    path.write_bytes(struct.pack("<5i", kind, 2, 1, 0, 2) + b"m\0" + bytes(16))
+    with pytest.raises(RecordingError, match=rf"m for gyro_x has figures of {said}.* with -v7\.3"):
+        columns(path, log_format({"gyro_x": {"column": "m"}}, reader=None))
+
+
+def test_version_4_that_is_cut_or_has_something_behind(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    path = version_4(tmp_path / "a.mat", {"m": rng.standard_normal((50, 4))})
+    whole = path.read_bytes()
+    assert cut_everywhere(path, log_format(MATRIX)) == 0
+    path.write_bytes(whole + bytes(100))
+    with pytest.raises(RecordingError, match=f"no header .* version 4 at byte {len(whole)}"):
+        columns(path, log_format(MATRIX))

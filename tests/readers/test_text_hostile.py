@@ -67,6 +67,7 @@ FILES: dict[str, Callable[[], bytes]] = {
 READ = {
     *("one row", "20000 columns", "lines of delimiters", "a number of 500 kB"),
     *("zeros at the end", "zeros after a cut record", "zeros between", "comments and a record"),
+    "zero in a cell",
 }
 PACKED = sorted(FILES)[::8]
 """They are read packed, too, and packed and cut: what unpacks knows nothing of what it hands on."""

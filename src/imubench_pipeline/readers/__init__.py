@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import unicodedata
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -137,16 +138,24 @@ def _file_of(path: Path, present: list[Path] | None, source: ColumnSource, name:
             f"{path.name}: is one file, but the sensor file takes {name} from {source.file!r} of "
             "a folder; put the files into a folder, or drop 'file:'"
         )
-    if path / source.file in present:
-        return path / source.file
-    # A folder that was packed with its own name, or unpacked into another one.
-    nested = [file for file in present if file.as_posix().endswith(f"/{source.file}")]
-    if len(nested) != 1:
+    # A folder that was packed with its own name, or unpacked into another one, has it deeper.
+    names = {file: _composed(file.relative_to(path).as_posix()) for file in present}
+    wanted = _composed(Path(source.file).as_posix())
+    found = [file for file in present if names[file] == wanted] or [
+        file for file in present if names[file].endswith(f"/{wanted}")
+    ]
+    if len(found) != 1:
+        what = f"{len(found)} files" if found else "no file"
         raise RecordingError(
-            f"{path.name}: no file {source.file!r} for {name}; the folder has "
-            f"{_names(path, present)}; mend 'file' of {name} in {stated_in(name)}"
+            f"{path.name}: {what} {source.file!r} for {name}; the folder has "
+            f"{_names(path, found or present)}; mend 'file' of {name} in {stated_in(name)}"
         )
-    return nested[0]
+    return found[0]
+
+
+def _composed(name: str) -> str:
+    """Return a name as it is mostly written: some systems keep a letter and its accent apart."""
+    return unicodedata.normalize("NFC", name)
 
 
 def only_log(path: Path, present: list[Path]) -> Path:

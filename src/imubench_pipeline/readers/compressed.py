@@ -20,7 +20,9 @@ from imubench_pipeline.readers.bounds import (
     MOST_MEMBERS,
     UNSUSPICIOUS,
 )
-from imubench_pipeline.readers.decompression import OPENED
+from imubench_pipeline.readers.decompression import LONGEST_MAGIC, OPENED, compression_of
+from imubench_pipeline.readers.holes import FileWithoutHoles, ZeroRuns
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _READ = 1 << 16
@@ -79,6 +81,11 @@ class Bytes:
             size -= len(block)
         return b"".join(blocks)
 
+    @property
+    def omitted(self) -> int:
+        """Zero bytes of holes of the log that were passed over so far."""
+        return self._stream.omitted if isinstance(self._stream, FileWithoutHoles) else 0
+
     def close(self) -> None:
         """Close the file."""
         for stream in self._streams:
@@ -129,7 +136,7 @@ _NOT_READ: Mapping[bytes, str] = {
     b"7z\xbc\xaf\x27\x1c": "7z",
     b"Rar!\x1a\x07": "rar",
     b"\x04\x22\x4d\x18": "lz4",
-    b"\x1f\x9d": "compress",
+    b"\x1f\x9d\x90": "compress",
     _ZIP_LOCAL: "zip in another way",
 }
 
@@ -166,24 +173,26 @@ def open_bytes(path: Path) -> Bytes:
     """
     archive = None if path.is_file() else _archive_of(path)
     try:
-        file = (archive or path).open("rb")
+        if archive is None:
+            return _open_file(path, FileWithoutHoles(path))
+        return _open_member(archive, path.relative_to(archive).as_posix(), archive.open("rb"))
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
+
+
+def _open_file(path: Path, file: FileWithoutHoles) -> Bytes:
     try:
-        if archive is not None:
-            return _open_member(archive, path.relative_to(archive).as_posix(), file)
-        begin = file.read(6)
-        file.seek(0)
+        begin = file.read(LONGEST_MAGIC)
+        file.rewind()
         for magic, kind in _NOT_READ.items():
             if begin.startswith(magic):
                 raise RecordingError(
                     f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
                     "zip: unpack it"
                 )
-        opened = next((how for magic, (_, how) in OPENED.items() if begin.startswith(magic)), None)
-        if opened is None:
+        if not (how := compression_of(begin)):
             return Bytes(path.name, file, _UNKNOWN_SIZE)
-        return Bytes(path.name, opened(file), path.stat().st_size, (file,))
+        return Bytes(path.name, OPENED[how](file), path.stat().st_size, (file,))
     except BaseException:
         file.close()
         raise
@@ -193,7 +202,9 @@ def open_bytes(path: Path) -> Bytes:
 
 
 def is_archive(path: Path) -> bool:
-    """Tell whether a file is a zip archive."""
+    """Tell whether a path is a zip archive; a named pipe, which may never answer, is none."""
+    if not path.is_file():
+        return False
     try:
         with path.open("rb") as file:
             return file.read(4) in (_ZIP_LOCAL, _ZIP_EMPTY)
@@ -255,12 +266,24 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
         raise RecordingError(f"{archive.name}: cannot be opened ({error.strerror})") from None
     except _CORRUPT as error:
         raise _corrupt(archive.name, error) from None
-    return {
+    by_name: dict[str, zipfile.ZipInfo] = {}
+    for info in members:
+        if not 0 < len(info.filename) <= _LONGEST_MEMBER_NAME or info.is_dir():
+            continue
         # A name that begins with / would leave the archive.
-        Path(info.filename.lstrip("/")).as_posix(): info
-        for info in members
-        if 0 < len(info.filename) <= _LONGEST_MEMBER_NAME and not info.is_dir()
-    }
+        name = Path(info.filename.lstrip("/")).as_posix()
+        other = by_name.setdefault(name, info)
+        if other is not info and visible(Path(name)):
+            raise RecordingError(
+                f"{archive.name}: {_described(other)} and {_described(info)} have one name; "
+                "expected each name once, since nobody can tell which is meant: pack it anew"
+            )
+    return by_name
+
+
+def _described(info: zipfile.ZipInfo) -> str:
+    size = "unknown size" if info.file_size == _UNKNOWN_SIZE else f"{info.file_size} bytes"
+    return f"{cut(info.filename, str)} ({size}, at byte {info.header_offset})"
 
 
 @contextmanager
@@ -298,10 +321,11 @@ class _Archive(io.FileIO):
 def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
     """Return the members of an archive without a directory, which stands at its end."""
     members: list[zipfile.ZipInfo] = []
-    with archive.open("rb") as file:
-        start, data = 0, b""
+    with closing(FileWithoutHoles(archive)) as file:
+        data = b""
         while block := file.read(_SCANNED):
             data += block
+            start = file.tell() - len(data)
             at = data.find(_ZIP_LOCAL)
             while at >= 0 and at + _LONGEST_HEADER <= len(data):
                 members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
@@ -311,8 +335,8 @@ def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
                     f"{archive.name}: an archive without its directory, with more than "
                     f"{MOST_MEMBERS} members; expected the log alone: pack it anew"
                 )
-            keep = at if at >= 0 else max(len(data) - 3, 0)
-            start, data = start + keep, data[keep:]
+            data = data[at if at >= 0 else max(len(data) - 3, 0) :]
+        start = file.tell() - len(data)
         at = data.find(_ZIP_LOCAL)
         while at >= 0:
             members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
@@ -350,6 +374,14 @@ def _local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
 
 
 def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
+    try:
+        return _member(archive, name, file)
+    except BaseException:
+        file.close()
+        raise
+
+
+def _member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     shown = f"{archive.name}/{name}"
     info = _directory(archive).get(name)
     if info is None:
@@ -382,23 +414,29 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
 BLOCK_BYTES = 1 << 20
 
 
-def blocks(path: Path, findings: list[Finding]) -> Iterator[bytes]:
+def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[bytes]:
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
-    ``findings``: what is found goes here: that compressed data end early.
+    ``findings``: what is found goes here: that compressed data end early, and that ``least_zeros``
+    zero bytes or more stand together, which no logger writes.
 
     Raises
     ------
     RecordingError
         If the file cannot be opened, or compressed data are corrupt.
     """
+    zeros = ZeroRuns(least_zeros)
     with closing(open_bytes(path)) as stream:
         while block := stream.filled(BLOCK_BYTES):
+            zeros.add(block)
             yield block
             if len(block) < BLOCK_BYTES:
                 break
     if stream.ended_early:
         findings.append(ended_early(path))
+    total = zeros.count + stream.omitted
+    if (finding := zeros.finding(path.name, f"byte {zeros.first[0]}", total)) is not None:
+        findings.append(finding)
 
 
 def ended_early(path: Path) -> Finding:

@@ -6,19 +6,25 @@ from contextlib import closing
 from pathlib import Path
 
 from imubench_pipeline.readers.compressed import is_member, members, open_bytes
-from imubench_pipeline.readers.decompression import OPENED
+from imubench_pipeline.readers.decompression import LONGEST_MAGIC, compression_of
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.settings.sensor import Reader
 from imubench_pipeline.tables.findings import RecordingError
 
 _SEEN = 1 << 16
-_COMPRESSED = {magic: name for magic, (name, _) in OPENED.items()} | {b"PK\x03\x04": "zip"}
-"""What is inside is text."""
+_ZIP = b"PK\x03\x04"
 
-_LONGEST_MAGIC = 6
-_BY_MARKS = sorted(FILE_FORMATS.values(), key=lambda entry: -len(entry.signature.within))
-"""The formats: those first that ask for most within a file."""
+
+_NOT_READ = {
+    "a log of PX4 (ULog)": (0, b"ULog\x01\x12\x35", "make CSV of it with 'ulog2csv' (pyulog)"),
+    "a log of ArduPilot (DataFlash)": (
+        *(0, b"\xa3\x95\x80\x80"),
+        "make CSV of it with 'mavlogdump.py --format csv' (pymavlink)",
+    ),
+    "a tar archive": (257, b"ustar", "unpack it"),
+}
+"""Where and by which bytes files are known that people have, and what to do."""
 
 
 def format_of_folder(path: Path) -> FileFormat | None:
@@ -70,6 +76,12 @@ def content_of(path: Path) -> tuple[FileFormat, str]:
             f"{path.name}: is compressed twice, by {packed} and inside by {again}; expected once: "
             "unpack it"
         )
+    for what, (place, mark, advice) in _NOT_READ.items():
+        if begin.startswith(mark, place):
+            raise RecordingError(
+                f"{path.name}: is {what}, which is not read; expected a format that 'imubench "
+                f"formats' lists: {advice}"
+            )
     file_format = _format_of_bytes(begin)
     if packed and not file_format.streamed:
         raise RecordingError(
@@ -87,22 +99,22 @@ def _compression_of(path: Path) -> str:
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
     try:
         with path.open("rb") as file:
-            return _named(file.read(_LONGEST_MAGIC))
+            return _named(file.read(LONGEST_MAGIC))
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
 
 
 def _named(begin: bytes) -> str:
-    return next((name for magic, name in _COMPRESSED.items() if begin.startswith(magic)), "")
+    return "zip" if begin.startswith(_ZIP) else compression_of(begin)
 
 
 def _format_of_bytes(begin: bytes) -> FileFormat:
     for file_format in FILE_FORMATS.values():
         if begin.startswith(file_format.signature.begins):
             return file_format
-    for file_format in _BY_MARKS:
-        marks = file_format.signature.within
-        if marks and all(mark in begin for mark in marks):
+    for file_format in FILE_FORMATS.values():
+        tells = file_format.signature.tells
+        if tells is not None and tells(begin):
             return file_format
     return TEXT
 

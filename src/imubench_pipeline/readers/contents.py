@@ -50,7 +50,7 @@ def contents(path: Path) -> Contents:
         If it cannot be read, or holds nothing.
     """
     if not path.exists():
-        raise RecordingError(f"{path}: no such file or folder; expected a log")
+        raise RecordingError(f"{path.name}: no such file or folder; expected a log")
     if path.is_dir() and format_of_folder(path) is None:
         return _of_files(path, "a folder", log_files(path))
     if is_archive(path) and format_of(path) is TEXT:

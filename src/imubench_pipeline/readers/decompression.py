@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import bz2
 import lzma
+import re
 import sys
 import zlib
 from collections.abc import Callable, Mapping
-from typing import IO, Any
+from typing import Any, Protocol
 
 from imubench_pipeline.readers.bounds import LARGEST_WINDOW, LEAST_IN_PART, MOST_PARTS
 
@@ -19,20 +20,28 @@ else:
 _READ = 1 << 16
 
 
+class Source(Protocol):
+    """What compressed bytes are read from."""
+
+    def read(self, size: int, /) -> bytes:
+        """Return the next bytes; none at the end."""
+
+    def close(self) -> None:
+        """Close it."""
+
+
 class _Parts:
     """The decompressed bytes of what may be several compressed parts, one behind another.
 
     Parts that hold next to nothing cost time and no bytes of the file to speak of: the libraries
     pass over them by the million before they return.
 
-    ``new`` makes what decompresses one part. ``padded``: zeros may follow a part, and nothing else;
-    otherwise what is no part ends the data.
+    ``new`` makes what decompresses one part. Zeros may follow a part, and nothing else.
     """
 
-    def __init__(self, file: IO[bytes], new: Callable[[], Any], padded: bool) -> None:
+    def __init__(self, file: Source, new: Callable[[], Any]) -> None:
         self._file = file
         self._new = new
-        self._padded = padded
         self._part = new()
         self._parts = 1
         self._size = 0
@@ -44,21 +53,17 @@ class _Parts:
             if not packed and (begins or self._part.needs_input):
                 packed = self._file.read(_READ)
             if begins:
-                if self._padded:
-                    while packed and not (packed := packed.lstrip(b"\0")):
-                        packed = self._file.read(_READ)
+                while packed and not (packed := packed.lstrip(b"\0")):
+                    packed = self._file.read(_READ)
                 if not packed:
                     return b""
                 self._part = self._new()
                 self._parts = _counted(self._parts, self._size)
             try:
                 block: bytes = self._part.decompress(packed, size)
-            except (OSError, lzma.LZMAError, EOFError):
-                if begins and not self._padded:
-                    return b""
-                raise
-            except zstd.ZstdError as error:
-                raise OSError(str(error)) from None
+            except (OSError, EOFError, lzma.LZMAError, zlib.error, zstd.ZstdError) as error:
+                why = "what follows the compressed data is not compressed" if begins else error
+                raise OSError(str(why)) from None
             if block:
                 self._size += len(block)
                 return block
@@ -128,10 +133,24 @@ def _unxz() -> lzma.LZMADecompressor:
     return lzma.LZMADecompressor(memlimit=LARGEST_WINDOW)
 
 
-OPENED: Mapping[bytes, tuple[str, Callable[[IO[bytes]], Any]]] = {
-    b"\x1f\x8b": ("gzip", lambda file: _Parts(file, _Gunzip, padded=True)),
-    b"\x28\xb5\x2f\xfd": ("zstd", lambda file: _Parts(file, _unzstd, padded=True)),
-    b"\xfd7zXZ\0": ("xz", lambda file: _Parts(file, _unxz, padded=False)),
-    b"BZh": ("bzip2", lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False)),
+OPENED: Mapping[str, Callable[[Source], Any]] = {
+    "gzip": lambda file: _Parts(file, _Gunzip),
+    "zstd": lambda file: _Parts(file, _unzstd),
+    "xz": lambda file: _Parts(file, _unxz),
+    "bzip2": lambda file: _Parts(file, bz2.BZ2Decompressor),
 }
-"""By what a file is compressed that begins so, and how it is opened."""
+"""How a file is opened that is compressed so."""
+
+_MAGIC = re.compile(
+    rb"(?P<gzip>\x1f\x8b\x08[\0-\x1f])|(?P<zstd>\x28\xb5\x2f\xfd)|(?P<xz>\xfd7zXZ\0)"
+    rb"|(?P<bzip2>BZh[1-9](?:1AY&SY|\x17rE8P\x90|.{0,5}\Z))",
+    re.DOTALL,
+)
+LONGEST_MAGIC = 10
+"""Bytes by which compression is told. With fewer of them bytes of chance would be taken for it."""
+
+
+def compression_of(begin: bytes) -> str:
+    """Return how a file is compressed that begins so, as `OPENED` calls it; empty: it is not."""
+    magic = _MAGIC.match(begin[:LONGEST_MAGIC])
+    return "" if magic is None else magic.lastgroup or ""

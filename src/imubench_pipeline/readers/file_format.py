@@ -35,9 +35,9 @@ class Signature:
 
     begins: tuple[bytes, ...] = ()
     """A file that begins with one of these is of the format."""
-    within: tuple[bytes, ...] = ()
-    """So is one that begins as that of no format, and has all of these near its beginning: formats
-    with more of them are asked first. Empty: it is told by its first bytes alone."""
+    tells: Callable[[bytes], bool] | None = None
+    """Tells from the first 64 kB of a file whether it is of the format, where these begin as that
+    of no format. Bytes of chance have nothing of the kind, however many they are."""
     folder_has: str | None = None
     """A folder with a file of this name is one log."""
     archive_has: str | None = None

@@ -18,7 +18,6 @@ a record, with the stamp of the first.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -32,86 +31,8 @@ from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.compressed import blocks
 from imubench_pipeline.readers.file_format import ROWS, FileFormat, LogColumn, LogTable, shown
 from imubench_pipeline.readers.stamps import WrapState, unwrapped
-from imubench_pipeline.tables.findings import Finding, RecordingError
-
-_SYNC = b"\xb5\x62"
-_AROUND = 8
-"""Bytes of a message beside its payload: sync, class and id, length, checksum."""
-
-_CLASSES = frozenset(b"\x01\x02\x03\x04\x05\x06\x09\x0a\x0b\x0c\x0d\x10\x13\x21\x27\x28\x2a")
-"""Those that u-blox uses; what else follows the first two bytes is no message."""
-
-
-class Frames:
-    """The UBX messages of a log: class and id, and payload.
-
-    NMEA and RTCM between them are passed over. After a damaged message the next one is looked
-    for right behind its first bytes, since its length may be what is damaged.
-
-    ``right``, ``wrong`` and ``cut`` count, by class and id, messages, those with a wrong checksum,
-    and those that reach beyond the end of the log; ``read``: bytes read so far.
-    """
-
-    def __init__(self, path: Path, findings: list[Finding]) -> None:
-        self._path = path
-        self._findings = findings
-        self.right: Counter[bytes] = Counter()
-        self.wrong: Counter[bytes] = Counter()
-        self.cut: Counter[bytes] = Counter()
-        self.read = 0
-
-    def kinds(self) -> str:
-        """Say of which class and id most messages are."""
-        most = self.right.most_common(10)
-        return ", ".join(f"{key.hex(' ')} ({count})" for key, count in most) or "none"
-
-    def __iter__(self) -> Iterator[tuple[bytes, bytes]]:
-        source = blocks(self._path, self._findings)
-        data, ended = b"", False
-        while not ended:
-            block = next(source, b"")
-            ended = not block
-            self.read += len(block)
-            data += block
-            first, second = _sums(data)
-            at = 0
-            while (sync := data.find(_SYNC, at)) >= 0:
-                at = sync
-                if len(data) > at + 2 and data[at + 2] not in _CLASSES:
-                    at += 2
-                    continue
-                end = at + _AROUND + int.from_bytes(data[at + 4 : at + 6], "little")
-                if end > len(data):
-                    if not ended:
-                        break
-                    self.cut[data[at + 2 : at + 4]] += 1
-                    at += 2
-                    continue
-                body, key = at + 2, data[at + 2 : at + 4]
-                right = (first[end - 2] - first[body]) & 0xFF == data[end - 2]
-                over = second[end - 2] - second[body] - (end - 2 - body) * first[body]
-                if right and over & 0xFF == data[end - 1]:
-                    self.right[key] += 1
-                    at = end
-                    yield key, data[body + 4 : end - 2]
-                else:
-                    self.wrong[key] += 1
-                    at += 2
-            else:
-                # The last byte may be the first one of the next message.
-                at = max(at, len(data) - 1)
-            data = data[at:]
-
-
-def _sums(data: bytes) -> tuple[bytes, bytes]:
-    """Return the sums of all bytes before each place, and the sums of these, modulo 256.
-
-    Those of a message are their differences: what begins as a message and is none costs nothing.
-    """
-    first = np.cumsum(np.frombuffer(data, np.uint8), dtype=np.uint8)
-    second = np.cumsum(first, dtype=np.uint8)
-    return b"\0" + first.tobytes(), b"\0" + second.tobytes()
-
+from imubench_pipeline.readers.ubx_frames import Frames
+from imubench_pipeline.tables.findings import RecordingError
 
 _MEAS, RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
 KINDS = {_MEAS: "ESF-MEAS", RAW: "ESF-RAW"}
@@ -134,6 +55,9 @@ UNITS = {"gyro": "deg/s", "accel": "m/s^2", "temperature": "degC"}
 TICK_MS = 5 / 128
 """1/25.6, which float64 holds exactly."""
 
+_LEAST_ZEROS = 512
+"""Bytes of a sector; fewer of them may be a part of a message."""
+
 _BATCH_WORDS = 1 << 17
 _LOOKED_AT = 1 << 20
 _LONGEST_HOLE_TICKS = 256_000
@@ -151,7 +75,7 @@ class UbxFile(LogFile):
         self._check_columns()
         kind = self._kind()
         self._check_time(kind)
-        frames = Frames(self.path, self.findings)
+        frames = Frames(blocks(self.path, self.findings, _LEAST_ZEROS))
         words = Words(kind, self._columns())
         clock = _Clock(self, kind)
         records = _Records(len(self._columns()))
@@ -228,7 +152,7 @@ class UbxFile(LogFile):
         if kinds:
             return kinds[0]
         words = {key: Words(key, self._columns()) for key in KINDS}
-        frames = Frames(self.path, [])
+        frames = Frames(blocks(self.path, [], _LEAST_ZEROS))
         for number, (key, payload) in enumerate(frames):
             if key in words:
                 words[key].add(payload)
@@ -494,7 +418,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """
     names = list(COLUMNS)
     words = {kind: Words(kind, names) for kind in KINDS}
-    frames = Frames(path, [])
+    frames = Frames(blocks(path, [], _LEAST_ZEROS))
     for key, payload in frames:
         if key in words and len(words[key]) < ROWS * len(names):
             words[key].add(payload)

@@ -86,6 +86,9 @@ class Row:
     counter: bytes = b""
 
 
+_LEAST_ZEROS = 16
+"""Bytes; fewer of them are noise of the line, and counted with the sentences that they damage."""
+
 _PIECES = re.compile(rb"[^$]{6,}")
 """What may be a sentence, from behind its sign: what is shorter than its name is none."""
 
@@ -180,7 +183,7 @@ def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
     by the end of the recording, which is noted in ``findings``.
     """
     rest = b""
-    for block in blocks(path, findings):
+    for block in blocks(path, findings, _LEAST_ZEROS):
         text = rest + block
         cut = text.rfind(b"\n") + 1
         rest = text[cut:]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
@@ -13,6 +14,7 @@ Severity = Literal["note", "warning", "fatal"]
 
 
 _HALF_REASON = 700
+_ADDRESS = re.compile(r" at 0x[0-9a-f]{6,}")
 
 
 @dataclass(frozen=True)
@@ -48,11 +50,13 @@ class RecordingError(ValueError):
 
     What a damaged file puts into it, such as a name of a million letters, is left out of the
     middle; of what is no sign to print, such as a line break in a name, a question mark is left.
+    The address of an object, which a library may print, is another one in each run: it is left out.
     """
 
     def __init__(self, reason: str) -> None:
         if not reason.isprintable():
             reason = "".join(sign if sign.isprintable() else "?" for sign in reason)
+        reason = _ADDRESS.sub("", reason)
         if len(reason) > 2 * _HALF_REASON:
             reason = f"{reason[:_HALF_REASON]} [...] {reason[-_HALF_REASON:]}"
         super().__init__(reason)

@@ -230,7 +230,8 @@ def explained(path: Path) -> Iterator[None]:
         raise RecordingError(f"{path.name}: {error}") from None
     # The libraries raise nearly every kind of exception on damaged files.
     except Exception as error:
-        reason = " ".join(str(error).split())[:300] or type(error).__name__
+        said = str(error).replace(f"{path.parent}/", "")
+        reason = " ".join(said.split())[:300] or type(error).__name__
         raise RecordingError(
             f"{path.name}: corrupt data, or cut short ({reason}); copy it again"
         ) from error

@@ -1,4 +1,4 @@
-"""MATLAB files: version 7.3, which is HDF5, and version 5 (-v6, -v7), both streamed.
+"""MATLAB files: version 7.3, which is HDF5, 5 (-v6, -v7) and 4 (-v4), all streamed.
 
 A column is a number, the column of a matrix as MATLAB shows it, counted from 1; or the name of a
 variable that is a vector. ``variable`` names the matrix; what is in a structure is ``imu/gyro``.
@@ -22,6 +22,7 @@ import numpy as np
 
 from imubench_pipeline.readers.arrays import hdf5
 from imubench_pipeline.readers.arrays.file import ArrayFile
+from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, header_of
 from imubench_pipeline.readers.arrays.table import (
     LARGEST_RATIO,
     Refused,
@@ -38,7 +39,7 @@ _LONGEST_CLASS = 64
 
 
 class MatlabFile(ArrayFile):
-    """A MATLAB file, of version 7.3 or 5."""
+    """A MATLAB file, of version 7.3, 5 or 4."""
 
     def tables(self, stack: ExitStack) -> Iterable[Table]:
         """Describe every variable."""
@@ -46,8 +47,13 @@ class MatlabFile(ArrayFile):
             return _variables(stack.enter_context(hdf5.opened(self.path)))
         if _is_version_5(self.path):
             return _variables_of_5(self.path)
+        with self.path.open("rb") as file:
+            begin = file.read(HEADER_BYTES)
+        if header_of(begin) is not None:
+            return _variables_of_4(self.path)
         raise UnusableError(
-            "not a MATLAB file of version 5 or 7.3, or its beginning is damaged; save it with -v7.3"
+            "not a MATLAB file of version 4, 5 or 7.3, or its beginning is damaged; save it with "
+            "-v7.3"
         )
 
 
@@ -79,6 +85,31 @@ def _fault(data_set: hdf5.DataSet) -> str | None:
     if np.bytes_(attributes["MATLAB_class"]) == b"char":
         return "holds text; expected numbers"
     return None
+
+
+# --------------------------------------------------------------------------------- version 4
+
+
+def _variables_of_4(path: Path) -> Iterator[Table]:
+    """Yield the variables of a file."""
+    start, size = 0, path.stat().st_size
+    with path.open("rb") as file:
+        while start < size:
+            file.seek(start)
+            header = header_of(file.read(HEADER_BYTES))
+            if header is None:
+                raise _damaged("no header of a variable of version 4", start)
+            begin, end = start + header.begin, start + header.begin + header.size
+            if end > size:
+                raise _cut_short(end, size)
+            if header.fault is not None:
+                yield Refused(header.name, header.fault)
+            else:
+                opened = partial(_plain, path)
+                yield StreamedArray(
+                    header.name, header.shape, header.dtype, True, opened, begin, False
+                )
+            start = end
 
 
 # --------------------------------------------------------------------------------- version 5
@@ -134,9 +165,7 @@ def _variables_of_5(path: Path) -> Iterator[Table]:
             kind, length = struct.unpack(f"{order}II", exactly(file, 8))
             begin, end = start + 8, start + 8 + length
             if end > size:
-                raise UnusableError(
-                    f"cut short: a variable ends at byte {end}, the file at {size}; copy it again"
-                )
+                raise _cut_short(end, size)
             if kind == _COMPRESSED:
                 opened = partial(_inflated, path, begin, length)
                 with opened() as stream:
@@ -214,6 +243,12 @@ class _Elements:
     def _check(self, length: int) -> None:
         if self.at + length > self.end:
             raise _damaged(f"an element of {length} bytes with {self.end - self.at} left", self.at)
+
+
+def _cut_short(end: int, size: int) -> UnusableError:
+    return UnusableError(
+        f"cut short: a variable ends at byte {end}, the file at {size}; copy it again"
+    )
 
 
 def _damaged(what: str, at: int) -> UnusableError:

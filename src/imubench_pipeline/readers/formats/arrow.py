@@ -1,6 +1,11 @@
 """Tables of Parquet, Feather and Arrow."""
 
+import re
+
 from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
+
+_MAGIC = re.compile(rb"(?:PAR1|FEA1|ARROW1)(?:[\0-\x08\x0e-\x1f]|\Z)")
+"""What follows in a text that begins so is no control character."""
 
 
 def _code() -> Code:
@@ -13,7 +18,7 @@ FORMAT = FileFormat(
     name="arrow",
     title="Parquet, Feather or Arrow table",
     endings=(".parquet", ".feather", ".arrow"),
-    signature=Signature(begins=(b"PAR1", b"ARROW1", b"FEA1")),
+    signature=Signature(tells=lambda begin: _MAGIC.match(begin) is not None),
     streamed=False,
     clock_of="length",
     time_columns=(),

@@ -1,5 +1,6 @@
-"""MATLAB files of version 5 and 7.3."""
+"""MATLAB files of version 4, 5 and 7.3."""
 
+from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, header_of
 from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
@@ -13,7 +14,10 @@ FORMAT = FileFormat(
     name="matlab",
     title="MATLAB file",
     endings=(".mat",),
-    signature=Signature(begins=(b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file")),
+    signature=Signature(
+        begins=(b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"),
+        tells=lambda begin: header_of(begin[:HEADER_BYTES]) is not None,
+    ),
     streamed=False,
     clock_of="length",
     time_columns=(),

@@ -14,7 +14,7 @@ FORMAT = FileFormat(
     title="ROS bag",
     endings=(".bag", ".db3", ".mcap"),
     signature=Signature(
-        begins=(b"#ROSBAG V", b"\x89MCAP", b"SQLite format 3"), folder_has="metadata.yaml"
+        begins=(b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0"), folder_has="metadata.yaml"
     ),
     streamed=False,
     clock_of="variable",

@@ -1,6 +1,11 @@
 """Asynchronous sentences of VectorNav's sensors."""
 
+import re
+
 from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
+
+_SENTENCE = re.compile(rb"\$VN[A-Z]{3},[-+.,\d]{8}")
+"""Whatever its checksum is: the reader says how many are wrong."""
 
 
 def _code() -> Code:
@@ -13,7 +18,7 @@ FORMAT = FileFormat(
     name="vectornav",
     title="VectorNav ASCII sentences",
     endings=(".txt", ".log"),
-    signature=Signature(within=(b"$VN",)),
+    signature=Signature(tells=lambda begin: _SENTENCE.search(begin) is not None),
     streamed=True,
     clock_of="file",
     time_columns=("host_time", "counter"),

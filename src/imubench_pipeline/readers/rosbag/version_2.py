@@ -73,12 +73,20 @@ class Bag2:
     def __init__(self, reader: _Reader) -> None:
         self._reader = reader
         reader.open()
-        self._connections: list[Connection] = list(reader.connections)
+        try:
+            self._connections: list[Connection] = list(reader.connections)
+            self._check()
+        except BaseException:
+            self.close()
+            raise
+
+    def _check(self) -> None:
+        """Raise if the bag asks for more than one has."""
         if len(self._connections) > MOST_TOPICS:
             raise ValueError(f"more than {MOST_TOPICS} topics, expected those of a vehicle")
         if any(len(str(c.topic) + str(c.msgtype)) > LONGEST_TOPIC for c in self._connections):
             raise ValueError(f"a topic or type of more than {LONGEST_TOPIC} letters")
-        storages = _storages(reader)
+        storages = _storages(self._reader)
         if len({storage.path for storage in storages}) < len(storages):
             raise ValueError("metadata.yaml names a file twice, expected each once")
         for storage in storages:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import codecs
+import re
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
 
 from imubench_pipeline.readers.bounds import LONGEST_LINE
 from imubench_pipeline.readers.compressed import ended_early, open_bytes
+from imubench_pipeline.readers.holes import ZeroRuns
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _SEEN = 1 << 16
+_ZEROS = re.compile(rb"\0{2,}")
 _BYTE_ORDER_MARKS: Mapping[bytes, str] = {
     codecs.BOM_UTF8: "",
     # Before UTF-16, whose mark is the beginning of this one.
@@ -24,12 +28,15 @@ _BYTE_ORDER_MARKS: Mapping[bytes, str] = {
 class _Text:
     """The bytes of a text log, decompressed, in an encoding that ASCII is a part of.
 
-    A lone carriage return at the ends of lines is a line feed here, and a byte order mark is
-    gone.
+    A lone carriage return at the ends of lines is a line feed here, a byte order mark is gone, and
+    of zero bytes that follow each other one is left.
     """
 
-    def __init__(self, path: Path, skipped: int) -> None:
+    def __init__(self, path: Path, skipped: int, most: int | None) -> None:
         self._bytes = open_bytes(path)
+        self._most = most
+        self._zeros = ZeroRuns()
+        self._returns = False
         try:
             self._prepare(skipped)
         except BaseException:
@@ -43,8 +50,10 @@ class _Text:
         self._decoder = (
             codecs.getincrementaldecoder(encoding)(errors="replace") if encoding else None
         )
-        self._begin = self._utf_8(begin.removeprefix(mark))
-        self._returns = b"\n" not in self._begin and b"\r" in self._begin[:-1]
+        self._letter = len("\0".encode(encoding)) if encoding else 1
+        text = self._utf_8(begin.removeprefix(mark))
+        self._returns = b"\n" not in text and b"\r" in text[:-1]
+        self._begin = self._taken(text)
         while skipped > 0 and (block := self.read(skipped)):
             self._begin = block[skipped:]
             skipped -= len(block)
@@ -57,18 +66,34 @@ class _Text:
     def read(self, size: int) -> bytes:
         """Return the next bytes, about ``size``; none at the end."""
         block, self._begin = self._begin, b""
-        while not block:
+        while not block and (self._most is None or self._zeros.read <= self._most):
             read = self._bytes.read(size)
             if not read:
                 return b""
-            block = self._utf_8(read)
-        return block.replace(b"\r", b"\n") if self._returns else block
+            block = self._taken(self._utf_8(read))
+        return block
+
+    def zeros(self, name: str, fate: str) -> Finding | None:
+        """Return the finding on zero bytes so far (see `ZeroRuns.finding`)."""
+        total = self._zeros.count * self._letter + self._bytes.omitted
+        return self._zeros.finding(name, f"line {self._zeros.first[1]}", total, fate)
 
     def close(self) -> None:
         self._bytes.close()
 
     def _utf_8(self, block: bytes) -> bytes:
         return self._decoder.decode(block).encode() if self._decoder else block
+
+    def _taken(self, block: bytes) -> bytes:
+        if self._returns:
+            block = block.replace(b"\r", b"\n")
+        goes_on = self._zeros.at_end
+        self._zeros.add(block)
+        if b"\0" not in block:
+            return block
+        if block == bytes(len(block)):
+            return b"" if goes_on else b"\0"
+        return _ZEROS.sub(b"\0", block.lstrip(b"\0") if goes_on else block)
 
 
 class CompleteLines:
@@ -105,11 +130,10 @@ class CompleteLines:
         self._records = records
         self._ready = b""
         self._ended = False
-        self._left = most
         self.rest = b""  # what follows the last complete line
         # Kept as well as raised: a parser between us and the caller may wrap the exception.
         self.error: RecordingError | None = None
-        self._text = _Text(path, skipped)
+        self._text = _Text(path, skipped, most)
 
     def __enter__(self) -> CompleteLines:
         return self
@@ -146,22 +170,13 @@ class CompleteLines:
 
     def _lines(self, size: int) -> bytes:
         """Return the next complete lines, none where the next line is not yet complete."""
-        if self._left is not None and self._left < 0:
-            self._ended = True
-            return b""
         block = self._text.read(max(size - len(self.rest), _SEEN))
-        if self._left is not None:
-            self._left -= len(block)
         if not block:
             self._end()
             return b""
         cut = block.rfind(b"\n") + 1
         if not cut:
-            # What a power cut leaves of a file that was growing; one of them is kept, for what
-            # may follow is another record.
-            self.rest += b"\0" if block == bytes(len(block)) else block
-            if self.rest.endswith(b"\0"):
-                self.rest = self.rest.rstrip(b"\0") + b"\0"
+            self.rest += block
             if len(self.rest) > LONGEST_LINE:
                 shown = self.rest[:40].decode("utf-8", "replace")
                 raise RecordingError(
@@ -173,17 +188,39 @@ class CompleteLines:
         self.rest = block[cut:]
         return lines
 
+    def zeros(self, fate: str) -> Finding | None:
+        """Return the finding on zero bytes; None: there are none.
+
+        ``fate``: of the lines that hold some.
+        """
+        return self._text.zeros(self._path.name, fate)
+
     def _end(self) -> None:
         self._ended = True
         if self._text.ended_early:
             self._findings.append(ended_early(self._path))
         if self.rest.strip(b"\0\r\n\t "):
-            shown = self.rest[:60].decode("utf-8", "replace")
+            shown = self.rest.strip(b"\0")[:60].decode("utf-8", "replace")
             detail = (
                 f"{self._path.name}: the last record has no line break and may be cut short; left "
                 f"out: {shown!r}"
             )
             self._findings.append(Finding("incomplete_last_record", "note", detail, 1))
+
+
+def describe_missing_text(path: Path) -> str:
+    """Say what a file holds in which no line of text was found, as the end of a sentence."""
+    with closing(open_bytes(path)) as file:
+        begin = file.filled(_SEEN)
+    if not begin:
+        return (
+            "the compressed data end before any text" if file.ended_early else "the file is empty"
+        )
+    if not begin.strip(b"\0"):
+        return "the file begins with zero bytes and no text: the logger wrote nothing, or lost it"
+    if not begin.strip(b"\0 \t\r\n"):
+        return "the file holds blank lines alone"
+    return "the file has no more lines"
 
 
 def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:

@@ -126,6 +126,7 @@ class CsvFile(LogFile):
                     raise lines.error from None
                 if _NOTHING not in str(error):
                     raise self._explained(error, fault, layout, time) from None
+            self._note_zeros(lines, records.damaged)
         if fault.row is not None:
             self.note(
                 "incomplete_last_record",
@@ -155,6 +156,15 @@ class CsvFile(LogFile):
                 records.restarts,
                 "note",
             )
+
+    def _note_zeros(self, lines: CompleteLines, damaged: int) -> None:
+        fate = ""
+        if damaged:
+            fate = f", with the text of {damaged} line{'s' if damaged > 1 else ''} that hold them"
+            if self.log.time is None:
+                fate += "; state 'time', for without it what follows is shifted in time"
+        if (finding := lines.zeros(fate)) is not None:
+            self.findings.append(finding)
 
     def _wrong_width(self, row: pacsv.InvalidRow, layout: TextLayout) -> RecordingError:
         return RecordingError(

@@ -20,11 +20,12 @@ from imubench_pipeline.readers.text.cells import (
     is_datum,
     is_number,
 )
-from imubench_pipeline.readers.text.complete_lines import first_lines
+from imubench_pipeline.readers.text.complete_lines import describe_missing_text, first_lines
 from imubench_pipeline.readers.text.header import are_units, completed, is_heading, likely_header
 from imubench_pipeline.readers.text.records import Records, are_apart
 from imubench_pipeline.readers.text.refusals import (
     refuse_binary,
+    refuse_control_characters,
     refuse_decimals_apart,
     refuse_other_formats,
 )
@@ -144,15 +145,17 @@ class _Search:
         self._last = max((place for place in self._wanted if isinstance(place, int)), default=1)
         self._comments, self._lines = self._head(path)
         if not self._comments and not self._lines:
+            skipped = f" behind {log.skip_lines} lines (skip_lines)" if log.skip_lines else ""
             raise RecordingError(
-                f"{self._file}: the file is empty, or cut short in its first line; expected lines "
-                "of a log"
+                f"{self._file}: {describe_missing_text(path)}; expected lines of a log{skipped}"
             )
 
     def layout(self) -> TextLayout:
         """Return the likeliest layout."""
         if self._lines:
             refuse_other_formats(self._file, self._lines[0].raw)
+            begin = b"\n".join(line.raw for line in self._lines[:_SCORED_LINES])
+            refuse_control_characters(self._file, self._lines[0].number, begin)
         split = max(self._splits(), key=self._likelihood)
         comments, lines = self._parted(split)
         if not lines:

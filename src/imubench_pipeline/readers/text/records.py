@@ -18,6 +18,8 @@ _NO_COMMENT = rb"(?!#(?i:n/a|na|value!|num!|div/0!)[;,|\t ])"
 _IN_BLANK = b" \t\r\n"
 _BLANK_LINES = re.compile(rb"^[ \t\r]*+\n", re.MULTILINE)
 _MISSING = b"nan\n"
+_WITH_ZEROS = re.compile(rb"^[^\0\n]*+\0[^\0\n]*+\n", re.MULTILINE)
+"""A line with one run of zero bytes. One with several may be text of two bytes a letter."""
 _MOST_BLANK = 1 << 24  # beside each other, for memory
 
 _TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
@@ -65,12 +67,15 @@ class Records:
         self._blank = 0
         self.restarts = 0  # how often the header stood among the records
         self.cut = 0  # records cut short, in the line of which the log begins again
+        self.damaged = 0  # records with a run of zero bytes in them
 
     def __call__(self, lines: bytes) -> bytes:
         """Return the records of complete lines."""
         # Before the comments, for a header may be one.
         if self._header and self._telling in lines and self._header in lines:
             lines = self._without_headers(lines)
+        if b"\0" in lines:
+            lines = _WITH_ZEROS.sub(self._left_out, lines)
         for sign in self._comments:
             if sign[:1] in lines and (lines.startswith(sign) or b"\n" + sign in lines):
                 lines = self._comment_lines.sub(b"", b"\n" + lines)[1:]
@@ -81,6 +86,11 @@ class Records:
             lines = self._with_missing(lines)
         # pyarrow shows us a record of wrong width only if it is UTF-8.
         return lines if lines.isascii() else lines.decode("utf-8", "replace").encode()
+
+    def _left_out(self, line: re.Match[bytes]) -> bytes:
+        """Count a line of which zeros hide a part; what is left may lack digits."""
+        self.damaged += bool(line[0].strip(b"\0 \t\r\n"))
+        return b""
 
     def _with_missing(self, lines: bytes) -> bytes:
         """Return the lines with a cell in blank ones; those at the end wait for what follows."""
@@ -101,7 +111,7 @@ class Records:
     def _without_headers(self, lines: bytes) -> bytes:
         records = []
         for line in lines[:-1].split(b"\n"):
-            text = line.rstrip(b"\r")
+            text = line.rstrip(b"\r").lstrip(b"\0")
             if text == self._header:
                 self.restarts += 1
             elif text in self._preamble:

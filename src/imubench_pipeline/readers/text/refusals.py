@@ -13,6 +13,11 @@ _ALONE = (b"{", b"[")
 _UTF_16 = 0.4
 """Part of zero bytes from which a line is text of two bytes a letter."""
 
+_CONTROLS = bytes({*range(1, 32)} - set(b"\t\n\r\f\x1a\x1b"))
+_FEW_CONTROLS, _PART_CONTROLS = 4, 0.05
+"""Control characters that a text may have, and part of its bytes; of bytes of chance 1 in 10 is
+one."""
+
 _WHOLE = re.compile(r"\s*[-+]?\d+")
 
 
@@ -36,6 +41,20 @@ def refuse_other_formats(file: str, line: bytes) -> None:
         )
 
 
+def refuse_control_characters(file: str, number: int, begin: bytes) -> None:
+    """Raise `RecordingError` if a log begins with many control characters, which no text has.
+
+    ``number``: of its first line, counted from 1.
+    """
+    controls = len(begin) - len(begin.translate(None, _CONTROLS))
+    if controls > max(_FEW_CONTROLS, _PART_CONTROLS * len(begin)):
+        raise RecordingError(
+            f"{file}, line {number}: holds binary data of no known format, the bytes "
+            f"{begin[:8].hex(' ')} (hexadecimal) and so on; expected text, or a log of a format "
+            "that 'imubench formats' lists: export it as CSV"
+        )
+
+
 def refuse_binary(file: str, number: int, line: bytes) -> None:
     """Raise `RecordingError` if a line holds zero bytes.
 
@@ -50,8 +69,9 @@ def refuse_binary(file: str, number: int, line: bytes) -> None:
             "UTF-8, or UTF-16 with its mark: save the text so"
         )
     raise RecordingError(
-        f"{file}, line {number}: holds binary data, expected text; state the 'reader' of the file, "
-        "or cut the file before that line"
+        f"{file}, line {number}: holds {zeros} zero byte{'s' if zeros > 1 else ''}, as binary data "
+        "do; expected text: state the 'reader' of the file, or, if zeros hide the beginning of a "
+        "log, cut the file behind that line"
     )
 
 

@@ -1,0 +1,174 @@
+"""Zeros that are no part of a log: holes of sparse files, and runs of zero bytes.
+
+A logger that reserves space leaves zeros behind the log when it loses its power. A file system may
+store none of them: such a hole is found and passed over without reading it.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from pathlib import Path
+
+from imubench_pipeline.tables.findings import Finding
+
+_LONGEST_READ = 1 << 16
+_STAND_IN = 512
+"""Bytes of a hole that is read, and of zeros that stand for a longer one."""
+
+
+def next_data(descriptor: int, offset: int) -> int | None:
+    """Return where the first stored byte at or after an offset is; None: only a hole follows.
+
+    Where the system does not say, every byte counts as stored.
+
+    ``descriptor``: of an open file; its position is unspecified afterwards.
+    """
+    if not hasattr(os, "SEEK_DATA"):
+        return offset
+    try:
+        return os.lseek(descriptor, offset, os.SEEK_DATA)
+    except OSError as error:
+        return None if error.errno == errno.ENXIO else offset
+
+
+def end_of_data(path: Path) -> int:
+    """Return the size of a file without the hole at its end, in bytes.
+
+    All bytes behind it read as zeros. It takes some 40 system calls and reads nothing, whatever
+    the size; 0 for a file that is one hole. Zeros that are stored count as data.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be opened.
+    """
+    with path.open("rb", buffering=0) as file:
+        stored, end = 0, os.fstat(file.fileno()).st_size
+        while stored < end:
+            middle = (stored + end) // 2
+            if next_data(file.fileno(), middle) is None:
+                end = middle
+            else:
+                stored = middle + 1
+        return end
+
+
+class FileWithoutHoles:
+    """A file that is read from its beginning; of a long hole, only its last bytes are read.
+
+    ``omitted``: zero bytes passed over so far.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("rb", buffering=0)
+        self._at = 0
+        self.omitted = 0
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes, at most ``size``; none at the end."""
+        descriptor = self._file.fileno()
+        data = next_data(descriptor, self._at)
+        hole = (os.fstat(descriptor).st_size if data is None else data) - self._at
+        if hole > _LONGEST_READ:
+            self.omitted += hole - _STAND_IN
+            self._at += hole
+            return bytes(_STAND_IN)
+        block = os.pread(descriptor, size, self._at)
+        self._at += len(block)
+        return block
+
+    read1 = read
+
+    def rewind(self) -> None:
+        """Go back to the beginning."""
+        self._at = self.omitted = 0
+
+    def tell(self) -> int:
+        """Return the place of the next byte."""
+        return self._at
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class ZeroRuns:
+    """Counts the zero bytes of a stream that stand together.
+
+    Parameters
+    ----------
+    least : int
+        A shorter run is not counted.
+    """
+
+    def __init__(self, least: int = 1) -> None:
+        self._least = least
+        self._runs = re.compile(rb"\0{%d,}" % least)
+        self._zeros = bytes(least)
+        self._run = 0
+        self._run_begin = (0, 0)
+        self.count = 0
+        self.places = 0
+        self.first = (0, 0)
+        """Byte from 0, and line from 1, at which the first run begins."""
+        self.read = 0
+        self.lines = 0
+        """Bytes and line breaks so far."""
+
+    @property
+    def at_end(self) -> bool:
+        """Whether what was read last is a run."""
+        return self._run >= self._least
+
+    def add(self, block: bytes) -> None:
+        """Count the zero bytes of the next block."""
+        if block == bytes(len(block)):  # 5 times as fast as what comes below
+            self._extend(block, 0, len(block))
+        elif self._run or self._zeros in block or block[-1] == 0:
+            inner = block.lstrip(b"\0")
+            begin = len(block) - len(inner)
+            if begin:
+                self._extend(block, 0, begin)
+            self._run = 0
+            end = begin + len(inner.rstrip(b"\0"))
+            for match in self._runs.finditer(block, begin, end):
+                self._extend(block, *match.span())
+                self._run = 0
+            if end < len(block):
+                self._extend(block, end, len(block))
+        self.read += len(block)
+        self.lines += block.count(b"\n")
+
+    def _extend(self, block: bytes, begin: int, end: int) -> None:
+        """Add zeros to the present run, or begin one with them."""
+        if not self._run and begin < end:
+            self._run_begin = self.read + begin, self.lines + block.count(b"\n", 0, begin) + 1
+        before, self._run = self._run, self._run + end - begin
+        if not self.at_end:
+            return
+        if before < self._least:
+            self.places += 1
+            self.count += before
+            if self.places == 1:
+                self.first = self._run_begin
+        self.count += end - begin
+
+    def finding(self, name: str, where: str, total: int, fate: str = "") -> Finding | None:
+        """Return the finding on what was counted; None: nothing was.
+
+        ``name``: of the file; ``where``: of the first run; ``total``: zero bytes with those that
+        were not read (`FileWithoutHoles`); ``fate``: of what stands among zeros in the middle.
+        """
+        if not self.count:
+            return None
+        zeros = f"{name}: {total} zero byte{'s' if total > 1 else ''}"
+        if self.at_end and self.places == 1:
+            detail = (
+                f"{zeros} from {where} to the end of the file; left out: the logger reserved "
+                "space, or lost its power"
+            )
+            return Finding("zero_bytes", "note", detail, total)
+        places = f"{self.places} places, the first in {where}" if self.places > 1 else where
+        return Finding("zero_bytes", "warning", f"{zeros} in {places}; left out{fate}", total)

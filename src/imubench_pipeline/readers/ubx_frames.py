@@ -1,0 +1,84 @@
+"""Bytes of a u-blox receiver -> UBX messages, by their checksums."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+
+_SYNC = b"\xb5\x62"
+_AROUND = 8
+"""Bytes of a message beside its payload: sync, class and id, length, checksum."""
+
+_CLASSES = frozenset(b"\x01\x02\x03\x04\x05\x06\x09\x0a\x0b\x0c\x0d\x10\x13\x21\x27\x28\x2a")
+"""Those that u-blox uses; what else follows the first two bytes is no message."""
+
+
+class Frames:
+    """The UBX messages in blocks of bytes: class and id, and payload; iterated over once.
+
+    NMEA and RTCM between them are passed over. After a damaged message the next one is looked
+    for right behind its first bytes, since its length may be what is damaged.
+
+    ``right``, ``wrong`` and ``cut`` count, by class and id, messages, those with a wrong checksum,
+    and those that reach beyond the end of the log; ``read``: bytes read so far.
+    """
+
+    def __init__(self, source: Iterator[bytes]) -> None:
+        self._source = source
+        self.right: Counter[bytes] = Counter()
+        self.wrong: Counter[bytes] = Counter()
+        self.cut: Counter[bytes] = Counter()
+        self.read = 0
+
+    def kinds(self) -> str:
+        """Say of which class and id most messages are."""
+        most = self.right.most_common(10)
+        return ", ".join(f"{key.hex(' ')} ({count})" for key, count in most) or "none"
+
+    def __iter__(self) -> Iterator[tuple[bytes, bytes]]:
+        data, ended = b"", False
+        while not ended:
+            block = next(self._source, b"")
+            ended = not block
+            self.read += len(block)
+            data += block
+            first, second = _sums(data)
+            at = 0
+            while (sync := data.find(_SYNC, at)) >= 0:
+                at = sync
+                if len(data) > at + 2 and data[at + 2] not in _CLASSES:
+                    at += 2
+                    continue
+                end = at + _AROUND + int.from_bytes(data[at + 4 : at + 6], "little")
+                if end > len(data):
+                    if not ended:
+                        break
+                    self.cut[data[at + 2 : at + 4]] += 1
+                    at += 2
+                    continue
+                body, key = at + 2, data[at + 2 : at + 4]
+                right = (first[end - 2] - first[body]) & 0xFF == data[end - 2]
+                over = second[end - 2] - second[body] - (end - 2 - body) * first[body]
+                if right and over & 0xFF == data[end - 1]:
+                    self.right[key] += 1
+                    at = end
+                    yield key, data[body + 4 : end - 2]
+                else:
+                    self.wrong[key] += 1
+                    at += 2
+            else:
+                # The last byte may be the first one of the next message.
+                at = max(at, len(data) - 1)
+            data = data[at:]
+
+
+def _sums(data: bytes) -> tuple[bytes, bytes]:
+    """Return the sums of all bytes before each place, and the sums of these, modulo 256.
+
+    Those of a message are their differences: what begins as a message and is none costs nothing.
+    """
+    first = np.cumsum(np.frombuffer(data, np.uint8), dtype=np.uint8)
+    second = np.cumsum(first, dtype=np.uint8)
+    return b"\0" + first.tobytes(), b"\0" + second.tobytes()
