@@ -71,6 +71,8 @@ class LogFile(ABC):
     """What was left out or passed over; complete once `batches` is exhausted."""
     units: dict[str, StatedUnit] = field(default_factory=dict)
     """Units of channels that the file itself states, known after the first batch."""
+    simulated: bool = False
+    """The file has the mark of a simulated log; known after the first batch."""
 
     @abstractmethod
     def batches(self) -> Iterator[Batch]:

@@ -294,6 +294,11 @@ class RecordingNotes(Strict):
 
     device: Text | None = Field(None, description="serial number; default: the recording's name")
     started: Text | None = Field(None, description="date and time of the first sample")
+    simulated: bool | None = Field(
+        None,
+        description="true: the log is simulated, and decides nothing beside measured ones; false "
+        "does not overrule the mark in a log of `imubench simulate`; null: the log says it",
+    )
     power_cycled: bool | None = Field(
         None,
         description="whether the sensor was without power between this recording and the one "

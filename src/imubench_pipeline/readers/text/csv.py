@@ -24,7 +24,13 @@ from imubench_pipeline.readers.file_format import (
 from imubench_pipeline.readers.stated_units import StatedUnit, stated
 from imubench_pipeline.readers.text.cells import MISSING, Decimal, is_missing, is_number
 from imubench_pipeline.readers.text.complete_lines import CompleteLines, first_lines
-from imubench_pipeline.readers.text.header import completed, says_units, stated_rate, stated_start
+from imubench_pipeline.readers.text.header import (
+    completed,
+    says_units,
+    stated_rate,
+    stated_start,
+    states_simulated,
+)
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
 from imubench_pipeline.readers.text.records import Records
 from imubench_pipeline.readers.text.stamps import (
@@ -61,6 +67,7 @@ class CsvFile(LogFile):
         self.units = text_units(layout, columns)
         preamble = [line.decode("utf-8", "replace") for line in layout.preamble]
         self.rate, self.started = stated_rate(preamble), stated_start(preamble)
+        self.simulated = states_simulated(preamble)
         time = None if self.log.time is None else TextTime(self, layout)
         for name, at in columns.items():
             if time is not None and at in time.types:
