@@ -20,7 +20,6 @@ from imubench_pipeline.settings.validation import (
     Between,
     ConfigError,
     Frequency,
-    Shown,
     Strict,
     Text,
     of_size,
@@ -250,9 +249,9 @@ def _check_unit(unit: str, dimension: str, key: str) -> None:
 class Sensor(Strict):
     """One IMU model: its logs, what it needs of a vehicle, and its datasheet."""
 
-    vendor: Shown
-    model: Shown
-    price_class: Shown | None = None
+    vendor: Text
+    model: Text
+    price_class: Text | None = None
     sold: bool = Field(
         True,
         description="false: no such sensor can be bought, as a board of several that is simulated; "
