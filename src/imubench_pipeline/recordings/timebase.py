@@ -15,7 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.stamps import Stamps, Track, tracked, typical_interval
+from imubench_pipeline.recordings.stamps import (
+    Stamps,
+    Track,
+    is_set_back,
+    tracked,
+    typical_interval,
+)
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
 
@@ -190,7 +196,10 @@ def _grid_findings(track: Track, interval: float) -> list[Finding]:
         times = [point * interval for point in track.starts[1:]]
         findings.append(_segments("the clock jumps or stops", times, track.jumps[1:]))
     if track.duplicates:
-        detail = f"{track.duplicates} records repeat a stamp or fall on an earlier one; left out"
+        detail = (
+            f"{track.duplicates} records repeat a stamp or fall on an earlier one: they were written "
+            "twice, or the clock was set back; left out"
+        )
         findings.append(Finding("repeated_stamps", "note", detail, track.duplicates))
     if track.unstamped:
         detail = f"{track.unstamped} records have no time stamp, or one far astray; taken as "
@@ -278,6 +287,8 @@ def _arrival_order(
         latest = latest[good]
         steps = np.diff(latest)
         cut = np.abs(steps) > gap
+        for i in np.flatnonzero(steps < 0):
+            cut[i] |= is_set_back(latest, i + 1, steps[i], mean)
         starts += [rows + int(i) for i in np.flatnonzero(cut)]
         jumps += steps[cut].tolist()
         usual = np.where(np.isfinite(steps) & ~cut, steps, 0.0)
