@@ -50,6 +50,11 @@ class Batch:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
+    def after(self, records: int) -> Batch:
+        """Return it without its first records."""
+        time = None if self.time is None else self.time[records:]
+        return Batch(time, {name: values[records:] for name, values in self.columns.items()})
+
 
 @dataclass
 class LogFile(ABC):

@@ -197,8 +197,8 @@ def _grid_findings(track: Track, interval: float) -> list[Finding]:
         findings.append(_segments("the clock jumps or stops", times, track.jumps[1:]))
     if track.duplicates:
         detail = (
-            f"{track.duplicates} records repeat a stamp or fall on an earlier one: they were written "
-            "twice, or the clock was set back; left out"
+            f"{track.duplicates} records repeat a stamp or fall on an earlier one: they were "
+            "written twice, or the clock was set back; left out"
         )
         findings.append(Finding("repeated_stamps", "note", detail, track.duplicates))
     if track.unstamped:
