@@ -348,3 +348,30 @@ def test_stamps_that_scatter_are_no_clock_that_is_set_back(rng: np.random.Genera
     base, _ = found(late)
     assert base.segments == ((0, 50_000),)
     assert base.rate == pytest.approx(100.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("rate", [10.0, 33.3, 100.0, 200.0])
+@pytest.mark.parametrize("length", [20.0, 600.0])
+def test_a_second_that_whole_seconds_count_twice_leaves_the_rate(
+    rate: float, length: float
+) -> None:
+    stamps = np.arange(round(rate * length)) / rate
+    stamps[len(stamps) // 2 :] -= 1.0
+    base, _ = found(np.floor(stamps + 1e-9))
+    assert base.rate == pytest.approx(rate, rel=0.1 / length)
+    assert "irregular_stamps" in names(base)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.003, 0.00999])
+def test_stamps_as_coarse_as_their_interval_lose_little(phase: float) -> None:
+    base, _ = found(np.floor((GRID[:6000] + phase) * 100.0) / 100.0)
+    assert base.rate == pytest.approx(100.0, rel=2e-4)
+    assert base.repeated < 0.005 * 6000
+
+
+def test_a_clock_that_is_slewed_in_a_short_log_is_said() -> None:
+    stamps = GRID[:20_000].copy()
+    stamps[10_000:] += 1e-3 * (stamps[10_000:] - stamps[10_000])
+    base, _ = found(stamps)
+    assert base.uniform and names(base) == ["rate_drifts"]
+    assert base.findings[0].value == pytest.approx(1e-3, rel=0.1)

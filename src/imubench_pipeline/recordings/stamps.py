@@ -97,7 +97,8 @@ def _long_steps_are_regular(steps: NDArray[np.float64], median: float) -> bool:
     return bool(np.mean(np.abs(distances - np.median(distances)) <= 1) > 0.9)
 
 
-_MARK = 1 << 14
+_MARK = 1 << 10
+"""Records between two marks."""
 
 
 @dataclass
@@ -232,7 +233,7 @@ def _follow(
     origin, last, interval, stamped = state[0], state[1], state[2], state[3]
     point = grid - 1
     elapsed = 0.0
-    late = False
+    late = after_hole = False
     for i in range(block.size):
         stamp = block[i]
         # One stamp far from where the next ones go on is no jump of the clock.
@@ -243,6 +244,7 @@ def _follow(
         )
         if np.isnan(stamp) or astray:
             counts[5] += 1
+            late = after_hole = False
             point += 1
             origin += interval
             points[i] = point
@@ -259,7 +261,7 @@ def _follow(
             jumps[counts[0]] = step
             counts[0] += 1
             origin = stamp
-            late = False
+            late = after_hole = False
         else:
             whole = int(np.round((stamp - origin) / interval))
             error = stamp - origin - whole * interval
@@ -267,29 +269,32 @@ def _follow(
             twice = whole < 1 and i > 0 and abs(stamp - block[i - 1] - interval) < 0.1 * interval
             if step != 0.0 and not twice and (abs(error) > _OFF_GRID * interval or whole < 1):
                 counts[1] += 1
-            if whole == 0 and step > 0.0 and late:
-                # The sample before came late by half an interval: it belongs into the hole.
+            if whole == 0 and ((step > 0.0 and late) or (step == 0.0 and after_hole)):
+                # The sample before came late by half an interval, or its stamp is rounded up to
+                # this one's: it belongs into the hole.
                 points[i - 1] -= 1
                 points[i] = point
                 counts[3] -= 1
-                late = False
+                late = after_hole = False
                 elapsed += step
                 last = stamp
                 continue
             if (
                 whole == 0
-                and step > 0.0
+                and step >= 0.0
                 and i + 1 < block.size
                 and np.round((block[i + 1] - origin) / interval) == 2
             ):
-                # This one came early: the next leaves a hole for it.
+                # This one came early, or its stamp is rounded down: the next leaves a hole for it.
                 whole = 1
                 error = stamp - origin - interval
             if whole < 1:
+                late = after_hole = False
                 counts[2] += 1
                 points[i] = -1
                 continue
-            late = whole == 2 and error < 0.0 and i > 0
+            after_hole = whole == 2 and i > 0
+            late = after_hole and error < 0.0
             if whole > 1:
                 counts[3] += 1
                 if whole - 1 > counts[4]:
