@@ -25,7 +25,7 @@ _LONG, _TWO = 1.75, 2.2
 _MIDDLE = 0.45
 """Level of the quantile that stands for the median: of as many short and long steps the short."""
 
-_SET_BACK = 0.45
+SET_BACK = 0.45
 """s; a step back that may be a clock that was set back, as by a leap second. Shorter ones are
 records that were written twice, or in another order."""
 
@@ -202,7 +202,7 @@ def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: floa
     interval : float
         Between samples, s.
     """
-    if not step < -max(_SET_BACK, 1.5 * interval):
+    if not step < -max(SET_BACK, 1.5 * interval):
         return False
     count = min(_AROUND, i, stamps.size - i)
     if count < 1:

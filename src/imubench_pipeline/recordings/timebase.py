@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.stamps import (
+    SET_BACK,
     Stamps,
     Track,
     is_set_back,
@@ -293,7 +294,7 @@ def _arrival_order(
         latest = latest[good]
         steps = np.diff(latest)
         cut = np.abs(steps) > gap
-        for i in np.flatnonzero(steps < 0):
+        for i in np.flatnonzero(steps < -SET_BACK):
             cut[i] |= is_set_back(latest, i + 1, steps[i], mean)
         starts += [rows + int(i) for i in np.flatnonzero(cut)]
         jumps += steps[cut].tolist()
