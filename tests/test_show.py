@@ -119,9 +119,7 @@ def after(text: str, head: str) -> str:
 
 def test_what_was_compared_comes_first(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = shown(capsys, results)
-    assert text.startswith(
-        "Recordings: 4 of 4 sensors; 3 analysed, 1 rejected; 1 simulated from published parameters"
-    )
+    assert text.startswith("Recordings: 4 of 4 sensors; 3 analysed, 1 rejected; 1 simulated")
     assert after(text, "Rejected: 1") == "bad/run: no column 'wx'; found [bold]wy\\x1b[31m"
     assert after(text, "Warnings: 1").startswith(
         "good/run gyro_x (suspicious unit): is it in degrees? is it"

@@ -296,3 +296,82 @@ def test_ten_thousand_segments_are_taken_and_no_more(
     assert ("jittered_stamps" in names(base)) == jittered
     with pytest.raises(RecordingError, match="10001 segments, expected 10000 at most"):
         found(clock)
+
+
+@pytest.mark.parametrize("rate", [10.0, 50.0, 100.0, 200.0, 1000.0])
+@pytest.mark.parametrize("length", [20.0, 60.0, 600.0])
+@pytest.mark.parametrize("step", [-1.0, -1.5, -3600.0, -604_800.0, 3600.1])
+def test_a_step_of_the_clock_divides_and_leaves_the_rate(
+    rate: float, length: float, step: float
+) -> None:
+    stamps = np.arange(round(rate * length)) / rate
+    middle = len(stamps) // 2
+    stamps[middle:] += step
+    for written in (stamps, np.round(stamps, 3)):
+        base, points = found(written)
+        assert base.rate == pytest.approx(rate, rel=2e-5)
+        assert names(base) == ["segments"]
+        assert base.segments == ((0, middle), (middle, len(stamps)))
+        np.testing.assert_array_equal(points, np.arange(len(stamps)))
+
+
+def test_several_steps_of_the_clock_leave_the_rate() -> None:
+    stamps = np.arange(4000) / 100.0
+    for begin in (1000, 2000, 3000):
+        stamps[begin:] -= 1.0
+    base, _ = found(stamps)
+    assert base.rate == pytest.approx(100.0, rel=1e-9)
+    assert [start for start, _ in base.segments] == [0, 1000, 2000, 3000]
+    stamps[1000:] += 2.0  # a second forward looks like a hole
+    base, _ = found(stamps)
+    assert base.rate == pytest.approx(100.0, rel=1e-9)
+    assert (base.missing, len(base.segments)) == (100, 3)
+
+
+@pytest.mark.parametrize("step", [-0.05, -0.3])
+def test_a_short_step_back_leaves_the_rate_and_is_said(step: float) -> None:
+    stamps = np.arange(2000) / 100.0
+    stamps[1000:] += step
+    base, _ = found(stamps)
+    assert base.rate == pytest.approx(100.0, rel=1e-9)
+    assert base.repeated == round(-100 * step)
+    assert "or the clock was set back" in base.findings[0].detail
+
+
+def test_stamps_that_scatter_are_no_clock_that_is_set_back(rng: np.random.Generator) -> None:
+    arrival = GRID + rng.uniform(0.0, 0.9, len(GRID))
+    base, _ = found(arrival)
+    assert len(base.segments) == 1
+    assert base.rate == pytest.approx(100.0, rel=5e-3)
+    late = GRID.copy()
+    late[[10_000, 20_000]] -= 0.7
+    base, _ = found(late)
+    assert base.segments == ((0, 50_000),)
+    assert base.rate == pytest.approx(100.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("rate", [10.0, 33.3, 100.0, 200.0])
+@pytest.mark.parametrize("length", [20.0, 600.0])
+def test_a_second_that_whole_seconds_count_twice_leaves_the_rate(
+    rate: float, length: float
+) -> None:
+    stamps = np.arange(round(rate * length)) / rate
+    stamps[len(stamps) // 2 :] -= 1.0
+    base, _ = found(np.floor(stamps + 1e-9))
+    assert base.rate == pytest.approx(rate, rel=0.1 / length)
+    assert "irregular_stamps" in names(base)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.003, 0.00999])
+def test_stamps_as_coarse_as_their_interval_lose_little(phase: float) -> None:
+    base, _ = found(np.floor((GRID[:6000] + phase) * 100.0) / 100.0)
+    assert base.rate == pytest.approx(100.0, rel=2e-4)
+    assert base.repeated < 0.005 * 6000
+
+
+def test_a_clock_that_is_slewed_in_a_short_log_is_said() -> None:
+    stamps = GRID[:20_000].copy()
+    stamps[10_000:] += 1e-3 * (stamps[10_000:] - stamps[10_000])
+    base, _ = found(stamps)
+    assert base.uniform and names(base) == ["rate_drifts"]
+    assert base.findings[0].value == pytest.approx(1e-3, rel=0.1)

@@ -256,7 +256,7 @@ def test_a_simulated_recording_is_called_so_on_every_page_that_names_it(
     assert (
         "Simulated from known parameters, not measured" in read["recordings/two/phantom.html"].text
     )
-    assert "All are simulated from published parameters" in read["sensors/two.html"].text
+    assert "All are simulated" in read["sensors/two.html"].text
 
 
 def test_what_is_measured_is_not_called_simulated(read: dict[str, Read]) -> None:

@@ -191,11 +191,11 @@ def test_a_summary_says_how_many_recordings_how_long_and_of_when() -> None:
     ).views
     assert summary(views) == (
         "3 recordings of 2 sensors, 4 h of data, recorded from 2023-12-31 to 2024-02-03: "
-        "2 analysed, 1 rejected. 1 of them is simulated from published parameters, not measured."
+        "2 analysed, 1 rejected. 1 of them is simulated, not measured."
     )
     assert summary(views[1:2], several=False) == (
         "1 recording, 2 h of data, recorded on 2023-12-31: 1 analysed, 0 rejected. "
-        "All are simulated from published parameters, not measured."
+        "All are simulated, not measured."
     )
     assert summary([]) == "0 recordings of 0 sensors: 0 analysed, 0 rejected."
 

@@ -55,7 +55,7 @@ def test_a_log_is_read_with_its_sensor_file(sensor: str, tmp_path: Path, capsys)
         given = ["--duration", "40 s", "--rate", "100 Hz", "--temperature", tmp_path / "warm.csv"]
         assert simulate(sensor, *given, "--out", path) == 0
         said = capsys.readouterr().out
-        assert said.startswith("SIMULATED, not measured: 4,000 samples")
+        assert said.startswith("SIMULATED by imubench, not measured: 4,000 samples")
         assert "assumed: " in said and "datasheet" in said
         found[suffix] = ingested(path, sensor, tmp_path / suffix)
         path.with_suffix(".yaml").unlink()
@@ -73,7 +73,9 @@ def test_a_text_log_of_a_sensor_with_names_needs_no_notes(tmp_path: Path) -> Non
     (block,) = channel_logs(tmp_path / "kept")["gyro_x"].blocks()
     steps = np.degrees(block) * 16  # 16 LSB/(deg/s)
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
-    assert path.read_text().startswith("# SIMULATED, not measured\n# from the datasheet of bno055")
+    assert path.read_text().startswith(
+        "# SIMULATED by imubench, not measured\n# from the datasheet of bno055"
+    )
 
 
 def test_parquet_is_a_kept_recording(tmp_path: Path) -> None:

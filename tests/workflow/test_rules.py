@@ -8,6 +8,7 @@ import pytest
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, PARTS_OF, TABLES
 from tests.conftest import PROJECT
+from tests.workflow.dry_runs import dry_run
 from tests.workflow.rules import costs, rules
 
 
@@ -56,3 +57,20 @@ def test_each_table_is_made_by_one_rule(known: dict[str, Any]) -> None:
                     made.setdefault(path.stem, []).append(name)
     assert {table for table, by in made.items() if len(by) > 1} == set()
     assert made.keys() == TABLES.keys() - set(OF_ONE_RECORDING)
+
+
+def test_texts_of_the_configuration_are_as_they_are_written(tmp_path: Path) -> None:
+    (tmp_path / "Snakefile").write_text(
+        f'include: "{PROJECT / "Snakefile"}"\n'
+        "print([plan.run.exports.axis, plan.run.exports.because, plan.run.requirements])\n"
+    )
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/config.yaml").write_text(
+        "exports: {axis: 0017, because: 12:30:45}\nsimulated: no\nrequirements: off\n"
+    )
+    (tmp_path / "logs/s").mkdir(parents=True)
+    (tmp_path / "logs/s/a.csv").write_text("gx\n1\n")
+    done = dry_run(tmp_path, ["-c1"])
+    assert "['0017', '12:30:45', None]" in done.stdout, done.stderr
+    done = dry_run(tmp_path, ["-c1", "--config", 'exports={"axis": "2"}'])
+    assert "['2', '12:30:45', None]" in done.stdout, done.stderr

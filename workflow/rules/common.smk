@@ -7,6 +7,7 @@ import time
 from functools import partial
 
 from snakemake.iocontainers import Wildcards
+from snakemake.utils import update_config
 
 from imubench_pipeline.recordings.kept import outcome
 from imubench_pipeline.report.drop_zone import drop_zone_lines
@@ -16,6 +17,7 @@ from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
 from imubench_pipeline.run.scripts import Scripts
 from imubench_pipeline.run.sealing import settings_digest, unsound
+from imubench_pipeline.settings.config import read_config
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
 from imubench_pipeline.tables.seals import place_of
@@ -30,6 +32,7 @@ atexit.register(gc.freeze)
 BEGUN = time.time()
 
 HERE = workflow.current_basedir
+CONFIG = Path("config/config.yaml")
 
 path_modifier = workflow.modifier.path_modifier
 if path_modifier.modifies_prefixes or path_modifier.replace_prefix("x") != "x":
@@ -39,6 +42,10 @@ if path_modifier.modifies_prefixes or path_modifier.replace_prefix("x") != "x":
     )
 
 try:
+    if CONFIG.exists() and not workflow.modifier.skip_configfile:
+        # Snakemake has read it as YAML 1.1, in which 0017 is 15.
+        update_config(config, read_config(CONFIG))
+        update_config(config, workflow.config_settings.overwrite_config)
     plan = Plan(config)
 except ConfigError as error:
     raise WorkflowError(str(error)) from None

@@ -94,6 +94,11 @@ class Log(Shown):
         return f"{self.sensor}/{self.recording}"
 
     @property
+    def simulated(self) -> bool:
+        """Whether the log is simulated, by its own mark or the notes beside it."""
+        return bool(self._about["simulated"])
+
+    @property
     def rates(self) -> dict[str, float]:
         """Sampling rate of each channel, Hz: as the stamps say it, where there are any."""
         return {name: log.rate for name, log in self._logs.items()}
@@ -209,7 +214,8 @@ class Log(Shown):
         if len(self.findings) > len(serious[:_SERIOUS]):
             notes.append(f"{len(self.findings)} findings in all: .findings")
         heads = ["channel", "rate", "samples", "unit", "some missing"]
-        title = f"Log {self.name}, {duration_text(self.duration)}"
+        made = " (simulated)" * self.simulated
+        title = f"Log {self.name}{made}, {duration_text(self.duration)}"
         return Summary(title, heads, rows, notes)
 
 

@@ -50,6 +50,11 @@ class Batch:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
+    def after(self, records: int) -> Batch:
+        """Return it without its first records."""
+        time = None if self.time is None else self.time[records:]
+        return Batch(time, {name: values[records:] for name, values in self.columns.items()})
+
 
 @dataclass
 class LogFile(ABC):
@@ -71,6 +76,8 @@ class LogFile(ABC):
     """What was left out or passed over; complete once `batches` is exhausted."""
     units: dict[str, StatedUnit] = field(default_factory=dict)
     """Units of channels that the file itself states, known after the first batch."""
+    simulated: bool = False
+    """The file has the mark of a simulated log; known after the first batch."""
 
     @abstractmethod
     def batches(self) -> Iterator[Batch]:

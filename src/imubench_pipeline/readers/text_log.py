@@ -12,6 +12,7 @@ import pyarrow.csv as pacsv
 from numpy.typing import DTypeLike, NDArray
 
 from imubench_pipeline.readers.batch import SECONDS
+from imubench_pipeline.readers.text.header import SIMULATED
 from imubench_pipeline.settings.sensor import (
     QUANTITIES,
     TEMPERATURE,
@@ -39,7 +40,7 @@ class TextLog:
     rate : float
         Hz.
     remarks : iterable of str
-        Comments at its top, where its layout has comments.
+        Comments at its top, under the mark of a simulated log, where its layout has comments.
     kind : dtype
         Of the numbers: float32 has seven digits, far finer than the noise, and half the text.
 
@@ -68,7 +69,7 @@ class TextLog:
         )
         self._file = path.open("wb")
         if log.comment:
-            for line in remarks:
+            for line in (SIMULATED, *remarks):
                 self._file.write(f"{log.comment} {line}\n".encode())
         self._file.write(b"\n" * log.skip_lines)
         if any(isinstance(source.column, str) for source in sources.values()):

@@ -49,6 +49,12 @@ SCALES: Mapping[str, Mapping[str, float]] = {
 """Findings whose value is a factor that mends samples, or times, and the power of it that mends
 each parameter: N² = σ²(τ) τ, so that N goes with the root of time."""
 
+BESIDE_MEASURED = "simulated_beside_measured"
+"""Code of the doubt that leaves out simulated recordings, though they be included."""
+
+WITH_DOUBTS = {"error_budget", "datasheet"}
+"""Tables of a recording's own step whose rows say what is doubted of the recording."""
+
 BEARS_ON: Mapping[str, frozenset[str]] = {
     "knocks": _WHITE,
     "held_samples": _WHITE,
@@ -163,6 +169,61 @@ def not_sold(recordings: Iterable[Row], sensors: Collection[str]) -> Iterator[Do
                 "no such sensor is sold",
                 unfit=True,
             )
+
+
+def simulated_beside_measured(recordings: Sequence[Row]) -> Iterator[Doubt]:
+    """Yield a doubt for each simulated recording, where any measured one was analysed.
+
+    Parameters
+    ----------
+    recordings : sequence of mapping
+        Rows of the table ``recordings``, of one sensor or of all.
+    """
+    if any(row["status"] == "ok" and not row["simulated"] for row in recordings):
+        for row in recordings:
+            if row["simulated"]:
+                yield Doubt(
+                    row["sensor"],
+                    row["recording"],
+                    None,
+                    BESIDE_MEASURED,
+                    "it is simulated, and other recordings are measured",
+                    unfit=True,
+                )
+
+
+def without_simulated(
+    recordings: Sequence[Row],
+) -> tuple[list[dict[str, Any]], list[Doubt]]:
+    """Return the recordings of all sensors, judged anew, and the doubts that are new.
+
+    Sensors are judged each by itself: a simulated recording of one decides until a measured one of
+    another is known.
+
+    Parameters
+    ----------
+    recordings : sequence of mapping
+        Rows of the table ``recordings``, with whether they decide.
+    """
+    known = {_key(row) for row in recordings if _names(row["doubts"], BESIDE_MEASURED)}
+    new = [
+        doubt
+        for doubt in simulated_beside_measured(recordings)
+        if (doubt.sensor, doubt.recording) not in known
+    ]
+    apart = {(doubt.sensor, doubt.recording): words([doubt]) for doubt in new}
+    judged_anew = [
+        {
+            **row,
+            "fitness": row["fitness"] and "unfit",
+            "decides": False,
+            "doubts": "; ".join(filter(None, [apart[_key(row)], row["doubts"]])),
+        }
+        if _key(row) in apart
+        else dict(row)
+        for row in recordings
+    ]
+    return judged_anew, new
 
 
 def fitness(of_recording: Iterable[Doubt]) -> Fitness:
@@ -297,12 +358,17 @@ def _shortened(texts: Sequence[str]) -> str:
 def _judged(row: Row, doubts: Sequence[Doubt], included: Collection[str]) -> dict[str, Any]:
     verdict = fitness(doubts) if row["status"] == "ok" else None
     named = f"{row['sensor']}/{row['recording']}" in included
+    named &= all(doubt.code != BESIDE_MEASURED for doubt in doubts)
     return {
         **row,
         "fitness": verdict,
         "decides": verdict is not None and (verdict != "unfit" or named),
         "doubts": words(doubts),
     }
+
+
+def _names(words_of_doubts: str | None, code: str) -> bool:
+    return (words_of_doubts or "").startswith(code.replace("_", " "))
 
 
 def _casts_doubt(row: Row) -> bool:

@@ -143,9 +143,12 @@ def _ingest(
     groups = _shared_bases(parts, bases)
     static = provenance.get("kind", "static") == "static"
     findings = _findings(parts, bases, groups, settings, scratch, static=static)
+    findings += _overruled_notes(parts, notes)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     names = names_of(parts, groups)
+    simulated = _is_simulated(parts, notes, provenance)
     metadata = provenance | {
+        "simulated": simulated,
         "sources": [
             {"name": (source / place).name, "size": file.size, "sha256": file.sha256}
             for place, file in sources.result().items()
@@ -164,7 +167,7 @@ def _ingest(
         assembled, repeated = assemble(chosen, base, settings, about, scratch / name)
         counts |= counted(assembled, chosen, repeated)
         written.append((assembled, folder / name))
-    summary = _summary(parts, bases, metadata["started"])
+    summary = _summary(parts, bases, metadata["started"]) | {"simulated": simulated}
     if all(channel in unusable for channel in log.channels):
         reasons = "; ".join(f.detail for f in findings if f.severity == "fatal")
         raise RecordingError(f"no channel can be used: {reasons}")
@@ -225,6 +228,24 @@ def _findings(
     for group in groups:
         findings += [f for f in bases[group[0]].findings if f not in findings]
     return findings
+
+
+def _is_simulated(parts: list[Part], notes: RecordingNotes, provenance: dict[str, Any]) -> bool:
+    """Return whether the run made the log, its notes say so, or one of its files has the mark."""
+    marked = any(part.source.simulated for part in parts)
+    return marked or bool(notes.simulated or provenance.get("simulated"))
+
+
+def _overruled_notes(parts: list[Part], notes: RecordingNotes) -> list[Finding]:
+    """Return a finding where the notes deny the mark of a simulated log."""
+    marked = [part.source.path.name for part in parts if part.source.simulated]
+    if not marked or notes.simulated is not False:
+        return []
+    detail = (
+        f"the notes say 'simulated: false', but {marked[0]} has the mark of a simulated log: it is "
+        "taken for simulated; remove the key from the notes, or the mark if it is wrong"
+    )
+    return [Finding("simulated_by_mark", "warning", detail, len(marked))]
 
 
 def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
@@ -346,7 +367,8 @@ def ingest_as_planned(
     plan = json.loads(settings)
     notes = RecordingNotes.model_validate(plan.get("notes", {}))
     names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}
-    names |= {"kind": plan.get("kind", "static"), "simulated": plan["simulated"]}
+    names |= {"kind": plan.get("kind", "static")}
+    provenance = names | {"simulated": _stated_simulated(plan)}
     if "unavailable" in plan:
         raise UnavailableError(plan["unavailable"])
     sources: dict[str, KnownFile] = {}
@@ -358,7 +380,7 @@ def ingest_as_planned(
         with watched(source, plan.get("files", ())):
             if guarded:
                 check_opening(source, log, limits.opening)
-            ingested = ingest(source, log, notes, limits, folder, names)
+            ingested = ingest(source, log, notes, limits, folder, provenance)
         sources = ingested.sources or {}
     except RecordingError as error:
         remove_kept(folder)
@@ -367,7 +389,7 @@ def ingest_as_planned(
             sources = read_log(source, lambda: True)  # no digests of large files
     if versions := plan.get("files"):
         write_known(sources, folder, versions)
-    return ingested.quality(names | {"power_cycled": notes.power_cycled})
+    return ingested.quality(provenance | {"power_cycled": notes.power_cycled})
 
 
 def write_failed(settings: str, failure: Failure, path: Path) -> None:
@@ -388,7 +410,7 @@ def write_failed(settings: str, failure: Failure, path: Path) -> None:
         "device": notes.get("device") or failure.recording,
         "recording": failure.recording,
         "kind": plan.get("kind", "static"),
-        "simulated": plan["simulated"],
+        "simulated": _stated_simulated(plan),
         "status": "failed",
         "started": notes.get("started"),
         "reason": failure.reason,
@@ -396,6 +418,11 @@ def write_failed(settings: str, failure: Failure, path: Path) -> None:
     finding = dict(failure.finding().row(failure.sensor, str(failure.recording)))
     remove_kept(path.parent)
     Quality(recording, [finding], {}, {}, asdict(failure)).write(path)
+
+
+def _stated_simulated(plan: dict[str, Any]) -> bool:
+    """Return whether the run makes the recording, or the notes beside its log say so."""
+    return bool(plan["simulated"] or plan.get("notes", {}).get("simulated"))
 
 
 def rejected(error: RecordingError, notes: RecordingNotes) -> Ingested:

@@ -21,6 +21,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from imubench_pipeline.readers.arrays.arrow import METADATA
 from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
 from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import RecordingError
@@ -31,7 +32,6 @@ ROW_GROUP = 1 << 20
 
 MEND = "remove it, and the next run reads the log again"
 
-_METADATA = b"imubench"
 BESIDE = frozenset({TEMPERATURE, POSITION, TABLE_RATE})
 """Columns that are no channels."""
 
@@ -78,7 +78,7 @@ class LogWriter:
         """Write what is waiting, and the metadata of the file; close it."""
         if self._rows:
             self._flush(self._rows)
-        self._writer.add_key_value_metadata({_METADATA: json.dumps(metadata)})
+        self._writer.add_key_value_metadata({METADATA: json.dumps(metadata)})
         self._writer.close()
 
     def _flush(self, rows: int) -> None:
@@ -209,7 +209,7 @@ def _named_if_damaged(path: Path) -> Iterator[None]:
 def read_metadata(path: Path) -> dict[str, Any]:
     """Return the metadata that `LogWriter.finish` wrote."""
     metadata = pq.read_metadata(path).metadata or {}
-    data: dict[str, Any] = json.loads(metadata[_METADATA])
+    data: dict[str, Any] = json.loads(metadata[METADATA])
     return data
 
 

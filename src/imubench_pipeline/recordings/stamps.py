@@ -25,6 +25,13 @@ _LONG, _TWO = 1.75, 2.2
 _MIDDLE = 0.45
 """Level of the quantile that stands for the median: of as many short and long steps the short."""
 
+SET_BACK = 0.45
+"""s; a step back that may be a clock that was set back, as by a leap second. Shorter ones are
+records that were written twice, or in another order."""
+
+_AROUND = 16
+"""Records on each side of a step that tell whether the clock was set back, or one stamp is late."""
+
 _ENOUGH = 1 << 17
 """Stamps of a block that tell its typical interval; all are then followed."""
 
@@ -90,7 +97,8 @@ def _long_steps_are_regular(steps: NDArray[np.float64], median: float) -> bool:
     return bool(np.mean(np.abs(distances - np.median(distances)) <= 1) > 0.9)
 
 
-_MARK = 1 << 14
+_MARK = 1 << 10
+"""Records between two marks."""
 
 
 @dataclass
@@ -177,6 +185,36 @@ def tracked(stamps: Stamps, interval: float, longest_hole: float) -> Track:
 
 
 @njit(cache=True, nogil=True)
+def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: float) -> bool:
+    """Return whether the clock was set back before a record.
+
+    The stamps on both sides go forward, and their medians go back: those of stamps that scatter, or
+    of a record that comes late, do not.
+
+    Parameters
+    ----------
+    stamps : ndarray
+        s, shape (n,); NaN where missing.
+    i : int
+        Place of the record.
+    step : float
+        From the stamp before to that of the record, s.
+    interval : float
+        Between samples, s.
+    """
+    if not step < -max(SET_BACK, 1.5 * interval):
+        return False
+    count = min(_AROUND, i, stamps.size - i)
+    if count < 1:
+        return False
+    for k in range(i - count + 1, i + count):
+        if k != i and stamps[k] < stamps[k - 1]:
+            return False
+    advance = np.nanmedian(stamps[i : i + count]) - np.nanmedian(stamps[i - count : i])
+    return bool(advance < count * interval + 0.5 * step)
+
+
+@njit(cache=True, nogil=True)
 def _follow(
     block: NDArray[np.float64],
     longest_hole: float,
@@ -195,7 +233,7 @@ def _follow(
     origin, last, interval, stamped = state[0], state[1], state[2], state[3]
     point = grid - 1
     elapsed = 0.0
-    late = False
+    late = after_hole = False
     for i in range(block.size):
         stamp = block[i]
         # One stamp far from where the next ones go on is no jump of the clock.
@@ -206,46 +244,57 @@ def _follow(
         )
         if np.isnan(stamp) or astray:
             counts[5] += 1
+            late = after_hole = False
             point += 1
             origin += interval
             points[i] = point
             continue
         step = stamp - last
-        if np.isnan(last) or step < -max(1.0, 10.0 * interval) or step > longest_hole:
+        if (
+            np.isnan(last)
+            or step < -max(1.0, 10.0 * interval)
+            or step > longest_hole
+            or is_set_back(block, i, step, interval)
+        ):
             point += 1
             breaks[counts[0]] = point
             jumps[counts[0]] = step
             counts[0] += 1
             origin = stamp
-            late = False
+            late = after_hole = False
         else:
             whole = int(np.round((stamp - origin) / interval))
             error = stamp - origin - whole * interval
-            if step != 0.0 and (abs(error) > _OFF_GRID * interval or whole < 1):
+            # Records that were written twice advance as all others do.
+            twice = whole < 1 and i > 0 and abs(stamp - block[i - 1] - interval) < 0.1 * interval
+            if step != 0.0 and not twice and (abs(error) > _OFF_GRID * interval or whole < 1):
                 counts[1] += 1
-            if whole == 0 and step > 0.0 and late:
-                # The sample before came late by half an interval: it belongs into the hole.
+            if whole == 0 and ((step > 0.0 and late) or (step == 0.0 and after_hole)):
+                # The sample before came late by half an interval, or its stamp is rounded up to
+                # this one's: it belongs into the hole.
                 points[i - 1] -= 1
                 points[i] = point
                 counts[3] -= 1
-                late = False
+                late = after_hole = False
                 elapsed += step
                 last = stamp
                 continue
             if (
                 whole == 0
-                and step > 0.0
+                and step >= 0.0
                 and i + 1 < block.size
                 and np.round((block[i + 1] - origin) / interval) == 2
             ):
-                # This one came early: the next leaves a hole for it.
+                # This one came early, or its stamp is rounded down: the next leaves a hole for it.
                 whole = 1
                 error = stamp - origin - interval
             if whole < 1:
+                late = after_hole = False
                 counts[2] += 1
                 points[i] = -1
                 continue
-            late = whole == 2 and error < 0.0 and i > 0
+            after_hole = whole == 2 and i > 0
+            late = after_hole and error < 0.0
             if whole > 1:
                 counts[3] += 1
                 if whole - 1 > counts[4]:

@@ -9,13 +9,21 @@ the samples are taken as consecutive, and that is a finding.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.stamps import Stamps, Track, tracked, typical_interval
+from imubench_pipeline.recordings.stamps import (
+    SET_BACK,
+    Stamps,
+    Track,
+    is_set_back,
+    tracked,
+    typical_interval,
+)
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
 
@@ -30,6 +38,11 @@ _SHORTEST, _LONGEST = 1e-18, 1e8
 
 _MOST_HOLES, _MOST_POINTS = 100, 10_000_000
 """Samples that may be missing for each that is there, and beside them: each takes memory."""
+
+_MOST_PAIRS = 10_000
+_FEWEST_OF_GROUP, _FEWEST_GROUPS, _REGULAR = 5, 5, 0.8
+"""Samples of a stamp, stamps, and the part of them that is alike, of which the rate is that of
+these alone."""
 
 _MOST_SEGMENTS = 10_000
 """Each takes 0.1 ms in a step, however short it is."""
@@ -190,7 +203,10 @@ def _grid_findings(track: Track, interval: float) -> list[Finding]:
         times = [point * interval for point in track.starts[1:]]
         findings.append(_segments("the clock jumps or stops", times, track.jumps[1:]))
     if track.duplicates:
-        detail = f"{track.duplicates} records repeat a stamp or fall on an earlier one; left out"
+        detail = (
+            f"{track.duplicates} records repeat a stamp or fall on an earlier one: they were "
+            "written twice, or the clock was set back; left out"
+        )
         findings.append(Finding("repeated_stamps", "note", detail, track.duplicates))
     if track.unstamped:
         detail = f"{track.unstamped} records have no time stamp, or one far astray; taken as "
@@ -270,7 +286,7 @@ def _arrival_order(
     starts, jumps = [0], []
     # Between the records with which a stamp changes: samples that share one are counted whole.
     changed_at, changed_stamp = 0, np.nan
-    samples, elapsed = 0, 0.0
+    groups = Groups()
     for block in stamps():
         # A missing stamp stands for no time: the step after it covers it.
         latest = np.concatenate(([last], block))
@@ -278,6 +294,8 @@ def _arrival_order(
         latest = latest[good]
         steps = np.diff(latest)
         cut = np.abs(steps) > gap
+        for i in np.flatnonzero(steps < -SET_BACK):
+            cut[i] |= is_set_back(latest, i + 1, steps[i], mean)
         starts += [rows + int(i) for i in np.flatnonzero(cut)]
         jumps += steps[cut].tolist()
         usual = np.where(np.isfinite(steps) & ~cut, steps, 0.0)
@@ -288,16 +306,17 @@ def _arrival_order(
             at = np.concatenate(([changed_at], rows + changes))
             when = np.concatenate(([changed_stamp], latest[changes + 1]))
             inside = ~cut[changes] & np.isfinite(when[:-1])
-            samples += int(np.diff(at)[inside].sum())
-            elapsed += float(np.diff(when)[inside].sum())
+            groups.add(np.diff(at)[inside], np.diff(when)[inside])
             changed_at, changed_stamp = int(at[-1]), float(when[-1])
         rows += len(block)
         last = latest[-1]
-    if elapsed <= 0:
+    if groups.elapsed <= 0:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     _check_segments(len(starts))
-    rate = samples / elapsed
+    rate, others = groups.rate()
     findings = [_jittered(track, rate, worst, worst_at / rate)]
+    if others:
+        findings.append(_irregular(others, rate))
     findings += _rate_findings(rate, stated, settings)
     segments = tuple(zip(starts, [*starts[1:], rows], strict=True))
     if len(segments) > 1:
@@ -312,8 +331,65 @@ def _arrival_order(
         False,
         False,
         tuple(findings),
-        rate_error=rate * worst / elapsed,
+        rate_error=rate * worst / groups.elapsed,
     )
+
+
+class Groups:
+    """Numbers of samples between the records with which the stamp changes, and their times."""
+
+    def __init__(self) -> None:
+        self.samples, self.elapsed, self._number = 0, 0.0, 0
+        # How often each pair of samples and time in ns was met; None: no regular groups.
+        self._pairs: Counter[tuple[int, int]] | None = Counter()
+
+    def add(self, samples: NDArray[np.int64], times: NDArray[np.float64]) -> None:
+        """Take consecutive groups, their times in s; shape (n,) each."""
+        self.samples += int(samples.sum())
+        self.elapsed += float(times.sum())
+        self._number += len(samples)
+        if self._pairs is None or self._number * _FEWEST_OF_GROUP > self.samples:
+            self._pairs = None
+            return
+        pairs = np.stack([samples, np.rint(1e9 * times).astype(np.int64)])
+        kinds, numbers = np.unique(pairs, axis=1, return_counts=True)
+        for (samples_of, time), number in zip(kinds.T.tolist(), numbers.tolist(), strict=True):
+            self._pairs[samples_of, time] += number
+        if len(self._pairs) > _MOST_PAIRS:
+            self._pairs = None
+
+    def rate(self) -> tuple[float, int]:
+        """Return the rate, Hz, and how many groups are of another one and do not count for it.
+
+        Stamps in whole seconds have the same number of samples each, but where the clock was set or
+        samples are lost. Without such a number all count alike.
+        """
+        everything = self.samples / self.elapsed, 0
+        if not self._pairs:
+            return everything
+        (samples, time), _ = max(self._pairs.items(), key=lambda pair: pair[1])
+        if samples < _FEWEST_OF_GROUP or time <= 0:
+            return everything
+        regular = {
+            pair: number
+            for pair, number in self._pairs.items()
+            if abs(pair[0] * time - pair[1] * samples) <= max(1.5, 0.02 * samples) * time
+        }
+        number = sum(regular.values())
+        if number < max(_FEWEST_GROUPS, _REGULAR * self._number):
+            return everything
+        counted = sum(pair[0] * number_of for pair, number_of in regular.items())
+        duration = sum(pair[1] * number_of for pair, number_of in regular.items())
+        return 1e9 * counted / duration, self._number - number
+
+
+def _irregular(groups: int, rate: float) -> Finding:
+    """Return the finding of stamps that stand for more or fewer samples than the others."""
+    detail = (
+        f"{groups} stamps stand for more or fewer samples than all others do: the clock was set, "
+        f"or samples are lost; the rate of {rate:.6g} Hz is that of the others"
+    )
+    return Finding("irregular_stamps", "warning", detail, groups)
 
 
 def _jittered(track: Track, rate: float, worst: float, at: float) -> Finding:

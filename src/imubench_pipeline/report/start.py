@@ -133,7 +133,7 @@ def made(views: Sequence[RecordingView]) -> str:
         return ""
     of_them = f"{number} of them {'is' if number == 1 else 'are'}"
     whole = number == len(views)
-    return f"{'All are' if whole else of_them} simulated from published parameters, not measured."
+    return f"{'All are' if whole else of_them} simulated, not measured."
 
 
 def folded(reason: str) -> tuple[str, str]:

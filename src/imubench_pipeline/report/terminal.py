@@ -164,7 +164,7 @@ def _compared(recordings: Sequence[Row]) -> Text:
         f"Recordings: {len(recordings)} of {sensors} sensors; "
         f"{len(recordings) - rejected - failed} analysed, {rejected} rejected"
         + f", {failed} failed" * bool(failed)
-        + f"; {simulated} simulated from published parameters, not measured\n"
+        + f"; {simulated} simulated, not measured\n"
     )
 
 

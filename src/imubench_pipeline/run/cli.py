@@ -222,7 +222,9 @@ def _check(options: argparse.Namespace) -> int:
         serious = [f for f in quality.findings if f["severity"] != "note"]
         worst = max(worst, int(bool(serious)))
         status = quality.recording["status"]
-        print(f"{sensor}/{recording}: {status if status != 'ok' or not serious else 'warnings'}")
+        status = status if status != "ok" or not serious else "warnings"
+        made = ", simulated" * bool(quality.recording.get("simulated"))
+        print(f"{sensor}/{recording}: {status}{made}")
         for finding in quality.findings:
             detail = printable(finding["detail"])
             print(f"  {finding['severity']:8} {finding['finding']}: {detail}")

@@ -79,9 +79,10 @@ def run(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> None:
     # Numerics are loaded for this command only: the others answer at once.
+    from imubench_pipeline.readers.text.header import SIMULATED
     from imubench_pipeline.settings.sensor import TEMPERATURE
     from imubench_pipeline.simulate.imu import simulate_imu
-    from imubench_pipeline.simulate.writing import MARK, layout, notes_path, write_log, write_notes
+    from imubench_pipeline.simulate.writing import layout, notes_path, write_log, write_notes
 
     origin, sensor = _origin(options)
     log = None if sensor is None else sensor.log
@@ -98,15 +99,15 @@ def _run(options: argparse.Namespace) -> None:
         origin.assume("log", text)
     if not motion:
         origin.assume("log", "at rest, and no gravity (--motion)")
-    remarks = [MARK, f"from {origin.source}"]
+    remarks = [f"from {origin.source}"]
     figures = {
         name: [figure.text for figure in of_channel] for name, of_channel in origin.figures.items()
     }
     assumed = [assumption.text for assumption in origin.assumed]
     remarks += [f"{name}: {line}" for name, lines in figures.items() for line in lines]
     remarks += [f"assumed: {line}" for line in _short(assumed)]
-    print(f"{remarks[0]}: {samples:,} samples of {', '.join(columns)} at {rate:g} Hz")
-    print("\n".join(_short(remarks[1:])), flush=True)
+    print(f"{SIMULATED}: {samples:,} samples of {', '.join(columns)} at {rate:g} Hz")
+    print("\n".join(_short(remarks)), flush=True)
     sensor_name = origin.sensor or Path(options.sensor).stem
     about = {
         "from": origin.source,

@@ -290,8 +290,11 @@ class ReportSettings(Strict):
     )
 
 
+_NO_PATH = {"false", "no", "off", "none", "null", ""}
+
+
 def _path_or_none(value: object) -> object:
-    return None if str(value).strip().lower() in {"false", "none", "null", ""} else value
+    return None if str(value).strip().lower() in _NO_PATH else value
 
 
 class Run(Strict):

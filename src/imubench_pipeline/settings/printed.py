@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from imubench_pipeline.settings.conversions import Filter
-from imubench_pipeline.settings.validation import Duration, Frequency, Shown, Strict, Text
+from imubench_pipeline.settings.validation import Duration, Frequency, Strict, Text
 from imubench_pipeline.units import UnitError, dimension_of, quantity_to_si, to_si
 
 Value = float | tuple[float, ...] | dict[str, float]
@@ -65,7 +65,7 @@ class PrintedFigure(Strict):
         description="as printed, ± left out; by axis: {xy: 60, z: 80}; [low, high] of a range; "
         "null: not published"
     )
-    unit: Shown | None = Field(None, description="as the vendor writes it")
+    unit: Text | None = Field(None, description="as the vendor writes it")
     kind: Kind = Field(
         "typ", description="choices: what can be selected; derived: computed from another figure"
     )
@@ -86,10 +86,8 @@ class PrintedFigure(Strict):
         description="grade, range or mode of the sensor that alone has this figure; which of "
         "them the logged ones have, 'options' of the datasheet says",
     )
-    condition: Shown | None = Field(
-        None, description="temperature, supply and the like, as printed"
-    )
-    evidence: Shown | None = Field(None, description="where the figure or its sidedness is from")
+    condition: Text | None = Field(None, description="temperature, supply and the like, as printed")
+    evidence: Text | None = Field(None, description="where the figure or its sidedness is from")
     source: Literal["primary", "secondary"] | None = Field(
         None, description="null: that of the datasheet"
     )
@@ -265,7 +263,7 @@ _LARGEST_ACCELERATION_NOISE = 1.0
 class Datasheet(Strict):
     """What a vendor prints of a sensor."""
 
-    document: Shown | None = None
+    document: Text | None = None
     revision: Text | None = Field(None, description="of the document, with its date")
     source: Literal["primary", "secondary"] | None = Field(
         None,

@@ -20,7 +20,6 @@ from imubench_pipeline.settings.validation import (
     Between,
     ConfigError,
     Frequency,
-    Shown,
     Strict,
     Text,
     of_size,
@@ -250,9 +249,9 @@ def _check_unit(unit: str, dimension: str, key: str) -> None:
 class Sensor(Strict):
     """One IMU model: its logs, what it needs of a vehicle, and its datasheet."""
 
-    vendor: Shown
-    model: Shown
-    price_class: Shown | None = None
+    vendor: Text
+    model: Text
+    price_class: Text | None = None
     sold: bool = Field(
         True,
         description="false: no such sensor can be bought, as a board of several that is simulated; "
@@ -294,6 +293,11 @@ class RecordingNotes(Strict):
 
     device: Text | None = Field(None, description="serial number; default: the recording's name")
     started: Text | None = Field(None, description="date and time of the first sample")
+    simulated: bool | None = Field(
+        None,
+        description="true: the log is simulated, and decides nothing beside measured ones; false "
+        "does not overrule the mark in a log of `imubench simulate`; null: the log says it",
+    )
     power_cycled: bool | None = Field(
         None,
         description="whether the sensor was without power between this recording and the one "

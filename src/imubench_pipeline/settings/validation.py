@@ -6,7 +6,6 @@ import difflib
 import re
 import reprlib
 from collections.abc import Callable, Mapping
-from datetime import date
 from fractions import Fraction
 from typing import Annotated, Any, TypeVar
 
@@ -24,9 +23,14 @@ class UnavailableSettingsError(ConfigError):
 
 
 class Strict(BaseModel):
-    """A group of settings in which an unknown key is an error."""
+    """A group of settings in which an unknown key is an error, and a number may be a text.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    As text it is what ``str`` makes of it: of a number from a file, as it is written there.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, coerce_numbers_to_str=True
+    )
 
 
 def _fraction(value: object) -> float:
@@ -57,13 +61,6 @@ def cut(value: object, words: Callable[[object], str] = _BRIEF.repr, most: int =
     """
     text = words(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
-
-
-def as_text(value: object) -> object:
-    """Return what YAML read as a number or a date as text again."""
-    if isinstance(value, (int, float, date)) and not isinstance(value, bool):
-        return value.isoformat() if isinstance(value, date) else str(value)
-    return value
 
 
 def checked(
@@ -122,9 +119,8 @@ def _shown(text: str) -> str:
     return text
 
 
-Shown = Annotated[str, AfterValidator(_shown)]
+Text = Annotated[str, AfterValidator(_shown)]
 """A text that stands in tables and on pages."""
-Text = Annotated[Shown, BeforeValidator(as_text)]
 Frequency = Annotated[
     Text, checked("frequency", "a frequency above zero"), Field(examples=["100 Hz"])
 ]

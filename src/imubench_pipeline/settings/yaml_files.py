@@ -2,11 +2,17 @@
 
 What is read is bounded before anything is built of it: size, depth, and nodes, those that stand
 behind aliases counted each time. A key that stands twice is an error, whichever would win.
+
+Text stays text. YAML 1.1 takes 0017 for 15, 12:30:45 for 45045, 2026-01-01 for a date and ``no``
+for false. Here a plain word is a text, unless it is null or a decimal or hexadecimal number, and a
+number keeps how it is written: a setting that is declared as text gets that (`validation.Strict`).
+Where a setting is true or false, pydantic makes it of the word. A key is a text.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import stat
 from collections.abc import Hashable, Iterable, Mapping
 from pathlib import Path
@@ -32,7 +38,7 @@ MOST = 200_000
 """Keys and values of a file; what an alias stands for counts where it stands."""
 
 LONGEST_FIGURE = 100
-"""Letters of a number or a date: what is read of base 60, which YAML has, takes their square."""
+"""Letters of a number."""
 
 if TYPE_CHECKING:
     _SAFE = yaml.SafeLoader
@@ -42,23 +48,55 @@ else:
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
-_MERGED = "tag:yaml.org,2002:merge"
-_TEXTS = {"tag:yaml.org,2002:str", "tag:yaml.org,2002:binary"}
-_LARGEST_KEY = 1 << 31
+_TAG = "tag:yaml.org,2002:"
+_MERGED = f"{_TAG}merge"
+_TEXTS = {f"{_TAG}str", f"{_TAG}binary"}
+
+
+class Integer(int):
+    """A whole number that keeps how it is written."""
+
+    written: str
+
+    def __str__(self) -> str:
+        return self.written
+
+
+class Decimal(float):
+    """A number with decimals that keeps how it is written."""
+
+    written: str
+
+    def __str__(self) -> str:
+        return self.written
 
 
 class _Loader(_SAFE):
     """Builds plain values; refuses a key that stands twice."""
+
+    yaml_implicit_resolvers = {}  # noqa: RUF012  # PyYAML declares it as one of an instance
+
+    def construct_integer(self, node: yaml.ScalarNode) -> Integer:
+        """Return a whole number in base 10 or 16."""
+        text = node.value.replace("_", "")
+        number = Integer(text, 16 if text.lstrip("+-")[:2] == "0x" else 10)
+        number.written = node.value
+        return number
+
+    def construct_decimal(self, node: yaml.ScalarNode) -> Decimal:
+        """Return a number with decimals."""
+        number = Decimal(self.construct_yaml_float(node))
+        number.written = node.value
+        return number
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
         seen: set[Hashable] = set()
         for key_node, _ in node.value:
             if key_node.tag == _MERGED:
                 continue
+            if isinstance(key_node, yaml.ScalarNode):
+                key_node.tag = f"{_TAG}str"
             key = self.construct_object(key_node, deep=True)
-            if isinstance(key, float) or (isinstance(key, int) and abs(key) > _LARGEST_KEY):
-                # A table of numbers that were chosen for it takes the square of their count.
-                raise _fault(key_node, f"found the key {cut(key)}; expected a name")
             if isinstance(key, Hashable):
                 if key in seen:
                     raise _fault(key_node, f"the key {cut(key)} stands twice; remove one")
@@ -79,6 +117,22 @@ class _Loader(_SAFE):
             kind = node.tag.rpartition(":")[2]
             problem = f"{cut(node.value)} is no {cut(kind, str)}"
             raise _fault(node, problem) from error
+
+
+_Loader.add_constructor(f"{_TAG}int", _Loader.construct_integer)
+_Loader.add_constructor(f"{_TAG}float", _Loader.construct_decimal)
+for _kind, _pattern, _first in (
+    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("int", r"[-+]?(0x[0-9a-fA-F_]+|[0-9][0-9_]*)", list("-+0123456789")),
+    (
+        "float",
+        r"[-+]?[0-9][0-9_]*\.[0-9_]*([eE][-+][0-9]+)?|\.[0-9][0-9_]*([eE][-+][0-9]+)?"
+        r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+        list("-+0123456789."),
+    ),
+    ("merge", "<<", ["<"]),
+):
+    _Loader.add_implicit_resolver(f"{_TAG}{_kind}", re.compile(rf"^(?:{_pattern})$"), _first)
 
 
 def _fault(at: Any, problem: str) -> yaml.MarkedYAMLError:

@@ -14,6 +14,7 @@ from typing import Any
 import pyarrow as pa
 import yaml
 
+from imubench_pipeline.readers.text.header import SIMULATED, states_simulated
 from imubench_pipeline.readers.text_log import TextLog
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.sensor import (
@@ -28,9 +29,8 @@ from imubench_pipeline.tables import replacing
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS
 
-MARK = "SIMULATED, not measured"
 FORMATS = (".parquet", ".csv")
-_HEAD = f"# {MARK}: "
+_HEAD = f"# {SIMULATED}: "
 """How notes begin, before the name of their log."""
 
 Blocks = Iterable[Mapping[str, Array]]
@@ -81,7 +81,7 @@ def write_notes(path: Path, log: LogFormat, sensor: LogFormat | None, words: str
     """
     own = log.model_dump(exclude_unset=True, exclude_none=True)
     base = {} if sensor is None else sensor.model_dump(exclude_unset=True)
-    notes = {"device": "simulated", "log": _over(own, base)}
+    notes = {"device": "simulated", "simulated": True, "log": _over(own, base)}
     text = yaml.safe_dump(notes, sort_keys=False, default_flow_style=None, width=100)
     comment = "".join(f"# {line}\n" for line in words.splitlines())
     with replacing(notes_path(path)) as temporary:
@@ -100,10 +100,11 @@ def notes_path(path: Path) -> Path:
     if not notes.exists():
         return notes
     first = notes.read_text("utf-8", "replace").partition("\n")[0]
-    if not first.startswith(_HEAD.rstrip(": ")):
+    mark, _, log = first.partition(": ")
+    if not states_simulated([mark]):
         raise ConfigError(f"{notes}: is there already and not of a simulation; name another --out")
-    other = path.with_name(first.removeprefix(_HEAD))
-    if first.startswith(_HEAD) and other != path and other.is_file():
+    other = path.with_name(log)
+    if log and other != path and other.is_file():
         raise ConfigError(
             f"{notes}: says how {other.name} is written, and that cannot be read without it; "
             f"expected a log of another name than {path.stem!r}: name another --out"

@@ -14,10 +14,12 @@ from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.pooled import pooled_rows
 from imubench_pipeline.recordings.fitness import (
+    WITH_DOUBTS,
     doubts,
     judged,
     left_out,
     not_sold,
+    simulated_beside_measured,
     undecided,
     with_doubts,
     with_doubts_of_all,
@@ -74,6 +76,7 @@ def joined_tables(
         findings += comparison.findings(joined["backtest"].to_pylist())
     joined["findings"] = build("findings", findings)
     doubted = [
+        *simulated_beside_measured(about),
         *not_sold(about, {name for name, sensor in sensors.items() if not sensor.sold}),
         *doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()),
     ]
@@ -83,16 +86,13 @@ def joined_tables(
     apart = left_out(about)
     pools = pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
     joined["pooled"] = build("pooled", with_doubts_of_all(pools, about))
-    for name in _JUDGED & joined.keys():
+    for name in WITH_DOUBTS & joined.keys():
         joined[name] = build(name, with_doubts(joined[name].to_pylist(), about))
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published_figures"] = build("published_figures", published_rows(truths, truth, joined))
     return with_failures(joined, failures)
 
-
-_JUDGED = {"error_budget", "datasheet"}
-"""Tables of a recording's own step whose rows say what is doubted of the recording."""
 
 _OF_LOGS = {"step": "bias_step", "warm_up": "warm_up_drift"}
 """What is found of a log as it is read, and found again, with its size, beside its noise."""

@@ -59,7 +59,7 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
     for name, source in sources.items():
         files.setdefault(source.file or "log.txt", {})[name] = source
     folder.mkdir(parents=True, exist_ok=True)
-    remarks = ("simulated, not measured", f"Update Rate: {recording.rate}")
+    remarks = (f"Update Rate: {recording.rate}",)
     with ExitStack() as stack:
         writers = [
             stack.enter_context(TextLog(folder / name, log, sources, rate, remarks, np.float32))

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from imubench_pipeline.recordings.fitness import WITH_DOUBTS, with_doubts, without_simulated
+from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures
 
 
@@ -16,4 +18,20 @@ def tables_of_all(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
     for name, paths in parts.items():
         joined[name], failed = read_with_failures(name, paths)
         failures |= dict.fromkeys(failed)
-    return with_failures(joined, list(failures))
+    return _without_simulated(with_failures(joined, list(failures)))
+
+
+def _without_simulated(tables: dict[str, pa.Table]) -> dict[str, pa.Table]:
+    """Return tables in which no simulated recording decides beside measured ones of any sensor."""
+    recordings, new = without_simulated(tables["recordings"].to_pylist())
+    if not new:
+        return tables
+    doubts = [*(doubt.row() for doubt in new), *tables["doubts"].to_pylist()]
+    return tables | {
+        "recordings": build("recordings", recordings),
+        "doubts": build("doubts", doubts),
+        **{
+            name: build(name, with_doubts(tables[name].to_pylist(), recordings))
+            for name in WITH_DOUBTS & tables.keys()
+        },
+    }

@@ -7,9 +7,10 @@ checksums. A record batch of a compressed Feather file is unpacked as a whole, a
 
 from __future__ import annotations
 
+import json
 import struct
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,9 @@ from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.parquet_pages import check_pages
 from imubench_pipeline.readers.arrays.table import Column, Table, UnusableError
 from imubench_pipeline.readers.bounds import LARGEST_ARROW_BATCH
+
+METADATA = b"imubench"
+"""Key of what a Parquet file that this package has written says of itself, as JSON."""
 
 _PARQUET, _FILE, _STREAM, _FEATHER_1 = b"PAR1", b"ARROW1", b"\xff\xff\xff\xff", b"FEA1"
 
@@ -107,6 +111,7 @@ class _ParquetTable(_ArrowTable):
         super().__init__(file.schema_arrow)
         self._path, self._file = path, file
         self.rows = file.metadata.num_rows
+        self.simulated = _states_simulated(file.metadata.metadata or {})
 
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
         check_pages(self._path, self._file.metadata, names)
@@ -131,6 +136,15 @@ class _IpcTable(_ArrowTable):
             return
         for number in range(self._reader.num_record_batches):
             yield self._reader.get_batch(number)
+
+
+def _states_simulated(metadata: Mapping[bytes, bytes]) -> bool:
+    """Return whether the metadata of a file that this package wrote say that it is simulated."""
+    try:
+        about = json.loads(metadata.get(METADATA, b"{}"))
+    except ValueError:
+        return False
+    return isinstance(about, dict) and about.get("simulated") is True
 
 
 def _kind(kind: pa.DataType) -> str:

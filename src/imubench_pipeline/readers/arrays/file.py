@@ -146,6 +146,7 @@ class ArrayFile(LogFile):
         if self.log.time is not None:
             places[_TIME] = self._time_place(by_name)
         self.units = _stated_units(places)
+        self.simulated = any(table.simulated for table, _ in places.values())
         return places
 
     def _time_place(self, tables: dict[str, Table]) -> _Place:

@@ -68,6 +68,8 @@ class Table(ABC):
     """Names of the columns; empty where they have none."""
     fault: str | None = None
     """Why it cannot be used at all, as the end of a sentence."""
+    simulated: bool = False
+    """It has the mark of a simulated log."""
 
     @property
     def shown(self) -> str:

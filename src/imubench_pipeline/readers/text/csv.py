@@ -24,7 +24,13 @@ from imubench_pipeline.readers.file_format import (
 from imubench_pipeline.readers.stated_units import StatedUnit, stated
 from imubench_pipeline.readers.text.cells import MISSING, Decimal, is_missing, is_number
 from imubench_pipeline.readers.text.complete_lines import CompleteLines, first_lines
-from imubench_pipeline.readers.text.header import completed, says_units, stated_rate, stated_start
+from imubench_pipeline.readers.text.header import (
+    completed,
+    says_units,
+    stated_rate,
+    stated_start,
+    states_simulated,
+)
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
 from imubench_pipeline.readers.text.records import Records
 from imubench_pipeline.readers.text.stamps import (
@@ -43,9 +49,14 @@ _ADVICE = (
 )
 _NOTHING = "Empty CSV file"
 _OPEN_QUOTE = "out of sync"
+_SECOND_SIXTY = re.compile(r"\d:\d\d:60(?!\d)")
 _ARROW_ROW = re.compile(r"Row #(\d+)")
 _ARROW_COLUMN = re.compile(r"In CSV column #(\d+)")
 _ARROW_VALUE = re.compile(r"invalid value '(.*)'|zone offset in '(.*?)'", re.DOTALL)
+
+
+class _SecondSixtyError(Exception):
+    """A stamp in a leap second, which pyarrow does not read."""
 
 
 class CsvFile(LogFile):
@@ -61,6 +72,7 @@ class CsvFile(LogFile):
         self.units = text_units(layout, columns)
         preamble = [line.decode("utf-8", "replace") for line in layout.preamble]
         self.rate, self.started = stated_rate(preamble), stated_start(preamble)
+        self.simulated = states_simulated(preamble)
         time = None if self.log.time is None else TextTime(self, layout)
         for name, at in columns.items():
             if time is not None and at in time.types:
@@ -68,6 +80,25 @@ class CsvFile(LogFile):
                     f"{self.path.name}: column {layout.names[at]!r} is taken for time and for "
                     f"{name}; mend 'column' of one of them in the sensor file"
                 )
+        before, rows = list(self.findings), 0
+        try:
+            for batch in self._batches(layout, columns, time):
+                rows += len(batch)
+                yield batch
+        except _SecondSixtyError:
+            # Once more, for pyarrow knows no leap second: what was read is passed over.
+            self.findings[:] = before
+            time = TextTime(self, layout, as_text=True)
+            for batch in self._batches(layout, columns, time):
+                again = min(rows, len(batch))
+                rows -= again
+                if again < len(batch):
+                    yield batch.after(again)
+
+    def _batches(
+        self, layout: TextLayout, columns: Mapping[str, int], time: TextTime | None
+    ) -> Iterator[Batch]:
+        """Yield all records, their stamps read as ``time`` says."""
         records = layout.records()
         rows = 0
         for part in self._parts(layout, set(columns.values()), time, records):
@@ -85,6 +116,14 @@ class CsvFile(LogFile):
         if rows == 0:
             raise RecordingError(f"{self.path.name}: no complete record; expected at least one")
         self._report(layout, records)
+        if time is not None and time.leap_seconds:
+            number = time.leap_seconds
+            self.note(
+                "leap_second",
+                f"the stamps count {number} leap second{'s' * (number > 1)}",
+                number,
+                "note",
+            )
 
     def _parts(
         self, layout: TextLayout, figures: set[int], time: TextTime | None, records: Records
@@ -125,6 +164,10 @@ class CsvFile(LogFile):
                 if lines.error is not None:
                     raise lines.error from None
                 if _NOTHING not in str(error):
+                    if time is not None and time.types.get(time.position) != pa.string():
+                        value = _ARROW_VALUE.search(str(error))
+                        if value is not None and _SECOND_SIXTY.search(value[1] or ""):
+                            raise _SecondSixtyError from None
                     raise self._explained(error, fault, layout, time) from None
             self._note_zeros(lines, records.damaged)
         if fault.row is not None:

@@ -78,6 +78,21 @@ def are_units(row: list[str], places: set[int]) -> bool:
     return bool(texts) and not any(is_number(text) or text[0].isdigit() for text in texts)
 
 
+SIMULATED = "SIMULATED by imubench, not measured"
+"""A comment at the top of text logs that this package has simulated."""
+
+_MARKS = {SIMULATED, "SIMULATED, not measured"}
+"""The second is that of earlier versions."""
+
+
+def states_simulated(lines: Iterable[str]) -> bool:
+    """Return whether one of the lines is the mark of a simulated log, and nothing else.
+
+    A spreadsheet may have added quotes and empty cells.
+    """
+    return any(line.strip().strip("\"',;\t").lstrip("#%;!/ ").rstrip() in _MARKS for line in lines)
+
+
 _RATE = re.compile(
     r"\b(?:update|sampl\w*|output|data|logging)[ _]?(?:data[ _]?)?(?:rate|freq\w*)\W{1,4}?"
     r"(?P<figure>\d+(?:[.,]\d+)?)\s*(?P<kilo>k)?(?:hz|sps)\b",

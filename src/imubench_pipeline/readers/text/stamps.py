@@ -84,6 +84,9 @@ class TextStamps:
         # Without a date, stamps start again at midnight.
         self.dated = "d" in self._fields or "j" in self._fields
         self._zoned: bool | None = None
+        self.leap_seconds = 0
+        # The last stamp, before leap seconds are added, and whether it is in one.
+        self._last: tuple[int, bool] = (0, False)
 
     def nanoseconds(self, texts: pa.Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return ns since 1970, or since midnight; and which stamps are there.
@@ -107,7 +110,27 @@ class TextStamps:
             text = texts[int(row)].as_py()
             if not is_missing(text):
                 raise StampError(int(row), text)
+        if "S" in self._fields:
+            leap = np.asarray(pc.fill_null(pc.equal(fields.field("S"), "60"), False))
+            time[sound] = self._counted(time[sound], leap[sound])
         return time, sound
+
+    def _counted(self, time: NDArray[np.int64], leap: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return stamps that go on through leap seconds.
+
+        Second 60 is taken for second 0 of the next minute, which follows it after a leap second.
+        Where a figure was only rounded up to 60, time goes on.
+        """
+        if not len(time):
+            return time
+        last, in_leap = self._last
+        before = np.concatenate(([last], time[:-1]))
+        if not self.dated:
+            before %= DAY
+        ended = np.concatenate(([in_leap], leap[:-1])) & ~leap & (time <= before)
+        seconds = self.leap_seconds + np.cumsum(ended)
+        self._last, self.leap_seconds = (int(time[-1]), bool(leap[-1])), int(seconds[-1])
+        return time + seconds * 10**9
 
     def _composed(self, fields: pa.StructArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         def figures(name: str, default: int) -> NDArray[np.int64]:
@@ -248,12 +271,13 @@ class TextTime:
     """Makes seconds of the stamps of a text log.
 
     ``types`` says what pyarrow is to read, by position, a date in a column of its own first;
-    ``position`` is that of the stamps, and ``expected`` what a stamp is, for messages.
+    ``position`` is that of the stamps, and ``expected`` what a stamp is, for messages. ``as_text``:
+    pyarrow is not to read ISO 8601.
     """
 
     _text: TextStamps | None = None
 
-    def __init__(self, file: LogFile, layout: TextLayout) -> None:
+    def __init__(self, file: LogFile, layout: TextLayout, *, as_text: bool = False) -> None:
         assert file.log.time is not None  # made where there are stamps
         source = file.log.time
         self._source = source
@@ -261,24 +285,29 @@ class TextTime:
         self.position = positions[-1]
         stamps = [row[self.position] for row in layout.rows if self.position < len(row)]
         present = [stamp for stamp in stamps if not is_missing(stamp)]
-        self.types = dict.fromkeys(positions, self._type(present))
+        self.types = dict.fromkeys(positions, self._type(present, as_text=as_text))
         daily = self._text is not None and not self._text.dated
         self._clock = Clock(file, DAY if daily else source.wraps, self._started)
         self.expected = f"a time stamp as {source.format or source.unit!r}"
         if present:
             self.expected += f", like {present[0]!r}"
 
-    def _type(self, stamps: list[str]) -> pa.DataType:
+    def _type(self, stamps: list[str], *, as_text: bool) -> pa.DataType:
         if self._source.format is None:
             # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
             whole = self._source.unit == "ns" and all(_WHOLE.fullmatch(s.strip()) for s in stamps)
             return pa.int64() if whole else pa.float64()
-        if self._source.format == "iso8601" and self._source.date is None:
+        if self._source.format == "iso8601" and self._source.date is None and not as_text:
             kind = arrow_type(stamps)
             if kind is not None:
                 return kind
         self._text = TextStamps(self._source.format)
         return pa.string()
+
+    @property
+    def leap_seconds(self) -> int:
+        """How many there were, among stamps that were read as text."""
+        return 0 if self._text is None else self._text.leap_seconds
 
     def seconds(self, part: pa.RecordBatch) -> NDArray[np.float64]:
         """Return s since the first stamp of the file; NaN where the stamp is missing.
