@@ -9,12 +9,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from imubench_pipeline.settings.shipped import folders
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import files_in, read_settings, read_yaml
+from imubench_pipeline.tables.outputs import OutputFile, add_output
 from imubench_pipeline.units import UnitError, naming, quantity_to_si
 
 if TYPE_CHECKING:
@@ -33,7 +35,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "sensor", help="name of a sensor file, whose datasheet is taken, or a file of models"
     )
-    parser.add_argument("--out", type=Path, required=True, help="log to write: .parquet or .csv")
+    add_output(
+        parser,
+        "--out",
+        partial(OutputFile, adds_to={"logs"}),
+        required=True,
+        help="log to write: .parquet or .csv",
+    )
     length = parser.add_mutually_exclusive_group(required=True)
     length.add_argument("--hours", type=float, help="length of the log")
     length.add_argument("--duration", metavar="TIME", help="length with its unit, such as 90 s")
@@ -71,9 +79,6 @@ def run(options: argparse.Namespace) -> int:
     except (ConfigError, UnitError) as error:
         print(error, file=sys.stderr)
         return 2
-    except OSError as error:
-        print(f"{options.out}: {error.strerror or error}", file=sys.stderr)
-        return 2
     return 0
 
 
@@ -81,7 +86,7 @@ def _run(options: argparse.Namespace) -> None:
     # Numerics are loaded for this command only: the others answer at once.
     from imubench_pipeline.settings.sensor import TEMPERATURE
     from imubench_pipeline.simulate.imu import simulate_imu
-    from imubench_pipeline.simulate.writing import MARK, layout, notes_path, write_log, write_notes
+    from imubench_pipeline.simulate.writing import MARK, check_notes, layout, notes_text, write_log
 
     origin, sensor = _origin(options)
     log = None if sensor is None else sensor.log
@@ -90,8 +95,11 @@ def _run(options: argparse.Namespace) -> None:
     samples = round(duration * rate)
     motion, temperature = _profiles(options, origin)
     columns = [*origin.imu.axes, *([TEMPERATURE] if temperature is not None else [])]
-    form = layout(options.out, columns, rate, log)
-    notes_path(options.out)
+    out: OutputFile = options.out
+    form = layout(out.path, columns, rate, log)
+    notes = out.beside(out.path.with_suffix(".yaml"))
+    check_notes(notes.path, out.path)
+    notes.check()
     if temperature is None and any(axis.drift for axis in origin.imu.axes.values()):
         origin.assume("drift", "no drift with temperature: none is given (--temperature)")
     for text in (*_ended(duration, motion, temperature), *_folded(origin, rate)):
@@ -118,7 +126,7 @@ def _run(options: argparse.Namespace) -> None:
         "motion": None if options.motion is None else str(options.motion),
     }
     kind = "static" if not motion else "in_motion"
-    metadata = _metadata(sensor_name, options.out.stem, kind, rate, columns) | {"simulation": about}
+    metadata = _metadata(sensor_name, out.path.stem, kind, rate, columns) | {"simulation": about}
     # A name of its own in the stream: the same seed gives every sensor its own noise.
     blocks = simulate_imu(
         origin.imu,
@@ -130,13 +138,14 @@ def _run(options: argparse.Namespace) -> None:
         temperature=temperature,
         threads=os.cpu_count() or 1,
     )
-    with _progress(samples) as report:
-        write_log(options.out, blocks, columns, form, metadata, remarks, report)
-    write_notes(options.out, form, log, f"from {origin.source}")
-    size = options.out.stat().st_size / 1e6
-    print(
-        f"{options.out}: {size:.1f} MB; {options.out.with_suffix('.yaml')} says how it is written"
-    )
+    # The notes are there before the log, which cannot be read without them.
+    with out.replacing() as temporary, notes.replacing() as beside:
+        with _progress(samples) as report:
+            write_log(temporary, blocks, columns, form, metadata, remarks, report)
+        words = notes_text(out.path.name, form, log, f"from {origin.source}")
+        beside.write_text(words, encoding="utf-8")
+    size = out.path.stat().st_size / 1e6
+    print(f"{out}: {size:.1f} MB; {notes} says how it is written")
 
 
 def _metadata(
