@@ -30,6 +30,7 @@ from imubench_pipeline.run.analysis import command as analysis
 from imubench_pipeline.run.nightly import command as nightly
 from imubench_pipeline.run.places import places_about
 from imubench_pipeline.run.verification import command as verification
+from imubench_pipeline.settings.command_line import LONGEST, named_path, number, seconds
 from imubench_pipeline.settings.config import Run, read_config
 from imubench_pipeline.settings.extras import ExtraError
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
@@ -118,13 +119,6 @@ def _close_terminal() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def named_path(text: str) -> Path:
-    """Return a path that an option names."""
-    if not text or "\0" in text:
-        raise argparse.ArgumentTypeError(f"found {text!r}; expected a path")
-    return Path(text)
-
-
 def _add_schema(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", choices=sorted(SCHEMAS), help="which configuration file")
     add_output(parser, "--output", help="where to write it; default: the terminal")
@@ -162,13 +156,17 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--horizon",
-        type=nightly.seconds,
+        type=number(1e-9, LONGEST, "a time above 0, such as 60 s", seconds),
         default="60 s",
         metavar="TIME",
         help="of coasting, for which terms that the program lacks are mapped; default: 60 s",
     )
     parser.add_argument(
-        "--inflate", type=float, default=1.0, metavar="FACTOR", help="multiplies every deviation"
+        "--inflate",
+        type=number(1e-6, 1e6, "a factor of 1e-6 to 1e6"),
+        default=1.0,
+        metavar="FACTOR",
+        help="multiplies every deviation",
     )
     parser.add_argument("--because", help="reason of --inflate, or of the use of unfit recordings")
     parser.add_argument(
@@ -178,15 +176,25 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--excess",
-        type=float,
+        type=number(1.0, 1e6, "a factor of 1 to 1e6"),
         default=3.0,
         metavar="FACTOR",
         help="an overbound whose Allan deviation must be more times its limit is refused; "
         "default: 3",
     )
     parser.add_argument("--method", help="of the estimates; default: the recommended one")
-    parser.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="default: the recording's")
+    parser.add_argument(
+        "--latitude",
+        type=number(-90.0, 90.0, "a latitude of -90 to 90, in degrees"),
+        metavar="DEG",
+        help="for gravity",
+    )
+    parser.add_argument(
+        "--rate",
+        type=number(1e-6, 1e9, "a rate above 0, in Hz"),
+        metavar="HZ",
+        help="default: the recording's",
+    )
     add_output(parser, "--output", help="where to write; default: the terminal")
 
 
@@ -303,7 +311,7 @@ def _inspect(options: argparse.Namespace) -> int:
 
 
 def _completion(options: argparse.Namespace) -> int:
-    print(completion.script(command_parser(), options.shell, named_path))
+    print(completion.script(command_parser(), options.shell))
     return 0
 
 

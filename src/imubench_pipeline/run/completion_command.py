@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from pathlib import Path
 
 import shtab
+
+from imubench_pipeline.settings.command_line import named_path
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,21 +18,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("shell", choices=shtab.SUPPORTED_SHELLS, help="which shell")
 
 
-def script(
-    parser: argparse.ArgumentParser, shell: str, path_type: Callable[[str], Path] = Path
-) -> str:
-    """Return the script for a shell; where a path is asked for, files are what it completes.
-
-    Parameters
-    ----------
-    path_type : callable
-        What options that name a path have as their type.
-    """
+def script(parser: argparse.ArgumentParser, shell: str) -> str:
+    """Return the script for a shell; where a path is asked for, files are what it completes."""
     of_commands = next(
         action for action in parser._actions if isinstance(action, argparse._SubParsersAction)
     )
     for command in of_commands.choices.values():
         for action in command._actions:
-            if action.type is path_type:
+            if action.type is named_path:
                 action.complete = shtab.FILE
     return shtab.complete(parser, shell)

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from imubench_pipeline.settings.command_line import MOST_WHOLE, whole_number
 from imubench_pipeline.settings.shipped import folders
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import files_in, read_settings, read_yaml
@@ -25,7 +26,10 @@ if TYPE_CHECKING:
 
 _YAML = (".yaml", ".yml")
 _MOST = 1 << 36
+_BEYOND = 1e15
 _WORTH_SAYING = 1.02
+_COLDEST, _HOTTEST = -273.15, 1000.0
+"""degC that a sensor may have."""
 _PATIENCE = 3.0
 """Seconds between two lines of progress where there is no terminal."""
 
@@ -59,7 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a YAML file with a formula for each channel, or a CSV or Parquet file with columns "
         "'time [s]' and 'gyro_x [deg/s]' to 'accel_z [m/s^2]'; default: at rest, and no gravity",
     )
-    parser.add_argument("--seed", type=int, default=1, help="of the noise; default: 1")
+    parser.add_argument(
+        "--seed",
+        type=whole_number(0, MOST_WHOLE, "a whole number from 0"),
+        default=1,
+        help="of the noise; default: 1",
+    )
     parser.add_argument(
         "--results", type=Path, help="folder of a run: its estimates replace printed figures"
     )
@@ -139,11 +148,10 @@ def _run(options: argparse.Namespace) -> None:
         threads=os.cpu_count() or 1,
     )
     # The notes are there before the log, which cannot be read without them.
-    with out.replacing() as temporary, notes.replacing() as beside:
+    with out.replacing() as temporary:
         with _progress(samples) as report:
             write_log(temporary, blocks, columns, form, metadata, remarks, report)
-        words = notes_text(out.path.name, form, log, f"from {origin.source}")
-        beside.write_text(words, encoding="utf-8")
+        notes.write(notes_text(out.path.name, form, log, f"from {origin.source}"))
     size = out.path.stat().st_size / 1e6
     print(f"{out}: {size:.1f} MB; {notes} says how it is written")
 
@@ -240,10 +248,11 @@ def _duration(text: str | None, hours: float | None, rate: float) -> float:
         duration, option = 3600.0 * hours, f"--hours {hours:g}"
     if not math.isfinite(duration):
         raise ConfigError(f"{option}: expected a length of 1 to {_MOST} samples")
-    samples = round(duration * rate)
-    if not 1 <= samples <= _MOST:
+    samples = duration * rate
+    if not 0.5 < samples <= _MOST:
+        shown = f"{samples:.0f}" if abs(samples) < _BEYOND else f"{samples:g}"
         raise ConfigError(
-            f"{option}: {duration:g} s at {rate:g} Hz are {samples} samples; expected 1 to {_MOST}"
+            f"{option}: {duration:g} s at {rate:g} Hz are {shown} samples; expected 1 to {_MOST}"
         )
     return duration
 
@@ -279,7 +288,11 @@ def _profiles(
         warm = {"form": "file", "file": str(path)}
     else:
         with naming("--temperature: "):
-            quantity_to_si(options.temperature, "temperature")
+            celsius = quantity_to_si(options.temperature, "temperature")
+        if not _COLDEST <= celsius <= _HOTTEST:
+            raise ConfigError(
+                f"--temperature {options.temperature}: expected {_COLDEST:g} to {_HOTTEST:g} degC"
+            )
         warm = options.temperature
     around = parse(Surroundings, {"temperature": warm}, options.temperature)
     _, temperature = profiles_of(around, folder)

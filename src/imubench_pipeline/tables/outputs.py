@@ -100,6 +100,11 @@ class Output:
         real = Path(os.path.realpath(self.path))
         if status is not None and not _is_at(real, status):
             raise OutputError(f"{self}: has no name in a folder; name a file")
+        there = next(folder for folder in (real, *real.parents) if folder.exists())
+        if status is None and not there.is_dir():
+            raise OutputError(f"{self}: {printable(str(there))} is no folder; name another place")
+        if not os.access(there.parent if status is not None else there, os.W_OK | os.X_OK):
+            raise OutputError(f"{self}: {explain(PermissionError(errno.EACCES, 'Not writable'))}")
         return real, status
 
     @contextmanager
@@ -242,7 +247,7 @@ class OutputFolder(Output):
         return target
 
 
-class _StoreOutput(argparse.Action):
+class StoreOutput(argparse.Action):
     """Stores an output, whose path is the value of the option."""
 
     def __init__(self, *arguments: Any, make: Callable[[Path], Output], **keys: Any) -> None:
@@ -275,7 +280,7 @@ def add_output(
     keys
         As `argparse.ArgumentParser.add_argument` takes them.
     """
-    parser.add_argument(name, type=Path, action=_StoreOutput, make=make, **keys)
+    parser.add_argument(name, type=Path, action=StoreOutput, make=make, **keys)
     if name.startswith("-") and "--force" not in parser._option_string_actions:
         parser.add_argument(
             "--force", action="store_true", help="replace an output file that is there already"
@@ -298,11 +303,6 @@ def explain(error: OSError) -> str:
     """Return what went wrong with a file, and how to mend it, as one line."""
     mended = _MENDED.get(error.errno or 0, "name another place")
     return f"{printable(error.strerror or str(error))}; {mended}"
-
-
-def is_output(action: argparse.Action) -> bool:
-    """Return whether an option of a parser names an output."""
-    return isinstance(action, _StoreOutput)
 
 
 def check_outputs(options: argparse.Namespace, places: Callable[[Path], Iterable[Place]]) -> None:

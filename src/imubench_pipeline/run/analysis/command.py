@@ -14,6 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from imubench_pipeline.settings.command_line import MOST_WHOLE, whole_number
 from imubench_pipeline.settings.extras import extra
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
@@ -71,7 +72,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
     )
     parser.add_argument(
-        "-c", "--cores", type=_cores, default=os.cpu_count() or 1, metavar="N", help="default: all"
+        "-c",
+        "--cores",
+        type=whole_number(1, MOST_WHOLE, "at least 1"),
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="default: all",
     )
 
 
@@ -133,13 +139,6 @@ def _called(arguments: argparse.Namespace) -> str:
     }
     words = [f"{name}={value}" for name, value in options.items() if value is not None]
     return shlex.join(["imubench", "analyse", *words, "--", *map(str, arguments.logs)])
-
-
-def _cores(text: str) -> int:
-    cores = int(text)
-    if cores < 1:
-        raise argparse.ArgumentTypeError(f"found {cores}; expected at least 1")
-    return cores
 
 
 def _say(text: str) -> None:
