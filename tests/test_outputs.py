@@ -19,11 +19,14 @@ import pytest
 
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.static_figures import of_run
-from imubench_pipeline.run.cli import command_parser, main
+from imubench_pipeline.run import cli
+from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.command_line import named_path
-from tests.conftest import PROJECT, few
+from imubench_pipeline.tables.outputs import OutputFolder, StoreOutput
+from tests.conftest import PROJECT
 from tests.report.tables import joined, put_samples, put_tables, recording_rows, site
 
+PARSER = cli.command_parser()
 LOG = "Time (s),Gyroscope X (deg/s)\n" + "".join(f"{n / 100},0.5\n" for n in range(200))
 
 OUTPUTS = {
@@ -59,9 +62,7 @@ INPUTS = {
 
 def actions() -> Iterator[tuple[str, argparse.Action]]:
     (commands,) = (
-        action
-        for action in command_parser()._actions
-        if isinstance(action, argparse._SubParsersAction)
+        action for action in PARSER._actions if isinstance(action, argparse._SubParsersAction)
     )
     for name, parser in commands.choices.items():
         yield from ((name, action) for action in parser._actions)
@@ -119,6 +120,8 @@ def lab(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     # In a folder of its own, so that nothing beside the project is missed.
     folder = Path(shutil.copytree(whole, tmp_path / "lab"))
     monkeypatch.chdir(folder)
+    # The same parser each time: hundreds of commands are called.
+    monkeypatch.setattr(cli, "command_parser", lambda: PARSER)
     return folder
 
 
@@ -217,7 +220,14 @@ def test_what_is_no_file_is_never_replaced(
         assert os.lstat("/dev/null").st_ino == before
 
 
-@pytest.mark.parametrize("case", few(QUICK, [case for case in FORCEABLE if case not in QUICK]))
+@pytest.mark.parametrize(
+    "case",
+    [
+        case if case in QUICK else pytest.param(case, marks=pytest.mark.release)
+        for case in FORCEABLE
+    ],
+    ids=str,
+)
 def test_an_output_is_replaced_with_force_alone(
     case: tuple[str, str], lab: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

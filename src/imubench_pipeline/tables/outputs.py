@@ -261,6 +261,7 @@ class StoreOutput(argparse.Action):
         values: Any,
         option_string: str | None = None,
     ) -> None:
+        """Store the output of a path."""
         del parser, option_string
         setattr(namespace, self.dest, self.make(values))
 
