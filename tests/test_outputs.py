@@ -27,7 +27,9 @@ from tests.conftest import PROJECT
 from tests.report.tables import joined, put_samples, put_tables, recording_rows, site
 
 PARSER = cli.command_parser()
-LOG = "Time (s),Gyroscope X (deg/s)\n" + "".join(f"{n / 100},0.5\n" for n in range(200))
+LOG = "Time (s),Gyroscope X (deg/s)\n" + "".join(
+    f"{n / 100},{(n * 7919) % 101 / 100}\n" for n in range(200)
+)
 
 OUTPUTS = {
     ("analyse", "output"): ["run.csv", "--output", "{}"],

@@ -1,14 +1,15 @@
-"""Types of options: values that the commands of the terminal take."""
+"""Types of options: values that the commands of the terminal take.
+
+Every command imports this: it loads nothing that takes long.
+"""
 
 from __future__ import annotations
 
 import argparse
 import math
+import reprlib
 from collections.abc import Callable
 from pathlib import Path
-
-from imubench_pipeline.settings.validation import cut
-from imubench_pipeline.units import UnitError, quantity_to_si
 
 
 def named_path(text: str) -> Path:
@@ -20,6 +21,8 @@ def named_path(text: str) -> Path:
 
 def seconds(text: str) -> float:
     """Return a time in s, which is given with its unit or without."""
+    from imubench_pipeline.units import UnitError, quantity_to_si
+
     try:
         return float(text)
     except ValueError:
@@ -50,7 +53,7 @@ def number(
         except ValueError:
             found = math.nan
         if not (math.isfinite(found) and least <= found <= most):
-            raise argparse.ArgumentTypeError(f"found {cut(text)}; expected {words}")
+            raise argparse.ArgumentTypeError(f"found {reprlib.repr(text)}; expected {words}")
         return found
 
     return value
@@ -65,7 +68,7 @@ def whole_number(least: int, most: int, words: str) -> Callable[[str], int]:
         except ValueError:
             found = least - 1
         if not least <= found <= most:
-            raise argparse.ArgumentTypeError(f"found {cut(text)}; expected {words}")
+            raise argparse.ArgumentTypeError(f"found {reprlib.repr(text)}; expected {words}")
         return found
 
     return value

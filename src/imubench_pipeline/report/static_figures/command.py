@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
         tables = _load(arguments.results)
         chosen = select(tables, arguments.sensor, arguments.recording, arguments.channel)
         written = _write(tables, chosen, arguments)
-    except (SelectionError, OSError) as error:
+    except SelectionError as error:
         print(error, file=sys.stderr)
         return 2
     if not written:
