@@ -132,8 +132,8 @@ class Output:
                     "another one, or remove it first"
                 )
             raise OutputError(
-                f"{self}: is the place of {place.holds} ({printable(str(place.path))}); name one "
-                "outside of it"
+                f"{self}: belongs to {place.holds} ({printable(str(place.path))}), where this command "
+                "writes nothing; name a place outside"
             )
 
 
@@ -198,10 +198,9 @@ class OutputFolder(Output):
         if self.shared or status is None:
             return real
         for place in self.places(real):
-            if _is_in(Path(os.path.realpath(place.path)), real):
+            if place.path.exists() and _is_in(Path(os.path.realpath(place.path)), real):
                 raise OutputError(
-                    f"{self}: {printable(str(place.path))} in it is the place of {place.holds}; "
-                    "name another folder"
+                    f"{self}: holds {place.holds} ({printable(str(place.path))}); name another folder"
                 )
         if not self.force and any(real.iterdir()) and not self.is_earlier(real):
             raise OutputError(
