@@ -44,6 +44,9 @@ class Place:
     holds: str
     """In words, such as "the logs"."""
 
+    def __str__(self) -> str:
+        return f"{self.holds} ({printable(str(self.path))})"
+
 
 def has_nothing_of_ours(_: Path) -> bool:
     """Return that no folder is an earlier output."""
@@ -132,8 +135,8 @@ class Output:
                     "another one, or remove it first"
                 )
             raise OutputError(
-                f"{self}: belongs to {place.holds} ({printable(str(place.path))}), where this command "
-                "writes nothing; name a place outside"
+                f"{self}: belongs to {place}, where this command writes nothing; name a place "
+                "outside"
             )
 
 
@@ -199,9 +202,7 @@ class OutputFolder(Output):
             return real
         for place in self.places(real):
             if place.path.exists() and _is_in(Path(os.path.realpath(place.path)), real):
-                raise OutputError(
-                    f"{self}: holds {place.holds} ({printable(str(place.path))}); name another folder"
-                )
+                raise OutputError(f"{self}: holds {place}; name another folder")
         if not self.force and any(real.iterdir()) and not self.is_earlier(real):
             raise OutputError(
                 f"{self}: is not empty; name another folder, or add --force, which replaces files "
@@ -315,7 +316,9 @@ def check_outputs(options: argparse.Namespace, places: Callable[[Path], Iterable
     """
     values = list(vars(options).values())
     listed = [one for value in values for one in (value if isinstance(value, list) else [value])]
-    inputs = [Path(one) for one in listed if isinstance(one, (str, Path))]
+    # A text is a file only where it looks so: the name of a sensor may be that of an output.
+    texts = [Path(one) for one in listed if isinstance(one, str) and Path(one).suffix]
+    inputs = [one for one in listed if isinstance(one, Path)] + texts
     for output in values:
         if isinstance(output, Output):
             output.force = getattr(options, "force", False)
