@@ -92,9 +92,9 @@ def test_parquet_is_a_kept_recording(tmp_path: Path) -> None:
     means = np.degrees([abs(one.mean()) for one in kept.values()])
     assert (np.abs(np.abs(means - 1) - 0.075) < 0.02).all()
     first = path.read_bytes()
-    assert simulate("bno055", *given, "--out", path) == 0
+    assert simulate("bno055", *given, "--out", path, "--force") == 0
     assert path.read_bytes() == first
-    assert simulate("bno055", *given[:-1], 8, "--out", path) == 0
+    assert simulate("bno055", *given[:-1], 8, "--out", path, "--force") == 0
     assert path.read_bytes() != first
 
 
@@ -169,7 +169,7 @@ def test_estimates_of_a_run_are_simulated_as_the_log_showed_them(tmp_path: Path,
     assert log.mean() == pytest.approx(0.02, abs=3e-4)
     curve = allan_variance(np.concatenate([*log.blocks()]), 100.0, cluster_sizes=np.array([100]))
     assert curve.deviation[0] == pytest.approx(3e-3, rel=0.05)
-    assert simulate("mti_7", *given, "--duration", "1 s") == 2
+    assert simulate("mti_7", *given, "--duration", "1 s", "--force") == 2
     assert "no estimate of sensor 'mti_7'; there are: bno055" in capsys.readouterr().err
 
 
@@ -234,12 +234,15 @@ def test_notes_of_another_log_are_kept_while_it_is_there(tmp_path: Path, capsys)
     assert simulate(*given, "--out", text) == 0
     before = text.with_suffix(".yaml").read_bytes()
     capsys.readouterr()
-    assert simulate(*given, "--out", binary) == 2
-    assert "log.yaml: says how log.csv is written" in capsys.readouterr().err
-    assert text.with_suffix(".yaml").read_bytes() == before and not binary.exists()
-    assert simulate(*given, "--out", text) == 0
+    for more in ([], ["--force"]):
+        assert simulate(*given, "--out", binary, *more) == 2
+        assert "log.yaml: says how log.csv is written" in capsys.readouterr().err
+        assert text.with_suffix(".yaml").read_bytes() == before and not binary.exists()
     text.unlink()
-    assert simulate(*given, "--out", binary) == 0
+    assert simulate(*given, "--out", binary) == 2
+    assert "log.yaml: exists already" in capsys.readouterr().err
+    assert text.with_suffix(".yaml").read_bytes() == before and not binary.exists()
+    assert simulate(*given, "--out", binary, "--force") == 0
     assert b"reader: arrow" in binary.with_suffix(".yaml").read_bytes()
 
 
@@ -283,6 +286,7 @@ def test_a_log_of_every_sensor_file_is_read(tmp_path: Path, names: Sequence[str]
             for column, values in found[0].columns.items():
                 np.testing.assert_allclose(values, 30.0 if column == "temperature" else 0.25)
             path.unlink()  # its notes are protected while it is there
+            path.with_suffix(".yaml").unlink()
 
 
 def test_nothing_is_left_of_a_log_that_could_not_be_finished(

@@ -121,17 +121,18 @@ def test_logs_that_are_analysed_at_once_have_the_same_numbers(
     config.write_text(yaml.safe_dump({key: yaml.safe_load(value) for key, value in given}))
     log = str(project.folder / "logs/one/b.csv.gz")
     sensor = str(project.folder / "sensors/one.yaml")
+    made = tmp_path / "made"
     status = main(
-        ["analyse", log, "--sensor", sensor, "--config", str(config), "--output", str(tmp_path)]
+        ["analyse", log, "--sensor", sensor, "--config", str(config), "--output", str(made)]
     )
     assert status == 0
     for table in ("parameters", "allan", "models", "recordings"):
         lines = (project.results / f"tables/{table}.csv").read_text().splitlines()
         # In `recordings`, the second name is that of the device.
         of_run = [line for line in lines if line.startswith(('"sensor"', '"one","b"'))]
-        assert (tmp_path / f"{table}.csv").read_text().splitlines() == of_run
-    assert "V one" in (tmp_path / "report.html").read_text()
-    assert (tmp_path / "figures/allan_gyro_x.svg").is_file()
+        assert (made / f"{table}.csv").read_text().splitlines() == of_run
+    assert "V one" in (made / "report.html").read_text()
+    assert (made / "figures/allan_gyro_x.svg").is_file()
 
 
 def test_bad_logs_are_rejected_and_stop_nothing_else(project: Project, said: str) -> None:

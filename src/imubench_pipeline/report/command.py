@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from imubench_pipeline.report.folder import files_of_report, is_report
 from imubench_pipeline.settings.extras import extra
+from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
 if TYPE_CHECKING:
     from imubench_pipeline.report.site import Site
@@ -16,14 +19,18 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command is given."""
     parser.add_argument("results", type=Path, help="folder of the results of a run")
-    parser.add_argument(
+    add_output(
+        parser,
         "--one-file",
-        type=Path,
         metavar="FILE",
         help="write all pages into one HTML file, to send by mail",
     )
-    parser.add_argument(
-        "--output", type=Path, metavar="FOLDER", help="where the pages go; default: RESULTS/report"
+    add_output(
+        parser,
+        "--output",
+        partial(OutputFolder, is_earlier=is_report),
+        metavar="FOLDER",
+        help="where the pages go, a new folder or an earlier report; default: RESULTS/report",
     )
 
 
@@ -63,22 +70,27 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _write(site: Site, arguments: argparse.Namespace) -> int:
     """Write the pages of a site where they are asked for."""
-    from imubench_pipeline.report.folder import files_of_report
-    from imubench_pipeline.report.publish import one_file, publish
+    from imubench_pipeline.report.publish import one_file, publish, remove_old_pages
     from imubench_pipeline.report.static_figures.of_run import draw_comparison
-    from imubench_pipeline.tables import write_content
     from imubench_pipeline.tables.seals import seal_again
 
     if arguments.one_file is not None:
-        write_content(one_file(site), arguments.one_file)
-        print(f"{arguments.one_file}: {arguments.one_file.stat().st_size / 1e6:.1f} MB")
+        page = one_file(site).encode()
+        arguments.one_file.write(page)
+        print(f"{arguments.one_file}: {len(page) / 1e6:.1f} MB")
         return 0
-    folder = arguments.output or arguments.results / "report"
-    written = publish(site, folder, _say if sys.stderr.isatty() else lambda _: None)
-    if arguments.output is None:
+    say = _say if sys.stderr.isatty() else lambda _: None
+    output: OutputFolder | None = arguments.output
+    if output is None:
+        folder = arguments.results / "report"
+        written = publish(site, folder, say)
         seal_again(arguments.results, "report", files_of_report(folder))
     else:
-        draw_comparison(site.tables, site.system, folder / "figures")
+        folder = output.path
+        with output.filling() as made:
+            written = publish(site, made, say)
+            draw_comparison(site.tables, site.system, made / "figures")
+            remove_old_pages(folder, made)
     print(f"{folder / 'index.html'}: {len(written)} files written")
     return 0
 

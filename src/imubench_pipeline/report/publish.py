@@ -10,6 +10,7 @@ from pathlib import Path
 import jinja2
 import pyarrow as pa
 
+from imubench_pipeline.report.folder import KEYS
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import ENTRIES, pages
@@ -21,7 +22,6 @@ from imubench_pipeline.tables import read, read_json, write_content
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
-_KEYS = "pages.json"
 _SETTINGS = "settings.json"
 _OF_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
 """Without which there are no pages."""
@@ -63,7 +63,7 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
         written += _put(folder, path, content)
     every = list(pages(site))
     keys = {page.path: page.key for page in every}
-    before = _keys(folder / _KEYS)
+    before = _keys(folder / KEYS)
     unchanged = {
         path: key
         for path, key in before.items()
@@ -73,7 +73,7 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     }
     # A run that is killed must not leave the keys of pages that it has written anew.
     if unchanged != before:
-        _put(folder, _KEYS, _text(unchanged))
+        _put(folder, KEYS, _text(unchanged))
     templates = environment(site.system)
     shown = dict(unchanged)
     for page in every:
@@ -85,8 +85,16 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     for path in _pages_there(site, folder) - keys.keys():
         (folder / path).unlink()
     _put(folder, _SETTINGS, _text(site.settings))
-    _put(folder, _KEYS, _text(shown))
+    _put(folder, KEYS, _text(shown))
     return written
+
+
+def remove_old_pages(folder: Path, made: Path) -> None:
+    """Remove the pages of an earlier report that one made anew no longer has, and no other file."""
+    gone = _keys(folder / KEYS).keys() - _keys(made / KEYS).keys()
+    for path in folder.rglob("*.html"):
+        if path.relative_to(folder).as_posix() in gone and not path.is_symlink():
+            path.unlink()
 
 
 def _text(data: object) -> str:

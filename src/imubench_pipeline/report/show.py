@@ -9,13 +9,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from imubench_pipeline.settings.command_line import whole_number
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
 Rows = list[Mapping[str, Any]]
 
 _NEEDED = ("recordings", "findings", "failures", "ranking", "next_steps", "parameters")
-_NARROWEST = 40
+_WIDTH = whole_number(40, 10_000, "40 to 10000 columns")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
     )
     parser.add_argument(
-        "--width", type=_width, metavar="COLUMNS", help="default: that of the terminal, or 80"
+        "--width", type=_WIDTH, metavar="COLUMNS", help="default: that of the terminal, or 80"
     )
 
 
@@ -120,10 +122,3 @@ def _check(rows: Rows, column: str, asked: str | None) -> None:
     existing = list(dict.fromkeys(row[column] for row in rows))
     if asked is not None and asked not in existing:
         raise _ShowError(f"no {column} {asked!r}; there are: {', '.join(existing) or 'none'}")
-
-
-def _width(text: str) -> int:
-    width = int(text)
-    if width < _NARROWEST:
-        raise argparse.ArgumentTypeError(f"found {width}; expected at least {_NARROWEST} columns")
-    return width

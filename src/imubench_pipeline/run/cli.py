@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -27,13 +28,22 @@ from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
 from imubench_pipeline.run.nightly import command as nightly
+from imubench_pipeline.run.places import places_about
 from imubench_pipeline.run.verification import command as verification
+from imubench_pipeline.settings.command_line import LONGEST, named_path, number, seconds
 from imubench_pipeline.settings.config import Run, read_config
 from imubench_pipeline.settings.extras import ExtraError
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.simulated_recordings import Board, Simulated
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.tables import replacing, write_content, write_json
+from imubench_pipeline.tables.outputs import (
+    OutputError,
+    OutputFile,
+    add_output,
+    check_outputs,
+    explain,
+)
+from imubench_pipeline.tables.texts import printable
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "run": Run,
@@ -59,6 +69,9 @@ def command_parser() -> argparse.ArgumentParser:
     for name, command in COMMANDS.items():
         of_it = commands.add_parser(name, help=command.help)
         command.add_arguments(of_it)
+        for action in of_it._actions:
+            if action.type is Path:
+                action.type = named_path
         said = (f"{status} {meaning}" for status, meaning in enumerate(command.statuses) if meaning)
         of_it.epilog = f"Exit status: {'; '.join(said)}."
     return parser
@@ -78,22 +91,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
         meant = f", did you mean {close[0]}?" if close else "."
         parser.error(f"no command {first!r}{meant} There are: {', '.join(COMMANDS)}")
     options = parser.parse_args(own, argparse.Namespace(flags=flags))
+    results = getattr(options, "results", None)
     try:
+        check_outputs(options, lambda path: places_about(path, results))
         status = COMMANDS[options.command].run(options)
         sys.stdout.flush()
         return status
-    except ExtraError as error:
+    except (ExtraError, OutputError) as error:
         print(f"imubench {options.command}: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:
-        # Who reads has seen enough, as `head` has; what is left must not be written at the exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Who reads has seen enough, as `head` has.
+        _close_terminal()
         return _CLOSED_PIPE
+    except OSError as error:
+        file = "" if error.filename is None else f"{printable(os.fsdecode(error.filename))}: "
+        print(f"imubench {options.command}: {file}{explain(error)}", file=sys.stderr)
+        _close_terminal()
+        return 2
+
+
+def _close_terminal() -> None:
+    """Drop what is left to print: where it cannot be written, Python would say so at the exit."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _add_schema(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", choices=sorted(SCHEMAS), help="which configuration file")
-    parser.add_argument("--output", type=Path, help="where to write it; default: the terminal")
+    add_output(parser, "--output", help="where to write it; default: the terminal")
 
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
@@ -109,8 +137,11 @@ def _add_inspect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--block", action="store_true", help="print the sensor file alone, and no listing"
     )
-    parser.add_argument(
-        "--output", type=Path, help="where to write the sensor file; default: the terminal"
+    add_output(
+        parser,
+        "--output",
+        partial(OutputFile, adds_to={"config"}),
+        help="where to write the sensor file; default: the terminal",
     )
 
 
@@ -125,13 +156,17 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--horizon",
-        type=nightly.seconds,
+        type=number(1e-9, LONGEST, "a time above 0, such as 60 s", seconds),
         default="60 s",
         metavar="TIME",
         help="of coasting, for which terms that the program lacks are mapped; default: 60 s",
     )
     parser.add_argument(
-        "--inflate", type=float, default=1.0, metavar="FACTOR", help="multiplies every deviation"
+        "--inflate",
+        type=number(1e-6, 1e6, "a factor of 1e-6 to 1e6"),
+        default=1.0,
+        metavar="FACTOR",
+        help="multiplies every deviation",
     )
     parser.add_argument("--because", help="reason of --inflate, or of the use of unfit recordings")
     parser.add_argument(
@@ -141,16 +176,26 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--excess",
-        type=float,
+        type=number(1.0, 1e6, "a factor of 1 to 1e6"),
         default=3.0,
         metavar="FACTOR",
         help="an overbound whose Allan deviation must be more times its limit is refused; "
         "default: 3",
     )
     parser.add_argument("--method", help="of the estimates; default: the recommended one")
-    parser.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="default: the recording's")
-    parser.add_argument("--output", type=Path, help="where to write; default: the terminal")
+    parser.add_argument(
+        "--latitude",
+        type=number(-90.0, 90.0, "a latitude of -90 to 90, in degrees"),
+        metavar="DEG",
+        help="for gravity",
+    )
+    parser.add_argument(
+        "--rate",
+        type=number(1e-6, 1e9, "a rate above 0, in Hz"),
+        metavar="HZ",
+        help="default: the recording's",
+    )
+    add_output(parser, "--output", help="where to write; default: the terminal")
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -179,7 +224,7 @@ def _export(options: argparse.Namespace) -> int:
         print(error, file=sys.stderr)
         return 2
     if options.output is not None:
-        write_content(content, options.output)
+        options.output.write(content)
     elif isinstance(content, bytes):
         print(f"{options.target} is no text; expected --output FILE", file=sys.stderr)
         return 2
@@ -191,11 +236,11 @@ def _export(options: argparse.Namespace) -> int:
 def _schema(options: argparse.Namespace) -> int:
     schema = SCHEMAS[options.file].model_json_schema()
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    if options.output:
-        write_json(schema, options.output)
+    text = json.dumps(schema, indent=1) + "\n"
+    if options.output is not None:
+        options.output.write(text)
     else:
-        json.dump(schema, sys.stdout, indent=1)
-        sys.stdout.write("\n")
+        sys.stdout.write(text)
     return 0
 
 
@@ -203,7 +248,6 @@ def _check(options: argparse.Namespace) -> int:
     # Numerics are loaded for this command only: the others answer at once.
     from imubench_pipeline.run.checking import check
     from imubench_pipeline.run.plan import Plan
-    from imubench_pipeline.tables.texts import printable
 
     try:
         over: dict[str, object] = {"logs": str(options.logs), "simulated": None}
@@ -244,16 +288,12 @@ def _inspect(options: argparse.Namespace) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names in a log may be in any script, and sensor files are UTF-8.
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")
-    output: Path | None = options.output
-    if output is not None and output.exists():
-        print(f"{output}: exists already; expected a new name", file=sys.stderr)
-        return 2
+    output: OutputFile | None = options.output
     try:
-        model = output.stem if output is not None else None
+        model = output.path.stem if output is not None else None
         inspected = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, options.log, model)
         if output is not None:
-            with replacing(output) as temporary:
-                temporary.write_text(inspected.block, encoding="utf-8")
+            output.write(inspected.block)
     except BoundError as error:
         print(
             f"{options.log.name}: to list it {error}; expected the log of an inertial sensor: copy "
@@ -326,7 +366,7 @@ COMMANDS = {
         "write the JSON Schema of a configuration file, for editors",
         _add_schema,
         _schema,
-        ("written",),
+        ("written", "", "cannot be written"),
     ),
     "check": Command(
         "say what is wrong with logs, without analysing them",
@@ -341,7 +381,7 @@ COMMANDS = {
         (
             "the sensor file is complete",
             "something is left to fill in",
-            "the log cannot be read, or the sensor file is there already",
+            "the log cannot be read, or the sensor file cannot be written",
         ),
     ),
     "formats": Command(

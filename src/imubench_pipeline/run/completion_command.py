@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 import shtab
+
+from imubench_pipeline.settings.command_line import named_path
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +25,6 @@ def script(parser: argparse.ArgumentParser, shell: str) -> str:
     )
     for command in of_commands.choices.values():
         for action in command._actions:
-            if action.type is Path:
+            if action.type is named_path:
                 action.complete = shtab.FILE
     return shtab.complete(parser, shell)

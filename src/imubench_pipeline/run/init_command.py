@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 
 from imubench_pipeline.settings.shipped import project
-from imubench_pipeline.tables import write_content
+from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
 _DEMONSTRATION = ("config/simulated.yaml", "config/boards")
 
@@ -18,7 +19,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Make a folder of logs: config/config.yaml with all settings, an example of a sensor file, "
         "and a README that says how to go on. Nothing that is there is written over."
     )
-    parser.add_argument("folder", type=Path, help="where to make it; made if it is not there")
+    add_output(
+        parser,
+        "folder",
+        partial(OutputFolder, shared=True),
+        help="where to make it; made if it is not there",
+    )
     parser.add_argument(
         "--demonstration",
         action="store_true",
@@ -28,7 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Make the folder; return the exit status."""
-    folder: Path = options.folder
+    output: OutputFolder = options.folder
+    folder = output.path
     shipped, own = project(), Path(__file__).with_name("lab")
     files = {
         "config/config.yaml": shipped / "config/config.yaml",
@@ -39,20 +46,17 @@ def run(options: argparse.Namespace) -> int:
         source = shipped / name
         for path in [source] if source.is_file() else source.glob("*.yaml"):
             files[path.relative_to(shipped).as_posix()] = path
-    try:
-        if there := [name for name in files if (folder / name).exists()]:
-            print(
-                f"{folder / there[0]}: exists already; expected a folder without it: choose "
-                "another one, or rename that file",
-                file=sys.stderr,
-            )
-            return 2
-        for made in ("logs", "config/sensors"):
-            (folder / made).mkdir(parents=True, exist_ok=True)
-        for name, source in files.items():
-            write_content(source.read_text("utf-8"), folder / name)
-    except OSError as error:
-        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
+    if there := [name for name in files if (folder / name).exists()]:
+        print(
+            f"{folder / there[0]}: exists already; expected a folder without it: choose "
+            "another one, or rename that file",
+            file=sys.stderr,
+        )
         return 2
+    for made in ("logs", "config/sensors"):
+        (folder / made).mkdir(parents=True, exist_ok=True)
+    # The configuration last: with it, the folder is that of a project.
+    for name, source in reversed(files.items()):
+        output.file(name).write(source.read_text("utf-8"))
     print(f"{folder}: logs go to {folder / 'logs'}/<sensor>/; {folder / 'README.md'} says how")
     return 0

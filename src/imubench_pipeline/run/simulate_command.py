@@ -9,12 +9,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from imubench_pipeline.settings.command_line import MOST_WHOLE, whole_number
 from imubench_pipeline.settings.shipped import folders
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import files_in, read_settings, read_yaml
+from imubench_pipeline.tables.outputs import OutputFile, add_output
 from imubench_pipeline.units import UnitError, naming, quantity_to_si
 
 if TYPE_CHECKING:
@@ -23,7 +26,10 @@ if TYPE_CHECKING:
 
 _YAML = (".yaml", ".yml")
 _MOST = 1 << 36
+_BEYOND = 1e15
 _WORTH_SAYING = 1.02
+_COLDEST, _HOTTEST = -273.15, 1000.0
+"""degC that a sensor may have."""
 _PATIENCE = 3.0
 """Seconds between two lines of progress where there is no terminal."""
 
@@ -33,7 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "sensor", help="name of a sensor file, whose datasheet is taken, or a file of models"
     )
-    parser.add_argument("--out", type=Path, required=True, help="log to write: .parquet or .csv")
+    add_output(
+        parser,
+        "--out",
+        partial(OutputFile, adds_to={"logs"}),
+        required=True,
+        help="log to write: .parquet or .csv",
+    )
     length = parser.add_mutually_exclusive_group(required=True)
     length.add_argument("--hours", type=float, help="length of the log")
     length.add_argument("--duration", metavar="TIME", help="length with its unit, such as 90 s")
@@ -51,7 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a YAML file with a formula for each channel, or a CSV or Parquet file with columns "
         "'time [s]' and 'gyro_x [deg/s]' to 'accel_z [m/s^2]'; default: at rest, and no gravity",
     )
-    parser.add_argument("--seed", type=int, default=1, help="of the noise; default: 1")
+    parser.add_argument(
+        "--seed",
+        type=whole_number(0, MOST_WHOLE, "a whole number from 0"),
+        default=1,
+        help="of the noise; default: 1",
+    )
     parser.add_argument(
         "--results", type=Path, help="folder of a run: its estimates replace printed figures"
     )
@@ -71,9 +88,6 @@ def run(options: argparse.Namespace) -> int:
     except (ConfigError, UnitError) as error:
         print(error, file=sys.stderr)
         return 2
-    except OSError as error:
-        print(f"{options.out}: {error.strerror or error}", file=sys.stderr)
-        return 2
     return 0
 
 
@@ -82,7 +96,7 @@ def _run(options: argparse.Namespace) -> None:
     from imubench_pipeline.readers.text.header import SIMULATED
     from imubench_pipeline.settings.sensor import TEMPERATURE
     from imubench_pipeline.simulate.imu import simulate_imu
-    from imubench_pipeline.simulate.writing import layout, notes_path, write_log, write_notes
+    from imubench_pipeline.simulate.writing import check_notes, layout, notes_text, write_log
 
     origin, sensor = _origin(options)
     log = None if sensor is None else sensor.log
@@ -91,8 +105,11 @@ def _run(options: argparse.Namespace) -> None:
     samples = round(duration * rate)
     motion, temperature = _profiles(options, origin)
     columns = [*origin.imu.axes, *([TEMPERATURE] if temperature is not None else [])]
-    form = layout(options.out, columns, rate, log)
-    notes_path(options.out)
+    out: OutputFile = options.out
+    form = layout(out.path, columns, rate, log)
+    notes = out.beside(out.path.with_suffix(".yaml"))
+    check_notes(notes.path, out.path)
+    notes.check()
     if temperature is None and any(axis.drift for axis in origin.imu.axes.values()):
         origin.assume("drift", "no drift with temperature: none is given (--temperature)")
     for text in (*_ended(duration, motion, temperature), *_folded(origin, rate)):
@@ -119,7 +136,7 @@ def _run(options: argparse.Namespace) -> None:
         "motion": None if options.motion is None else str(options.motion),
     }
     kind = "static" if not motion else "in_motion"
-    metadata = _metadata(sensor_name, options.out.stem, kind, rate, columns) | {"simulation": about}
+    metadata = _metadata(sensor_name, out.path.stem, kind, rate, columns) | {"simulation": about}
     # A name of its own in the stream: the same seed gives every sensor its own noise.
     blocks = simulate_imu(
         origin.imu,
@@ -131,13 +148,13 @@ def _run(options: argparse.Namespace) -> None:
         temperature=temperature,
         threads=os.cpu_count() or 1,
     )
-    with _progress(samples) as report:
-        write_log(options.out, blocks, columns, form, metadata, remarks, report)
-    write_notes(options.out, form, log, f"from {origin.source}")
-    size = options.out.stat().st_size / 1e6
-    print(
-        f"{options.out}: {size:.1f} MB; {options.out.with_suffix('.yaml')} says how it is written"
-    )
+    # The notes are there before the log, which cannot be read without them.
+    with out.replacing() as temporary:
+        with _progress(samples) as report:
+            write_log(temporary, blocks, columns, form, metadata, remarks, report)
+        notes.write(notes_text(out.path.name, form, log, f"from {origin.source}"))
+    size = out.path.stat().st_size / 1e6
+    print(f"{out}: {size:.1f} MB; {notes} says how it is written")
 
 
 def _metadata(
@@ -232,10 +249,11 @@ def _duration(text: str | None, hours: float | None, rate: float) -> float:
         duration, option = 3600.0 * hours, f"--hours {hours:g}"
     if not math.isfinite(duration):
         raise ConfigError(f"{option}: expected a length of 1 to {_MOST} samples")
-    samples = round(duration * rate)
-    if not 1 <= samples <= _MOST:
+    samples = duration * rate
+    if not 0.5 < samples <= _MOST:
+        shown = f"{samples:.0f}" if abs(samples) < _BEYOND else f"{samples:g}"
         raise ConfigError(
-            f"{option}: {duration:g} s at {rate:g} Hz are {samples} samples; expected 1 to {_MOST}"
+            f"{option}: {duration:g} s at {rate:g} Hz are {shown} samples; expected 1 to {_MOST}"
         )
     return duration
 
@@ -271,7 +289,11 @@ def _profiles(
         warm = {"form": "file", "file": str(path)}
     else:
         with naming("--temperature: "):
-            quantity_to_si(options.temperature, "temperature")
+            celsius = quantity_to_si(options.temperature, "temperature")
+        if not _COLDEST <= celsius <= _HOTTEST:
+            raise ConfigError(
+                f"--temperature {options.temperature}: expected {_COLDEST:g} to {_HOTTEST:g} degC"
+            )
         warm = options.temperature
     around = parse(Surroundings, {"temperature": warm}, options.temperature)
     _, temperature = profiles_of(around, folder)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 ONE_THREAD = {
@@ -25,9 +26,14 @@ def main() -> int:
         )
         return 2
     os.environ |= ONE_THREAD | os.environ
+    # As an error does, so that no temporary file is left.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     from imubench_pipeline.run.cli import main as run
 
-    return run()
+    try:
+        return run()
+    except KeyboardInterrupt:
+        return 128 + signal.SIGINT
 
 
 if __name__ == "__main__":

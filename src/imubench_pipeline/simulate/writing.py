@@ -25,7 +25,6 @@ from imubench_pipeline.settings.sensor import (
     quantity_of,
 )
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.tables import replacing
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS
 
@@ -45,7 +44,7 @@ def write_log(
     remarks: Iterable[str],
     progress: Callable[[int], None],
 ) -> None:
-    """Write a simulated log, atomically, as Parquet or CSV, which its suffix says.
+    """Write a simulated log as Parquet or CSV.
 
     The columns are in SI; the format is as `layout` gives it. The metadata is that of a Parquet
     file, the remarks are comments at the top of a CSV file. Progress is told after each block how
@@ -55,50 +54,44 @@ def write_log(
     known_sources = {str(name): source for name, source in log.channels.items()}
     known_sources |= {} if log.temperature is None else {TEMPERATURE: log.temperature}
     sources = {name: known_sources[name] for name in names}
-    with replacing(path) as temporary:
-        samples = 0
-        if path.suffix == ".parquet":
-            with LogWriter(temporary, dict.fromkeys(names, pa.float64())) as writer:
-                for block in blocks:
-                    writer.write(block)
-                    samples += len(next(iter(block.values())))
-                    progress(samples)
-                writer.finish(
-                    {**metadata, "rows": samples, "grid": samples, "segments": [[0, samples]]}
-                )
-            return
-        with TextLog(temporary, log, sources, log.rate_hz or 1.0, remarks) as text:
+    samples = 0
+    if log.reader == "arrow":
+        with LogWriter(path, dict.fromkeys(names, pa.float64())) as writer:
             for block in blocks:
-                text.write(block)
+                writer.write(block)
                 samples += len(next(iter(block.values())))
                 progress(samples)
+            writer.finish(
+                {**metadata, "rows": samples, "grid": samples, "segments": [[0, samples]]}
+            )
+        return
+    with TextLog(path, log, sources, log.rate_hz or 1.0, remarks) as text:
+        for block in blocks:
+            text.write(block)
+            samples += len(next(iter(block.values())))
+            progress(samples)
 
 
-def write_notes(path: Path, log: LogFormat, sensor: LogFormat | None, words: str) -> None:
-    """Write the notes beside a log: what of its format the sensor file says otherwise.
+def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) -> str:
+    """Return the notes beside a log: what of its format the sensor file says otherwise.
 
-    ``words`` says what the log is.
+    ``name`` is that of its file, ``words`` says what the log is.
     """
     own = log.model_dump(exclude_unset=True, exclude_none=True)
     base = {} if sensor is None else sensor.model_dump(exclude_unset=True)
     notes = {"device": "simulated", "simulated": True, "log": _over(own, base)}
     text = yaml.safe_dump(notes, sort_keys=False, default_flow_style=None, width=100)
     comment = "".join(f"# {line}\n" for line in words.splitlines())
-    with replacing(notes_path(path)) as temporary:
-        temporary.write_text(f"{_HEAD}{path.name}\n{comment}{text}", encoding="utf-8")
+    return f"{_HEAD}{name}\n{comment}{text}"
 
 
-def notes_path(path: Path) -> Path:
-    """Return where the notes beside a log are.
+def check_notes(notes: Path, path: Path) -> None:
+    """Raise `ConfigError` where the notes beside a log are not of a simulation, or of another log.
 
-    Raises
-    ------
-    ConfigError
-        If notes are there that `write_notes` has not written, or those of another log.
+    ``path`` is the log; that of the notes need not be there.
     """
-    notes = path.with_suffix(".yaml")
-    if not notes.exists():
-        return notes
+    if not notes.is_file():
+        return
     first = notes.read_text("utf-8", "replace").partition("\n")[0]
     mark, _, log = first.partition(": ")
     if not states_simulated([mark]):
@@ -109,7 +102,6 @@ def notes_path(path: Path) -> Path:
             f"{notes}: says how {other.name} is written, and that cannot be read without it; "
             f"expected a log of another name than {path.stem!r}: name another --out"
         )
-    return notes
 
 
 def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | None) -> LogFormat:

@@ -20,6 +20,8 @@ from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 from imubench_pipeline.tables.texts import printable, with_safe_cells
 
 _SMALL = 1_000_000  # bytes
+_LONGEST_NAME = 240
+"""Bytes of a name to which a temporary one can add; file systems take 255."""
 
 
 class TableError(ValueError):
@@ -88,7 +90,9 @@ def _shown(text: str) -> str:
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary name beside ``path``, renamed to it when the block ends without error."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    # The temporary name is longer, and must not be too long where the name itself is not.
+    stem = path.name if len(os.fsencode(path.name)) <= _LONGEST_NAME else path.name[:60]
+    handle, name = tempfile.mkstemp(prefix=f".{stem}.", suffix=".part", dir=path.parent)
     temporary = Path(name)
     try:
         os.close(handle)

@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 
 from imubench_pipeline.settings.extras import extra
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
+from imubench_pipeline.tables.outputs import OutputFolder, add_output
 from imubench_pipeline.tables.schemas import TABLES
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--units", choices=("practical", "si"), default="practical", help="default: practical"
     )
-    parser.add_argument("--output", type=Path, help="folder; default: RESULTS/figures")
+    add_output(parser, "--output", OutputFolder, metavar="FOLDER", help="default: RESULTS/figures")
 
 
 def _listed(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
@@ -86,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
         tables = _load(arguments.results)
         chosen = select(tables, arguments.sensor, arguments.recording, arguments.channel)
         written = _write(tables, chosen, arguments)
-    except (SelectionError, OSError) as error:
+    except SelectionError as error:
         print(error, file=sys.stderr)
         return 2
     if not written:
@@ -161,20 +162,23 @@ def _write(
     with extra("workflow", "draw figures"):
         from imubench_pipeline.report.static_figures.files import save
 
-    output: Path = arguments.output or arguments.results / "figures"
+    # The figures that were drawn beside the tables before are drawn again.
+    own = OutputFolder(arguments.results / "figures", is_earlier=lambda _: True)
+    output: OutputFolder = arguments.output or own
     # The order of the pages of the report, so that a sensor looks the same in both.
     sensors = sorted(set(tables["recordings"]["sensor"].to_pylist()))
-    written = 0
-    for name, make in _figures(chosen, sensors, arguments):
-        figure = make()
-        if figure is None:
-            continue
-        for ending in arguments.format:
-            path = output / f"{name}.{ending}"
-            save(figure, path)
-            written += 1
-            print(path, flush=True)
-    return written
+    written = []
+    with output.filling() as folder:
+        for name, make in _figures(chosen, sensors, arguments):
+            figure = make()
+            if figure is None:
+                continue
+            for ending in arguments.format:
+                save(figure, folder / f"{name}.{ending}")
+                written.append(output.path / f"{name}.{ending}")
+    for path in written:
+        print(path)
+    return len(written)
 
 
 def _figures(

@@ -14,7 +14,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from imubench_pipeline.settings.command_line import MOST_WHOLE, whole_number
 from imubench_pipeline.settings.extras import extra
+from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -49,9 +51,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rate", metavar="FREQUENCY", help="of a log without stamps, as '100 Hz'")
     parser.add_argument("--gyro-unit", metavar="UNIT", help="where the log does not say it")
     parser.add_argument("--accel-unit", metavar="UNIT", help="where the log does not say it")
-    parser.add_argument(
+    add_output(
+        parser,
         "--output",
-        type=Path,
+        OutputFolder,
         metavar="FOLDER",
         help="write report.html, figures (SVG, PDF) and tables (CSV) into it",
     )
@@ -69,7 +72,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
     )
     parser.add_argument(
-        "-c", "--cores", type=_cores, default=os.cpu_count() or 1, metavar="N", help="default: all"
+        "-c",
+        "--cores",
+        type=whole_number(1, MOST_WHOLE, "at least 1"),
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="default: all",
     )
 
 
@@ -127,17 +135,10 @@ def _called(arguments: argparse.Namespace) -> str:
         "--rate": arguments.rate,
         "--gyro-unit": arguments.gyro_unit,
         "--accel-unit": arguments.accel_unit,
-        "--output": arguments.output,
+        "--output": arguments.output and arguments.output.path,
     }
     words = [f"{name}={value}" for name, value in options.items() if value is not None]
     return shlex.join(["imubench", "analyse", *words, "--", *map(str, arguments.logs)])
-
-
-def _cores(text: str) -> int:
-    cores = int(text)
-    if cores < 1:
-        raise argparse.ArgumentTypeError(f"found {cores}; expected at least 1")
-    return cores
 
 
 def _say(text: str) -> None:
@@ -159,18 +160,19 @@ def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Names
     from imubench_pipeline.report.static_figures.of_run import figures_of
     from imubench_pipeline.tables import write_arrow, write_content
 
-    folder: Path = arguments.output
+    output: OutputFolder = arguments.output
     # Of one log there are no intervals to hold side by side.
     kinds = ("comparison", "forest") if len(arguments.logs) > 1 else ("comparison",)
-    figures = figures_of(tables, arguments.units, folder / "figures", kinds=kinds)
     # The results are gone with the process: what makes them again is this command.
     told = json.loads(plan.report_settings()) | {"at_once": _called(arguments)}
-    with _drawn_beside(figures, arguments.cores):
-        site = site_of(tables, json.dumps(told), plan.run.results)
-        write_content(one_file(site), folder / "report.html")
-        for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
-            write_arrow(tables[name], folder / f"{name}.csv")
-    print(f"{folder / 'report.html'}: open it in a browser")
+    with output.filling() as folder:
+        figures = figures_of(tables, arguments.units, folder / "figures", kinds=kinds)
+        with _drawn_beside(figures, arguments.cores):
+            site = site_of(tables, json.dumps(told), plan.run.results)
+            write_content(one_file(site), folder / "report.html")
+            for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
+                write_arrow(tables[name], folder / f"{name}.csv")
+    print(f"{output.path / 'report.html'}: open it in a browser")
 
 
 @contextmanager

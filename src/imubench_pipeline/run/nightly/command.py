@@ -7,8 +7,10 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+from imubench_pipeline.settings.command_line import LONGEST, number, seconds
 from imubench_pipeline.settings.extras import extra
-from imubench_pipeline.units import UnitError, quantity_to_si
+
+_WAIT = number(0.0, LONGEST, "a time, such as 10 s", seconds)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,14 +29,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--settle",
-        type=_wait,
+        type=_WAIT,
         default="10 s",
         metavar="TIME",
         help="a log is complete when nothing of it has changed for so long; default: 10 s",
     )
     parser.add_argument(
         "--wait",
-        type=_wait,
+        type=_WAIT,
         default="0 s",
         metavar="TIME",
         help="how long to wait for a run that goes on; default: not at all",
@@ -68,20 +70,3 @@ def run(options: argparse.Namespace) -> int:
     if status or not options.quiet:
         print(in_words(summary), end="", file=sys.stderr if status == 2 else sys.stdout)
     return status
-
-
-def seconds(text: str) -> float:
-    """Return the time in s that an option has, with its unit or without."""
-    try:
-        return float(text)
-    except ValueError:
-        try:
-            return quantity_to_si(text, "time")
-        except UnitError as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _wait(text: str) -> float:
-    if not 0.0 <= (time := seconds(text)) < float("inf"):
-        raise argparse.ArgumentTypeError(f"found {text}; expected a time, such as 10 s")
-    return time

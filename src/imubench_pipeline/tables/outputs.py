@@ -1,0 +1,343 @@
+"""Files and folders that a command writes where its user says, so that none destroys another.
+
+One rule for every option that names an output (`add_output`):
+
+- What is there is refused without ``--force``: another name, or ``--force``, mends it. A folder may
+  be there if it is empty, or if it is an earlier output of the same kind. Of a folder that is
+  replaced only files of the same name change; all else in it stays.
+- Only regular files are replaced, each by a rename of a complete file: on any error the old one is
+  whole. Devices, pipes, sockets, and folders in the place of a file are refused.
+- Symbolic links are followed: the link stays, and its target is judged by this rule. A link to
+  nothing has its target made; a loop is refused. Missing parent folders are made.
+- Nothing is written over what the command reads, nor into the places of a project (`Place`), not
+  even with ``--force``. Only commands whose output belongs there add new files to such a place.
+"""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import os
+import stat
+import tempfile
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.tables.files import making, replacing
+from imubench_pipeline.tables.texts import printable
+
+
+class OutputError(ValueError):
+    """An output that cannot be written where it is asked for; the text says how to mend it."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A folder or file of a project in which other commands must not write."""
+
+    path: Path
+    kind: str
+    """Such as ``logs``; an output that belongs there names it (`add_output`)."""
+    holds: str
+    """In words, such as "the logs"."""
+
+    def __str__(self) -> str:
+        return f"{self.holds} ({printable(str(self.path))})"
+
+
+def has_nothing_of_ours(_: Path) -> bool:
+    """Return that no folder is an earlier output."""
+    return False
+
+
+@dataclass
+class Output:
+    """Where a command writes what its user asks for.
+
+    Parameters
+    ----------
+    path : Path
+        As it was named.
+    adds_to : collection of str
+        Kinds of places to which it may add new files.
+    force : bool
+        Replace regular files that are there.
+    places : callable
+        Returns the places of the projects about a path.
+    inputs : sequence of Path
+        What the command reads.
+    """
+
+    path: Path
+    adds_to: Collection[str] = ()
+    force: bool = False
+    places: Callable[[Path], Iterable[Place]] = lambda _: ()
+    inputs: Sequence[Path] = ()
+
+    def __str__(self) -> str:
+        return printable(str(self.path))
+
+    def check(self) -> Path:
+        """Return the path that is written, links followed.
+
+        Raises
+        ------
+        OutputError
+            If it must not be written.
+        """
+        raise NotImplementedError
+
+    def _resolve(self) -> tuple[Path, os.stat_result | None]:
+        """Return the path behind all links, and the status of what is there."""
+        if not str(self.path).isprintable():
+            raise OutputError(f"{self}: expected a name of printable characters")
+        try:
+            status = self.path.stat()
+        except (FileNotFoundError, NotADirectoryError):
+            status = None
+        except OSError as error:
+            raise OutputError(f"{self}: {explain(error)}") from None
+        real = Path(os.path.realpath(self.path))
+        if status is not None and not _is_at(real, status):
+            raise OutputError(f"{self}: has no name in a folder; name a file")
+        there = next(folder for folder in (real, *real.parents) if folder.exists())
+        if status is None and not there.is_dir():
+            raise OutputError(f"{self}: {printable(str(there))} is no folder; name another place")
+        if not os.access(there.parent if status is not None else there, os.W_OK | os.X_OK):
+            raise OutputError(f"{self}: {explain(PermissionError(errno.EACCES, 'Not writable'))}")
+        return real, status
+
+    @contextmanager
+    def _explaining(self) -> Iterator[None]:
+        """Say of an error of writing which output it is of."""
+        try:
+            yield
+        except OSError as error:
+            # An error of writing names nothing, a temporary file, or a folder that is not there;
+            # any other is of what the command reads meanwhile.
+            real, name = Path(os.path.realpath(self.path)), error.filename
+            temporary = (f"{real.parent}/.".replace("//", "/"), f"{real}/.")
+            if name is None or str(name).startswith(temporary) or real.is_relative_to(name):
+                raise OutputError(f"{self}: {explain(error)}") from error
+            raise
+
+    def _check_place(self, real: Path, *, exists: bool) -> None:
+        """Raise unless a path is in no place, or is a new one that belongs there."""
+        for place in self.places(real):
+            if not _is_in(real, place.path) or (place.kind in self.adds_to and not exists):
+                continue
+            if place.kind in self.adds_to:
+                raise OutputError(
+                    f"{self}: exists already, among {place.holds}, which no command replaces; name "
+                    "another one, or remove it first"
+                )
+            raise OutputError(
+                f"{self}: belongs to {place}, where this command writes nothing; name a place "
+                "outside"
+            )
+
+
+@dataclass
+class OutputFile(Output):
+    """A file that a command writes."""
+
+    def check(self) -> Path:
+        """Return the path that is written, links followed."""
+        real, status = self._resolve()
+        if status is not None and stat.S_ISDIR(status.st_mode):
+            raise OutputError(f"{self}: is a folder; name a file in it")
+        if status is not None and not stat.S_ISREG(status.st_mode):
+            raise OutputError(f"{self}: is a device, a pipe or a socket; name a file")
+        self._check_place(real, exists=status is not None)
+        if status is None:
+            return real
+        if any(_is_at(path, status) for path in self.inputs):
+            raise OutputError(f"{self}: is what the command reads; name another file")
+        if not self.force:
+            raise OutputError(f"{self}: exists already; name another file, or add --force")
+        return real
+
+    @contextmanager
+    def replacing(self) -> Iterator[Path]:
+        """Give a temporary name, renamed to the output when the block ends without error."""
+        with self._explaining(), replacing(self.check()) as temporary:
+            yield temporary
+            self.check()
+
+    def write(self, content: str | bytes) -> None:
+        """Write a text or bytes."""
+        with self.replacing() as temporary:
+            temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+    def beside(self, path: Path) -> OutputFile:
+        """Return another file of the same output."""
+        return replace(self, path=path)
+
+
+@dataclass
+class OutputFolder(Output):
+    """A folder that a command fills.
+
+    Parameters
+    ----------
+    is_earlier : callable
+        Returns whether a folder is an earlier output, which is replaced without ``--force``.
+    shared : bool
+        Other things may be in it: only its files are refused where they are there.
+    """
+
+    is_earlier: Callable[[Path], bool] = has_nothing_of_ours
+    shared: bool = False
+
+    def check(self) -> Path:
+        """Return the folder that is filled, links followed."""
+        real, status = self._resolve()
+        if status is not None and not stat.S_ISDIR(status.st_mode):
+            raise OutputError(f"{self}: is a file; name a folder")
+        self._check_place(real, exists=False)
+        if self.shared or status is None:
+            return real
+        for place in self.places(real):
+            if place.path.exists() and _is_in(Path(os.path.realpath(place.path)), real):
+                raise OutputError(f"{self}: holds {place}; name another folder")
+        if not self.force and any(real.iterdir()) and not self.is_earlier(real):
+            raise OutputError(
+                f"{self}: is not empty; name another folder, or add --force, which replaces files "
+                "of the same name and leaves all others"
+            )
+        return real
+
+    def file(self, name: str) -> OutputFile:
+        """Return a file in it."""
+        return OutputFile(self.path / name, self.adds_to, self.force, self.places, self.inputs)
+
+    @contextmanager
+    def filling(self) -> Iterator[Path]:
+        """Give a folder to fill, whose files are moved here when the block ends without error.
+
+        A file of the same content as the one that is there is left as it is.
+        """
+        real = self.check()
+        if not real.exists():
+            with self._explaining(), making(real) as made:
+                yield made
+                self.check()
+            return
+        with (
+            self._explaining(),
+            tempfile.TemporaryDirectory(prefix=".", suffix=".part", dir=real) as scratch,
+        ):
+            yield Path(scratch)
+            files = [path for path in sorted(Path(scratch).rglob("*")) if path.is_file()]
+            # All are judged before the first is moved.
+            moves = [(path, self._target(real, path.relative_to(scratch))) for path in files]
+            for source, target in moves:
+                if not target.is_file() or target.read_bytes() != source.read_bytes():
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    source.replace(target)
+
+    def _target(self, real: Path, name: Path) -> Path:
+        """Return where a file of a folder is moved, which may be there."""
+        target = replace(self.file(str(name)), force=True).check()
+        if not target.is_relative_to(real):
+            raise OutputError(f"{self}: {name} in it is a link that leads out; remove the link")
+        return target
+
+
+class StoreOutput(argparse.Action):
+    """Stores an output, whose path is the value of the option."""
+
+    def __init__(self, *arguments: Any, make: Callable[[Path], Output], **keys: Any) -> None:
+        super().__init__(*arguments, **keys)
+        self.make = make
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Store the output of a path."""
+        del parser, option_string
+        setattr(namespace, self.dest, self.make(values))
+
+
+def add_output(
+    parser: argparse.ArgumentParser,
+    name: str,
+    make: Callable[[Path], Output] = OutputFile,
+    **keys: Any,
+) -> None:
+    """Declare an option, or an argument, that names an output, and beside it ``--force``.
+
+    Parameters
+    ----------
+    make : callable
+        Makes the output of its path.
+    keys
+        As `argparse.ArgumentParser.add_argument` takes them.
+    """
+    parser.add_argument(name, type=Path, action=StoreOutput, make=make, **keys)
+    if name.startswith("-") and "--force" not in parser._option_string_actions:
+        parser.add_argument(
+            "--force", action="store_true", help="replace an output file that is there already"
+        )
+
+
+_MENDED = {
+    errno.ENOSPC: "make room on the disk, or name a place on another one",
+    errno.EDQUOT: "make room on the disk, or name a place on another one",
+    errno.EFBIG: "the system allows no larger file: name a place elsewhere, or raise the limit",
+    errno.EACCES: "name a place that you may write to, or change its permissions",
+    errno.EPERM: "name a place that you may write to, or change its permissions",
+    errno.EROFS: "name a place that can be written to",
+    errno.ENAMETOOLONG: "name a shorter one",
+    errno.ELOOP: "remove the links that lead to each other, or name another place",
+}
+
+
+def explain(error: OSError) -> str:
+    """Return what went wrong with a file, and how to mend it, as one line."""
+    mended = _MENDED.get(error.errno or 0, "name another place")
+    return f"{printable(error.strerror or str(error))}; {mended}"
+
+
+def check_outputs(options: argparse.Namespace, places: Callable[[Path], Iterable[Place]]) -> None:
+    """Judge all outputs that the options of a command name, before it does anything.
+
+    Raises
+    ------
+    OutputError
+        If one must not be written.
+    """
+    values = list(vars(options).values())
+    listed = [one for value in values for one in (value if isinstance(value, list) else [value])]
+    # A text is a file only where it looks so: the name of a sensor may be that of an output.
+    texts = [Path(one) for one in listed if isinstance(one, str) and Path(one).suffix]
+    inputs = [one for one in listed if isinstance(one, Path)] + texts
+    for output in values:
+        if isinstance(output, Output):
+            output.force = getattr(options, "force", False)
+            output.places, output.inputs = places, inputs
+            output.check()
+
+
+def _is_at(path: Path, status: os.stat_result) -> bool:
+    """Return whether what is at a path is what has this status: any spelling, any hard link."""
+    try:
+        return os.path.samestat(path.stat(), status)
+    except (OSError, ValueError):
+        return False
+
+
+def _is_in(path: Path, folder: Path) -> bool:
+    """Return whether a path without links is a folder, or is in it; neither need be there."""
+    try:
+        status = folder.stat()
+    except OSError:
+        return path.is_relative_to(os.path.realpath(folder))
+    return any(_is_at(above, status) for above in (path, *path.parents))
