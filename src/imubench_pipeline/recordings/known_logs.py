@@ -22,6 +22,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from imubench_pipeline.readers import log_files
+from imubench_pipeline.readers.holes import end_of_data
 from imubench_pipeline.recordings.drop_zone import Recording
 from imubench_pipeline.tables.digests import (
     open_without_waiting,
@@ -251,9 +252,12 @@ def glimpse(path: Path) -> str:
 def _digest(path: Path, size: int, is_stopped: Callable[[], bool]) -> str | None:
     """Return the SHA-256 of a file; None where it was stopped.
 
-    At most `size` bytes are read: a file of the kernel says that it is empty, and may never end.
+    At most `size` bytes are read: a file of the kernel says that it is empty, and may never end. A
+    long hole at the end of a file has no part in it.
     """
     digest, is_large = hashlib.sha256(), size > MAX_DIGESTED_SIZE
+    if is_large and size - (end := end_of_data(path)) > MAX_DIGESTED_SIZE:
+        size = end
     with open(path, "rb", buffering=0, opener=open_without_waiting) as file:
         while size > 0 and (chunk := file.read(min(size, _CHUNK_SIZE))):
             if is_large and is_stopped():
