@@ -8,7 +8,7 @@ from typing import Any
 
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.report.practical import number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.typing import Row
 
@@ -179,7 +179,7 @@ def line_of(row: Row) -> dict[str, Any]:
         "inside": None if inside is None else 100.0 * inside,
         "inside_text": ""
         if inside is None or error is None
-        else f"{number_text(100.0 * inside, 3)} ± {number_text(100.0 * error, 2)} %",
+        else f"{number_text(100.0 * inside, 3)} ± {percent_text(error, 2)}",
         "consistent": row["consistent"],
         "as_sure": _AS_SURE[row["consistent"]],
         "of": counted(row["outages"], "outage", "outages") if row["outage"] else "",

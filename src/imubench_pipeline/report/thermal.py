@@ -59,7 +59,7 @@ def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
             "digits": limit_digits(row["lower"], row["upper"], 4),
             "status": "" if row["status"] == "ok" else row["status"],
             "truth": truth["value"] if truth else None,
-            "why": sentence(row["reason"] or ""),
+            "why": sentence(row["reason"]),
         }
 
 
