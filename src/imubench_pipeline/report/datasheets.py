@@ -8,9 +8,9 @@ from statistics import median
 from typing import Any
 
 from imubench_pipeline.report.practical import (
+    NO_VALUE,
     PageUnit,
     System,
-    number_text,
     page_unit,
     printed_text,
 )
@@ -209,8 +209,9 @@ def curve_distances(view: ChannelView, system: System) -> Iterator[str]:
     unit = page_unit(view.quantity, "adev", system)
     for row in view.datasheet_curve:
         reading = f", density read as {row['sidedness']}" if row["sidedness"] else ""
-        rms, decades = unit.text(row["rms"], 3), number_text(row["rms_log10"], 3)
-        yield f"{rms} {unit.sign}, {decades} decades{reading}"
+        away = row["rms_log10"]
+        decades = NO_VALUE if away is None else f"{away:.3f}"
+        yield f"{unit.text(row['rms'], 3)} {unit.sign}, {decades} decades{reading}"
 
 
 def _percent(share: float | None) -> str:
