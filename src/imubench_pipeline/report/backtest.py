@@ -31,7 +31,7 @@ def backtest_lines(
                 else "–",
                 "ratio": number_text(row["ratio"], 3) if has_ratio else "–",
                 "range": range_text(row) if has_ratio else "",
-                "windows": f"{row['windows']} ({number_text(row['independent'], 2)} independent)"
+                "windows": f"{number_text(row['windows'], 9)} ({number_text(row['independent'], 2)} independent)"
                 if has_ratio
                 else "–",
                 "verdict": row["verdict"],
@@ -60,9 +60,9 @@ def standing_text(row: Row) -> str:
         return ""
     return (
         f"the log drifted {number_text(row['backtest_ratio'], 3)} times the prediction at "
-        f"{duration_text(row['time'])} ({row['backtest_channel'].replace('_', ' ')}, "
+        f"{duration_text(row['time'])} ({(row['backtest_channel'] or 'all channels').replace('_', ' ')}, "
         f"{row['error']}; {range_text(row, 'backtest_')} is to be expected), "
-        f"{row['backtest_windows']} windows"
+        f"{number_text(row['backtest_windows'], 9)} windows"
     )
 
 

@@ -60,7 +60,10 @@ def answer(rows: Sequence[Row], system: System) -> str:
     text = f"The bias is {_around(bias, unit.text)} {unit.sign} (95 %)"
     scale = by_parameter.get("scale_factor")
     if scale is not None and scale["value"] is not None:
-        error = {name: _PPM * (scale[name] - 1.0) for name in ("value", "lower", "upper")}
+        error = {
+            name: None if scale[name] is None else _PPM * (scale[name] - 1.0)
+            for name in ("value", "lower", "upper")
+        }
         text = f"The scale factor is off by {_around(error, number_text)} ppm. " + text
     text += ". "
     straight = by_parameter.get("linearity")
@@ -74,7 +77,9 @@ def answer(rows: Sequence[Row], system: System) -> str:
 
 
 def _around(row: Row, as_text: Any) -> str:
-    half = (row["upper"] - row["lower"]) / 2.0
+    half = None
+    if row["lower"] is not None and row["upper"] is not None:
+        half = (row["upper"] - row["lower"]) / 2.0
     digits = limit_digits(row["lower"], row["upper"], 3)
     return f"{as_text(row['value'], digits)} ± {as_text(half, 2)}"
 

@@ -36,6 +36,7 @@ def environment(system: System) -> jinja2.Environment:
         loader=jinja2.FileSystemLoader(Path(__file__).with_name("templates")),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
+        finalize=_shown,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -95,6 +96,11 @@ def environment(system: System) -> jinja2.Environment:
     templates.filters["packed"] = packed
     templates.tests["hidden_row"] = _is_hidden
     return templates
+
+
+def _shown(value: Any) -> Any:
+    """Return what a template writes of a value: whatever is not there, as everywhere."""
+    return NO_VALUE if value is None else value
 
 
 @cache

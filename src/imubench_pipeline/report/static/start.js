@@ -8,7 +8,7 @@ async function openPage(main) {
   if (!ABLE) return showPlain(main);
   await unfold(main);
   const data = main.querySelector("script[type='application/json'].page");
-  pageData = data ? JSON.parse(data.textContent) : {};
+  pageData = data ? JSON.parse(data.textContent, withoutPrototype) : {};
   decoded = [];
   showUnits(main);
   startTables(main);
@@ -17,6 +17,12 @@ async function openPage(main) {
   startChooser(main);
   startComparison(main);
   startFigures(main);
+}
+
+// Sensors, recordings and devices may have any name: without a prototype no mapping of a page has
+// "constructor" or "toString" but where a sensor is called so.
+function withoutPrototype(_key, value) {
+  return value && typeof value === "object" && !Array.isArray(value) ? Object.setPrototypeOf(value, null) : value;
 }
 
 // What a page has packed (`html.packed`): its data, further rows of tables, and what stands for its
