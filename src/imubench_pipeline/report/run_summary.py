@@ -107,7 +107,8 @@ def rejections(recordings: Iterable[Row]) -> Iterator[str]:
     """Yield a line for each rejected recording: its name and the reason."""
     for row in recordings:
         if row["status"] == "rejected":
-            yield one_line(f"{row['sensor']}/{row['recording']}: {row['reason'] or 'no reason is kept'}")
+            reason = row["reason"] or "no reason is kept"
+            yield one_line(f"{row['sensor']}/{row['recording']}: {reason}")
 
 
 def left_out(failures: Iterable[Row]) -> Iterator[str]:

@@ -58,7 +58,7 @@ async function startPages(main) {
   const pageOf = (path) => document.getElementById(`page:${path}`);
   let here = null;
   const show = async () => {
-    const [path, section] = decodeURIComponent(location.hash.slice(2) || "index.html").split("#");
+    const [path, section] = (location.hash.slice(2) || "index.html").split("#").map(decodeURIComponent);
     const page = pageOf(path) ? path : "index.html";
     if (page !== here || stateText(location.hash)) {
       here = page;
@@ -86,7 +86,7 @@ async function startPages(main) {
     const path = target === "" ? here : resolved(target, inHeader ? "" : here);
     if (!pageOf(path)) return;
     event.preventDefault();
-    const hash = `#/${encodeURI(path)}${section ? `#${section}` : ""}`;
+    const hash = `#/${path.split("/").map(encodeURIComponent).join("/")}${section ? `#${section}` : ""}`;
     if (location.hash === hash) show();
     else location.hash = hash;
   });
