@@ -166,7 +166,7 @@ def budget_tables(
             chosen = [row for row in parts if (row["error"], row["axis"]) == (error, axis)]
             sigmas = tuple(row["sigma"] for row in chosen if row["source"] == "total")
             if not any(sigmas):
-                missing[f"{_NAMES[error]}: {chosen[0]['reason']}"] = None
+                missing[f"{_NAMES[error]}: {chosen[0]['reason'] or 'not known'}"] = None
             elif (error, sigmas) in lines:
                 # One channel is the worst and the median.
                 lines[error, sigmas]["axis"] += f", {axis}"
