@@ -34,7 +34,7 @@ from tests.report import (
 from tests.report.pages import unfolded
 from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site
 
-pytestmark = pytest.mark.usefixtures("small_report")
+pytestmark = [pytest.mark.usefixtures("small_report"), pytest.mark.release]
 
 Tables = Mapping[str, pa.Table]
 
@@ -168,7 +168,6 @@ def test_a_report_comes_whatever_is_not_there(whole: Tables, reports: Reports) -
         reports.check(without(whole, table, [column], row))
 
 
-@pytest.mark.release
 @pytest.mark.parametrize("seed", range(3))
 def test_a_report_comes_whichever_value_is_not_there(
     seed: int, whole: Tables, reports: Reports
