@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.estimators.rows import recommended_estimates
-from imubench_pipeline.experiments.alignment.accuracy import OPEN, accuracies
+from imubench_pipeline.experiments.alignment.accuracy import accuracies
+from imubench_pipeline.experiments.alignment.fine import OPEN
 from imubench_pipeline.experiments.alignment.triad import Site, Triad
 from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.noise import NoiseModel
