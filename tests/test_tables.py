@@ -1,8 +1,12 @@
 import hashlib
 import json
+import math
 import os
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -31,9 +35,46 @@ def test_rows_are_checked() -> None:
         build("scores", [SCORE | {"channel": None}])
 
 
-def test_a_value_that_is_not_there_is_null(tmp_path: Path) -> None:
-    write("scores", [SCORE | {"rms": float("nan")}], tmp_path / "a.parquet")
-    assert pq.read_table(tmp_path / "a.parquet")["rms"].null_count == 1
+NOT_FINITE = (math.nan, math.inf, -math.inf)
+
+
+def a_row(table: str) -> dict[str, Any]:
+    """A row of a table that has a value in every column."""
+    values = {"string": "gyro_x", "double": 1.5, "float": 1.5, "int64": 1, "bool": True}
+    return {column.name: values[str(column.type)] for column in TABLES[table]}
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_a_number_that_is_not_finite_becomes_null_or_is_refused(table: str) -> None:
+    numbers = [one for one in TABLES[table] if pa.types.is_floating(one.type)]
+    optional = [one.name for one in numbers if not one.required]
+    rows = [a_row(table) | {name: value} for name in optional for value in NOT_FINITE]
+    made = build(table, rows).to_pylist()
+    assert [row[name] for name, row in zip(np.repeat(optional, 3), made, strict=True)] == (
+        [None] * len(rows)
+    )
+    for column in numbers:
+        if column.required:
+            with pytest.raises(TableError, match=f"column {column.name} has 3 nulls"):
+                build(table, [a_row(table) | {column.name: value} for value in NOT_FINITE])
+
+
+@pytest.mark.parametrize("value", NOT_FINITE)
+@pytest.mark.parametrize("column", ["tau", "lower"])
+def test_no_file_holds_a_number_that_is_not_finite(
+    column: str, value: float, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.parquet"
+    made = build("allan", [a_row("allan")] * 2)
+    place = made.column_names.index(column)
+    wrong = made.set_column(place, made.schema.field(place), pa.array([1.5, value]))
+    fault = rf"a\.parquet: {column} of row 2 is {value}; expected a finite number or null"
+    with pytest.raises(TableError, match=fault):
+        write_arrow(wrong, path)
+    assert not path.exists()
+    pq.write_table(wrong, path)
+    with pytest.raises(TableError, match=f"{fault}: remove the file"):
+        read("allan", [path])
 
 
 def test_texts_show_each_of_their_signs() -> None:

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from imubench_pipeline.report import practical
 from imubench_pipeline.report.practical import (
     PageUnit,
     duration_text,
@@ -239,3 +240,11 @@ def test_limits_have_as_many_digits_as_tell_them_apart(
     lower: float | None, upper: float | None, digits: int
 ) -> None:
     assert limit_digits(lower, upper) == digits
+
+
+def test_what_is_not_there_is_a_dash() -> None:
+    assert number_text(None) == number_text(float("nan")) == "–"
+    assert practical.duration_text(None) == practical.percent_text(None) == "–"
+    assert practical.degrees_text(None) == "–"
+    assert practical.printed_text({"printed": None, "unit": "deg/h"}) == "–"
+    assert practical.printed_text({"printed": 4.0, "unit": None}) == "4"

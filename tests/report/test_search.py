@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -37,7 +38,7 @@ def test_everything_that_has_a_name_is_found_and_is_there(tmp_path: Path) -> Non
         file for file, _ in made.navigation
     }
     pages = read_pages(tmp_path)
-    lost = [path for _, _, path, _ in found if not there(pages, path)]
+    lost = [path for _, _, path, _ in found if not there(pages, unquote(path))]
     assert lost == []
 
 

@@ -7,11 +7,13 @@ import math
 _MOST = 7
 
 
-def digits_by(value: float, lower: float | None, upper: float | None, otherwise: int = 3) -> int:
+def digits_by(
+    value: float | None, lower: float | None, upper: float | None, otherwise: int = 3
+) -> int:
     """Return with how many digits a value and its limits are printed: what its interval tells.
 
     The last digit is the first of half the interval, or the second where that begins with 1. They
-    are two at least. Where there are no limits, they are as many as ``otherwise``.
+    are two at least. Where there are no limits or no value, they are as many as ``otherwise``.
     """
     if lower is None or upper is None or not upper > lower or not value:
         return otherwise

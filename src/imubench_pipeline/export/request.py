@@ -140,6 +140,8 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
         if about["doubts"]:
             cautions.append(f"{choice.recording} is in doubt: {about['doubts']}")
         simulated = simulated or bool(about["simulated"])
+        if about["rate"] is None:
+            raise ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
         rates.append(float(f"{about['rate']:.9g}"))  # stamps are not sure of more
         axes[quantity] = choice.axis
         warmed = _rows(tables["temperature"], sensor=request.sensor, recording=choice.recording)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.practical import duration_text, number_text, page_unit
+from imubench_pipeline.report.practical import degrees_text, duration_text, number_text, page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.words import sentence
 from imubench_pipeline.typing import Row
@@ -32,7 +31,7 @@ def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
             entries.append(
                 {
                     "view": view,
-                    "latitude": f"{number_text(math.degrees(about['latitude']))}°",
+                    "latitude": degrees_text(about["latitude"]),
                     "biases": (
                         f"Fixed biases of {unit.text(about['gyro_bias'], 3)} {unit.sign} "
                         f"({about['gyro_bias_from']}) and "
@@ -74,7 +73,7 @@ def _line(row: Row) -> dict[str, Any]:
 
 
 def _angle(value: float | None) -> str:
-    return "not to be had" if value is None else f"{number_text(math.degrees(value), 3)}°"
+    return "not to be had" if value is None else degrees_text(value, 3)
 
 
 def _check(rows: Sequence[Row]) -> str:
@@ -106,7 +105,7 @@ def _drawn(rows: Sequence[Row], arrays: Arrays) -> list[dict[str, Any]]:
             own = [r for r in rows if r["positions"] == positions and r["method"] == method]
             values = {
                 "heading": [r["heading"] for r in own],
-                "level": [max(r["roll"], r["pitch"]) for r in own],
+                "level": [_worse(r["roll"], r["pitch"]) for r in own],
             }
             for angle, sigma in values.items():
                 points = [(r["time"], s) for r, s in zip(own, sigma, strict=True) if s]
@@ -121,3 +120,8 @@ def _drawn(rows: Sequence[Row], arrays: Arrays) -> list[dict[str, Any]]:
                         }
                     )
     return courses
+
+
+def _worse(*angles: float | None) -> float | None:
+    """Return the largest angle; None where one is not known, which may be the largest."""
+    return None if None in angles else max(angle for angle in angles if angle is not None)

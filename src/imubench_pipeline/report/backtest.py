@@ -31,15 +31,18 @@ def backtest_lines(
                 else "–",
                 "ratio": number_text(row["ratio"], 3) if has_ratio else "–",
                 "range": range_text(row) if has_ratio else "",
-                "windows": f"{row['windows']} ({number_text(row['independent'], 2)} independent)"
-                if has_ratio
-                else "–",
+                "windows": _windows(row) if has_ratio else "–",
                 "verdict": row["verdict"],
                 "contradicted": row["contradicted"],
                 "why": "; ".join(_remarks(row)),
             }
         )
     return lines
+
+
+def _windows(row: Row) -> str:
+    independent = number_text(row["independent"], 2)
+    return f"{number_text(row['windows'], 9)} ({independent} independent)"
 
 
 def range_text(row: Row, prefix: str = "") -> str:
@@ -58,11 +61,12 @@ def standing_text(row: Row) -> str:
     """
     if row["backtest_ratio"] is None:
         return ""
+    channel = (row["backtest_channel"] or "all channels").replace("_", " ")
     return (
         f"the log drifted {number_text(row['backtest_ratio'], 3)} times the prediction at "
-        f"{duration_text(row['time'])} ({row['backtest_channel'].replace('_', ' ')}, "
-        f"{row['error']}; {range_text(row, 'backtest_')} is to be expected), "
-        f"{row['backtest_windows']} windows"
+        f"{duration_text(row['time'])} ({channel}, {row['error']}; "
+        f"{range_text(row, 'backtest_')} is to be expected), "
+        f"{number_text(row['backtest_windows'], 9)} windows"
     )
 
 

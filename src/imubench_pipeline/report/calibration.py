@@ -6,7 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
+from imubench_pipeline.report.practical import (
+    System,
+    degrees_text,
+    limit_digits,
+    number_text,
+    page_unit,
+    percent_text,
+)
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import noise_words, sentence
@@ -48,12 +55,15 @@ def answer(rows: Sequence[Row], system: System) -> str:
     if bias is None:
         return "Nothing was found of this recording."
     if bias["value"] is None:
-        return sentence(bias["reason"] or "")
+        return sentence(bias["reason"])
     unit = page_unit("gyro", "adev", system)
     text = f"The bias is {_around(bias, unit.text)} {unit.sign} (95 %)"
     scale = by_parameter.get("scale_factor")
     if scale is not None and scale["value"] is not None:
-        error = {name: _PPM * (scale[name] - 1.0) for name in ("value", "lower", "upper")}
+        error = {
+            name: None if scale[name] is None else _PPM * (scale[name] - 1.0)
+            for name in ("value", "lower", "upper")
+        }
         text = f"The scale factor is off by {_around(error, number_text)} ppm. " + text
     text += ". "
     straight = by_parameter.get("linearity")
@@ -62,12 +72,14 @@ def answer(rows: Sequence[Row], system: System) -> str:
         largest = number_text(_PERCENT * straight["value"], 3)
         text += f"The largest deviation from the line is {largest} % of the largest rate. "
         text += f"A straight line {'does not fit' if doubted else 'fits'}: noise alone departs as "
-        text += f"far from it with a chance of {number_text(100 * straight['chance'], 2)} %."
+        text += f"far from it with a chance of {percent_text(straight['chance'], 2)}."
     return text.strip()
 
 
 def _around(row: Row, as_text: Any) -> str:
-    half = (row["upper"] - row["lower"]) / 2.0
+    half = None
+    if row["lower"] is not None and row["upper"] is not None:
+        half = (row["upper"] - row["lower"]) / 2.0
     digits = limit_digits(row["lower"], row["upper"], 3)
     return f"{as_text(row['value'], digits)} ± {as_text(half, 2)}"
 
@@ -82,10 +94,8 @@ def lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             "words": WORDS[row["parameter"]],
             "digits": limit_digits(row["lower"], row["upper"], 4),
             "is_rate": row["unit"] == "rad/s",
-            "percent": None
-            if row["chance"] is None
-            else f"{number_text(100.0 * row['chance'], 2)} %",
-            "why": sentence(row["reason"] or ""),
+            "percent": None if row["chance"] is None else percent_text(row["chance"], 2),
+            "why": sentence(row["reason"]),
         }
         yield line | _texts(row)
 
@@ -130,7 +140,7 @@ def scatter_words(rows: Sequence[Row]) -> str:
     chance = next((row["scatter"] for row in rows if row["scatter"] is not None), None)
     if chance is None:
         return ""
-    text = f"{number_text(100.0 * chance, 2)} %"
+    text = percent_text(chance, 2)
     if chance < _DOUBTED / 5.0:
         return (
             "The means scatter more than the noise model allows: that much or more has a chance of "
@@ -148,7 +158,7 @@ def earth_words(rows: Sequence[Row], system: System) -> str:
     unit = page_unit("gyro", "adev", system)
     text = (
         f"The Earth's rate along the axis, {unit.text(row['earth_rate'], 4)} {unit.sign} (latitude "
-        f"{_degrees(row['latitude'])}, {_direction(row)}), is taken off"
+        f"{degrees_text(row['latitude'])}, {_direction(row)}), is taken off"
     )
     if row["half_width"]:
         text += f"; with no heading it is within ± {unit.text(row['half_width'], 3)} {unit.sign}"
@@ -161,14 +171,11 @@ def earth_words(rows: Sequence[Row], system: System) -> str:
 
 
 def _direction(row: Row) -> str:
-    elevation = f"elevation {_degrees(row['elevation'])}"
+    elevation = f"elevation {degrees_text(row['elevation'])}"
     if row["heading"] is not None:
-        return f"heading {_degrees(row['heading'])}, {elevation}"
-    return elevation if abs(math.cos(row["elevation"])) < 1e-6 else f"{elevation}, no heading"
-
-
-def _degrees(angle: float) -> str:
-    return f"{number_text(math.degrees(angle))}°"
+        return f"heading {degrees_text(row['heading'])}, {elevation}"
+    upright = row["elevation"] is not None and abs(math.cos(row["elevation"])) < 1e-6
+    return elevation if upright else f"{elevation}, no heading"
 
 
 def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
@@ -226,5 +233,5 @@ def attitude_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             else f"{number_text(lower, digits)}° to {number_text(upper, digits)}°",
             "truth": "–" if truth is None else f"{number_text(truth, digits)}°",
             "off": "–" if off is None else f"{number_text(off, 2)} σ",
-            "why": sentence(row["reason"] or ""),
+            "why": sentence(row["reason"]),
         }

@@ -7,7 +7,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from imubench_pipeline.report.practical import PageUnit, System, page_unit
+from imubench_pipeline.report.practical import (
+    NO_VALUE,
+    PageUnit,
+    System,
+    page_unit,
+    printed_text,
+)
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.typing import Row
@@ -51,7 +57,7 @@ def delta_rows(
             "quantity": _figure_name(first),
             "published": published,
             "coverage": coverage.get((view.sensor, view.quantity, figure), "not looked up"),
-            "printed": f"{first['printed']:g} {first['unit']}" if published else "–",
+            "printed": printed_text(first),
             "about": ", ".join(filter(None, (first["kind"], first["condition"]))),
             "readings": [_reading(row, view.quantity, system) for row in rows],
             "verdict": verdict,
@@ -129,7 +135,7 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
             "simulated": simulated,
             "channel": channel,
             "quantity": _figure_name(first),
-            "printed": f"{first['printed']:g} {first['unit']}",
+            "printed": printed_text(first),
             "about": first["kind"] or "",
             "unit": unit.sign,
             "readings": [_over_recordings(rows, unit) for rows in readings],
@@ -145,7 +151,7 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
 def _over_recordings(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
     """Return one way to read a printed figure against all recordings of a sensor."""
     deltas = sorted(row["delta"] for row in rows)
-    measured = sorted(row["measured"] for row in rows)
+    measured = sorted(row["measured"] for row in rows if row["measured"] is not None) or [None]
     return {
         "as": _read_as(rows[0]),
         "comparable": unit.text(rows[0]["comparable"]),
@@ -169,7 +175,7 @@ def repeatability_lines(
             "device": row["device"],
             "channel": row["channel"].replace("_", " "),
             "recordings": row["recordings"],
-            "printed": f"{row['printed']:g} {row['unit']}",
+            "printed": printed_text(row),
             "about": ", ".join(filter(None, (row["kind"], row["condition"]))),
             "comparable": unit.text(row["comparable"]),
             "measured": _with_limits(row, unit),
@@ -203,7 +209,9 @@ def curve_distances(view: ChannelView, system: System) -> Iterator[str]:
     unit = page_unit(view.quantity, "adev", system)
     for row in view.datasheet_curve:
         reading = f", density read as {row['sidedness']}" if row["sidedness"] else ""
-        yield f"{unit.text(row['rms'], 3)} {unit.sign}, {row['rms_log10']:.3f} decades{reading}"
+        away = row["rms_log10"]
+        decades = NO_VALUE if away is None else f"{away:.3f}"
+        yield f"{unit.text(row['rms'], 3)} {unit.sign}, {decades} decades{reading}"
 
 
 def _percent(share: float | None) -> str:

@@ -185,7 +185,9 @@ def _column(name: str, declared: Mapping[str, Any], answer: str) -> Column:
 def _drawn(row: Row) -> list[float]:
     """Return the margins of a row that are drawn."""
     known = [row[name] for name in ("logged_margin", "unless_margin") if row[name] is not None]
-    return known if row["margin"] is None else [row["margin"], *margin_limits(row)]
+    if row["margin"] is None:
+        return known
+    return [row["margin"], *(limit for limit in margin_limits(row) if limit is not None)]
 
 
 def word_of(row: Row) -> str:
@@ -219,7 +221,10 @@ def _cell(row: Row, scale: Scale) -> Cell:
     word = word_of(row)
     judged = word != "not judged"
     shown = margin(row) if judged else None
-    bar = [scale.place(x) for x in (row["margin"], *margin_limits(row))] if shown else None
+    low, high = margin_limits(row) if shown else (None, None)
+    bar = None
+    if low is not None and high is not None:
+        bar = (scale.place(row["margin"]), scale.place(low), scale.place(high))
     ranked = list(WORDS)
     return Cell(
         row["requirement"],
@@ -227,7 +232,7 @@ def _cell(row: Row, scale: Scale) -> Cell:
         word,
         _conditions(row) if judged else 0,
         shown,
-        (bar[0], bar[1], bar[2]) if bar else None,
+        bar,
         evidence_words(row) if judged else "",
         row["doubts"] or "",
         "" if judged else _reason(row),

@@ -139,8 +139,15 @@ def published_words(lines: Sequence[Row]) -> str:
 
 def _gain(lines: Sequence[Row]) -> str:
     """Return how much better a filter is than the mean over pairs, in a sentence."""
-    gains = [100.0 * (1.0 - line["sigma_filter"] / line["sigma"]) for line in lines]
-    text = " to ".join(dict.fromkeys(number_text(gain, 2) for gain in (min(gains), max(gains))))
+    gains = [
+        1.0 - line["sigma_filter"] / line["sigma"]
+        for line in lines
+        if line["sigma_filter"] is not None and line["sigma"]
+    ]
+    if not gains:
+        return ""
+    ends = [number_text(100.0 * gain, 2) for gain in (min(gains), max(gains))]
+    text = " to ".join(dict.fromkeys(ends))
     return (
         f"A filter that does not know the rate has a σ that is {text} % less than that of "
         "the mean over pairs in these runs: that is all that it improves."

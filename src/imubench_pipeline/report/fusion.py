@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.report.practical import number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES
 from imubench_pipeline.typing import Row
@@ -46,7 +46,7 @@ def shared_words(common: Mapping[str, float]) -> str:
     Parts of the variance of N, B, K and R.
     """
     named = [
-        f"{number_text(100.0 * share, 3)} % of the variance of the {_PARAMETERS[name]} ({name})"
+        f"{percent_text(share)} of the variance of the {_PARAMETERS[name]} ({name})"
         for name, share in common.items()
         if share > 0.0
     ]
@@ -175,10 +175,10 @@ def _number_limits(row: Row) -> str:
 def _common(row: Row) -> str:
     if row["common_share"] is None:
         return "–"
-    text = f"{number_text(100.0 * row['common_share'], 3)} %"
+    text = percent_text(row["common_share"])
     of_temperature = row["temperature_share"]
     if of_temperature:
-        text += f" (temperature {number_text(100.0 * of_temperature, 3)} %)"
+        text += f" (temperature {percent_text(of_temperature)})"
     return text
 
 

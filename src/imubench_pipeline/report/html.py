@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import zlib
 from collections.abc import Mapping
 from functools import cache, partial
@@ -17,6 +18,7 @@ from markupsafe import Markup, escape
 
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.practical import (
+    NO_VALUE,
     PageUnit,
     System,
     duration_text,
@@ -34,6 +36,7 @@ def environment(system: System) -> jinja2.Environment:
         loader=jinja2.FileSystemLoader(Path(__file__).with_name("templates")),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
+        finalize=_shown,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -43,8 +46,8 @@ def environment(system: System) -> jinja2.Environment:
 
         ``inside``: an element around it has the unit, and the digits where they are not 4.
         """
-        if value is None:
-            return Markup("–")
+        if value is None or not math.isfinite(value):
+            return Markup(number_text(value))
         rounded = f"{value:.7g}"
         text = _unit(unit, system).text(float(rounded), digits)
         of = "" if inside else f' data-unit="{unit}" data-digits="{digits}"'
@@ -59,7 +62,7 @@ def environment(system: System) -> jinja2.Environment:
         for part in cell["parts"]:
             value, status, lower, upper = (part[k] for k in ("value", "status", "lower", "upper"))
             if value is None:
-                text = f"{_hint(status)}" if status else "–"
+                text = f"{_hint(status)}"
             else:
                 shown = status.replace("_", " ")
                 text = f"{number(value)}" + (
@@ -72,7 +75,7 @@ def environment(system: System) -> jinja2.Environment:
         none = " none" if cell["value"] is None else ""
         of_digits = f' data-digits="{digits}"' if digits != 3 else ""
         # Numbers and words of our own: nothing to escape.
-        return Markup(f'<td class="number{none}"{of_digits}>{"<br>".join(parts) or "–"}</td>')
+        return Markup(f'<td class="number{none}"{of_digits}>{"<br>".join(parts) or NO_VALUE}</td>')
 
     def sign(unit: str) -> Markup:
         """Return the sign of a unit that the reader can switch."""
@@ -93,6 +96,11 @@ def environment(system: System) -> jinja2.Environment:
     templates.filters["packed"] = packed
     templates.tests["hidden_row"] = _is_hidden
     return templates
+
+
+def _shown(value: Any) -> Any:
+    """Return what a template writes of a value: whatever is not there, as everywhere."""
+    return NO_VALUE if value is None else value
 
 
 @cache
@@ -118,7 +126,12 @@ def _term(context: Context, key: str, text: str | None = None) -> Markup:
 
 @cache
 def _hint(key: str, text: str | None = None) -> Markup:
-    """Return a term with its explanation alone, for tables of many rows."""
+    """Return a term with its explanation alone, for tables of many rows.
+
+    An empty key, such as the status of a plain value that is not there, is `NO_VALUE`.
+    """
+    if not key:
+        return Markup(NO_VALUE)
     entry = term(key)
     return Markup('<i data-term="{}">{}</i>').format(entry.key, escape(text or entry.name))
 

@@ -9,6 +9,7 @@ from typing import Any
 from imubench_pipeline.navigation.suitability.conditions import parts_of
 from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.practical import (
+    NO_VALUE,
     PageUnit,
     System,
     duration_text,
@@ -165,7 +166,7 @@ def budget_tables(
             chosen = [row for row in parts if (row["error"], row["axis"]) == (error, axis)]
             sigmas = tuple(row["sigma"] for row in chosen if row["source"] == "total")
             if not any(sigmas):
-                missing[f"{_NAMES[error]}: {chosen[0]['reason']}"] = None
+                missing[f"{_NAMES[error]}: {chosen[0]['reason'] or 'not known'}"] = None
             elif (error, sigmas) in lines:
                 # One channel is the worst and the median.
                 lines[error, sigmas]["axis"] += f", {axis}"
@@ -197,9 +198,9 @@ def budget_bars(rows: Sequence[Row], system: System) -> list[dict[str, Any]]:
     for (error, time), parts in sorted(
         groups.items(), key=lambda group: _ERRORS.index(group[0][0])
     ):
-        (total,) = (row for row in parts if row["source"] == "total")
-        sigma = total["sigma"]
-        if not sigma:
+        total = _total(parts)
+        sigma = total["sigma"] if total else None
+        if not total or not sigma:
             continue
         size = _shown(total, unit_of(DIMENSIONS[error], system, sigma))
         bars.append(
@@ -215,6 +216,11 @@ def budget_bars(rows: Sequence[Row], system: System) -> list[dict[str, Any]]:
     return bars
 
 
+def _total(rows: Iterable[Row]) -> Row | None:
+    """Return the row of the whole error among those of an error and a time."""
+    return next((row for row in rows if row["source"] == "total"), None)
+
+
 def _notes(lines: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     """Yield what is said of the cells of a budget, each thing once, with the errors it is about."""
     by_note: dict[str, dict[str, None]] = {}
@@ -228,7 +234,10 @@ def _notes(lines: Iterable[Mapping[str, Any]]) -> Iterator[str]:
 
 def _cell(rows: Sequence[Row], system: System) -> dict[str, Any]:
     """Return an error with its interval, and what it comes of."""
-    (total,) = (row for row in rows if row["source"] == "total")
+    total = _total(rows)
+    if total is None or total["sigma"] is None:
+        reason = (total or {}).get("reason") or ""
+        return {"lines": [NO_VALUE], "note": reason, "class": "number none"}
     unit = unit_of(DIMENSIONS[total["error"]], system, total["sigma"])
     lines = [_shown(total, unit)]
     if _sensible(total, total["sigma"]):
@@ -254,8 +263,8 @@ def _shown(row: Row, unit: PageUnit) -> str:
     return f"{unit.text(row['sigma'], digits)} {unit.sign}"
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
+def _percent(share: float | None) -> str:
+    return NO_VALUE if share is None else f"{100 * share:.0f} %"
 
 
 def budget_words(settings: Mapping[str, Any]) -> str:

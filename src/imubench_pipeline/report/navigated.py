@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.report.practical import NO_VALUE, number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.typing import Row
 
@@ -28,7 +28,8 @@ TUNINGS = {
 }
 """What the page calls each tuning."""
 
-_SIGNALS = {
+_SIGNALS: Mapping[str | None, str] = {
+    None: NO_VALUE,
     "truth": "simulated from the truth",
     "estimate": "simulated from the estimate",
     "log": "pieces of the log",
@@ -179,7 +180,7 @@ def line_of(row: Row) -> dict[str, Any]:
         "inside": None if inside is None else 100.0 * inside,
         "inside_text": ""
         if inside is None or error is None
-        else f"{number_text(100.0 * inside, 3)} ± {number_text(100.0 * error, 2)} %",
+        else f"{number_text(100.0 * inside, 3)} ± {percent_text(error, 2)}",
         "consistent": row["consistent"],
         "as_sure": _AS_SURE[row["consistent"]],
         "of": counted(row["outages"], "outage", "outages") if row["outage"] else "",
@@ -194,7 +195,8 @@ def _figure(row: Row, name: str, factor: float) -> str:
     if row[name] is None:
         return "–"
     value, low, high = (
-        number_text(factor * row[f"{name}{end}"], 3) for end in ("", "_lower", "_upper")
+        number_text(None if size is None else factor * size, 3)
+        for size in (row[f"{name}{end}"] for end in ("", "_lower", "_upper"))
     )
     return value if low == high else f"{value} ({low} to {high})"
 

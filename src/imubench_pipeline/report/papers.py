@@ -15,7 +15,7 @@ from imubench_pipeline.experiments.papers.about import (
     Verdict,
 )
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
-from imubench_pipeline.report.practical import limit_digits, number_text
+from imubench_pipeline.report.practical import limit_digits, number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.typing import Row
@@ -83,7 +83,7 @@ def _panel(rows: Sequence[Row]) -> dict[str, Any]:
         "logs": rows[0]["logs"] if rows else 0,
         "symbols": symbols,
         "bounds": [
-            _percent(next(r["bound"] for r in rows if r["parameter"] == symbol))
+            percent_text(next(r["bound"] for r in rows if r["parameter"] == symbol))
             for symbol in symbols
         ],
         "lines": [
@@ -99,13 +99,9 @@ def _cell(row: Row) -> dict[str, str]:
     low, high = (number_text(row[f"ratio_{end}"], 2) for end in ("lower", "upper"))
     given = "" if row["given"] == row["logs"] else f", in {row['given']} logs"
     return {
-        "error": f"{_percent(row['rmse'])}{given}",
+        "error": f"{percent_text(row['rmse'])}{given}",
         "ratio": f"{number_text(row['ratio'], 3)} ({low} to {high})",
     }
-
-
-def _percent(value: float) -> str:
-    return f"{number_text(100.0 * value, 3)} %"
 
 
 def _pages(site: Site) -> set[str]:
@@ -170,5 +166,5 @@ def cells(row: Row) -> dict[str, str]:
     ratio, tolerance = "–", ""
     if row["ratio"] is not None:
         ratio = number_text(row["ratio"], 3)
-        tolerance = f"±{number_text(100.0 * row['tolerance'], 2)} %"
+        tolerance = f"±{percent_text(row['tolerance'], 2)}"
     return {"found_text": words or "–", "ratio_text": ratio, "tolerance_text": tolerance}

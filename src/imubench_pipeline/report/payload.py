@@ -14,6 +14,7 @@ from scipy.special import chdtri
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.noise import NoiseModel, Term
 from imubench_pipeline.report.palette import Appearance, method_appearance
+from imubench_pipeline.report.practical import printed_text
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
 from imubench_pipeline.typing import Row
 
@@ -155,7 +156,7 @@ def _model(model: NoiseModel, tau: NDArray[np.float64]) -> tuple[Packed, Packed]
     return packed_log(tau), packed_log(_curve(model, tau))
 
 
-def channel_payload(view: ChannelView, rate: float, arrays: Arrays) -> dict[str, Any]:
+def channel_payload(view: ChannelView, rate: float | None, arrays: Arrays) -> dict[str, Any]:
     """Return everything that is drawn of one channel, but its samples; the rate is in Hz."""
     model = view.model(view.recommended)
     return {
@@ -227,12 +228,13 @@ def datasheet_lines(view: ChannelView) -> list[dict[str, Any]]:
         if row["statistic"] not in ("N", "adev_minimum"):
             continue
         name = {"N": "noise density", "adev_minimum": "bias instability"}[row["statistic"]]
-        reading = f", read as {row['sidedness']}" if row["sidedness"] else ""
+        reading = f"read as {row['sidedness']}" if row["sidedness"] else ""
+        about = filter(None, (row["kind"], reading))
         lines.append(
             {
                 "of": row["statistic"],
                 "value": row["comparable"],
-                "label": f"{name} {row['printed']:g} {row['unit']} ({row['kind']}{reading})",
+                "label": f"{name} {printed_text(row)} ({', '.join(about)})",
             }
         )
     return lines
@@ -249,7 +251,7 @@ def _estimates(view: ChannelView, method: str) -> dict[str, Any]:
 
 
 def _spectrum(
-    view: ChannelView, model: NoiseModel, rate: float, arrays: Arrays
+    view: ChannelView, model: NoiseModel, rate: float | None, arrays: Arrays
 ) -> dict[str, Any] | None:
     if not view.spectrum:
         return None
@@ -272,7 +274,9 @@ def _spectrum(
         },
         "model": next((row["model"] for row in view.models if row["chosen"]), ""),
         "smooth": arrays.log(smooth),
-        "terms": [
+        "terms": []
+        if not rate
+        else [
             {"name": name, "density": arrays.log(np.sqrt(term.psd(smooth, 1.0 / rate)))}
             for name, term in _named_terms(model)
         ],

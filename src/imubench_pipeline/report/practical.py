@@ -25,11 +25,18 @@ _LEAST_PLAIN, _MOST_PLAIN = Decimal("0.0001"), 1_000_000
 _MOST_DIGITS = 7
 
 
-def number_text(value: float, digits: int = 4) -> str:
+NO_VALUE = "–"
+"""How every page shows a number that is not there."""
+
+
+def number_text(value: float | None, digits: int = 4) -> str:
     """Return a number rounded to some digits, with a power of ten where it is small or large.
 
-    A number in the middle of two is rounded away from zero, as the scripts of the pages do.
+    None and NaN are `NO_VALUE`. A number in the middle of two is rounded away from zero, as the
+    scripts of the pages do.
     """
+    if value is None or math.isnan(value):
+        return NO_VALUE
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
     exact = Decimal(value)
@@ -61,11 +68,11 @@ class PageUnit:
 
     def text(self, value: float | None, digits: int = 4) -> str:
         """Return a SI value in this unit, rounded to some digits; a dash where there is none."""
-        return "–" if value is None else number_text(value * self.per_si, digits)
+        return number_text(None if value is None else value * self.per_si, digits)
 
-    def digits(self, value: float, lower: float | None, upper: float | None) -> int:
+    def digits(self, value: float | None, lower: float | None, upper: float | None) -> int:
         """Return with how many digits a SI value and its limits are printed in this unit."""
-        if lower is None or upper is None:
+        if value is None or lower is None or upper is None:
             return digits_by(value, None, None)
         return digits_by(value * self.per_si, lower * self.per_si, upper * self.per_si)
 
@@ -194,8 +201,27 @@ def _page_unit(sign: str, dimension: str) -> PageUnit:
     return PageUnit(sign, 1.0 / factor)
 
 
-def duration_text(seconds: float) -> str:
-    """Return a time in the unit in which it is easily read."""
+def percent_text(share: float | None, digits: int = 3) -> str:
+    """Return a share of 1 in per cent; `NO_VALUE` where there is none."""
+    return NO_VALUE if share is None else f"{number_text(100.0 * share, digits)} %"
+
+
+def degrees_text(angle: float | None, digits: int = 4) -> str:
+    """Return an angle in rad in degrees; `NO_VALUE` where there is none."""
+    return NO_VALUE if angle is None else f"{number_text(math.degrees(angle), digits)}°"
+
+
+def printed_text(row: Mapping[str, Any]) -> str:
+    """Return the figure of a datasheet as it is printed; `NO_VALUE` where there is none."""
+    if row["printed"] is None:
+        return NO_VALUE
+    return f"{row['printed']:g} {row['unit'] or ''}".rstrip()
+
+
+def duration_text(seconds: float | None) -> str:
+    """Return a time in the unit in which it is easily read; `NO_VALUE` where there is none."""
+    if seconds is None:
+        return NO_VALUE
     for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2.0 * size:
             return f"{number_text(seconds / size, 3)} {name}"
@@ -214,6 +240,6 @@ def interval_text(row: Mapping[str, Any], unit: PageUnit, least: int = 3) -> str
     """Return ``lower to upper`` of a row of a table; a dash where they are not known."""
     lower, upper = row["lower"], row["upper"]
     if lower is None or upper is None:
-        return "–"
+        return NO_VALUE
     digits = limit_digits(lower, upper, least)
     return f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"

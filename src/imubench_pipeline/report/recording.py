@@ -17,6 +17,7 @@ from imubench_pipeline.report.parameters import digits_of, methods_table
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks, samples_payload
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
+    NO_VALUE,
     System,
     duration_text,
     number_text,
@@ -134,6 +135,12 @@ def _summary(view: RecordingView, channels: int) -> str:
     return summary_words(view, parts)
 
 
+def _inside(score: Row) -> str:
+    """Return the part of the curve inside the band of one reconstruction."""
+    inside = score["inside_band"]
+    return NO_VALUE if inside is None else f"{100 * inside:.0f} %"
+
+
 def _drawn(score: Row) -> tuple[str, str]:
     """Return the score of one reconstruction and its range, in decades."""
     low, high = (number_text(score[f"drawn_log10_{end}"], 2) for end in ("lower", "upper"))
@@ -162,7 +169,7 @@ def _channel(
         scored = score is not None and score["rms_log10"] is not None
         line["score"] = number_text(score["rms_log10"], 2) if scored and score else "–"
         line["drawn"] = _drawn(score) if scored and score else ("–", "")
-        line["inside"] = f"{100 * score['inside_band']:.0f} %" if scored and score else "–"
+        line["inside"] = _inside(score) if scored and score else "–"
     best = channel.models[0] if channel.models else None
     return {
         "view": channel,
@@ -179,7 +186,7 @@ def _channel(
                 "model": row["model"],
                 "chosen": row["chosen"],
                 "above": number_text(row["bic"] - best["bic"], 3) if best else "",
-                "deviance": "–" if row["deviance"] is None else number_text(row["deviance"], 3),
+                "deviance": number_text(row["deviance"], 3),
                 "verdict": row["verdict"],
             }
             for row in _best(channel.models)

@@ -109,7 +109,8 @@ def rejections(recordings: Iterable[Row]) -> Iterator[str]:
     """Yield a line for each rejected recording: its name and the reason."""
     for row in recordings:
         if row["status"] == "rejected":
-            yield one_line(f"{row['sensor']}/{row['recording']}: {row['reason']}")
+            reason = row["reason"] or "no reason is kept"
+            yield one_line(f"{row['sensor']}/{row['recording']}: {reason}")
 
 
 def left_out(failures: Iterable[Row]) -> Iterator[str]:
@@ -152,7 +153,7 @@ def leaders(ranking: Iterable[Row], recordings: Iterable[Row]) -> Iterator[str]:
         if not first:
             yield one_line(f"{name}: no sensor can be ranked")
             continue
-        best = max(first, key=lambda row: row["margin"])
+        best = max(first, key=lambda row: row["margin"] or 0.0)
         shown = best["sensor"] + " (simulated)" * ((best["sensor"], best["recording"]) in simulated)
         if best["verdict"].endswith("fails"):
             shown = f"no sensor fulfils it; nearest is {shown}"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from urllib.parse import quote
 
 from imubench_pipeline.experiments.papers.about import PAPERS
 from imubench_pipeline.report.glossary import glossary, term
 from imubench_pipeline.report.site import Site
 
 Found = tuple[str, str, str, str]
-"""Kind, title, where it stands (page and section), and further words by which it is found."""
+"""Kind, title, address (page and section), and further words by which it is found."""
 
 
 def index(site: Site) -> str:
@@ -21,17 +22,17 @@ def index(site: Site) -> str:
 def _entries(site: Site) -> Iterator[Found]:
     for sensor in site.sensors:
         about = site.settings["sensors"].get(sensor, {}).get("price_class") or ""
-        yield "sensor", site.names[sensor], site.sensor_page(sensor), f"{sensor} {about}"
+        yield "sensor", site.names[sensor], quote(site.sensor_page(sensor)), f"{sensor} {about}"
     for view in site.views:
         findings = (term(row["finding"]).name for row in view.findings)
         state = [*dict.fromkeys(findings), *(["simulated"] if view.simulated else [])]
         if view.left_out:
             state += [view.row["status"], view.row["reason"] or ""]
         words = f"{view.sensor} {view.row['device']} {', '.join(state)}"
-        yield "recording", f"{site.names[view.sensor]}: {view.name}", view.page, words
+        yield "recording", f"{site.names[view.sensor]}: {view.name}", quote(view.page), words
     devices = {view.device_page: view for view in site.views if view.device_page}
     for page, view in devices.items():
-        yield "device", f"{site.names[view.sensor]}: device {view.row['device']}", page, ""
+        yield "device", f"{site.names[view.sensor]}: device {view.row['device']}", quote(page), ""
     for name, requirement in site.settings["requirements"].items():
         yield "requirement", requirement["title"], f"index.html#requirement-{name}", name
     for file, title in site.navigation:

@@ -136,10 +136,10 @@ def made(views: Sequence[RecordingView]) -> str:
     return f"{'All are' if whole else of_them} simulated, not measured."
 
 
-def folded(reason: str) -> tuple[str, str]:
+def folded(reason: str | None) -> tuple[str, str]:
     """Return the beginning of a reason that fits on a line, and the whole; empty if that is all."""
-    if len(reason) <= _LINE:
-        return reason, ""
+    if reason is None or len(reason) <= _LINE:
+        return reason or "", ""
     begin = reason[: _LINE - 1]
     return f"{begin[: begin.rfind(' ')].rstrip(',;:')} …", reason
 

@@ -59,7 +59,7 @@ def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
             "digits": limit_digits(row["lower"], row["upper"], 4),
             "status": "" if row["status"] == "ok" else row["status"],
             "truth": truth["value"] if truth else None,
-            "why": sentence(row["reason"] or ""),
+            "why": sentence(row["reason"]),
         }
 
 
@@ -83,7 +83,8 @@ def answer(channel: ChannelView, system: System) -> list[str]:
         lines.append("The spectrum shows no low-pass of the sensor.")
     elif low_pass:
         order = low_pass["cutoff"]["order"]
-        kind = "of first order" if order == 1 else f"as a Butterworth filter of order {order}"
+        kind = "of first order" if order == 1 else "as a Butterworth filter"
+        kind += f" of order {order}" if order not in (None, 1) else ""
         if low_pass["cutoff"]["value"] is not None:
             cutoff = number_text(low_pass["cutoff"]["value"])
             lines.append(f"The sensor's own low-pass cuts off at {cutoff} Hz, {kind}.")

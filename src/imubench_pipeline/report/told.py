@@ -80,7 +80,14 @@ def margin(row: Row) -> tuple[Told, Told, Told] | None:
     return first, lower, upper
 
 
-def margin_limits(row: Row) -> tuple[float, float]:
+def margin_limits(row: Row) -> tuple[float | None, float | None]:
     """Return the 95 % limits of the margin of a row of the table ``ranking`` that has one."""
-    low, high = (row["limit"] / row[end] if row[end] else math.inf for end in ("upper", "lower"))
+    low, high = (_over(row["limit"], row[end]) for end in ("upper", "lower"))
     return low, high
+
+
+def _over(limit: float | None, error: float | None) -> float | None:
+    """Return a limit over an error; infinite where the error is zero, None where one is unknown."""
+    if limit is None or error is None:
+        return None
+    return limit / error if error else math.inf

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,10 +11,12 @@ from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
     System,
+    degrees_text,
     duration_text,
     limit_digits,
     number_text,
     page_unit,
+    percent_text,
 )
 from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words
 from imubench_pipeline.report.site import Site
@@ -97,7 +98,7 @@ def _summary(view: RecordingView, turning: Sequence[Row], rows: Sequence[Row]) -
 
 def latitude_text(rows: Sequence[Row]) -> str:
     """Return the latitude of a recording in degrees, of rows that have it, at least one."""
-    return f"{number_text(math.degrees(rows[0]['latitude']))}°"
+    return degrees_text(rows[0]["latitude"])
 
 
 def answer(rows: Sequence[Row], system: System) -> str:
@@ -110,15 +111,16 @@ def answer(rows: Sequence[Row], system: System) -> str:
     if best is None:
         return "Nothing was found of the turns of this recording."
     if best["value"] is None:
-        return sentence(best["reason"] or "")
+        return sentence(best["reason"])
     unit = page_unit("gyro", "adev", system)
     value, truth = (unit.text(best[name], 4) for name in ("value", "truth"))
-    limit = unit.text(best["upper"] - best["value"], 2)
+    size = None if best["upper"] is None else best["upper"] - best["value"]
+    away = None if best["off_sigma"] is None else abs(best["off_sigma"])
     text = (
-        f"The filter finds an Earth's rate of {value} ± {limit} {unit.sign} (95 %); it is {truth} "
-        f"{unit.sign}, {number_text(abs(best['off_sigma']), 2)} standard deviations away."
+        f"The filter finds an Earth's rate of {value} ± {unit.text(size, 2)} {unit.sign} (95 %); "
+        f"it is {truth} {unit.sign}, {number_text(away, 2)} standard deviations away."
     )
-    if abs(best["off_sigma"]) > _FAR:
+    if away is not None and away > _FAR:
         text += (
             " So far off is not noise: a wrong sense, axis or latitude, a sensor that is warming "
             "up, or another noise than at rest."
@@ -163,7 +165,7 @@ def line(row: Row) -> dict[str, Any]:
         "words": METHOD_WORDS[row["method"]],
         "digits": limit_digits(row["lower"], row["upper"], 4),
         "off": "–" if row["off_sigma"] is None else f"{number_text(row['off_sigma'], 2)} σ",
-        "why": sentence(row["reason"] or ""),
+        "why": sentence(row["reason"]),
         "use": row["method"] == "filter" and row["status"] == "ok",
     }
 
@@ -187,13 +189,13 @@ def needs(rows: Sequence[Row]) -> dict[str, Any] | None:
     if not goals:
         return None
     curve = [row for row in rows if row["of"] == "dwell"]
-    best = next(row for row in curve if row["best"])
+    best = next((row for row in curve if row["best"]), None)
     nearly = [row["dwell"] for row in curve if row["nearly_best"]]
     return {
         "dwell": duration_text(goals[0]["dwell"]),
         "goals": [
             {
-                "goal": f"{number_text(100.0 * row['goal'], 3)} %",
+                "goal": percent_text(row["goal"]),
                 "turns": f"{row['turns']:,}".replace(",", " "),
                 "time": duration_text(row["time"]),
                 "seconds": row["time"],
@@ -202,10 +204,12 @@ def needs(rows: Sequence[Row]) -> dict[str, Any] | None:
             }
             for row in goals
         ],
-        "best": (
+        "best": ""
+        if best is None
+        else (
             f"In a run of {duration_text(best['time'])} the best dwell has "
             f"{number_text(best['dwell'], 3)} s of data ({counted(best['turns'], 'turn')}): it "
-            f"gives the Earth's rate to {number_text(100.0 * best['relative'], 3)} %. "
+            f"gives the Earth's rate to {percent_text(best['relative'])}. "
             + _about_best(best["dwell"], [row["dwell"] for row in curve], nearly)
         ),
     }
@@ -213,7 +217,8 @@ def needs(rows: Sequence[Row]) -> dict[str, Any] | None:
 
 def _about_best(best: float, tried: Sequence[float], nearly: Sequence[float]) -> str:
     """Return which dwells are as good as the best, in a sentence; at an edge of the search so."""
-    low, high = (number_text(limit, 3) for limit in (min(nearly), max(nearly)))
+    near = [*nearly, best]
+    low, high = (number_text(limit, 3) for limit in (min(near), max(near)))
     if best in (max(tried), min(tried)):
         longest = best == max(tried)
         text = f"It is the {'longest' if longest else 'shortest'} that was tried"
@@ -230,10 +235,10 @@ _SMALL = 0.5
 """Largest standard deviation of a heading, rad, of which the formula for small angles tells."""
 
 
-def _heading(heading: float) -> str:
-    if heading > _SMALL:
-        return f"above {number_text(math.degrees(_SMALL), 2)}°"
-    return f"{number_text(math.degrees(heading), 3)}°"
+def _heading(heading: float | None) -> str:
+    if heading is not None and heading > _SMALL:
+        return f"above {degrees_text(_SMALL, 2)}"
+    return degrees_text(heading, 3)
 
 
 def _stretches(turning: Sequence[Row]) -> Iterator[dict[str, Any]]:

@@ -14,7 +14,7 @@ from imubench_pipeline.report.practical import (
     PageUnit,
     duration_text,
     interval_text,
-    number_text,
+    percent_text,
     symbol_text,
 )
 from imubench_pipeline.settings.requirements import Requirement
@@ -74,7 +74,7 @@ def precision(row: Row, unit: PageUnit) -> str:
     half = (row["upper"] - row["lower"]) / 2.0 / abs(row["value"])
     if half > _ROUGH:
         return interval_text(row, unit, 2)
-    return f"± {number_text(100.0 * half, 2)} %"
+    return f"± {percent_text(half, 2)}"
 
 
 def verdict_words(row: Row) -> str:
@@ -87,7 +87,8 @@ def evidence_words(row: Row) -> str:
     """Return what makes the evidence of a verdict weak; empty where it is strong or not known."""
     if row["evidence"] != "weak":
         return ""
-    return "; ".join(_weakness(code, row) for code in row["evidence_reasons"].split(", "))
+    reasons = (row["evidence_reasons"] or "reason not stated").split(", ")
+    return "; ".join(_weakness(code, row) for code in reasons)
 
 
 def _weakness(code: str, row: Row) -> str:
@@ -111,10 +112,11 @@ def _weakness(code: str, row: Row) -> str:
 
 def spread_words(row: Row) -> str:
     """Return how much specimens differ, of a row of ``ranking`` that says so."""
-    return f"{number_text(100.0 * row['spread'], 2)} %, {_SPREAD_OF[row['spread_of']]}"
+    return ", ".join(filter(None, (percent_text(row["spread"], 2), _SPREAD_OF[row["spread_of"]])))
 
 
-_SPREAD_OF = {
+_SPREAD_OF: Mapping[str | None, str] = {
+    None: "",
     "specimens": "from specimen to specimen",
     "recordings": "from recording to recording of one specimen",
     "other sensors": "taken from other sensors with several specimens",
@@ -264,8 +266,8 @@ def model_text(name: str) -> str:
     return f"{rest} + {counted(lines, 'line')}" if lines else rest
 
 
-def sentence(text: str) -> str:
-    """Return a text as a sentence: a capital first, a full stop at the end."""
+def sentence(text: str | None) -> str:
+    """Return a text as a sentence: a capital first, a full stop at the end; empty if none."""
     return text[:1].upper() + text[1:].rstrip(".") + "." if text else ""
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.experiments.alignment.accuracy import accuracies
+from imubench_pipeline.experiments.alignment.fine import OPEN
 from imubench_pipeline.experiments.alignment.triad import Site, Triad
 from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.noise import NoiseModel
@@ -153,7 +154,7 @@ def _aligned(
             "time": accuracy.time,
             "roll": roll,
             "pitch": pitch,
-            "heading": heading if accuracy.reason is None else None,
+            "heading": heading if heading < OPEN else None,
             "reason": accuracy.reason,
         }
         if accuracy.errors is not None:

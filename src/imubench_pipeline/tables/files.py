@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.csv as pacsv
 
 from imubench_pipeline.tables.columns import Column
@@ -56,8 +57,8 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
     table : str
         A key of `imubench_pipeline.tables.schemas.TABLES`, or of ``PARTS_OF`` there.
     rows : iterable of mapping
-        One mapping a row; a column that a row leaves out is null. NaN becomes null, and
-        of texts what does not show is escaped.
+        One mapping a row; a column that a row leaves out is null. NaN and infinities become
+        null, and of texts what does not show is escaped.
 
     Raises
     ------
@@ -74,11 +75,29 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
         values = [row.get(column.name) for row in listed]
         if pa.types.is_string(column.type):
             values = [None if text is None else _shown(text) for text in values]
-        array = pa.array(values, type=column.type, from_pandas=True)
+        array = _finite(pa.array(values, type=column.type, from_pandas=True))
         if column.required and array.null_count:
             raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
         arrays.append(array)
     return pa.Table.from_arrays(arrays, schema=schema(table))
+
+
+def _finite(column: pa.Array) -> pa.Array:
+    """Return a column with null in place of NaN and infinities, which no table holds."""
+    if not pa.types.is_floating(column.type):
+        return column
+    return pc.if_else(pc.is_finite(column), column, pa.scalar(None, column.type))
+
+
+def _not_finite(table: pa.Table) -> str:
+    """Return the first cell of a table that is NaN or infinite, in words; empty if none is."""
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        if pa.types.is_floating(column.type):
+            finite = pc.is_finite(column)  # null where there is no value
+            if not pc.all(finite, min_count=0).as_py():
+                row = pc.index(finite, pa.scalar(False)).as_py()
+                return f"{name} of row {row + 1} is {column[row].as_py()}"
+    return ""
 
 
 def _shown(text: str) -> str:
@@ -136,7 +155,14 @@ def write_arrow(table: pa.Table, path: Path) -> None:
 
     Texts in CSV are such as no spreadsheet takes for formulas (`imubench_pipeline.tables.texts`);
     Parquet has them without that.
+
+    Raises
+    ------
+    TableError
+        If a number is NaN or infinite: `build` makes null of it.
     """
+    if fault := _not_finite(table):
+        raise TableError(f"{path}: {fault}; expected a finite number or null")
     with replacing(path) as temporary:
         if path.suffix == ".csv":
             # Arrow ignores that a file which it opened itself cannot be closed.
@@ -190,7 +216,7 @@ def read_part(table: str, path: Path) -> pa.Table:
     Raises
     ------
     TableError
-        If it is damaged, or has other columns.
+        If it is damaged, has other columns, or a number that is NaN or infinite.
     """
     expected = schema(table)
     try:
@@ -212,6 +238,11 @@ def read_part(table: str, path: Path) -> pa.Table:
         raise TableError(
             f"{path}: was made by another version of imubench_pipeline: {other}; run snakemake -c2 "
             "again, as for these results, and it is made anew"
+        )
+    if fault := _not_finite(part):
+        raise TableError(
+            f"{path}: {fault}; expected a finite number or null: remove the file, and the next run "
+            "makes it again"
         )
     if part.schema.equals(expected):
         return part

@@ -460,6 +460,20 @@ def many(results: Path, sensors: int, each: int) -> Site:
     return site_of(tables, settings_of(catalogue, {}), results)
 
 
+def named(results: Path, names: Sequence[str]) -> Site:
+    """Return the report of copies of one log: sensors, recordings and devices of these names."""
+    log = Log("alpha", "one", channels=("gyro_x",), methods=("likelihood",))
+    of_one = rows_of([log])
+    tables = {}
+    for table, rows in of_one.items():
+        found = build(table, rows)
+        copies = [_copy(found, name, name, 1.0) for name in names] if rows else [found]
+        tables[table] = pa.concat_tables(copies)
+    for name in names:
+        write_samples(replace(log, sensor=name, recording=name), results)
+    return site_of(tables, settings_of({}, REQUIREMENTS), results)
+
+
 def _copy(table: pa.Table, sensor: str, recording: str, factor: float) -> pa.Table:
     names = {"sensor": sensor, "recording": recording, "device": recording}
     columns: list[pa.ChunkedArray | pa.Array] = []

@@ -98,7 +98,12 @@ class Accuracy:
 
     @property
     def reason(self) -> str | None:
-        """Why there is no heading; None where there is one."""
+        """Why an angle is missing; None where all are there."""
+        if not np.all(np.isfinite(self.sigma)):
+            return (
+                "the noise is so small that rounding errors hide the angles: no sensor is that "
+                "quiet, look at the findings about it"
+            )
         if self.sigma[2] < OPEN:
             return None
         if self.positions == 1:

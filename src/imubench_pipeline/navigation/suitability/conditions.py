@@ -138,7 +138,7 @@ def _measured(row: Row) -> str:
 
 def is_condition(row: Row) -> bool:
     """Tell whether a limit rests on the figure of a source, a row of the table ``error_budget``."""
-    return row["largest_unit"] is not None
+    return row["largest_unit"] is not None and row["cause"] in _FIGURES
 
 
 def once_calibrated(words: str, total: Row, conditions: Iterable[Row]) -> str:

@@ -91,9 +91,25 @@ def standings(
     sensors by `limit_of`.
     """
     by_limit: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
+    for row in map(_judgeable, rows):
         by_limit.setdefault(limit_of(row), []).append(row)
-    return [_standing(parts, devices, (usual or {}).get(key)) for key, parts in by_limit.items()]
+    return [
+        _standing(parts, devices, (usual or {}).get(key))
+        for key, parts in by_limit.items()
+        if any(row["source"] == "total" for row in parts)
+    ]
+
+
+_JUDGED_BY = ("sigma", "lower", "upper", "within", "limit")
+
+
+def _judgeable(row: Row) -> Row:
+    """Return a row; a total that lacks a number by which it is judged has no figure."""
+    missing = [name for name in _JUDGED_BY if row[name] is None]
+    if row["source"] != "total" or not missing:
+        return row
+    reason = row["reason"] or f"it has no {' and no '.join(missing)}"
+    return {**row, "sigma": None, "reason": reason}
 
 
 def limit_of(row: Row) -> tuple[Any, ...]:

@@ -40,18 +40,13 @@ function startSearch() {
   const said = document.createElement("output");
   const list = document.createElement("ul");
   list.hidden = true;
-  const addressOf = (path) => {
-    const [file, section] = path.split("#");
-    const way = file.split("/").map(encodeURIComponent).join("/");
-    return `${root}${way}${section ? `#${section}` : ""}`;
-  };
   const show = async () => {
     const text = field.value.trim();
     const found = text ? searchFor(text, await loadSearch()) : [];
     if (field.value.trim() !== text) return;
     list.hidden = found.length === 0;
     list.replaceChildren(...found.slice(0, MOST_FOUND).map(([kind, title, path]) => {
-      const link = Object.assign(document.createElement("a"), { href: addressOf(path), textContent: title });
+      const link = Object.assign(document.createElement("a"), { href: root + path, textContent: title });
       link.append(" ", Object.assign(document.createElement("span"), { className: "badge", textContent: kind }));
       const line = document.createElement("li");
       line.append(link);

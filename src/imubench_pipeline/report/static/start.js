@@ -8,7 +8,7 @@ async function openPage(main) {
   if (!ABLE) return showPlain(main);
   await unfold(main);
   const data = main.querySelector("script[type='application/json'].page");
-  pageData = data ? JSON.parse(data.textContent) : {};
+  pageData = data ? JSON.parse(data.textContent, withoutPrototype) : {};
   decoded = [];
   showUnits(main);
   startTables(main);
@@ -17,6 +17,12 @@ async function openPage(main) {
   startChooser(main);
   startComparison(main);
   startFigures(main);
+}
+
+// Sensors, recordings and devices may have any name: without a prototype no mapping of a page has
+// "constructor" or "toString" but where a sensor is called so.
+function withoutPrototype(_key, value) {
+  return value && typeof value === "object" && !Array.isArray(value) ? Object.setPrototypeOf(value, null) : value;
 }
 
 // What a page has packed (`html.packed`): its data, further rows of tables, and what stands for its
@@ -52,7 +58,7 @@ async function startPages(main) {
   const pageOf = (path) => document.getElementById(`page:${path}`);
   let here = null;
   const show = async () => {
-    const [path, section] = decodeURIComponent(location.hash.slice(2) || "index.html").split("#");
+    const [path, section] = (location.hash.slice(2) || "index.html").split("#").map(decodeURIComponent);
     const page = pageOf(path) ? path : "index.html";
     if (page !== here || stateText(location.hash)) {
       here = page;
@@ -80,7 +86,7 @@ async function startPages(main) {
     const path = target === "" ? here : resolved(target, inHeader ? "" : here);
     if (!pageOf(path)) return;
     event.preventDefault();
-    const hash = `#/${encodeURI(path)}${section ? `#${section}` : ""}`;
+    const hash = `#/${path.split("/").map(encodeURIComponent).join("/")}${section ? `#${section}` : ""}`;
     if (location.hash === hash) show();
     else location.hash = hash;
   });

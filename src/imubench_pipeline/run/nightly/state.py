@@ -153,7 +153,9 @@ def state_of(
 ) -> State:
     """Return the state after a run, of tables as of `load_tables` and the logs that were read."""
     rejected = {
-        name_in(row): row["reason"] for row in tables["recordings"] if row["status"] == "rejected"
+        name_in(row): row["reason"] or "no reason is kept"
+        for row in tables["recordings"]
+        if row["status"] == "rejected"
     }
     return State(
         finished=finished,
