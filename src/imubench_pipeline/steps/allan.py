@@ -9,7 +9,7 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks, of_phase
-from imubench_pipeline.allan.phase import integrate
+from imubench_pipeline.allan.phase import NO_GAPS, gaps_of, integrate
 from imubench_pipeline.estimators.rows import allan_rows
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
@@ -35,9 +35,17 @@ def curve_of(
 ) -> AllanCurve:
     """Return the Allan variance of a channel, with the same bits for any number of threads."""
     blocks, holes, segments = log.blocks(), log.holes, log.segments
+    gaps = gaps_of(log.blocks()) if holes else NO_GAPS
     if overlap == "full":
         phase = integrate(blocks, log.grid, holes=holes, segments=segments)
-        return of_phase(phase, log.rate, sizes, threads=threads)
+        return of_phase(phase, log.rate, sizes, gaps=gaps, threads=threads)
     return of_blocks(
-        blocks, log.grid, log.rate, sizes, holes=holes, segments=segments, threads=threads
+        blocks,
+        log.grid,
+        log.rate,
+        sizes,
+        holes=holes,
+        gaps=gaps,
+        segments=segments,
+        threads=threads,
     )
