@@ -248,6 +248,12 @@ def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
         "segments": [list(segment) for segment in base.segments],
         "uniform": base.uniform,
         "holes": holes,
+        "empty": [
+            name
+            for part in parts
+            for name, column in part.columns.items()
+            if name in BESIDE and not column.present
+        ],
     }
 
 

@@ -283,7 +283,7 @@ def _describe(of_clock: Part, clock: _Clock, part: Part) -> None:
     """Give a part its time base, with what is to be said of it."""
     names = ", ".join(name for name in of_clock.columns if name in clock.channels)
     base = clock.base
-    findings = [replace(found, detail=f"{names}: {found.detail}") for found in base.findings]
+    findings = [replace(found, channel=name) for name in clock.channels for found in base.findings]
     if of_clock.rows < part.rows:
         verb = "has a number" if len(clock.channels) == 1 else "have numbers"
         detail = (

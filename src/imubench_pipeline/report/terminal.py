@@ -101,9 +101,13 @@ def logs(
         recommended = [line for line in own["parameters"] if line["recommended"]]
         yield from _parameter_tables(recommended, "95 % intervals below", {key: row}, system, width)
         if not own["parameters"]:
-            yield Text(
-                f"  {row['kind'].replace('_', ' ')}: no noise is estimated of a turned sensor\n"
+            static = row["kind"] == "static"
+            why = (
+                "no channel can be analysed"
+                if static
+                else "no noise is estimated of a turned sensor"
             )
+            yield Text(f"  {row['kind'].replace('_', ' ')}: {why}\n")
 
 
 def _length(row: Row, parameters: Sequence[Row]) -> str:

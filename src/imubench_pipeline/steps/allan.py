@@ -14,16 +14,30 @@ from imubench_pipeline.estimators.rows import allan_rows
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Row
+
+
+def too_sparse(channel: str, log: ChannelLog) -> Finding:
+    """Return why a channel has no Allan variance, and so no estimates."""
+    detail = (
+        f"so many samples of {channel} are missing that no two adjacent clusters have enough; the "
+        f"grid has {log.grid} points at {log.rate:.6g} Hz; record without losses, or for longer"
+    )
+    return Finding("too_short", "fatal", detail, log.grid, channel)
 
 
 def curves(folder: Path, sensor: str, recording: str, settings: AllanSettings) -> Iterator[Row]:
     """Yield the rows of the table ``allan``; none of a rejected recording."""
     for channel, log in kept_static_logs(folder).items():
-        sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
-        curve = curve_of(log, sizes, settings.overlap)
-        yield from allan_rows(Key(sensor, recording, channel), curve)
+        yield from allan_rows(Key(sensor, recording, channel), curve_of_channel(log, settings))
+
+
+def curve_of_channel(log: ChannelLog, settings: AllanSettings) -> AllanCurve:
+    """Return the Allan variance of a channel at the cluster sizes of the settings."""
+    sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
+    return curve_of(log, sizes, settings.overlap)
 
 
 def curve_of(

@@ -40,6 +40,7 @@ from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog, mean_of
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.steps.allan import too_sparse
 from imubench_pipeline.steps.kept_curves import curves
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
@@ -381,6 +382,9 @@ def estimation(
         if channels is not None and channel not in channels:
             continue
         key = Key(sensor, recording, channel)
+        if channel not in measured:
+            into.add_findings(key, [too_sparse(channel, log)])
+            continue
         how = EstimateSettings.model_validate(sections["estimate"])
         estimate_channel(key, log, measured[channel], how, sections["bandwidth"], into)
         if read := sections.get("authors", {}).get(channel):
