@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,12 @@ from imubench_pipeline.run.analysis.chain import Analysis
 from imubench_pipeline.run.analysis.compilation import Compilation
 from imubench_pipeline.run.checking import check
 from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.typing import Array
 
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 UNITS = {"gyro": "deg/s", "accel": "m/s^2"}
+METHODS = tuple(EstimateSettings().methods)
 WORDS = ("", "nan", "NaN", "null", "NULL", "inf", "-inf")
 
 
@@ -136,7 +138,7 @@ def tables(draw: st.DrawFn, most: int = 1500) -> Table:
     return table
 
 
-def project(table: Table, folder: Path) -> Plan:
+def project(table: Table, folder: Path, methods: Sequence[str] = METHODS) -> Plan:
     """Write a log with its sensor file, and return the plan of a run of it."""
     logs = folder / "logs" / "made"
     logs.mkdir(parents=True)
@@ -150,7 +152,7 @@ def project(table: Table, folder: Path) -> Plan:
         "simulated": None,
         "requirements": None,
     }
-    return Plan(paths)
+    return Plan({**paths, "estimate": {"methods": list(methods)}})
 
 
 class Compiled(Compilation):
@@ -164,11 +166,12 @@ class Compiled(Compilation):
     def finish(self) -> None: ...
 
 
-def analysed(plan: Plan) -> Mapping[str, list[dict[str, Any]]]:
-    """Run every step of a plan; return the rows of the joined tables."""
+def analysed(plan: Plan, *, pages: bool = True) -> Mapping[str, list[dict[str, Any]]]:
+    """Run every step of a plan, or those that come before pages; return the joined tables."""
     analysis = Analysis(plan, Compiled(), 1, lambda _: None)
-    analysis.estimates()
-    return {name: table.to_pylist() for name, table in analysis.for_pages().items()}
+    joined = analysis.estimates()
+    joined = analysis.for_pages() if pages else joined
+    return {name: table.to_pylist() for name, table in joined.items()}
 
 
 def checked(plan: Plan) -> tuple[str, str | None, set[str]]:
