@@ -9,6 +9,7 @@ import pytest
 
 import imubench_pipeline as imu
 from imubench_pipeline.library.logs import Log
+from imubench_pipeline.report.terminal import logs
 from tests.chain.logs import Table, analysed, checked, noise, project
 
 ROWS = 6000
@@ -159,3 +160,6 @@ def test_every_command_takes_both_sensors_at_their_rates(tmp_path: Path) -> None
     }
     for name, sigma, rate in (("gyro_z", np.radians(0.1), 100.0), ("accel_z", 0.02, 50.0)):
         assert N[name]["lower"] < sigma / np.sqrt(rate) < N[name]["upper"]
+    (row,) = found["recordings"]
+    (head, *_) = (str(shown) for shown in logs(found, "practical", 200))
+    assert head == f"log: {row['duration'] / 60:.0f} min at 100 and 50 Hz, 2 channels"
