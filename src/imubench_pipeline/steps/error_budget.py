@@ -63,7 +63,7 @@ def _deviations(
     estimates: Mapping[str, Estimate],
     sections: Mapping[str, Any],
 ) -> Iterator[Row]:
-    """Yield the rows of the table ``drawn_deviations``, of what the ingest says of its recording."""
+    """Yield the rows of the table ``drawn_deviations``."""
     how = FusionSettings.model_validate(sections["fusion"])
     for name, estimate in estimates.items():
         channel = FusionChannel(
