@@ -16,10 +16,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan.phase import (
+    NO_GAPS,
+    Gaps,
     Phase,
     accumulate,
     accumulate_present,
-    enough_present,
     finite_mean,
     full_sums,
     integrate,
@@ -75,7 +76,8 @@ class OctaveSums:
     """Sums of squared differences of cluster means of one segment of a log.
 
     The sizes, shape (m,), are as `octave_sizes` gives them; the sums have the same bits for any
-    number of threads. With ``holes`` samples may be missing (NaN).
+    number of threads. With ``holes`` samples may be missing (NaN); ``gaps``
+    says where.
 
     Attributes
     ----------
@@ -87,14 +89,22 @@ class OctaveSums:
         Cumulative number of samples present at the same points; None: all are.
     """
 
-    def __init__(self, sizes: Integers, samples: int, *, holes: bool, threads: int = 1) -> None:
+    def __init__(
+        self,
+        sizes: Integers,
+        samples: int,
+        *,
+        holes: bool,
+        gaps: Gaps = NO_GAPS,
+        threads: int = 1,
+    ) -> None:
         self._sizes, self._holes, self._threads = sizes, holes, max(1, threads)
         self._short = _level(sizes) < _LEVELS
         short = sizes[self._short]
         level = _level(short)
         steps = short >> level
         self._grid = (short, steps, _LANES * steps, np.searchsorted(level, np.arange(_LEVELS + 1)))
-        self._enough = enough_present(short)
+        self._gaps, self._enough = gaps, gaps.enough(short)
         self._sums = np.zeros((4, len(short)))
         # The end of the log is a point of the grid only if it falls on it.
         points = samples // DECIMATION + 1
@@ -154,7 +164,7 @@ class OctaveSums:
     def results(self) -> list[NDArray[Any]]:
         """Sum of squares, sum of mean inverse counts, differences, and the most there could be."""
         steps = self._sizes[~self._short] // DECIMATION
-        long = full_sums(self.phase, steps, self._threads, stride=DECIMATION)
+        long = full_sums(self.phase, steps, self._threads, stride=DECIMATION, gaps=self._gaps)
         return [
             np.concatenate((of_short.astype(of_long.dtype), of_long))
             for of_short, of_long in zip(self._sums, long, strict=True)

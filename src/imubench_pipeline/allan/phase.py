@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -18,7 +18,11 @@ BLOCK = 1 << 14
 """Differences summed together: three blocks of float64 stay in the L2 cache."""
 
 PRESENT = 0.9
-"""Part of a cluster's samples that must be there for its mean to count."""
+"""Part of a cluster's samples that must be there for its mean to count; of a log with many short
+gaps, part of those that are there as a rule."""
+
+_SHORT = 4
+"""A gap is short in a cluster that is this many times longer."""
 
 
 Span = tuple[int, int]
@@ -28,6 +32,72 @@ Span = tuple[int, int]
 def spans_of(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...]:
     """Return the segments of a log; by default it is one."""
     return tuple(segments) if segments else ((0, samples),)
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """How many samples of a log are missing, by the length of the gap that they are in.
+
+    A mean over a cluster stands for all of it if the samples that are missing are spread evenly
+    over it, as where every fifth is lost. It does not if they are missing in one piece. So clusters
+    are compared with what is usual between gaps that are long beside them.
+    """
+
+    samples: int
+    """Points of the grid."""
+    missing: NDArray[np.int64]
+    """Shape (64,): samples in gaps of 1, of 2 to 3, of 4 to 7 and so on."""
+
+    def enough(self, sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return how many samples a cluster must have for its mean to count, by size."""
+        longest = (1 << np.arange(1, 33)) - 1  # in each octave
+        octaves = np.searchsorted(longest, sizes // _SHORT, side="right")
+        short = np.concatenate(([0], np.cumsum(self.missing)))[octaves]
+        between = self.samples - (self.missing.sum() - short)
+        usual = 1.0 - short / np.maximum(between, 1)
+        return np.maximum(np.ceil(PRESENT * usual * sizes - 1e-9), 1).astype(np.int64)
+
+
+NO_GAPS = Gaps(0, np.zeros(64, dtype=np.int64))
+"""Of a log with none, or none but long ones."""
+
+
+@dataclass
+class GapCount:
+    """Counts the gaps of a log as its blocks go by."""
+
+    _samples: int = 0
+    _open: int = 0
+    _missing: NDArray[np.int64] = field(default_factory=lambda: np.zeros(64, dtype=np.int64))
+
+    def add(self, block: NDArray[np.floating[Any]]) -> None:
+        """Take the next samples; NaN where one is missing."""
+        self._samples += len(block)
+        there = np.flatnonzero(np.isfinite(block))
+        if not len(there):
+            self._open += len(block)
+            return
+        inside = np.diff(there) - 1
+        self._missing += _by_octave(np.concatenate(([self._open + there[0]], inside)))
+        self._open = len(block) - 1 - int(there[-1])
+
+    def gaps(self) -> Gaps:
+        """Return the gaps so far."""
+        return Gaps(self._samples, self._missing + _by_octave(np.array([self._open])))
+
+
+def gaps_of(blocks: Iterable[NDArray[np.floating[Any]]]) -> Gaps:
+    """Return the gaps of a log that comes in consecutive blocks, NaN where a sample is missing."""
+    count = GapCount()
+    for block in blocks:
+        count.add(block)
+    return count.gaps()
+
+
+def _by_octave(lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+    lengths = lengths[lengths > 0]
+    octaves = np.frexp(lengths.astype(np.float64))[1] - 1
+    return np.bincount(octaves, weights=lengths, minlength=64).astype(np.int64)
 
 
 @dataclass(frozen=True)
@@ -247,13 +317,13 @@ def sum_present(
     return total, thinned, number
 
 
-def enough_present(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return how many samples a cluster must have for its mean to count, by size."""
-    return np.ceil(PRESENT * sizes - 1e-9).astype(np.int64)
-
-
 def full_sums(
-    phase: Phase, sizes: NDArray[np.int64], threads: int, *, stride: int = 1
+    phase: Phase,
+    sizes: NDArray[np.int64],
+    threads: int,
+    *,
+    stride: int = 1,
+    gaps: Gaps = NO_GAPS,
 ) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
     """Sum over the differences of means, by size.
 
@@ -265,6 +335,8 @@ def full_sums(
         The sums have the same bits for any number.
     stride : int
         Samples from one point of the phase to the next.
+    gaps : Gaps
+        Which samples are missing.
 
     Returns
     -------
@@ -292,7 +364,7 @@ def full_sums(
             terms += most
         else:
             counts = phase.present[start : stop + 1]
-            work = partial(_full_with_holes, theta, counts, sizes, enough_present(samples))
+            work = partial(_full_with_holes, theta, counts, sizes, gaps.enough(samples))
             sums, inverse, numbers = in_threads(work, blocks, threads)
             total += sums.sum(axis=0)
             thinned += inverse.sum(axis=0)

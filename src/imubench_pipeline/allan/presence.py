@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import PRESENT, Span, spans_of
+from imubench_pipeline.allan.phase import GapCount, Gaps, Span, spans_of
 
 Counts = NDArray[np.int64]
 
@@ -27,6 +27,7 @@ class Presence:
     first: Counts  # samples present before each of the first points
     stride: int
     coarse: Counts  # samples present before every ``stride``-th point of the log
+    gaps: Gaps
 
     def differences(self, n: int) -> tuple[NDArray[np.bool_], int] | None:
         """Tell which differences of two adjacent cluster means of n samples there are.
@@ -44,7 +45,7 @@ class Presence:
         begin = np.arange(0, len(counts) - 2 * size, max(1, size // _STEPS))
         if not len(begin):
             return np.zeros(0, dtype=np.bool_), base
-        enough = PRESENT * size * base - 1e-9
+        enough = self.gaps.enough(np.array([size * base]))[0]
         complete = np.ones(len(begin), dtype=np.bool_)
         for cluster in (begin, begin + size):
             complete &= counts[cluster + size] - counts[cluster] >= enough
@@ -71,14 +72,16 @@ def presence(
         stride *= 2
     first = np.zeros(min(samples, 2 * _POINTS) + 1, dtype=np.int64)
     coarse = np.zeros(samples // stride + 1, dtype=np.int64)
+    gaps = GapCount()
     reached = total = 0
     for block in blocks:
         counts = total + np.cumsum(np.isfinite(block), dtype=np.int64)
         stop = reached + len(block)
+        gaps.add(block)
         points = np.arange(reached // stride + 1, min(stop // stride, len(coarse) - 1) + 1)
         coarse[points] = counts[points * stride - reached - 1]
         if reached + 1 < len(first):
             part = counts[: len(first) - 1 - reached]
             first[reached + 1 : reached + 1 + len(part)] = part
         reached, total = stop, int(counts[-1]) if len(counts) else total
-    return Presence(samples, spans_of(segments, samples), first, stride, coarse)
+    return Presence(samples, spans_of(segments, samples), first, stride, coarse, gaps.gaps())

@@ -22,10 +22,13 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
 from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
 from imubench_pipeline.allan.phase import (
+    NO_GAPS,
     PRESENT,
+    Gaps,
     Phase,
     Span,
     full_sums,
+    gaps_of,
     integrate,
     spans_of,
     split,
@@ -203,6 +206,7 @@ def allan_variance(
         values = np.where(mask, values, np.nan)
     present = np.isfinite(values)
     holes, number, cores = not bool(present.all()), len(values), available(threads)
+    gaps = gaps_of([values]) if holes else NO_GAPS
     if overlap == "octave":
         curve = of_blocks(
             [values],
@@ -210,16 +214,18 @@ def allan_variance(
             rate,
             cluster_sizes,
             holes=holes,
+            gaps=gaps,
             segments=segments,
             threads=cores,
         )
     else:
         phase = integrate([values], number, holes=holes, segments=segments)
-        curve = of_phase(phase, rate, cluster_sizes, threads=cores)
+        curve = of_phase(phase, rate, cluster_sizes, gaps=gaps, threads=cores)
     if not len(curve.tau) and holes:
         raise ValueError(
             f"{int(present.sum())} of {number} samples are finite numbers, and no two adjacent "
-            f"clusters have {PRESENT:.0%} of theirs; expected a log with fewer missing"
+            f"clusters have {PRESENT:.0%} of those between long gaps; expected a log with fewer "
+            "missing"
         )
     return curve
 
@@ -231,6 +237,7 @@ def of_blocks(
     sizes: ArrayLike | None = None,
     *,
     holes: bool,
+    gaps: Gaps = NO_GAPS,
     segments: Sequence[Span] | None = None,
     threads: int = 1,
 ) -> AllanCurve:
@@ -249,6 +256,9 @@ def of_blocks(
         The sizes are rounded to the stride of their octave.
     holes : bool
         Samples may be missing.
+    gaps : Gaps
+        Which are (`imubench_pipeline.allan.phase.gaps_of`): where many short gaps are spread over
+        the log, clusters count all the same.
     threads : int
         With more than one, the next block is made while the last is summed.
 
@@ -262,7 +272,7 @@ def of_blocks(
     wanted = octave_sizes(wanted)
     if samples < SHORTEST:
         phase = integrate(blocks, samples, holes=holes, segments=spans)
-        return of_phase(phase, rate, wanted, threads=threads)
+        return of_phase(phase, rate, wanted, gaps=gaps, threads=threads)
     longest: OctaveSums | None = None
     sums: list[NDArray[Any]] = []
     done = 0
@@ -270,7 +280,7 @@ def of_blocks(
         blocks = read_ahead(blocks)
     for number, group in groupby(split(blocks, spans), key=itemgetter(0)):
         start, stop = spans[number]
-        part = OctaveSums(wanted, stop - start, holes=holes, threads=threads)
+        part = OctaveSums(wanted, stop - start, holes=holes, gaps=gaps, threads=threads)
         for _, block in group:
             part.push(block if block.dtype == np.float32 else np.asarray(block, np.float64))
         if part.received != stop - start:
@@ -294,7 +304,12 @@ def of_blocks(
 
 
 def of_phase(
-    phase: Phase, rate: float, sizes: ArrayLike | None = None, *, threads: int = 1
+    phase: Phase,
+    rate: float,
+    sizes: ArrayLike | None = None,
+    *,
+    gaps: Gaps = NO_GAPS,
+    threads: int = 1,
 ) -> AllanCurve:
     """Return the fully overlapping Allan variance of cumulative sums (see `allan_variance`).
 
@@ -306,7 +321,7 @@ def of_phase(
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
         return *phase.every(n, start, stop), n
 
-    sums = full_sums(phase, wanted, threads)
+    sums = full_sums(phase, wanted, threads, gaps=gaps)
     return _curve(rate, wanted, phase.samples, phase.segments, sums, edges)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan import of_blocks
-from imubench_pipeline.allan.phase import Span, spans_of
+from imubench_pipeline.allan.phase import Span, gaps_of, spans_of
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
@@ -151,7 +151,8 @@ def fit(
     if not present.any():
         raise ValueError(f"none of the {len(values)} samples is present")
     holes = not bool(present.all())
-    curve = of_blocks([values], len(values), rate, holes=holes, segments=segments)
+    gaps = gaps_of([values])
+    curve = of_blocks([values], len(values), rate, holes=holes, gaps=gaps, segments=segments)
     return fit_blocks(
         lambda: [values],
         len(values),
@@ -233,7 +234,8 @@ def _first_model(
     blocks: Callable[[], Iterable[Array]], samples: int, rate: float, spans: Sequence[Span]
 ) -> NoiseModel:
     """Return what the Allan variance says, or white noise where too few clusters are complete."""
-    curve = of_blocks(blocks(), samples, rate, holes=True, segments=spans)
+    gaps = gaps_of(blocks())
+    curve = of_blocks(blocks(), samples, rate, holes=True, gaps=gaps, segments=spans)
     try:
         return least_squares.fit(curve).model
     except ValueError:

@@ -28,7 +28,7 @@ from imubench_pipeline.library.shown import Shown, Summary
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
-from imubench_pipeline.steps.allan import curve_of
+from imubench_pipeline.steps.allan import curve_of, too_sparse
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.units import SI_UNITS
 
@@ -127,21 +127,15 @@ class Curves(Shown, Mapping[str, Curve]):
         return Summary(title, _HEADS, [_row(curve) for curve in self.values()])
 
 
-def measured(log: ChannelLog, sizes: ArrayLike | None, overlap: Overlap, threads: int) -> Curve:
+def measured(
+    log: ChannelLog, sizes: ArrayLike | None, overlap: Overlap, threads: int
+) -> Curve | None:
     """Return the curve of a channel of a log, at cluster sizes, shape (m,), or those by default.
 
-    Raises
-    ------
-    ValueError
-        If too many samples are missing.
+    None: too many samples are missing (`imubench_pipeline.steps.allan.too_sparse`).
     """
     curve = curve_of(log, sizes, overlap, threads=threads)
-    if not len(curve.tau):
-        raise ValueError(
-            f"{log.channel}: so many samples are missing that no cluster is nine tenths full; "
-            "expected a log with fewer missing, or another rate"
-        )
-    return Curve.of(curve, log.channel)
+    return Curve.of(curve, log.channel) if len(curve.tau) else None
 
 
 def _row(curve: Curve) -> list[str]:
@@ -247,13 +241,12 @@ def allan_variance(
             raise ValueError(
                 "a log has its own rate, units, missing samples and segments; expected none of them"
             )
-        return Curves(
-            (
-                measured(log, cluster_sizes, overlap, cores)
-                for log in data.chosen(channels).values()
-            ),
-            data.name,
-        )
+        chosen = data.chosen(channels)
+        curves = [measured(log, cluster_sizes, overlap, cores) for log in chosen.values()]
+        if not any(curves):
+            reasons = [too_sparse(name, log).detail for name, log in chosen.items()]
+            raise ValueError(f"{data.name}: {'; '.join(reasons)}")
+        return Curves((curve for curve in curves if curve is not None), data.name)
     hertz = rate_of(rate, data)
 
     def of_samples(samples: Any, channel: str | None) -> Curve:

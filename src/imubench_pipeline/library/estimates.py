@@ -23,6 +23,7 @@ from imubench_pipeline.report.practical import System, interval_text, page_unit,
 from imubench_pipeline.settings.config import AllanSettings, EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of, shipped_sensors
 from imubench_pipeline.settings.validation import parse
+from imubench_pipeline.steps.allan import too_sparse
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.steps.sensor_tables import findings_of
 from imubench_pipeline.tables.findings import Finding, finding_of
@@ -274,6 +275,11 @@ def estimate(
         sizes = cluster_sizes(kept.grid, per_decade=grid.per_decade, longest=grid.longest)
         curve = measured(kept, sizes, grid.overlap, available(threads))
         key = Key(log.sensor, log.recording, channel)
+        if curve is None:
+            lack = too_sparse(channel, kept)
+            into.add_findings(key, [lack])
+            left_out[channel] = lack.detail
+            continue
         estimate_channel(key, kept, curve, how, log.bandwidth, into)
         found = into.estimates[channel].get(method)
         if found is None:

@@ -96,7 +96,8 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     """
     if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
-    sources = {str(name): source for name, source in log.channels.items()}
+    # In one order, however the sensor file has them: so are findings, and the columns kept.
+    sources = {str(name): source for name, source in sorted(log.channels.items())}
     if log.temperature is not None:
         sources[TEMPERATURE] = log.temperature
     if log.position is not None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.parts import Part
-from imubench_pipeline.recordings.recording import LogWriter
+from imubench_pipeline.recordings.recording import BESIDE, LogWriter
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import checked_parquet, checked_row_group
@@ -23,7 +23,10 @@ def names_of(parts: list[Part], groups: list[list[int]]) -> list[str]:
     """Name the Parquet file of each clock after the quantity or the channels it holds."""
     if len(groups) == 1:
         return ["log.parquet"]
-    contents = [[name for index in group for name in parts[index].columns] for group in groups]
+    contents = []
+    for group in groups:
+        columns = [name for index in group for name in parts[index].columns]
+        contents.append([name for name in columns if name not in BESIDE] or columns)
     quantities = [sorted({quantity_of(name) for name in names}) for names in contents]
     names = []
     for channels, kinds in zip(contents, quantities, strict=True):

@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -25,6 +26,7 @@ from imubench_pipeline.recordings.quality.levels import kept_level
 from imubench_pipeline.recordings.quality.rotation import GravityTurn, gravity_turn
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import BESIDE, channel_logs, log_paths
+from imubench_pipeline.recordings.separation import separate_clocks
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
     TEMPERATURE,
@@ -137,7 +139,9 @@ def _ingest(
     sources: Future[dict[str, KnownFile]],
 ) -> Ingested:
     parts = [
-        read_part(file, notes.use, scratch, number) for number, file in enumerate(read(source, log))
+        part
+        for number, file in enumerate(read(source, log))
+        for part in _separated(read_part(file, notes.use, scratch, number), log, settings, scratch)
     ]
     bases = [_base(part, log, settings) for part in parts]
     groups = _shared_bases(parts, bases)
@@ -201,18 +205,22 @@ def _findings(
     static: bool,
 ) -> list[Finding]:
     """Return what is wrong with the files, their columns and their clocks."""
-    findings = [finding for part in parts for finding in part.source.findings]
-    findings += [finding for part in parts for finding in part.source.contradicted_units()]
+    files = {id(part.source): part.source for part in parts}.values()
+    findings = [finding for file in files for finding in file.findings]
+    findings += [finding for file in files for finding in file.contradicted_units()]
     for part, base in zip(parts, bases, strict=True):
-        findings += column_findings(part.columns, base.rate, settings, static=static)
+        columns = part.columns | part.left_out
+        found = column_findings(columns, base.rate, settings, static=static)
+        findings += [finding for finding in found if finding not in findings]
         if static:  # what is sensed of a turn looks like a knock
             findings += _knock_findings(part, base.rate, settings, scratch)
     findings += copied_channels(
         {name: c for part in parts for name, c in part.columns.items() if name not in BESIDE}
     )
-    if len({part.rows for part in parts if not part.stamped}) > 1:
-        lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in parts)
-        rows = [part.rows for part in parts]
+    whole = [part for part in parts if part.base is None]
+    if len({part.rows for part in whole if not part.stamped}) > 1:
+        lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in whole)
+        rows = [part.rows for part in whole]
         detail = (
             f"files without stamps differ in length ({lengths} samples): the shorter ones may "
             "be cut short"
@@ -265,6 +273,12 @@ def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
         "segments": [list(segment) for segment in base.segments],
         "uniform": base.uniform,
         "holes": holes,
+        "empty": [
+            name
+            for part in parts
+            for name, column in part.columns.items()
+            if name in BESIDE and not column.present
+        ],
     }
 
 
@@ -298,7 +312,15 @@ def _knock_findings(
     return findings
 
 
+def _separated(part: Part, log: LogFormat, settings: QualitySettings, scratch: Path) -> list[Part]:
+    stated = log.rate_hz or part.source.rate
+    whole = partial(_base, part, log, settings)
+    return separate_clocks(part, stated, whole, settings, scratch)
+
+
 def _base(part: Part, log: LogFormat, settings: QualitySettings) -> timebase.TimeBase:
+    if part.base is not None:
+        return part.base
     if not part.stamped:
         assert log.rate_hz is not None  # checked with the sensor file
         return timebase.without_stamps(part.rows, log.rate_hz)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -15,22 +17,26 @@ from imubench_pipeline.readers import Batch, LogFile
 from imubench_pipeline.recordings.quality import levels
 from imubench_pipeline.recordings.quality.knocks import Knock, knocks, suspects
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.recordings.recording import LogWriter
+from imubench_pipeline.recordings.recording import ROW_GROUP, LogWriter
+from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.sensor import UsedPart
 from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import RecordingError
 
-_STAMP_BLOCK = 1 << 20
+STAMP_BLOCK = ROW_GROUP
+"""Records of a block of stamps: as many as of a row group."""
 
 
 @dataclass
 class Part:
-    """One file of a recording, read once into columns and stamps on the disk."""
+    """The columns of one file of a recording that share a clock, with their stamps on the disk."""
 
     source: LogFile
     data: Path
     stamps_path: Path
-    """Scratch files: the columns as Parquet, the stamps as they come."""
+    present_path: Path
+    """Scratch files: the columns as Parquet, the stamps as they come, and which columns have a
+    number, a bit each."""
     writer: LogWriter
     """Of ``data``; open until it is known what belongs into the metadata."""
     rows: int = 0
@@ -38,15 +44,26 @@ class Part:
     """Records kept, and those outside the part to use."""
     columns: dict[str, ColumnSummary] = field(default_factory=dict)
     """What was counted of each column."""
+    patterns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Records by the columns that have a number in them: entry 5 of the first and the third."""
     knocks: dict[str, int] = field(default_factory=dict)
     """Samples left out of each column, as part of a knock."""
     stamped: bool = False
     """Records have stamps."""
+    base: TimeBase | None = None
+    """The time base, where it was found when the columns of a file were separated."""
+    left_out: dict[str, ColumnSummary] = field(default_factory=dict)
+    """Columns of the file that were then not written: they have too few samples to be used."""
 
     def stamps(self) -> Iterator[NDArray[np.float64]]:
         """Yield the stamps in s, from the disk."""
-        for start in range(0, self.rows, _STAMP_BLOCK):
-            yield np.fromfile(self.stamps_path, np.float64, _STAMP_BLOCK, offset=8 * start)
+        for start in range(0, self.rows, STAMP_BLOCK):
+            yield np.fromfile(self.stamps_path, np.float64, STAMP_BLOCK, offset=8 * start)
+
+    def present(self) -> Iterator[NDArray[np.uint16]]:
+        """Yield which columns have a number in each record, in blocks like those of the stamps."""
+        for start in range(0, self.rows, STAMP_BLOCK):
+            yield np.fromfile(self.present_path, np.uint16, STAMP_BLOCK, offset=2 * start)
 
     def digest(self) -> str:
         """Return a digest of the stamps: files with the same ones share a clock."""
@@ -54,6 +71,53 @@ class Part:
         for block in self.stamps():
             digest.update(block.data)
         return digest.hexdigest()
+
+
+@contextlib.contextmanager
+def new_part(
+    source: LogFile, columns: Iterable[str], scratch: Path, name: str
+) -> Iterator[tuple[Part, PartWriter]]:
+    """Begin a part, and give what writes its records.
+
+    ``scratch``, ``name``: folder and stem of the scratch files.
+    """
+    data, stamps, present = (
+        scratch / f"{name}.{ending}" for ending in ("parquet", "stamps", "present")
+    )
+    summaries = {column: ColumnSummary() for column in columns}
+    writer = LogWriter(data, dict.fromkeys(summaries, pa.float64()))
+    part = Part(source, data, stamps, present, writer, columns=summaries)
+    part.patterns = np.zeros(1 << len(summaries), np.int64)
+    with stamps.open("wb") as stamps_file, present.open("wb") as present_file:
+        yield part, PartWriter(part, stamps_file, present_file)
+
+
+@dataclass
+class PartWriter:
+    """Takes the records of a part."""
+
+    _part: Part
+    _stamps: BinaryIO
+    _present: BinaryIO
+
+    def add(
+        self, time: NDArray[np.float64] | None, columns: Mapping[str, NDArray[np.float64]]
+    ) -> None:
+        """Count and write consecutive records: their stamps, s, and their samples, SI."""
+        part = self._part
+        # Not `tofile`: what it hands to the C library may fail unseen when it is closed.
+        if time is not None:
+            part.stamped = True
+            self._stamps.write(np.ascontiguousarray(time).data)
+        counted = {name: part.columns[name].add(values) for name, values in columns.items()}
+        rows = len(next(iter(counted.values())))
+        bits = np.zeros(rows, np.uint16)
+        for place, name in enumerate(part.columns):
+            bits |= np.isfinite(counted[name]).astype(np.uint16) << np.uint16(place)
+        part.patterns += np.bincount(bits, minlength=len(part.patterns))
+        self._present.write(bits.data)
+        part.rows += rows
+        part.writer.write(counted)
 
 
 def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
@@ -67,30 +131,17 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     RecordingError
         If the file cannot be used, or no sample lies in the part to use.
     """
-    data, stamps_path = scratch / f"part{number}.parquet", scratch / f"part{number}.stamps"
-    columns = list(file.sources)
-    writer = LogWriter(data, dict.fromkeys(columns, pa.float64()))
-    part = Part(
-        file, data, stamps_path, writer, columns={name: ColumnSummary() for name in columns}
-    )
     rate = file.log.rate_hz
     read_rows = 0
-    with stamps_path.open("wb") as stamps:
+    with new_part(file, file.sources, scratch, f"part{number}") as (part, writer):
         for batch in file.batches():
-            time = batch.time
-            part.stamped = time is not None
             keep = _used(batch, use, read_rows, rate)
             read_rows += len(batch)
-            if time is not None:
-                # Not `tofile`: what it hands to the C library may fail unseen when it is closed.
-                stamps.write(np.ascontiguousarray(time[keep]).data)
-            columns_used = {
-                name: part.columns[name].add(values[keep]) for name, values in batch.columns.items()
-            }
-            rows = len(next(iter(columns_used.values())))
-            part.not_used += len(batch) - rows
-            part.rows += rows
-            writer.write(columns_used)
+            writer.add(
+                None if batch.time is None else batch.time[keep],
+                {name: values[keep] for name, values in batch.columns.items()},
+            )
+    part.not_used = read_rows - part.rows
     if part.rows == 0:
         raise RecordingError(
             f"{file.path.name}: none of its {read_rows} samples lies in the part to use "

@@ -234,6 +234,7 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
     for path in log_paths(folder):
         metadata = read_metadata(path)
         columns = pq.read_schema(path).names
+        beside = set(columns) - set(metadata.get("empty", ()))  # without one reading
         for channel in columns:
             if channel in _NOT_CHANNELS or channel in metadata["unusable"]:
                 continue
@@ -244,9 +245,9 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
                 metadata["grid"],
                 tuple((start, stop) for start, stop in metadata["segments"]),
                 bool(metadata["holes"].get(channel, True)),
-                TEMPERATURE in columns,
-                POSITION in columns,
-                TABLE_RATE in columns,
+                TEMPERATURE in beside,
+                POSITION in beside,
+                TABLE_RATE in beside,
             )
     order = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
     return {name: logs[name] for name in order if name in logs}

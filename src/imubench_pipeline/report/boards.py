@@ -27,7 +27,7 @@ def _context(site: Site) -> dict[str, Any]:
         views = _views(site, name)
         channels = {view.sensor: view.channels() for view in views}
         payloads += (
-            channel_payload(channel, view.row["rate"], arrays)
+            channel_payload(channel, channel.rate, arrays)
             for view in views
             for channel in channels[view.sensor]
         )

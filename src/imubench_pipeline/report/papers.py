@@ -26,7 +26,7 @@ def _context(site: Site) -> dict[str, Any]:
     rows = site.rows("published")
     arrays = Arrays()
     drawn = _drawn(site)
-    payloads = [channel_payload(channel, view.row["rate"], arrays) for _, view, channel in drawn]
+    payloads = [channel_payload(channel, channel.rate, arrays) for _, _, channel in drawn]
     used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
     return {
         "bases": BASES,

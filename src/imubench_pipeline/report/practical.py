@@ -7,7 +7,7 @@ it needs for that. The first choice is the practical one, the last is SI.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 from functools import cache
@@ -199,6 +199,16 @@ _PREFIXES = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
 def _page_unit(sign: str, dimension: str) -> PageUnit:
     factor, _ = conversion(sign, dimension)
     return PageUnit(sign, 1.0 / factor)
+
+
+def rates_text(rate: float, of_channels: Iterable[float]) -> str:
+    """Return the rates of the channels of a recording, Hz, the highest first.
+
+    ``rate``: that of the recording, which says all where no channel has an Allan variance.
+    """
+    rates = sorted({float(f"{each:.6g}") for each in of_channels}, reverse=True)
+    texts = list(dict.fromkeys(map(number_text, rates))) or [number_text(rate)]
+    return f"{' and '.join(filter(None, (', '.join(texts[:-1]), texts[-1])))} Hz"
 
 
 def percent_text(share: float | None, digits: int = 3) -> str:

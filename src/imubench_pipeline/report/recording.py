@@ -22,6 +22,7 @@ from imubench_pipeline.report.practical import (
     duration_text,
     number_text,
     page_unit,
+    rates_text,
     symbol_text,
 )
 from imubench_pipeline.report.shell import imubench
@@ -104,9 +105,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         ),
         "page": {
             "looks": looks({view.sensor: site.looks[view.sensor]}),
-            "channels": [
-                channel_payload(channel, view.row["rate"], arrays) for channel in channels
-            ],
+            "channels": [channel_payload(channel, channel.rate, arrays) for channel in channels],
             "samples": samples,
             "of_models": compared_samples.payload(of_models, arrays),
             "budgets": [budget_bars(view.budget, site.system)] if budgets else [],
@@ -150,7 +149,7 @@ def _drawn(score: Row) -> tuple[str, str]:
 def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
     """Return length and rate of a recording, and parts that say more, as a sentence."""
     row = view.row
-    length = f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"
+    length = f"{duration_text(row['duration'])} at {rates_text(row['rate'], view.rates)}"
     kind = "Simulated from known parameters, not measured: " if view.simulated else ""
     return kind + ", ".join([length, *parts]) + "."
 
@@ -312,6 +311,9 @@ def _provenance(
             "Rate",
             f"{number_text(row['rate'], 7)} Hz{error}, {_RATE_FROM.get(row['rate_from'], '')}",
         )
+        rates = {channel.channel: number_text(channel.rate, 6) for channel in channels}
+        if len(set(rates.values())) > 1:
+            yield "Rate of each", ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
     if row["samples"] is not None:
         yield "Samples", f"{row['samples']:,}".replace(",", " ")
     segments: Sequence[Any] = metadata.get("segments", [])

@@ -19,6 +19,7 @@ from imubench_pipeline.report.practical import (
     duration_text,
     number_text,
     page_unit,
+    rates_text,
     symbol_text,
 )
 from imubench_pipeline.report.run_summary import left_out, one_line, rejections, serious
@@ -90,7 +91,9 @@ def logs(
             name: [line for line in rows if (line["sensor"], line["recording"]) == key]
             for name, rows in tables.items()
         }
-        yield Text(one_line(row["recording"]) + _length(row, own["parameters"]), style="bold")
+        yield Text(
+            one_line(row["recording"]) + _length(row, own["parameters"], own["allan"]), style="bold"
+        )
         if row["status"] != "ok":
             yield Text(f"  {row['status']}: {one_line(row['reason'] or '', _LONGEST_FINDING)}\n")
             continue
@@ -101,17 +104,22 @@ def logs(
         recommended = [line for line in own["parameters"] if line["recommended"]]
         yield from _parameter_tables(recommended, "95 % intervals below", {key: row}, system, width)
         if not own["parameters"]:
-            yield Text(
-                f"  {row['kind'].replace('_', ' ')}: no noise is estimated of a turned sensor\n"
+            static = row["kind"] == "static"
+            why = (
+                "no channel can be analysed"
+                if static
+                else "no noise is estimated of a turned sensor"
             )
+            yield Text(f"  {row['kind'].replace('_', ' ')}: {why}\n")
 
 
-def _length(row: Row, parameters: Sequence[Row]) -> str:
+def _length(row: Row, parameters: Sequence[Row], allan: Sequence[Row]) -> str:
     """Return how long a log is, and of what."""
     if row["duration"] is None:
         return ""
     channels = len({line["channel"] for line in parameters})
-    words = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
+    rates = [line["cluster_size"] / line["tau"] for line in allan]
+    words = [f"{duration_text(row['duration'])} at {rates_text(row['rate'], rates)}"]
     words += [counted(channels, "channel")]
     if row["temperature_min"] is not None:
         low, high = (number_text(row[f"temperature_{end}"], 3) for end in ("min", "max"))

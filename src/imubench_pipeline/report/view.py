@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property, partial
@@ -47,6 +48,7 @@ class ChannelView:
     adev: NDArray[np.float64]
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
+    rate: float = math.nan
     parameters: dict[str, list[Row]] = field(default_factory=dict)
     recommended: str = ""
     reconstruction: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
@@ -193,6 +195,12 @@ class RecordingView:
         chosen = part.filter(part["recommended"])
         return dict(zip(chosen["channel"].to_pylist(), chosen["method"].to_pylist(), strict=True))
 
+    @property
+    def rates(self) -> list[float]:
+        """The rate of each row of the table ``allan``, Hz."""
+        allan = self.parts["allan"]
+        return (allan["cluster_size"].to_numpy() / allan["tau"].to_numpy()).tolist()
+
     def channels(self) -> list[ChannelView]:
         """Return its channels, made anew."""
         return _channels(self)
@@ -221,7 +229,8 @@ def _channels(view: RecordingView) -> list[ChannelView]:
     for (name,), part in _by(view.parts["allan"], "channel").items():
         named = (view.sensor, view.name, name, view.simulated)
         tau, adev, lower, upper = _floats(part, *_CURVE).values()
-        channels[name] = ChannelView(*named, tau, adev, lower, upper)
+        rate = float(part["cluster_size"][0].as_py() / tau[0])
+        channels[name] = ChannelView(*named, tau, adev, lower, upper, rate)
     for row in view.rows("parameters"):
         channel = channels[row["channel"]]
         channel.parameters.setdefault(row["method"], []).append(row)

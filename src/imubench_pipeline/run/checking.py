@@ -17,6 +17,8 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import ChannelLog, static_logs
 from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.settings.config import AllanSettings
+from imubench_pipeline.steps.allan import curve_of_channel, too_sparse
 from imubench_pipeline.tables.failures import Failure, describe_error
 from imubench_pipeline.tables.findings import Finding
 
@@ -43,20 +45,23 @@ def _checked(plan: Plan, sensor: str, name: str, recording: Recording) -> Qualit
             recording.path, settings, sensor, name, Path(folder), guarded=True
         )
         quality.findings.extend(implausible_of(quality, plan.sensors.get(sensor)))
+        how = AllanSettings.model_validate_json(plan.settings("allan"))
         for channel, log in static_logs(Path(folder)).items():
-            for finding in findings_of_channel(channel, log, plan.bandwidth(sensor, name)):
+            for finding in findings_of_channel(channel, log, plan.bandwidth(sensor, name), how):
                 quality.findings.append(dict(finding.row(sensor, name)))
     return quality
 
 
-def findings_of_channel(channel: str, log: ChannelLog, bandwidth: float | None) -> list[Finding]:
+def findings_of_channel(
+    channel: str, log: ChannelLog, bandwidth: float | None, settings: AllanSettings
+) -> list[Finding]:
     """Return lines and the end of the band of a channel, if its spectrum can be taken.
 
     `bandwidth`: cut-off of the sensor's own filter, where it is known, Hz.
     """
     if log.holes:
         # Filling holes takes a model: that is the estimation's.
-        return []
+        return [] if len(curve_of_channel(log, settings).tau) else [too_sparse(channel, log)]
     spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
     frame = frame_of(spectrum, line_spectra, bandwidth=bandwidth)
     if frame.used.sum() >= FEWEST_BINS:

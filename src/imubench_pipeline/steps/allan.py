@@ -9,21 +9,35 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks, of_phase
-from imubench_pipeline.allan.phase import integrate
+from imubench_pipeline.allan.phase import NO_GAPS, gaps_of, integrate
 from imubench_pipeline.estimators.rows import allan_rows
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Row
+
+
+def too_sparse(channel: str, log: ChannelLog) -> Finding:
+    """Return why a channel has no Allan variance, and so no estimates."""
+    detail = (
+        f"so many samples of {channel} are missing that no two adjacent clusters have enough; the "
+        f"grid has {log.grid} points at {log.rate:.6g} Hz; record without losses, or for longer"
+    )
+    return Finding("too_short", "fatal", detail, log.grid, channel)
 
 
 def curves(folder: Path, sensor: str, recording: str, settings: AllanSettings) -> Iterator[Row]:
     """Yield the rows of the table ``allan``; none of a rejected recording."""
     for channel, log in kept_static_logs(folder).items():
-        sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
-        curve = curve_of(log, sizes, settings.overlap)
-        yield from allan_rows(Key(sensor, recording, channel), curve)
+        yield from allan_rows(Key(sensor, recording, channel), curve_of_channel(log, settings))
+
+
+def curve_of_channel(log: ChannelLog, settings: AllanSettings) -> AllanCurve:
+    """Return the Allan variance of a channel at the cluster sizes of the settings."""
+    sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
+    return curve_of(log, sizes, settings.overlap)
 
 
 def curve_of(
@@ -35,9 +49,17 @@ def curve_of(
 ) -> AllanCurve:
     """Return the Allan variance of a channel, with the same bits for any number of threads."""
     blocks, holes, segments = log.blocks(), log.holes, log.segments
+    gaps = gaps_of(log.blocks()) if holes else NO_GAPS
     if overlap == "full":
         phase = integrate(blocks, log.grid, holes=holes, segments=segments)
-        return of_phase(phase, log.rate, sizes, threads=threads)
+        return of_phase(phase, log.rate, sizes, gaps=gaps, threads=threads)
     return of_blocks(
-        blocks, log.grid, log.rate, sizes, holes=holes, segments=segments, threads=threads
+        blocks,
+        log.grid,
+        log.rate,
+        sizes,
+        holes=holes,
+        gaps=gaps,
+        segments=segments,
+        threads=threads,
     )

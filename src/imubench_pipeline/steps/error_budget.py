@@ -49,7 +49,7 @@ def error_tables(
         error_rows(names, estimates, questions, figures=figures, **drawn),
         backtest_rows(names, logs, estimates, requirements, apart, **drawn),
         growth_rows(names, estimates, times=times, window=window, figures=figures, **drawn),
-        _deviations(names, Quality.read(inputs["quality"]).recording, estimates, sections),
+        _deviations(names, Quality.read(inputs["quality"]), estimates, sections),
     )
     return dict(zip(_TABLES, tables, strict=True))
 
@@ -59,22 +59,22 @@ _TABLES = ("error_budget", "backtest", "error_growth", "drawn_deviations")
 
 def _deviations(
     names: Mapping[str, str],
-    recording: Mapping[str, Any],
+    quality: Quality,
     estimates: Mapping[str, Estimate],
     sections: Mapping[str, Any],
 ) -> Iterator[Row]:
-    """Yield the rows of the table ``drawn_deviations``, of the row of its recording."""
+    """Yield the rows of the table ``drawn_deviations``."""
     how = FusionSettings.model_validate(sections["fusion"])
     for name, estimate in estimates.items():
         channel = FusionChannel(
             sensor=names["sensor"],
             recording=names["recording"],
             channel=name,
-            simulated=recording["simulated"],
-            duration=recording["duration"],
+            simulated=quality.recording["simulated"],
+            duration=quality.recording["duration"],
             estimate=estimate,
         )
-        rate = recording["rate"]
+        rate = quality.channels[name]["rate"]
         yield from deviation_rows(
             channel, rate, longest=how.longest, draws=how.draws, seed=how.seed
         )

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve, of_blocks
+from imubench_pipeline.allan.phase import NO_GAPS
 from imubench_pipeline.allan.presence import presence
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
@@ -39,6 +40,7 @@ from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog, mean_of
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.steps.allan import too_sparse
 from imubench_pipeline.steps.kept_curves import curves
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
@@ -139,6 +141,7 @@ class _Channel:
         self.courses = find_courses(
             log.blocks, log.grid, log.rate, segments=log.segments, highest=unfiltered
         )
+        self._presence = presence(log.blocks(), log.grid, log.segments) if log.holes else None
         self._bare = self._curve_of(self._blocks()) if self.courses.courses else curve
         self.fitted: Likelihood | None = None
 
@@ -171,8 +174,7 @@ class _Channel:
                 shift_by_effect(nothing, warm.path, warm.effect, 1.0), whole=True
             )
 
-        present = presence(log.blocks(), log.grid, log.segments) if log.holes else None
-        limited = partial(with_fitted_limits, segments=log.segments, presence=present)
+        limited = partial(with_fitted_limits, segments=log.segments, presence=self._presence)
         into.allan += allan_rows(key, limited(self.curve, fitted))
         if not self.courses.courses:  # else what they explain is taken out
             white = fitted.estimates[0].parameters["N"].lower
@@ -190,8 +192,17 @@ class _Channel:
 
     def _curve_of(self, blocks: Iterator[Array], *, whole: bool = False) -> AllanCurve:
         """Return the Allan variance of what stands in place of the log, at the same clusters."""
-        log, sizes, holes = self.log, self.curve.cluster_size, self.log.holes and not whole
-        return of_blocks(blocks, log.grid, log.rate, sizes, holes=holes, segments=log.segments)
+        log, sizes = self.log, self.curve.cluster_size
+        there = None if whole else self._presence
+        return of_blocks(
+            blocks,
+            log.grid,
+            log.rate,
+            sizes,
+            holes=there is not None,
+            gaps=there.gaps if there else NO_GAPS,
+            segments=log.segments,
+        )
 
     def _temperature(self, fitted: Likelihood, into: Estimation) -> ThermalFit:
         """Return what temperature explains of the channel."""
@@ -371,6 +382,9 @@ def estimation(
         if channels is not None and channel not in channels:
             continue
         key = Key(sensor, recording, channel)
+        if channel not in measured:
+            into.add_findings(key, [too_sparse(channel, log)])
+            continue
         how = EstimateSettings.model_validate(sections["estimate"])
         estimate_channel(key, log, measured[channel], how, sections["bandwidth"], into)
         if read := sections.get("authors", {}).get(channel):

@@ -20,7 +20,7 @@ from imubench_pipeline.settings.sensor import (
     TEMPERATURE,
     quantity_of,
 )
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, Severity
 from imubench_pipeline.units import SI_UNITS, from_si
 
 _SURE = 4.0
@@ -34,6 +34,9 @@ two steps the mean lies."""
 
 _USUAL = {"gyro": ("deg/s", "°/s"), "accel": ("mg", "mg")}
 """Unit in which a reader knows the figures of each quantity, and its sign."""
+
+_FEW_EMPTY = 0.01
+"""Part of the records of a channel that may lack its number without harm."""
 
 _ROUNDING = 1.5
 """Step over noise from which the rounding makes most of the noise."""
@@ -182,7 +185,9 @@ def _cells(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding
     if column.missing:
         detail = f"{channel} has {column.missing} records without a number"
         detail += f"{most}; treated as missing samples"
-        yield Finding("empty_cells", "note", detail, column.missing, channel, begin, end)
+        few = column.missing < _FEW_EMPTY * (column.missing + column.present)
+        severity: Severity = "note" if few else "warning"
+        yield Finding("empty_cells", severity, detail, column.missing, channel, begin, end)
     if column.not_finite:
         detail = (
             f"{channel} has {column.not_finite} infinities, or figures beyond {LARGEST:g}{most}; "

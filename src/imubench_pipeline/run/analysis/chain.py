@@ -19,6 +19,7 @@ import pyarrow as pa
 
 from imubench_pipeline.readers.bounded import BoundError, bounded
 from imubench_pipeline.recordings.ingest import write_failed
+from imubench_pipeline.recordings.recording import static_logs
 from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.run.analysis.compilation import Compilation
 from imubench_pipeline.run.plan import Plan
@@ -119,9 +120,8 @@ class Analysis:
         settings = self._plan.ingest_settings(sensor, recording)
         write_recording(source, settings, sensor, recording, outputs)
         how = AllanSettings.model_validate_json(self._plan.settings("allan"))
-        rows = list(allan_step.curves(folder, sensor, recording, how))
-        write("allan", rows, folder / "curve.parquet")
-        return list(dict.fromkeys(str(row["channel"]) for row in rows))
+        write("allan", allan_step.curves(folder, sensor, recording, how), folder / "curve.parquet")
+        return list(static_logs(folder))
 
     def _estimate(self, sensor: str, recording: str, channel: str) -> Estimation:
         folder = self._folder(sensor, recording)

@@ -1,0 +1,164 @@
+"""Several rates in one table: each group of channels has a time base of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import imubench_pipeline as imu
+from imubench_pipeline.library.logs import Log
+from imubench_pipeline.report.terminal import logs
+from tests.chain.logs import Table, analysed, checked, noise, project
+
+ROWS = 6000
+NUMBER = np.arange(ROWS)
+TIMES = NUMBER / 100.0
+
+
+def read(folder: Path, table: Table) -> Log:
+    table.write(folder / "log.csv")
+    return imu.read_log(folder / "log.csv", table.sensor())
+
+
+def table_of(there: dict[str, np.ndarray], times: np.ndarray | None = TIMES) -> Table:
+    columns = {
+        name: np.where(mask, noise(name, len(mask), 1), np.nan) for name, mask in there.items()
+    }
+    return Table(columns, 100.0, times)
+
+
+def merged(*streams: tuple[float, float], jitter: float = 0.0) -> tuple[np.ndarray, list]:
+    """The stamps of streams of a rate and an offset, in order, and which records each has."""
+    rng = np.random.default_rng(3)
+    each = [offset + np.arange(60 * rate) / rate for rate, offset in streams]
+    each = [
+        stamps + jitter / rate * rng.uniform(-0.5, 0.5, len(stamps))
+        for stamps, (rate, _) in zip(each, streams, strict=True)
+    ]
+    owner = np.repeat(np.arange(len(each)), [len(stamps) for stamps in each])
+    order = np.argsort(np.concatenate(each), kind="stable")
+    return np.concatenate(each)[order], [owner[order] == number for number in range(len(each))]
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+@pytest.mark.parametrize(("every", "phase"), [(2, 0), (2, 1), (3, 2), (10, 4)])
+def test_a_channel_in_every_nth_record_has_its_own_rate(
+    tmp_path: Path, every: int, phase: int, stamped: bool
+) -> None:
+    table = table_of(
+        {
+            "gyro_z": np.ones(ROWS, bool),
+            "accel_x": NUMBER % every == phase,
+            "accel_z": NUMBER % every == phase,
+        },
+        TIMES if stamped else None,
+    )
+    log = read(tmp_path, table)
+    assert log.rates == pytest.approx(
+        {"gyro_z": 100.0, "accel_x": 100.0 / every, "accel_z": 100.0 / every}
+    )
+    for name in log.channels:
+        wanted = table.columns[name]
+        assert log[name] / log[name].mean() == pytest.approx(
+            wanted[np.isfinite(wanted)] / np.nanmean(wanted), rel=1e-6
+        )
+    (note,) = (found for found in log.findings if found.finding == "own_rate")
+    assert note.severity == "note"
+    assert "accel_x, accel_z: have numbers in" in note.detail
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize("offset", [0.0, 0.0033, 0.005, 0.0101])
+def test_streams_that_share_no_stamp_have_their_own_rates(
+    tmp_path: Path, offset: float, jitter: float
+) -> None:
+    times, (gyro, accel) = merged((100.0, 0.0), (50.0, offset), jitter=jitter)
+    log = read(tmp_path, table_of({"gyro_x": gyro, "gyro_z": gyro, "accel_z": accel}, times))
+    wanted = {"gyro_x": 100.0, "gyro_z": 100.0, "accel_z": 50.0}
+    assert log.rates == pytest.approx(wanted, rel=1e-3)
+    assert {name: len(log[name]) for name in log} == {
+        "gyro_x": 6000,
+        "gyro_z": 6000,
+        "accel_z": 3000,
+    }
+    assert not any(np.isnan(log[name]).any() for name in log)
+
+
+def test_three_rates_and_a_temperature_with_records_of_its_own(tmp_path: Path) -> None:
+    streams = ((100.0, 0.0), (50.0, 0.002), (10.0, 0.003), (1.0, 0.0041))
+    times, (gyro, accel, slow, warm) = merged(*streams)
+    there = {"gyro_z": gyro, "accel_x": accel, "accel_z": slow, "temperature": warm}
+    log = read(tmp_path, table_of(there, times))
+    wanted = {"gyro_z": 100.0, "accel_x": 50.0, "accel_z": 10.0}
+    assert log.rates == pytest.approx(wanted, rel=1e-4)
+    readings = {name: [part for part in kept.temperatures()] for name, kept in log.chosen().items()}
+    for parts in readings.values():
+        assert np.isfinite(np.concatenate(parts)).sum() == 60
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+@pytest.mark.parametrize("lost", [0.005, 0.2, 0.45, 0.6, 0.8])
+def test_samples_lost_at_random_stay_on_the_common_grid(
+    tmp_path: Path, lost: float, stamped: bool
+) -> None:
+    there = np.random.default_rng(7).random(ROWS) >= lost
+    table = table_of({"gyro_z": np.ones(ROWS, bool), "accel_z": there}, TIMES if stamped else None)
+    log = read(tmp_path, table)
+    assert log.rates == pytest.approx({"gyro_z": 100.0, "accel_z": 100.0})
+    assert (np.isfinite(log["accel_z"]) == there).all()
+    curves = imu.allan_variance(log)
+    full, holed = curves["gyro_z"], curves["accel_z"]
+    assert holed.tau[-1] == full.tau[-1]
+    if lost < 0.7:  # else many gaps are as long as the shorter clusters
+        assert len(holed.tau) >= len(full.tau) - 1
+    severity = "warning" if lost > 0.01 else "note"
+    assert ("empty_cells", severity) in {(f.finding, f.severity) for f in log.findings}
+
+
+def test_samples_that_a_slower_sensor_loses_are_holes_on_its_own_grid(tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    there = {
+        "gyro_z": np.ones(ROWS, bool),
+        "accel_x": (NUMBER % 2 == 0) & (rng.random(ROWS) > 0.1),
+        "accel_z": (NUMBER % 2 == 0) & (rng.random(ROWS) > 0.1),
+    }
+    log = read(tmp_path, table_of(there))
+    assert log.rates["accel_x"] == pytest.approx(50.0)
+    for name in ("accel_x", "accel_z"):
+        assert np.isfinite(log[name]).sum() == there[name].sum()
+
+
+def test_a_stated_rate_says_that_every_fifth_sample_is_lost(tmp_path: Path) -> None:
+    table = table_of({"gyro_z": np.ones(ROWS, bool), "accel_z": NUMBER % 5 != 4})
+    as_rounded = read(tmp_path, table)
+    assert as_rounded.rates["accel_z"] == pytest.approx(80.0, rel=1e-3)
+    (coarse,) = (found for found in as_rounded.findings if found.finding == "coarse_stamps")
+    assert (coarse.severity, coarse.channel) == ("warning", "accel_z")
+    sensor = table.sensor()
+    sensor["log"]["rate"] = "100 Hz"
+    as_lost = imu.read_log(tmp_path / "log.csv", sensor)
+    assert as_lost.rates["accel_z"] == pytest.approx(100.0)
+    curve = imu.allan_variance(as_lost)["accel_z"]
+    assert len(curve.tau) > 30
+    lower, upper = curve.limits()
+    white = 0.02 / np.sqrt(curve.averaged)
+    assert ((lower <= white) & (white <= upper)).mean() > 0.8
+
+
+def test_every_command_takes_both_sensors_at_their_rates(tmp_path: Path) -> None:
+    there = {"gyro_z": np.ones(ROWS, bool), "accel_z": NUMBER % 2 == 0}
+    plan = project(table_of(there), tmp_path, ["likelihood"])
+    assert checked(plan)[:2] == ("ok", None)
+    found = analysed(plan, pages=False)
+    assert not found["failures"]
+    N = {
+        row["channel"]: row
+        for row in found["parameters"]
+        if row["recommended"] and row["parameter"] == "N"
+    }
+    for name, sigma, rate in (("gyro_z", np.radians(0.1), 100.0), ("accel_z", 0.02, 50.0)):
+        assert N[name]["lower"] < sigma / np.sqrt(rate) < N[name]["upper"]
+    head = str(next(iter(logs(found, "practical", 200))))
+    assert head == "log: 60 s at 100 and 50 Hz, 2 channels"
