@@ -3,17 +3,19 @@ import pytest
 
 from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.presence import presence
+from tests.test_allan import needed_in_cluster
 
 
 def expected(
     log: np.ndarray, n: int, begin: np.ndarray, spans: list[tuple[int, int]]
 ) -> list[bool]:
-    """From the definition: both clusters have nine tenths of their samples, in one segment."""
+    """From the definition: both clusters have enough of their samples, in one segment."""
     found = []
+    needed = needed_in_cluster(log, n) - 1e-9
     for i in begin:
         parts = (log[i : i + n], log[i + n : i + 2 * n])
         whole = any(start <= i and i + 2 * n <= stop for start, stop in spans)
-        found.append(whole and all(np.isfinite(p).sum() >= 0.9 * n - 1e-9 for p in parts))
+        found.append(whole and all(np.isfinite(p).sum() >= needed for p in parts))
     return found
 
 

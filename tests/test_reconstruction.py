@@ -97,7 +97,8 @@ def test_what_authors_read_is_reconstructed_and_scored_beside_the_methods(rng, t
     )
     plan = Plan(
         {"logs": str(tmp_path / "logs"), "sensors": str(tmp_path / "sensors"), "simulated": None,
-         "results": str(tmp_path), "requirements": None, "estimate": {"methods": ["curve"]}}
+         "results": str(tmp_path / "results"), "requirements": None,
+         "estimate": {"methods": ["curve"]}}
     )  # fmt: skip
     folder, names = tmp_path / "kept", ("s", "r")
     folder.mkdir()

@@ -154,7 +154,7 @@ NUMPY = [
         "npz without the array that is named",
         file(lambda: npz(n=matrix()), "log.npz"),
         MATRIX | VARIABLE,
-        Rejected(r"no variable 'm' for accel_z; the file has n"),
+        Rejected(r"no variable 'm' for gyro_x; the file has n"),
     ),
 ]
 ARROW = [

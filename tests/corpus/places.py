@@ -144,7 +144,7 @@ ENTRIES = [
         "file where a folder is expected",
         file(TEXT),
         PER_FILE,
-        Rejected("log.csv: is one file, but the sensor file takes accel_z from 'accel.csv'"),
+        Rejected("log.csv: is one file, but the sensor file takes gyro_x from 'gyro.csv'"),
     ),
     Entry(
         "file with a name of odd letters",

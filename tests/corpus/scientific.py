@@ -76,7 +76,7 @@ MATLAB = [
         "matlab 5 of a header",
         changed(mat_5(), lambda data: data[:128]),
         MATRIX,
-        Rejected(r"log\.mat: no numeric array for accel_z; the file has none"),
+        Rejected(r"log\.mat: no numeric array for gyro_x; the file has none"),
     ),
     Entry(
         "matlab 5 with a flipped bit",
@@ -94,7 +94,7 @@ MATLAB = [
         "matlab 5 of text",
         mat_5(m="some text"),
         MATRIX,
-        Rejected(r"m for accel_z holds text; expected numbers"),
+        Rejected(r"m for gyro_x holds text; expected numbers"),
     ),
     Entry(
         "matlab 5 of two matrices",
@@ -125,7 +125,7 @@ MATLAB = [
         "matlab 7.3 of text",
         mat_73(MATLAB_class=np.bytes_("char")),
         MATRIX,
-        Rejected(r"m for accel_z holds text"),
+        Rejected(r"m for gyro_x holds text"),
     ),
 ]
 HDF5 = [
@@ -165,7 +165,7 @@ HDF5 = [
         "hdf5 without data",
         hdf5(lambda made: made.create_group("imu")),
         STAMPED,
-        Rejected(r"log\.h5: no variable or column 'az' for accel_z; the file has none"),
+        Rejected(r"log\.h5: no variable or column 'wx' for gyro_x; the file has none"),
     ),
 ]
 

@@ -84,7 +84,7 @@ def test_formats_that_fix_the_unit(tmp_path: Path) -> None:
     assert where == "the format of VectorNav"
     counts = np.ones((20, 6), int)
     samples = test_ubx.samples(counts, 1000 + np.arange(20) * 256)
-    (tmp_path / "a.ubx").write_bytes(test_ubx.raw(samples))
+    (tmp_path / "a.ubx").write_bytes(2 * test_ubx.raw(samples))
     assert contradicted(tmp_path / "a.ubx", {"column": "gyro_x"}) == []
     ((where, factor),) = contradicted(tmp_path / "a.ubx", {"column": "gyro_x", "unit": "rad/s"})
     assert where == "the format of u-blox" and factor == pytest.approx(1 / 57.29578)

@@ -37,7 +37,7 @@ rule files:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=300, memory_of_each=0.1, time=1, time_of_each=0.001)),
+        **cost(OfMany(memory=300, memory_of_each=0.1, time=1, time_of_each=0.1)),
     params:
         files=plan.files(),
         code=plan.code("files"),

@@ -15,6 +15,7 @@ from imubench_pipeline.readers.bounds import MOST_LOOKED_INTO
 from imubench_pipeline.readers.compressed import holds_text, is_archive, is_member, members, visible
 from imubench_pipeline.readers.content import format_of, format_of_folder, is_endless
 from imubench_pipeline.settings.sensor import (
+    CHANNELS,
     POSITION,
     TABLE_RATE,
     TEMPERATURE,
@@ -97,7 +98,7 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
     # In one order, however the sensor file has them: so are findings, and the columns kept.
-    sources = {str(name): source for name, source in sorted(log.channels.items())}
+    sources = {name: log.channels[name] for name in CHANNELS if name in log.channels}
     if log.temperature is not None:
         sources[TEMPERATURE] = log.temperature
     if log.position is not None:

@@ -210,7 +210,8 @@ class Plan:
         """Return a reason without the folders above those of the run: it stands in tables."""
         sensors = self.run.sensors
         for folder in (self.run.logs, *((sensors,) if isinstance(sensors, Path) else sensors)):
-            reason = reason.replace(str(folder), folder.name)
+            if folder.is_absolute():
+                reason = reason.replace(str(folder), folder.name)
         return reason
 
     def kind(self, sensor: str, name: str) -> Kind:

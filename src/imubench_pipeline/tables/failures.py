@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import traceback
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -19,7 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from imubench_pipeline.tables.files import build, joined, read_json, read_part, schema, write_arrow
-from imubench_pipeline.tables.findings import Finding, UnavailableError
+from imubench_pipeline.tables.findings import Finding, UnavailableError, without_addresses
 
 Cause = Literal["error", "killed", "time"]
 QUALITY = "quality.json"
@@ -57,10 +58,16 @@ class Failure:
 
 
 def describe_error(error: BaseException) -> str:
-    """Return an error in words: with its type, unless it is a log that cannot be read now."""
+    """Return an error in words: with its type, unless it is a log that cannot be read now.
+
+    It is the same in each run: without addresses of objects, and of files with their names alone.
+    """
     if isinstance(error, UnavailableError):
         return str(error)
-    return "".join(traceback.format_exception_only(error)).strip()
+    text = "".join(traceback.format_exception_only(error)).strip()
+    for name in filter(None, (getattr(error, "filename", None), getattr(error, "filename2", None))):
+        text = text.replace(repr(name), repr(Path(os.fsdecode(name)).name))
+    return without_addresses(text)
 
 
 def failure_of(path: Path) -> Failure | None:

@@ -45,6 +45,11 @@ def finding_of(row: Mapping[str, Any]) -> Finding:
     return Finding(**{field.name: row[field.name] for field in fields(Finding)})
 
 
+def without_addresses(reason: str) -> str:
+    """Return a text without addresses of objects, which are others in each run."""
+    return _ADDRESS.sub("", reason)
+
+
 class RecordingError(ValueError):
     """A recording that cannot be used; the text is the reason, with what to mend.
 
@@ -56,7 +61,7 @@ class RecordingError(ValueError):
     def __init__(self, reason: str) -> None:
         if not reason.isprintable():
             reason = "".join(sign if sign.isprintable() else "?" for sign in reason)
-        reason = _ADDRESS.sub("", reason)
+        reason = without_addresses(reason)
         if len(reason) > 2 * _HALF_REASON:
             reason = f"{reason[:_HALF_REASON]} [...] {reason[-_HALF_REASON:]}"
         super().__init__(reason)

@@ -149,7 +149,7 @@ def _print(tables: Mapping[str, pa.Table], system: System) -> None:
     from imubench_pipeline.report.show import show
     from imubench_pipeline.report.terminal import logs
 
-    needed = ("recordings", "findings", "failures", "doubts", "parameters")
+    needed = ("recordings", "findings", "failures", "doubts", "parameters", "allan")
     rows = {name: tables[name].to_pylist() for name in needed}
     show(lambda width: logs(rows, system, width))
 
