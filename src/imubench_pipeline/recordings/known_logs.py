@@ -218,6 +218,31 @@ def _now(path: Path, before: KnownFile) -> KnownFile | None:
     return replace(now, version=before.version) if now.sha256 == before.sha256 else None
 
 
+def is_changed(source: Path, folder: Path) -> bool:
+    """Return whether the files of a log are not those that its results rest on, if it has any.
+
+    Parameters
+    ----------
+    source : Path
+        The log file, or the folder of a recording.
+    folder : Path
+        Its results.
+    """
+    known = read_known(folder)
+    try:
+        places = _places(source)
+        return known is not None and (
+            known.keys() != places.keys()
+            or any(
+                _now(path, known[name]) is None
+                and not (known[name].stamps is None and known[name].size == path.stat().st_size)
+                for name, path in places.items()
+            )
+        )
+    except OSError:
+        return True
+
+
 def versions_of(recording: Recording, results: Path) -> dict[str, str]:
     """Return `plan_versions` of a recording; of one that is to be simulated, none."""
     if recording.simulated:

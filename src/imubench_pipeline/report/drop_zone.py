@@ -7,9 +7,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from imubench_pipeline.readers import log_files
-from imubench_pipeline.recordings.drop_zone import Recording, account_for, found_logs
-from imubench_pipeline.recordings.known_logs import read_known
+from imubench_pipeline.recordings.drop_zone import account_for, found_logs
+from imubench_pipeline.recordings.known_logs import is_changed
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.texts import printable
@@ -72,25 +71,13 @@ def _changes(files: Iterable[Row], logs: Path, results: Path) -> Iterator[str]:
     recordings = found_logs(logs)
     before = {row["file"] for row in files}
     now = {found.file for found in account_for(logs, recordings)}
-    changed = {f"{log.sensor}/{log.path.name}" for log in recordings if _is_changed(log, results)}
+    changed = {
+        f"{log.sensor}/{log.path.name}"
+        for log in recordings
+        if is_changed(log.path, results / "recordings" / log.sensor / log.name)
+    }
     for what, names in (("added", now - before), ("removed", before - now), ("changed", changed)):
         if names:
             shown = ", ".join(sorted(names)[:_MAX_NAMES]) + ", ..." * (len(names) > _MAX_NAMES)
             number = counted(len(names), "file" if what != "changed" else "log")
             yield printable(f"{number} {what} since the last run: {shown}")
-
-
-def _is_changed(log: Recording, results: Path) -> bool:
-    """Return whether the files of a log are not those that its results rest on."""
-    known = read_known(results / "recordings" / log.sensor / log.name)
-    if known is None:
-        return False
-    try:
-        files = {path.relative_to(log.path).as_posix(): path for path in log_files(log.path)}
-        return known.keys() != files.keys() or any(
-            known[name].size != path.stat().st_size
-            or (known[name].stamps is not None and not known[name].is_unchanged(path.stat()))
-            for name, path in files.items()
-        )
-    except OSError:
-        return True
