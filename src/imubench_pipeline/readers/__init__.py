@@ -98,7 +98,8 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
     # In one order, however the sensor file has them: so are findings, and the columns kept.
-    sources = {name: log.channels[name] for name in CHANNELS if name in log.channels}
+    channels = sorted(log.channels, key=CHANNELS.index)
+    sources = {str(name): log.channels[name] for name in channels}
     if log.temperature is not None:
         sources[TEMPERATURE] = log.temperature
     if log.position is not None:
