@@ -21,7 +21,7 @@ import os
 import stat
 import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -282,10 +282,11 @@ def add_output(
         As `argparse.ArgumentParser.add_argument` takes them.
     """
     parser.add_argument(name, type=Path, action=StoreOutput, make=make, **keys)
-    if name.startswith("-") and "--force" not in parser._option_string_actions:
-        parser.add_argument(
-            "--force", action="store_true", help="replace an output file that is there already"
-        )
+    if name.startswith("-"):
+        with suppress(argparse.ArgumentError):  # another output of the command has declared it
+            parser.add_argument(
+                "--force", action="store_true", help="replace an output file that is there already"
+            )
 
 
 _MENDED = {
