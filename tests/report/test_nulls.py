@@ -5,6 +5,7 @@ The columns are those of the schemas, so that a new one is tried, too.
 
 import random
 import re
+import traceback
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from functools import cache
@@ -172,8 +173,13 @@ def test_a_report_comes_whatever_is_not_there(whole: Tables, reports: Reports) -
 def test_a_report_comes_whichever_value_is_not_there(
     seed: int, whole: Tables, reports: Reports
 ) -> None:
+    failures = {}
     for table, column, row in _cells(whole, seed):
-        reports.check(without(whole, table, [column], row))
+        try:
+            reports.check(without(whole, table, [column], row))
+        except Exception as error:  # all of them are named at once
+            failures[table, column, row] = "".join(traceback.format_exception(error)[-2:])
+    assert not failures
 
 
 TERMINAL = ("recordings", "findings", "failures", "ranking", "next_steps", "parameters")

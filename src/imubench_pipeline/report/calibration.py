@@ -111,7 +111,7 @@ def _texts(row: Row) -> dict[str, str]:
             "–" if row[key] is None else number_text(row[key], digits)
             for key in ("value", "lower", "upper", "truth")
         )
-        sigma = f"{number_text(_PPM * row['sigma'], 3)} ppm"
+        sigma = "–" if row["sigma"] is None else f"{number_text(_PPM * row['sigma'], 3)} ppm"
     else:
         _, per = _OF_RATIO[name]
         value, low, high, true, sigma = (
