@@ -79,6 +79,9 @@ def say_if_idle():
             print(line, file=sys.stderr)
 
 
+if not {"--delete-all-output", "--delete-temp-output"}.isdisjoint(sys.argv):
+    take_lock()
+
 atexit.register(run_lock.release)
 atexit.register(say_if_idle)
 

@@ -8,7 +8,6 @@ import unicodedata
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import NoReturn
 
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.bounds import MOST_LOOKED_INTO
@@ -60,13 +59,14 @@ def log_files(path: Path) -> list[Path]:
 
 def _inside(folder: Path) -> Iterator[Path]:
     """Yield what lies in a folder and those below."""
-    for place, folders, files in os.walk(folder, onerror=_raise):
-        folders[:] = [name for name in folders if visible(Path(name))]
-        yield from (Path(place, name) for name in files)
-
-
-def _raise(error: OSError) -> NoReturn:
-    raise error
+    waiting = [folder]
+    while waiting:
+        with os.scandir(waiting.pop()) as entries:
+            for entry in entries:
+                if not entry.is_dir(follow_symlinks=False):
+                    yield Path(entry.path)
+                elif visible(Path(entry.name)):
+                    waiting.append(Path(entry.path))
 
 
 def _is_file(path: Path) -> bool:

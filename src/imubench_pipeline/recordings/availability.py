@@ -7,7 +7,7 @@ different an hour later: the ingest fails, nothing is concluded, and the next ru
 from __future__ import annotations
 
 import errno
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -27,8 +27,10 @@ _ABSENT = frozenset({errno.ENOENT, errno.ENOTDIR})
 
 
 @contextmanager
-def watched(source: Path, planned: Collection[str] = ()) -> Iterator[None]:
+def watched(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[], bool]]:
     """Let a `RecordingError` pass only where it is a property of the log.
+
+    It gives a function that returns whether the log is still the one that was there at first.
 
     Parameters
     ----------
@@ -58,7 +60,7 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[None]:
     if before.keys() == {"."} and source.is_dir():
         raise RecordingError(f"the folder {source.name!a} has no files")
     try:
-        yield
+        yield lambda: _identity(source) == before
     except (RecordingError, OSError) as raised:
         for cause in _causes(raised):
             if cause.errno in OF_RESULTS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 from collections.abc import Iterable, Iterator
@@ -95,6 +96,8 @@ def found_logs(logs: Path) -> list[Recording]:
     for path in _shown(logs):
         if path.is_dir():
             recordings += _logs_of(path)
+        elif _is_dangling(path):
+            recordings.append(_behind_link(path, sensor_of(path), sensor_of(path)))
         elif _is_log(path):
             fault = _fault(path, _stem(path)) or (
                 f"{path.name} lies beside the folders of the sensors; expected it in "
@@ -128,7 +131,7 @@ def account_for(
     owners = {file: recording for recording in recordings for file in files_of(recording)}
     waiting = {file for recording in held_back for file in files_of(recording)}
     found = []
-    for file in _every_file(logs) if logs.is_dir() else ():
+    for file in sorted(_every_file(logs)) if logs.is_dir() else ():
         place = os.fsencode(file.relative_to(logs)).decode(errors="backslashreplace")
         if owner := owners.get(file):
             found.append(FoundFile(place, owner.sensor, owner.name))
@@ -143,25 +146,28 @@ _FOLLOWED = 2
 """Levels of folders of which links are followed: those of sensors, and of recordings."""
 
 
-def _every_file(folder: Path, level: int = 0) -> Iterator[Path]:
-    """Yield all files below a folder, in order, and folders that cannot be listed."""
-    try:
-        paths = sorted(folder.iterdir())
-    except OSError:
-        yield folder
-        return
-    for path in paths:
-        if path.is_dir() and (level < _FOLLOWED or not path.is_symlink()):
-            yield from _every_file(path, level + 1)
-        else:
-            yield path
+def _every_file(folder: Path) -> Iterator[Path]:
+    """Yield all files below a folder, and folders that cannot be listed."""
+    waiting = [(folder, 0)]
+    while waiting:
+        inside, level = waiting.pop()
+        try:
+            paths = sorted(inside.iterdir())
+        except OSError:
+            yield inside
+            continue
+        for path in paths:
+            if path.is_dir() and (level < _FOLLOWED or not path.is_symlink()):
+                waiting.append((path, level + 1))
+            else:
+                yield path
 
 
 def _why_skipped(file: Path, logs: Path) -> str:
     """Return why a file of the drop zone belongs to no recording, by its name and place."""
     name, suffix = file.name, file.suffix.lower()
-    if name.endswith("~"):
-        return "backup of an editor"
+    if copy := next((part for part in file.relative_to(logs).parts if part.endswith("~")), ""):
+        return f"backup of an editor: the name {copy!a} ends in ~"
     if suffix in PARTIAL or Path(name.lstrip(".")).suffix.lower() in PARTIAL:
         return f"still being transferred, by its ending {suffix}"
     if hidden := next((part for part in file.relative_to(logs).parts if part.startswith(".")), ""):
@@ -201,13 +207,33 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
     for path in sorted({*shown} - {*logs} - {*notes_of.values()}):
         if path.suffix.lower() in _MISNAMED_NOTES:
             misnamed.setdefault(path.stem, path)
+    names = {path.name if path.is_dir() else _stem(path) for path in logs if not _is_dangling(path)}
     for path in logs:
         name = path.name if path.is_dir() else _stem(path)
+        if _is_dangling(path):  # it may lead to a folder, whose name has no ending
+            yield _behind_link(path, sensor, path.name if name in names else name)
+            continue
         notes, other = notes_of.get(f"{name}{_NOTES}"), misnamed.get(name)
         fault = _fault(path, name)
         if fault is None and other:
             fault = f"{other.name}: notes end in {_NOTES}; rename it to {name}{_NOTES}"
         yield _found(sensor, path, name, fault, notes)
+
+
+def _is_dangling(path: Path) -> bool:
+    """Return whether a path is a link to what is not there now, as where a mount is away."""
+    if not path.is_symlink():
+        return False
+    try:
+        path.stat()
+    except OSError as error:
+        return error.errno in (errno.ENOENT, errno.ENOTDIR, errno.EACCES)
+    return False
+
+
+def _behind_link(path: Path, sensor: str, name: str) -> Recording:
+    reason = f"{path.name}: cannot be read (No such file or directory): it links to nothing now"
+    return Recording(sensor, _usable(name), path, None, simulated=False, unavailable=reason)
 
 
 def _shown(folder: Path) -> list[Path]:

@@ -399,11 +399,13 @@ def ingest_as_planned(
             raise RecordingError(plan["error"])
         log = LogFormat.model_validate(plan["log"])
         limits = QualitySettings.model_validate(plan["quality"])
-        with watched(source, plan.get("files", ())):
+        with watched(source, plan.get("files", ())) as is_same:
             if guarded:
                 check_opening(source, log, limits.opening)
             ingested = ingest(source, log, notes, limits, folder, provenance)
         sources = ingested.sources or {}
+        if not is_same():  # what was read, and what was digested, may be two logs
+            sources = {name: file.distrusted() for name, file in sources.items()}
     except RecordingError as error:
         remove_kept(folder)
         ingested = rejected(error, notes)

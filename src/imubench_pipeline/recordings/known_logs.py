@@ -15,14 +15,16 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
 import os
 import time
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from imubench_pipeline.readers import log_files
-from imubench_pipeline.readers.holes import end_of_data
+from imubench_pipeline.readers.holes import FileWithoutHoles
 from imubench_pipeline.recordings.drop_zone import Recording
 from imubench_pipeline.tables.digests import (
     open_without_waiting,
@@ -33,8 +35,8 @@ from imubench_pipeline.tables.digests import (
 KNOWN = "log.json"
 """The file of the evidence, beside ``quality.json``."""
 
-MAX_DIGESTED_SIZE = 1 << 28
-"""Bytes. A file up to this size is read in the plan where only its stamps may have changed (0.2 s);
+MAX_DIGESTED_SIZE = 1 << 26
+"""Bytes. A file up to this size is read in the plan where only its stamps may have changed (0.1 s);
 a larger one goes through the ingest again."""
 
 _MAX_WHOLE_GLIMPSE = 1 << 20  # bytes
@@ -61,6 +63,9 @@ class KnownFile:
     have the same stamps."""
     version: str = ""
     """The name of this content in the settings of the ingest."""
+    inode: int = 0
+    """The number of the file. Two files may have the same size and stamps. Some network disks give
+    other numbers each time: then only the content of a file of moderate size is compared."""
 
     @classmethod
     def of(cls, path: Path, is_stopped: Callable[[], bool] = lambda: False) -> KnownFile:
@@ -75,14 +80,18 @@ class KnownFile:
         if (before.st_size, _stamps(before)) != (after.st_size, _stamps(after)):
             return cls(before.st_size, None, None)
         old = all(abs(begin - stamp) > _STAMP_RESOLUTION for stamp in _stamps(before))
-        return cls(before.st_size, digest, _stamps(before) if old else None)
+        stamps = _stamps(before) if old else None
+        return cls(before.st_size, digest, stamps, inode=before.st_ino)
+
+    def distrusted(self) -> KnownFile:
+        """Return the file without what says that it has not changed."""
+        return replace(self, sha256=None, stamps=None)
 
     def is_unchanged(self, about: os.stat_result) -> bool:
         """Return whether nothing was done to the file, by its status now."""
-        return self.stamps is not None and (self.size, self.stamps) == (
-            about.st_size,
-            _stamps(about),
-        )
+        same_file = self.inode == about.st_ino or about.st_size > MAX_DIGESTED_SIZE
+        same_stamps = (self.size, self.stamps) == (about.st_size, _stamps(about))
+        return same_file and same_stamps
 
 
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
@@ -193,6 +202,8 @@ def plan_versions(source: Path, folder: Path) -> dict[str, str]:
                 touched[name] = now
         except OSError as error:
             versions[name] = _unreadable(error)
+            if before is not None and before.size is None:
+                continue  # as the last ingest found it
             now = None
         if before is not None and now is None and versions[name] == before.version:
             versions[name] += " again"
@@ -231,16 +242,21 @@ def is_changed(source: Path, folder: Path) -> bool:
     known = read_known(folder)
     try:
         places = _places(source)
-        return known is not None and (
-            known.keys() != places.keys()
-            or any(
-                _now(path, known[name]) is None
-                and not (known[name].stamps is None and known[name].size == path.stat().st_size)
-                for name, path in places.items()
-            )
-        )
     except OSError:
         return True
+    return known is not None and (
+        known.keys() != places.keys()
+        or any(_is_another(path, known[name]) for name, path in places.items())
+    )
+
+
+def _is_another(path: Path, before: KnownFile) -> bool:
+    """Return whether a file has not the content that an ingest found."""
+    try:
+        size = path.stat().st_size
+        return _now(path, before) is None and not (before.stamps is None and before.size == size)
+    except OSError:
+        return before.size is not None
 
 
 def versions_of(recording: Recording, results: Path) -> dict[str, str]:
@@ -263,7 +279,7 @@ def glimpse(path: Path) -> str:
         If it cannot be read.
     """
     digest = hashlib.sha256()
-    with open(path, "rb", buffering=0, opener=open_without_waiting) as file:
+    with _opened(path) as file:
         size = os.fstat(file.fileno()).st_size
         if size <= _MAX_WHOLE_GLIMPSE:
             digest.update(file.read(size))
@@ -277,19 +293,22 @@ def glimpse(path: Path) -> str:
 def _digest(path: Path, size: int, is_stopped: Callable[[], bool]) -> str | None:
     """Return the SHA-256 of a file; None where it was stopped.
 
-    At most `size` bytes are read: a file of the kernel says that it is empty, and may never end. A
-    long hole at the end of a file has no part in it.
+    At most `size` bytes are read: a file of the kernel says that it is empty, and may never end. Of
+    a long hole in a large sparse file, only the last bytes count.
     """
     digest, is_large = hashlib.sha256(), size > MAX_DIGESTED_SIZE
-    if is_large and size - (end := end_of_data(path)) > MAX_DIGESTED_SIZE:
-        size = end
-    with open(path, "rb", buffering=0, opener=open_without_waiting) as file:
+    is_sparse = is_large and 512 * path.stat().st_blocks < size - MAX_DIGESTED_SIZE
+    with closing(FileWithoutHoles(path)) if is_sparse else _opened(path) as file:
         while size > 0 and (chunk := file.read(min(size, _CHUNK_SIZE))):
             if is_large and is_stopped():
                 return None
             digest.update(chunk)
             size -= len(chunk)
     return digest.hexdigest()
+
+
+def _opened(path: Path) -> io.FileIO:
+    return open(path, "rb", buffering=0, opener=open_without_waiting)
 
 
 def _places(source: Path) -> dict[str, Path]:

@@ -30,20 +30,32 @@ def drop_zone_lines(results: Path) -> list[str]:
     try:
         files = read("files", [results / "tables/files.parquet"]).to_pylist()
         settings = json.loads((results / "report/settings.json").read_text("utf-8"))
-        logs = _folder_of_run(results, settings["results"]) / settings["logs"]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError):
         return []  # what is missing or damaged is reported elsewhere
+    try:
+        logs = _folder_of_run(results, Path(settings["results"])) / settings["logs"]
+    except (ValueError, KeyError, TypeError):
+        return [*balance(files), *(["the drop zone of the run is not known"] if files else [])]
     if logs.is_dir():
         return [*balance(files), *_changes(files, logs, results)]
     absent = f"the drop zone {logs} is not here: its files were not compared with the results"
     return [*balance(files), absent] if files else []
 
 
-def _folder_of_run(results: Path, given: str) -> Path:
-    """Return the folder that a run was started in, by the place of its results as it was given."""
-    own, parts = results.absolute(), Path(given).parts
-    below = own.parts[-len(parts) :] == parts
-    return own.parents[len(parts) - 1] if below and not Path(given).is_absolute() else Path()
+def _folder_of_run(results: Path, given: Path) -> Path:
+    """Return the folder that a run was started in, by the place of its results as it was given.
+
+    Raises
+    ------
+    ValueError
+        If the results have another name now.
+    """
+    if given.is_absolute() or given.resolve() == results.resolve():
+        return Path()
+    own, parts = results.absolute(), given.parts
+    if own.parts[-len(parts) :] != parts:
+        raise ValueError(f"{results}: expected results of the name {given}")
+    return own.parents[len(parts) - 1]
 
 
 def balance(files: Sequence[Row]) -> Iterator[str]:

@@ -7,6 +7,7 @@ of what the rule depends on, so that an edit runs again what it touches and noth
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from functools import cached_property
@@ -134,7 +135,10 @@ class Plan:
                 )
             return []
         by_name: dict[str, list[Recording]] = {}
+        results = self.run.results.resolve()
         for log in found_logs(self.run.logs):
+            if log.path.is_symlink() and Path(os.path.realpath(log.path)).is_relative_to(results):
+                log = replace(log, error=f"{log.path.name} links to the results of runs: remove it")
             by_name.setdefault(f"{log.sensor}/{log.name}", []).append(log)
         for key in self.run.held_back:
             found = by_name.get(key, [])
@@ -209,10 +213,10 @@ class Plan:
     def _without_folders(self, reason: str) -> str:
         """Return a reason without the folders above those of the run: it stands in tables."""
         sensors = self.run.sensors
-        for folder in (self.run.logs, *((sensors,) if isinstance(sensors, Path) else sensors)):
+        for folder in (sensors,) if isinstance(sensors, Path) else sensors:
             if folder.is_absolute():
-                reason = reason.replace(str(folder), folder.name)
-        return reason
+                reason = reason.replace(str(folder), "sensors")
+        return reason.replace(str(self.run.logs), "logs") if self.run.logs.is_absolute() else reason
 
     def kind(self, sensor: str, name: str) -> Kind:
         """Return what was done with the sensor; what its notes were to say, if they are wrong."""
@@ -536,6 +540,12 @@ class Plan:
 def _check_places(run: Run) -> None:
     """Refuse results that would be taken for logs, and logs that would be taken for results."""
     logs, results = run.logs.resolve(), run.results.resolve()
+    declared = (run.sensors,) if isinstance(run.sensors, Path) else run.sensors
+    if results in [folder.resolve() for folder in declared]:
+        raise ConfigError(
+            f"results: found {str(run.results)!r}, the folder of the sensor files; expected one of "
+            "its own"
+        )
     if logs.is_relative_to(results) or results.is_relative_to(logs):
         raise ConfigError(
             f"logs: found {str(run.logs)!r}, and results: {str(run.results)!r}; expected two "

@@ -49,7 +49,9 @@ def curve_rows(folder: Path, sensor: str, recording: str, settings: str) -> Iter
     for channel, curve in measured.items():
         names = {"sensor": sensor, "recording": recording, "channel": channel}
         printed = list(comparables(datasheet, channel))
-        for distance in curve_rms(printed, curve.tau, curve.deviation):
+        above_zero = curve.deviation > 0.0  # that of a periodic log is 0 at multiples of its period
+        tau, deviation = curve.tau[above_zero], curve.deviation[above_zero]
+        for distance in curve_rms(printed, tau, deviation) if above_zero.any() else ():
             yield names | {
                 "sidedness": distance.noise.sidedness if distance.noise else None,
                 "N": distance.noise.value if distance.noise else None,

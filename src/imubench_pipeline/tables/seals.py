@@ -210,7 +210,9 @@ def _check(seal: Seal) -> None:
 def places(results: Path) -> list[str]:
     """Return the places of all seals, in order."""
     folder = results / FOLDER
-    files = (path.relative_to(folder).as_posix() for path in folder.rglob("*.json"))
+    files = (
+        path.relative_to(folder).as_posix() for path in folder.rglob("*.json") if path.is_file()
+    )
     return sorted(name.removesuffix(".json") for name in files)
 
 

@@ -9,6 +9,7 @@ has it open for writing (a logger may write its buffer every few minutes only).
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -204,7 +205,7 @@ def moved(before: Mapping[str, Found], after: Mapping[str, Found]) -> set[str]:
 
 
 def _real(recording: Found) -> Iterable[Path]:
-    return (Path(path).resolve() for path, _, _ in recording.files)
+    return (Path(os.path.realpath(path)) for path, _, _ in recording.files)
 
 
 def _signature(log: Recording) -> Signature:
