@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.processes import Job, Processes, StepError
 from imubench_pipeline.run.resources import Limit
@@ -137,7 +136,10 @@ class Project:
 
     def failed(self) -> set[str]:
         """Return the recordings of which the ingest failed."""
-        return {failure.name for failure, _ in Faults(self.results).now()}
+        told = self.outcome()
+        return {
+            name for name, of in told.items() if name != "files" and of[0]["status"] == "failed"
+        }
 
 
 _hooks: list[Callable[[str, Path, int], None]] = []

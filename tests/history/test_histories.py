@@ -161,7 +161,7 @@ class Histories(RuleBasedStateMachine):
             self.project.run()
             self.project.run()  # what failed with a fault is tried again
             assert self.project.outcome() == self.project.from_nothing()
-            assert self.project.run() == sorted(self.project.failed())
+            assert sorted(self.project.run()) == sorted(self.project.failed())
         finally:
             shutil.rmtree(self.folder)
 

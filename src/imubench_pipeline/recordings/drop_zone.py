@@ -152,15 +152,15 @@ def _every_file(folder: Path) -> Iterator[Path]:
     while waiting:
         inside, level = waiting.pop()
         try:
-            paths = sorted(inside.iterdir())
-        except OSError:
+            with os.scandir(inside) as entries:
+                for entry in entries:
+                    path = Path(entry.path)
+                    if entry.is_dir(follow_symlinks=level < _FOLLOWED):
+                        waiting.append((path, level + 1))
+                    else:
+                        yield path
+        except OSError:  # such as a path that is too long
             yield inside
-            continue
-        for path in paths:
-            if path.is_dir() and (level < _FOLLOWED or not path.is_symlink()):
-                waiting.append((path, level + 1))
-            else:
-                yield path
 
 
 def _why_skipped(file: Path, logs: Path) -> str:
@@ -185,10 +185,15 @@ def _why_skipped(file: Path, logs: Path) -> str:
                 "sensor file belongs into the folder of the others"
             )
         return f"notes that are not read: rename the file to {file.stem}{_NOTES}"
-    if file.is_dir():
-        return "link to a folder, which is not followed: link to its files, or copy it"
-    if is_endless(file):
-        return "neither a file nor a folder"
+    try:
+        if file.is_symlink() and file.is_dir():
+            return "link to a folder, which is not followed: link to its files, or copy it"
+        if file.is_dir():
+            return "folder that cannot be listed"
+        if is_endless(file):
+            return "neither a file nor a folder"
+    except OSError as error:
+        return f"cannot be looked at ({error.strerror})"
     return "no log: it was not there when the run was planned, or belongs to no recording"
 
 

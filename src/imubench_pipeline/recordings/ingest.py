@@ -6,6 +6,7 @@ import json
 import shutil
 import tempfile
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -410,7 +411,8 @@ def ingest_as_planned(
         remove_kept(folder)
         ingested = rejected(error, notes)
         if "files" in plan:
-            sources = read_log(source, lambda: True)  # no digests of large files
+            with suppress(OSError):  # a path that cannot be listed at all
+                sources = read_log(source, lambda: True)  # no digests of large files
     if versions := plan.get("files"):
         write_known(sources, folder, versions)
     return ingested.quality(provenance | {"power_cycled": notes.power_cycled})
