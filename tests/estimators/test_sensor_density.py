@@ -57,6 +57,7 @@ def test_without_a_filter_there_is_no_n_sensor() -> None:
     assert estimate.parameters["N"].value == pytest.approx(N, rel=0.02)
 
 
+@pytest.mark.release  # to twice the rate every day
 def test_of_a_log_interpolated_at_any_place_n_sensor_is_doubtful_and_n_on_the_curve() -> None:
     # Variance 2/3 and covariance 1/4 of neighbours, so 7/6 of the density at no frequency.
     place = np.random.default_rng(3).uniform(size=60_000)

@@ -14,7 +14,7 @@ from tests.history.project import Project, on_access
 from tests.workflow.project import put_log
 
 MAX_ACCESSES = 400
-EVERY = pytest.mark.parametrize("step", few([6], [1]))
+EVERY = pytest.mark.parametrize("step", few([11], [1]))
 """The accesses before which something is done: each before a release."""
 
 
