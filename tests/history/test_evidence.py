@@ -120,3 +120,14 @@ def test_a_sparse_file_of_two_terabytes_costs_the_plan_nothing(project: Project)
     huge.touch()
     project.run()
     assert time.process_time() - begin < 20.0  # to read it takes half an hour
+
+
+def test_files_that_no_channel_is_read_from_are_named(project: Project) -> None:
+    put_log(project.logs / "s/a/log.csv", 1, samples=300)
+    (project.logs / "s/a/more").mkdir()
+    (project.logs / "s/a/more/notes.yaml").write_text("device: '7'\n")
+    project.run()
+    about, findings, _ = project.outcome()["s/a"]
+    assert about["status"] == "ok" and about["device"] == "a"
+    (note,) = [row for row in findings if row["finding"] == "unused_files"]
+    assert note["value"] == 1 and "more/notes.yaml" in note["detail"]

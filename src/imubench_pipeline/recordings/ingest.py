@@ -13,7 +13,8 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from imubench_pipeline.readers import read
+from imubench_pipeline.readers import log_files, read
+from imubench_pipeline.readers.content import format_of_folder
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.assembly import assemble, counted, names_of
 from imubench_pipeline.recordings.availability import watched
@@ -37,6 +38,8 @@ from imubench_pipeline.settings.sensor import (
 )
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError
+
+_MAX_NAMES = 5
 
 
 @dataclass(frozen=True)
@@ -149,6 +152,7 @@ def _ingest(
     static = provenance.get("kind", "static") == "static"
     findings = _findings(parts, bases, groups, settings, scratch, static=static)
     findings += _overruled_notes(parts, notes)
+    findings += _unused_files(source, parts)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     names = names_of(parts, groups)
     simulated = _is_simulated(parts, notes, provenance)
@@ -194,6 +198,22 @@ def _ingest(
     ]
     files = identified(log_paths(folder))
     return Ingested(summary, findings, channels, files, _gravity(parts, bases), sources.result())
+
+
+def _unused_files(source: Path, parts: list[Part]) -> list[Finding]:
+    """Return a note of the files of a folder that no channel is read from."""
+    if not source.is_dir() or format_of_folder(source) is not None:
+        return []
+    used = {path for part in parts for path in (part.source.path, *part.source.path.parents)}
+    unused = [file.relative_to(source).as_posix() for file in log_files(source) if file not in used]
+    if not unused:
+        return []
+    shown = ", ".join(unused[:_MAX_NAMES]) + ", ..." * (len(unused) > _MAX_NAMES)
+    detail = (
+        f"no channel is read from {shown}; name the file of a channel with 'file:' in the sensor "
+        f"file; notes belong beside the folder, as {source.name}.yaml"
+    )
+    return [Finding("unused_files", "note", detail, len(unused))]
 
 
 def _findings(
