@@ -417,3 +417,20 @@ def test_a_command_that_is_stopped_leaves_nothing(lab: Path, number: signal.Sign
         _, err = process.communicate(timeout=60)
     assert process.returncode == 128 + number
     assert b"Traceback" not in err
+
+
+def test_the_logs_that_a_report_names_are_a_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "results/seals").mkdir(parents=True)
+    (tmp_path / "results/report").mkdir()
+    (tmp_path / "results/report/settings.json").write_text('{"results": "results", "logs": "drop"}')
+    (tmp_path / "drop/s").mkdir(parents=True)
+    log = tmp_path / "drop/s/a.csv"
+    log.write_text("1,2\n")
+    (tmp_path / "link").symlink_to(log)
+    for name in ("link", "drop/s/a.csv", "drop/s/new.json"):
+        assert main(["schema", "run", "--output", name, "--force"]) == 2
+        assert "belongs to the logs" in capsys.readouterr().err
+    assert log.read_text() == "1,2\n" and [*log.parent.iterdir()] == [log]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from imubench_pipeline.recordings.drop_zone import account_for, found_logs
 from imubench_pipeline.recordings.known_logs import is_changed
+from imubench_pipeline.report.folder import drop_zone_of
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.texts import printable
@@ -29,33 +29,15 @@ def drop_zone_lines(results: Path) -> list[str]:
     """
     try:
         files = read("files", [results / "tables/files.parquet"]).to_pylist()
-        settings = json.loads((results / "report/settings.json").read_text("utf-8"))
     except (OSError, ValueError):
         return []  # what is missing or damaged is reported elsewhere
-    try:
-        logs = _folder_of_run(results, Path(settings["results"])) / settings["logs"]
-    except (ValueError, KeyError, TypeError):
+    logs = drop_zone_of(results)
+    if logs is None:
         return [*balance(files), *(["the drop zone of the run is not known"] if files else [])]
     if logs.is_dir():
         return [*balance(files), *_changes(files, logs, results)]
     absent = f"the drop zone {logs} is not here: its files were not compared with the results"
     return [*balance(files), absent] if files else []
-
-
-def _folder_of_run(results: Path, given: Path) -> Path:
-    """Return the folder that a run was started in, by the place of its results as it was given.
-
-    Raises
-    ------
-    ValueError
-        If the results have another name now.
-    """
-    if given.is_absolute() or given.resolve() == results.resolve():
-        return Path()
-    own, parts = results.absolute(), given.parts
-    if own.parts[-len(parts) :] != parts:
-        raise ValueError(f"{results}: expected results of the name {given}")
-    return own.parents[len(parts) - 1]
 
 
 def balance(files: Sequence[Row]) -> Iterator[str]:

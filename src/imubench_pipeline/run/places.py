@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from imubench_pipeline.report.folder import drop_zone_of
 from imubench_pipeline.settings.config import Run
 from imubench_pipeline.settings.shipped import CATALOGUE, project
 from imubench_pipeline.settings.validation import ConfigError
@@ -34,8 +35,9 @@ def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
     A project is a folder with ``config/config.yaml``: the working folder, any folder at or above
     the path, and any above the results that a command is given. Its places are ``config/`` and the
     folders of logs, results, sensors and requirements that the file names. Results are also those
-    that a command is given, and any folder at or above the path with ``seals/`` or
-    ``tables/recordings.parquet``. In results, the folders that runs fill are places; the folder
+    that a command is given, and any folder at or above the path, and any folder ``results`` beside
+    one of these, with ``seals/`` or ``tables/recordings.parquet``; the logs that their report names
+    are a place, too. In results, the folders that runs fill are places; the folder
     itself is none. The configuration that comes with the package is a place.
 
     Parameters
@@ -61,7 +63,10 @@ def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
                 yield Place(folder / one, "config", "the configuration")
         yield Place(folder / run.logs, "logs", "the logs")
         found.append(folder / run.results)
+    found += [folder / "results" for folder in projects if _has_results(folder / "results")]
     for folder in dict.fromkeys(found):
+        if (logs := drop_zone_of(folder)) is not None:
+            yield Place(logs.absolute(), "logs", "the logs")
         yield from (Place(folder / name, "results", "the results of runs") for name in _OF_RUNS)
 
 
