@@ -173,7 +173,7 @@ class Undisturbed:
 
 def _is_dated(name: Path) -> bool:
     """Tell whether a file holds dates of others, which each run has its own of."""
-    return name.parts[0] == "seals" or name.name == "log.json"
+    return name.parts[0] in ("seals", "nightly") or name.name == "log.json"
 
 
 def _digest(path: Path) -> bytes:
