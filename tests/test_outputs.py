@@ -380,7 +380,7 @@ def test_numbers_out_of_range_are_refused(
         try:
             status = main([*command.split(), f"{option}={value}"])
         except SystemExit as ended:
-            status = ended.code  # type: ignore[assignment]
+            status = ended.code  # type: ignore[assignment]  # argparse ends with a number
         out, err = capsys.readouterr()
         assert (status, out) == (2, ""), value
         assert option in err.splitlines()[-1] and "expected" in err.splitlines()[-1]

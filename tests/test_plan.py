@@ -1,5 +1,6 @@
 import json
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -252,3 +253,18 @@ def test_a_new_log_does_not_change_the_settings_of_the_report(project: dict[str,
     before = Plan(project).report_settings()
     put(project, "b.csv")
     assert Plan(project).report_settings() == before
+
+
+def test_names_with_braces_are_no_wildcards_and_reject_themselves_alone(
+    project: dict[str, Any],
+) -> None:
+    for name in ("a.csv", "{y}.csv", "r#1.csv", "r_1.csv"):
+        put(project, name)
+    (Path(project["sensors"]) / "{x}.yaml").write_text(yaml.safe_dump(SENSOR))
+    plan = Plan(project)
+    for text in (plan.files(), plan.catalogue(), plan.ranking_settings()):
+        assert not re.search(r"\{\s*\w", text)
+    assert {file["file"] for file in json.loads(plan.files())} >= {"s/{y}.csv", "s/a.csv"}
+    assert "{x}" in json.loads(plan.catalogue())
+    errors = {log.path.name: bool(log.error) for log in plan.recordings.values()}
+    assert errors == {"a.csv": False, "{y}.csv": True, "r#1.csv": True, "r_1.csv": False}

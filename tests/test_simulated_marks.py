@@ -12,8 +12,11 @@ import pytest
 import yaml
 
 import imubench_pipeline as imu
+from imubench_pipeline.readers import read
+from imubench_pipeline.readers.text.header import SIMULATED
 from imubench_pipeline.recordings.fitness import judged, simulated_beside_measured
 from imubench_pipeline.run.cli import main
+from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.steps.tables import tables_of_all
 from imubench_pipeline.tables import build, write_arrow
 from tests.workflow.project import put_sensor
@@ -167,3 +170,18 @@ def test_a_measured_recording_of_any_sensor_leaves_out_simulated_ones(tmp_path: 
     for name in ("one/sim", "two/sim"):
         assert found[name]["doubts"] == "simulated beside measured"
         assert found[name]["fitness"] == "unfit"
+
+
+GYRO = {"column": "gx", "unit": "rad/s"}
+
+
+@pytest.mark.parametrize("skipped", [1, 3])
+def test_the_mark_is_found_among_lines_that_are_skipped(skipped: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"# {SIMULATED}\n" + "#\n" * (skipped - 1) + "gx\n" + "1\n2\n" * 20)
+    log = LogFormat.model_validate(
+        {"rate": "10 Hz", "skip_lines": skipped, "channels": {"gyro_x": GYRO}}
+    )
+    (file,) = read(path, log)
+    assert sum(map(len, file.batches())) == 40
+    assert file.simulated

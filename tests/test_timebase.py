@@ -1,3 +1,5 @@
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -375,3 +377,21 @@ def test_a_clock_that_is_slewed_in_a_short_log_is_said() -> None:
     base, _ = found(stamps)
     assert base.uniform and names(base) == ["rate_drifts"]
     assert base.findings[0].value == pytest.approx(1e-3, rel=0.1)
+
+
+@pytest.mark.parametrize("true", [1030.0, 1100.0, 1125.0, 1190.0])
+@pytest.mark.parametrize("rounded", [np.round, np.floor])
+def test_a_rate_above_the_resolution_of_the_stamps_loses_no_sample(
+    true: float, rounded: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    stamps = rounded(1000.0 * np.arange(20_000) / true) / 1000.0
+    base = from_stamps(lambda: iter([stamps]), None, QualitySettings())
+    assert base.rate == pytest.approx(true, rel=1e-3)
+    assert base.samples >= 0.999 * len(stamps)
+    assert any(found.severity == "warning" for found in base.findings)
+
+
+def test_records_written_twice_at_regular_distances_are_left_out_where_the_rate_is_stated() -> None:
+    stamps = np.sort(np.concatenate([np.arange(8000) / 100.0, np.arange(0, 8000, 8) / 100.0]))
+    base = from_stamps(lambda: iter([stamps]), 100.0, QualitySettings())
+    assert base.rate == pytest.approx(100.0) and base.repeated == 1000

@@ -15,9 +15,9 @@ from tests.corpus import (
     values,
 )
 from tests.corpus.cut import cut_short
-from tests.corpus.entry import Cut, Entry, Kept, Rejected, Unavailable
+from tests.corpus.entry import Cut, Entry, Kept, Rejected
 
-__all__ = ["ENTRIES", "Cut", "Entry", "Kept", "Rejected", "Unavailable"]
+__all__ = ["ENTRIES", "Cut", "Entry", "Kept", "Rejected"]
 
 _TEXTS = [
     *text.ENTRIES,

@@ -23,22 +23,12 @@ class Rejected:
     ----------
     reason : str
         Regular expression that is found in what is said of it.
+    is_final : bool
+        The reason lies in the log; otherwise its ingest fails, and is tried again.
     """
 
     reason: str
-
-
-@dataclass(frozen=True)
-class Unavailable:
-    """The recording cannot be read now; nothing is concluded about it.
-
-    Attributes
-    ----------
-    reason : str
-        Regular expression that is found in what is said of it.
-    """
-
-    reason: str
+    is_final: bool = True
 
 
 @dataclass(frozen=True)
@@ -73,7 +63,7 @@ class Entry:
     write : callable
     log : mapping
         As in a sensor file.
-    expected : Rejected, Unavailable, Kept or Cut
+    expected : Rejected, Kept or Cut
     skip : str or None
         Why it cannot be tried here.
     """
@@ -81,7 +71,7 @@ class Entry:
     name: str
     write: Written
     log: Mapping[str, Any]
-    expected: Rejected | Unavailable | Kept | Cut
+    expected: Rejected | Kept | Cut
     skip: str | None = None
 
     def place(self, logs: Path, sensors: Path) -> Path:

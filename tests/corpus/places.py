@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from tests.corpus.entry import Entry, Rejected, Unavailable, Written, file, folder_of, kept
+from tests.corpus.entry import Entry, Rejected, Written, file, folder_of, kept
 from tests.corpus.signals import AZ, ROWS, STAMPED, TIME, WX, log
 
 TEXT = log()
@@ -71,7 +71,7 @@ ENTRIES = [
         "link to nothing",
         link_to("gone.csv"),
         STAMPED,
-        Unavailable("log.csv: cannot be read .No such file"),
+        Rejected("log.csv: cannot be read .No such file", is_final=False),
     ),
     Entry("folder with a link to itself", looped_folder, STAMPED, kept(ROWS)),
     Entry(
@@ -91,7 +91,7 @@ ENTRIES = [
         "file that may not be read",
         forbidden,
         STAMPED,
-        Unavailable("log.csv: cannot be read .Permission denied"),
+        Rejected("log.csv: cannot be read .Permission denied", is_final=False),
         skip="root may read every file" if os.geteuid() == 0 else None,
     ),
     Entry("folder of one log", folder_of({"log.csv": TEXT}), STAMPED, kept(ROWS)),

@@ -430,7 +430,7 @@ def found_with_holes() -> Likelihood:
     return fit(log_with_holes(), RATE)
 
 
-@pytest.mark.release  # test_blocks_of_a_log_with_holes_do_not_matter is one more fit of the log
+@pytest.mark.release  # test_blocks_do_not_matter is one more fit of the log
 def test_the_same_log_gives_the_same_result() -> None:
     np.random.seed(1)  # noqa: NPY002  # the global state must not matter
     again = fit(log_with_holes(), RATE)
@@ -767,28 +767,17 @@ def in_pieces(log: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
     return pieces
 
 
-@pytest.mark.release  # those of a log with holes are told apart every day
-def test_blocks_do_not_matter(rng: np.random.Generator) -> None:
-    pieces, whole = in_pieces(log_of(SHORT, samples=LONG), rng), found_in(SHORT, samples=LONG)
-    found = fit_blocks(
-        lambda: iter(pieces),
-        LONG,
-        RATE,
-        holes=False,
-        stretch=whole.stretch,
-        rng=np.random.default_rng(0),
-    )
-    assert_same(whole, found)
-
-
 @pytest.mark.release
-def test_blocks_of_a_log_with_holes_do_not_matter(rng: np.random.Generator) -> None:
-    pieces, whole = in_pieces(log_with_holes(), rng), found_with_holes()
+@pytest.mark.parametrize("holes", [False, True])
+def test_blocks_do_not_matter(holes: bool, rng: np.random.Generator) -> None:
+    log = log_with_holes() if holes else log_of(SHORT, samples=LONG)
+    whole = found_with_holes() if holes else found_in(SHORT, samples=LONG)
+    pieces = in_pieces(log, rng)
     found = fit_blocks(
         lambda: iter(pieces),
-        WITH_HOLES,
+        WITH_HOLES if holes else LONG,
         RATE,
-        holes=True,
+        holes=holes,
         stretch=whole.stretch,
         rng=np.random.default_rng(0),
     )

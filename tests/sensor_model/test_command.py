@@ -51,7 +51,7 @@ def test_a_log_is_read_with_its_sensor_file(sensor: str, tmp_path: Path, capsys)
     (tmp_path / "warm.csv").write_text(WARM)
     found = {}
     for suffix in ("csv", "parquet"):
-        path = tmp_path / f"log.{suffix}"
+        path = tmp_path / f"log_{suffix}.{suffix}"
         given = ["--duration", "40 s", "--rate", "100 Hz", "--temperature", tmp_path / "warm.csv"]
         assert simulate(sensor, *given, "--out", path) == 0
         said = capsys.readouterr().out
@@ -236,7 +236,7 @@ def test_notes_of_another_log_are_kept_while_it_is_there(tmp_path: Path, capsys)
     capsys.readouterr()
     for more in ([], ["--force"]):
         assert simulate(*given, "--out", binary, *more) == 2
-        assert "log.yaml: says how log.csv is written" in capsys.readouterr().err
+        assert "log.csv is a recording of the same name" in capsys.readouterr().err
         assert text.with_suffix(".yaml").read_bytes() == before and not binary.exists()
     text.unlink()
     assert simulate(*given, "--out", binary) == 2
@@ -301,3 +301,28 @@ def test_nothing_is_left_of_a_log_that_could_not_be_finished(
     assert simulate("bno055", "--duration", "5 s", "--out", tmp_path / "log.parquet") == 2
     assert "No space left on device" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_a_simulated_log_does_not_change_a_measured_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/config.yaml").write_text("logs: logs\n")
+    logs = tmp_path / "logs/bno055"
+    (logs / "rec").mkdir(parents=True)
+    for name in ("b.txt", "rec/one.csv", "c.csv.gz"):
+        (logs / name).write_text("1,2\n")
+    before = sorted(logs.rglob("*"))
+    given = ["bno055", "--duration", "1 s", "--out"]
+    for name, said in (
+        ("b.csv", "b.txt is a recording of the same name"),
+        ("rec.csv", "rec is a recording of the same name"),
+        ("c.parquet", "c.csv.gz is a recording of the same name"),
+        ("rec/two.csv", "expected <sensor>/<recording>"),
+        ("../x.csv", "expected <sensor>/<recording>"),
+    ):
+        assert simulate(*given, logs / name, "--force") == 2
+        assert said in capsys.readouterr().err
+    assert sorted(logs.rglob("*")) == before
+    assert simulate(*given, logs / "new.csv") == 0

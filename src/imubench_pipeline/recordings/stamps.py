@@ -22,6 +22,12 @@ the square."""
 _LONG, _TWO = 1.75, 2.2
 """Steps, over their median, that are more than one, and no more than two."""
 
+SHARED = 0.2
+"""Share of the records that repeat a stamp above which each stamp belongs to a group of samples."""
+
+_NEGLIGIBLE = 0.02
+"""Share of repeated stamps below which it makes 1 % of N whether they are rounded or copies."""
+
 _MIDDLE = 0.45
 """Level of the quantile that stands for the median: of as many short and long steps the short."""
 
@@ -42,29 +48,42 @@ class Interval:
 
     mean: float
     """Mean of the intervals between which no sample is missing, s."""
-    with_losses: float | None = None
-    """That, if the long ones among regular steps of one and two are samples lost; None where there
-    are none. Stamps rounded coarsely look the same, and are taken to be there."""
+    other: float | None = None
+    """The mean, s, if double steps at regular distances are lost samples, or repeated stamps at
+    regular distances are records written twice; None where there are none. Rounded stamps look the
+    same, and are assumed."""
+
+    @property
+    def has_repeats(self) -> bool:
+        """Whether stamps repeat at regular distances: the rate exceeds their resolution."""
+        return self.other is not None and self.other > self.mean
 
 
 def typical_interval(stamps: Stamps) -> Interval | None:
     """Return the interval between samples; None where the stamps do not advance."""
-    medians, rounded = [], []
+    medians, rounded, repeated = [], [], []
     for block in stamps():
         steps = _advances(block)
         if len(steps):
             medians.append(float(np.quantile(steps, _MIDDLE, method="lower")))
-            rounded.append(_long_steps_are_regular(steps, medians[-1]))
+            long = (steps > _LONG * medians[-1]) & (steps < _TWO * medians[-1])
+            rounded.append(_are_regular(np.flatnonzero(long)))
+            zeros = np.flatnonzero(np.diff(block[:_ENOUGH]) == 0.0)
+            share = len(zeros) / len(block[:_ENOUGH])
+            repeated.append(_NEGLIGIBLE <= share <= SHARED and _are_regular(zeros))
     if not medians:
         return None
     median = float(np.median(medians))
     # Two steps for one are a missing sample.
     total, count = _steps_up_to(stamps, _LONG * median)
-    lossy = total / count
+    single = total / count
+    if np.mean(repeated) > 0.5:
+        count += sum(int(np.count_nonzero(np.diff(block) == 0.0)) for block in stamps())
+        return Interval(total / count, single)
     if np.mean(rounded) <= 0.5:
-        return Interval(lossy)
+        return Interval(single)
     total, count = _steps_up_to(stamps, _TWO * median)
-    return Interval(total / count, lossy)
+    return Interval(total / count, single)
 
 
 def _steps_up_to(stamps: Stamps, limit: float) -> tuple[float, int]:
@@ -88,12 +107,11 @@ def _advances(block: NDArray[np.float64]) -> NDArray[np.float64]:
     return steps
 
 
-def _long_steps_are_regular(steps: NDArray[np.float64], median: float) -> bool:
-    """Tell rounding, whose long steps come at regular distances, from losses, which do not."""
-    long = np.flatnonzero((steps > _LONG * median) & (steps < _TWO * median))
-    if len(long) < 10:
+def _are_regular(places: NDArray[np.int64]) -> bool:
+    """Return whether steps come at regular distances, as by rounding, and not as by losses."""
+    if len(places) < 10:
         return False
-    distances = np.diff(long)
+    distances = np.diff(places)
     return bool(np.mean(np.abs(distances - np.median(distances)) <= 1) > 0.9)
 
 

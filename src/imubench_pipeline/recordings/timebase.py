@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.stamps import (
     SET_BACK,
+    SHARED,
     Stamps,
     Track,
     is_set_back,
@@ -26,9 +27,6 @@ from imubench_pipeline.recordings.stamps import (
 )
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
-
-_SHARED = 0.2
-"""Part of the records that repeat a stamp beyond which a stamp belongs to a group of samples."""
 
 _SAME = 1e-5
 """Relative difference of two intervals at which stamps are put on the same grid points."""
@@ -111,8 +109,8 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
             f"the time stamps are {interval:.3g} s apart; is 'unit' of 'time' the right one of s, "
             "ms, us, ns?"
         )
-    if typical.with_losses is not None and _is(stated, typical.with_losses, settings):
-        interval = typical.with_losses
+    if typical.other is not None and _is(stated, typical.other, settings):
+        interval = typical.other
     track = tracked(stamps, interval, settings.longest_hole)
     mean = track.mean_interval or interval
     if abs(mean / interval - 1.0) > _SAME:
@@ -126,15 +124,19 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
         )
     # Many holes that are together longer than the log are pauses of the host, not losses.
     bursts = track.grid > 2 * track.rows and track.holes > 0.05 * track.rows
-    shared = track.duplicates > _SHARED * track.rows
+    shared = track.duplicates > SHARED * track.rows
+    if typical.has_repeats and interval == typical.mean:
+        base = _arrival_order(stamps, track, stated, settings)
+        coarse = [] if stated else [_coarse(base.rate, 1.0 / (typical.other or interval))]
+        return replace(base, findings=(*base.findings, *coarse))
     if track.off_grid > settings.jitter * track.rows or bursts or shared:
         return _arrival_order(stamps, track, stated, settings)
     _check_segments(len(track.starts))
     exact = track.mean_interval or interval
     findings = _grid_findings(track, exact)
     rate = 1.0 / exact
-    if typical.with_losses is not None and stated is None:
-        findings.append(_coarse(rate, 1.0 / typical.with_losses))
+    if typical.other is not None and stated is None:
+        findings.append(_coarse(rate, 1.0 / typical.other))
     findings += _rate_findings(rate, stated, settings)
     findings += _drift_findings(track, settings)
     jitter = math.sqrt(track.scatter / max(track.steps, 1))
@@ -175,14 +177,23 @@ def _is(stated: float | None, interval: float, settings: QualitySettings) -> boo
     return stated is not None and abs(interval * stated - 1.0) <= settings.rate_tolerance
 
 
-def _coarse(rate: float, lossy: float) -> Finding:
-    """Return the finding of stamps that advance by one step and two, in regular turn."""
+def _coarse(rate: float, other: float) -> Finding:
+    """Return the finding of stamps with double or zero steps at regular distances.
+
+    ``other``: rate without rounding, Hz: double steps are lost samples, zero steps are copies.
+    """
+    steps, instead, change = (
+        ("double steps", "samples are lost so regularly", "less")
+        if other > rate
+        else ("repeated stamps", "records are written twice so regularly", "more")
+    )
+    percent = 100.0 * abs(1.0 - math.sqrt(rate / other))
     return Finding(
         "coarse_stamps",
         "warning",
-        f"the stamps advance by one step or two in regular turn: taken as rounded, at {rate:.6g} "
-        f"Hz; if samples are lost so regularly instead, the rate is {lossy:.6g} Hz and N is "
-        f"{100 * (1.0 - math.sqrt(rate / lossy)):.2g} % less; state 'rate' in the sensor file",
+        f"the stamps have {steps} at regular distances: taken as rounded, at {rate:.6g} Hz; if "
+        f"{instead} instead, the rate is {other:.6g} Hz and N is {percent:.2g} % {change}; state "
+        "'rate' in the sensor file",
         rate,
     )
 

@@ -28,13 +28,16 @@ _OF_RUNS = (
 )
 """Folders in the results that runs fill."""
 
+_OF_WORKFLOW = ("Snakefile", "workflow", "profiles", "src", "tests", "pyproject.toml")
+
 
 def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
     """Yield the places that a path may be in, or hold.
 
     A project is a folder with ``config/config.yaml``: the working folder, any folder at or above
     the path, and any above the results that a command is given. Its places are ``config/`` and the
-    folders of logs, results, sensors and requirements that the file names. Results are also those
+    folders of logs, results, sensors and requirements that the file names, and the workflow of a
+    checkout. Results are also those
     that a command is given, and any folder at or above the path, and any folder ``results`` beside
     one of these, with ``seals/`` or ``tables/recordings.parquet``; the logs that their report names
     are a place, too. In results, the folders that runs fill are places; the folder
@@ -62,6 +65,8 @@ def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
             if one != CATALOGUE:
                 yield Place(folder / one, "config", "the configuration")
         yield Place(folder / run.logs, "logs", "the logs")
+        for name in _OF_WORKFLOW:
+            yield Place(folder / name, "workflow", "the workflow")
         found.append(folder / run.results)
     found += [folder / "results" for folder in projects if _has_results(folder / "results")]
     for folder in dict.fromkeys(found):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from functools import cached_property
@@ -73,6 +74,10 @@ _ANY_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"
 """Stands for the layout of a sensor's logs where that does not matter."""
 
 
+_BRACE_OF_NAME = re.compile(r"\{(?=\s*\w)")
+"""In JSON a brace before a letter is part of a text; others are before quotes or braces."""
+
+
 class Plan:
     """The plan of a run.
 
@@ -115,11 +120,14 @@ class Plan:
                 )
                 if recording.simulated or recording.held_back:
                     raise ConfigError(fault)
-                self._leave_out_both(other, recording, fault)
+                self._reject_one_name(other, recording, fault)
 
-    def _leave_out_both(self, first: Recording, second: Recording, fault: str) -> None:
-        """Reject two logs of one name: which of them is meant, nobody can tell."""
-        self.recordings[first.sensor, first.name] = replace(first, error=first.error or fault)
+    def _reject_one_name(self, first: Recording, second: Recording, fault: str) -> None:
+        """Reject two logs of one name, or only the one that cannot be used for its own reason."""
+        if first.error and not second.error:
+            first, second = second, first
+        error = first.error or (None if second.error else fault)
+        self.recordings[first.sensor, first.name] = replace(first, error=error)
         number = 2
         while (second.sensor, name := f"{second.name} ({number})") in self.recordings:
             number += 1
@@ -554,4 +562,6 @@ def _check_places(run: Run) -> None:
 
 
 def _text(value: object) -> str:
-    return json.dumps(value, sort_keys=True, ensure_ascii=False)
+    """Return a value as JSON, in which Snakemake finds no wildcard: a name may have braces."""
+    text = json.dumps(value, sort_keys=True, ensure_ascii=False)
+    return _BRACE_OF_NAME.sub(r"\\u007b", text)

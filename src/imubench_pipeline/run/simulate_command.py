@@ -34,6 +34,10 @@ _PATIENCE = 3.0
 """Seconds between two lines of progress where there is no terminal."""
 
 
+_DEPTH = 2
+"""Names from the drop zone to a log: that of the sensor, and of the recording."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command to its parser."""
     parser.add_argument(
@@ -110,6 +114,7 @@ def _run(options: argparse.Namespace) -> None:
     notes = out.beside(out.path.with_suffix(".yaml"))
     check_notes(notes.path, out.path)
     notes.check()
+    _check_depth(out)
     if temperature is None and any(axis.drift for axis in origin.imu.axes.values()):
         origin.assume("drift", "no drift with temperature: none is given (--temperature)")
     for text in (*_ended(duration, motion, temperature), *_folded(origin, rate)):
@@ -155,6 +160,20 @@ def _run(options: argparse.Namespace) -> None:
         notes.write(notes_text(out.path.name, form, log, f"from {origin.source}"))
     size = out.path.stat().st_size / 1e6
     print(f"{out}: {size:.1f} MB; {notes} says how it is written")
+
+
+def _check_depth(out: OutputFile) -> None:
+    """Raise `ConfigError` where a log among others would become a part of a recording."""
+    real = out.check()
+    for place in out.places(real):
+        logs = Path(os.path.realpath(place.path))
+        if place.kind == "logs" and real.is_relative_to(logs):
+            parts = real.relative_to(logs).parts
+            if len(parts) != _DEPTH:
+                raise ConfigError(
+                    f"{out}: lies at {'/'.join(parts)} in the drop zone {logs}; expected "
+                    "<sensor>/<recording>, as a recording of its own: name another --out"
+                )
 
 
 def _metadata(

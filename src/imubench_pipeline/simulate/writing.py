@@ -16,6 +16,7 @@ import yaml
 
 from imubench_pipeline.readers.text.header import SIMULATED, states_simulated
 from imubench_pipeline.readers.text_log import TextLog
+from imubench_pipeline.recordings.drop_zone import name_of
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.sensor import (
     QUANTITIES,
@@ -86,22 +87,32 @@ def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) 
 
 
 def check_notes(notes: Path, path: Path) -> None:
-    """Raise `ConfigError` where the notes beside a log are not of a simulation, or of another log.
+    """Check that the notes of a simulated log are the notes of no other recording.
 
-    ``path`` is the log; that of the notes need not be there.
+    Parameters
+    ----------
+    notes, path : Path
+        The notes, and the log; they need not exist.
+
+    Raises
+    ------
+    ConfigError
+        If another log or folder has the same name, which the notes would belong to as well, or the
+        notes that exist are not from a simulation of this log.
     """
+    beside = sorted(path.parent.iterdir()) if path.parent.is_dir() else []
+    for other in beside:
+        name = other.name if other.is_dir() else name_of(other.name)
+        if name == path.stem and other not in (path, notes):
+            raise ConfigError(
+                f"{path}: {other.name} is a recording of the same name, and the notes "
+                f"{notes.name} would change it; name another --out"
+            )
     if not notes.is_file():
         return
-    first = notes.read_text("utf-8", "replace").partition("\n")[0]
-    mark, _, log = first.partition(": ")
+    mark = notes.read_text("utf-8", "replace").partition("\n")[0].partition(": ")[0]
     if not states_simulated([mark]):
-        raise ConfigError(f"{notes}: is there already and not of a simulation; name another --out")
-    other = path.with_name(log)
-    if log and other != path and other.is_file():
-        raise ConfigError(
-            f"{notes}: says how {other.name} is written, and that cannot be read without it; "
-            f"expected a log of another name than {path.stem!r}: name another --out"
-        )
+        raise ConfigError(f"{notes}: exists, and is not of a simulation; name another --out")
 
 
 def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | None) -> LogFormat:

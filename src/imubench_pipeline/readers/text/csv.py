@@ -70,9 +70,12 @@ class CsvFile(LogFile):
             name: layout.position(source.column, name) for name, source in self.sources.items()
         }
         self.units = text_units(layout, columns)
-        preamble = [line.decode("utf-8", "replace") for line in layout.preamble]
+        preamble, skipped = (
+            [line.decode("utf-8", "replace") for line in lines]
+            for lines in (layout.preamble, layout.skipped)
+        )
         self.rate, self.started = stated_rate(preamble), stated_start(preamble)
-        self.simulated = states_simulated(preamble)
+        self.simulated = states_simulated([*preamble, *skipped])
         time = None if self.log.time is None else TextTime(self, layout)
         for name, at in columns.items():
             if time is not None and at in time.types:

@@ -58,6 +58,8 @@ class TextLayout:
     """The cells of the first records; the last of them may be cut short."""
     comments: tuple[str, ...]
     """Beginnings of lines that are comments."""
+    skipped: tuple[bytes, ...]
+    """The first of the lines that the sensor file says to skip."""
     header: bytes
     """The line of names; empty: none."""
     preamble: tuple[bytes, ...]
@@ -138,6 +140,7 @@ class _Search:
         self, path: Path, log: LogFormat, figures: Sequence[Column], times: Sequence[Column]
     ) -> None:
         self._file = path.name
+        self._skipped: list[bytes] = []
         self._log = log
         self._figures = figures
         self._wanted = [*figures, *times]
@@ -185,6 +188,7 @@ class _Search:
             names=names,
             rows=rows,
             comments=self._signs(split),
+            skipped=tuple(self._skipped),
             header=b"" if header is None or (passed_over and not self._names) else header.raw,
             preamble=tuple(
                 line.raw for line in [*comments, *lines[:first]] if line.number < record.number
@@ -214,6 +218,8 @@ class _Search:
             number, here, start = number + 1, start, start + len(raw)
             if number > bounds.MOST_LINES_BEFORE + self._log.skip_lines:
                 break
+            if number <= min(self._log.skip_lines, bounds.COMMENT_LINES):
+                self._skipped.append(raw.rstrip(b"\r\n"))
             if number <= self._log.skip_lines or not raw.strip(b"\0 \t\r\n"):
                 continue
             line = _Line(number, here, raw.rstrip(b"\r\n"), _decoded(raw.rstrip(b"\r\n")))
