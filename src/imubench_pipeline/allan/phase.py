@@ -38,9 +38,9 @@ def spans_of(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...]:
 class Gaps:
     """How many samples of a log are missing, by the length of the gap that they are in.
 
-    A mean over a cluster stands for all of it if the samples that are missing are spread evenly
+    The mean of a cluster represents all of it if the missing samples are spread evenly
     over it, as where every fifth is lost. It does not if they are missing in one piece. So clusters
-    are compared with what is usual between gaps that are long beside them.
+    are compared with the usual share of samples between gaps that are long for their size.
     """
 
     samples: int

@@ -37,7 +37,7 @@ class BoundError(Exception):
     Attributes
     ----------
     is_external : bool
-        The reason lies outside of what was called: it waited, as for a disk, or was killed.
+        The reason lies outside of the function: it waited, as for a disk, or was killed.
     """
 
     def __init__(self, text: str, *, is_external: bool = False) -> None:

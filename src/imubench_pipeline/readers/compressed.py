@@ -276,7 +276,7 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
         if other is not info and visible(Path(name)):
             raise RecordingError(
                 f"{archive.name}: {_described(other)} and {_described(info)} have one name; "
-                "expected each name once, since nobody can tell which is meant: pack it anew"
+                "expected each name once: pack it again without the copy"
             )
     return by_name
 
@@ -417,8 +417,8 @@ BLOCK_BYTES = 1 << 20
 def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[bytes]:
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
-    ``findings``: what is found goes here: that compressed data end early, and that ``least_zeros``
-    zero bytes or more stand together, which no logger writes.
+    ``findings`` receives the findings: compressed data that end early, and runs of at least
+    ``least_zeros`` zero bytes, which no logger writes.
 
     Raises
     ------

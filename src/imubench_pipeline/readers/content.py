@@ -24,7 +24,7 @@ _NOT_READ = {
     ),
     "a tar archive": (257, b"ustar", "unpack it"),
 }
-"""Where and by which bytes files are known that people have, and what to do."""
+"""Known files that are not read: place and bytes of their signature, and how to convert them."""
 
 
 def format_of_folder(path: Path) -> FileFormat | None:

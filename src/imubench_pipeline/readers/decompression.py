@@ -147,7 +147,7 @@ _MAGIC = re.compile(
     re.DOTALL,
 )
 LONGEST_MAGIC = 10
-"""Bytes by which compression is told. With fewer of them bytes of chance would be taken for it."""
+"""Signatures of compressed files. A shorter signature would match random bytes."""
 
 
 def compression_of(begin: bytes) -> str:

@@ -15,7 +15,7 @@ from imubench_pipeline.tables.findings import Finding
 
 _LONGEST_READ = 1 << 16
 _STAND_IN = 512
-"""Bytes of a hole that is read, and of zeros that stand for a longer one."""
+"""Bytes: the zeros that are returned in place of a longer hole."""
 
 
 def next_data(descriptor: int, offset: int) -> int | None:
@@ -95,7 +95,7 @@ class FileWithoutHoles:
 
 
 class ZeroRuns:
-    """Counts the zero bytes of a stream that stand together.
+    """Counts runs of zero bytes in a stream.
 
     Parameters
     ----------
@@ -119,12 +119,12 @@ class ZeroRuns:
 
     @property
     def at_end(self) -> bool:
-        """Whether what was read last is a run."""
+        """Whether the last bytes are a run of zeros."""
         return self._run >= self._least
 
     def add(self, block: bytes) -> None:
         """Count the zero bytes of the next block."""
-        if block == bytes(len(block)):  # 5 times as fast as what comes below
+        if block == bytes(len(block)):  # 5 times as fast as the general case
             self._extend(block, 0, len(block))
         elif self._run or self._zeros in block or block[-1] == 0:
             inner = block.lstrip(b"\0")
@@ -156,10 +156,10 @@ class ZeroRuns:
         self.count += end - begin
 
     def finding(self, name: str, where: str, total: int, fate: str = "") -> Finding | None:
-        """Return the finding on what was counted; None: nothing was.
+        """Return the finding about the zero bytes; None if there are none.
 
         ``name``: of the file; ``where``: of the first run; ``total``: zero bytes with those that
-        were not read (`FileWithoutHoles`); ``fate``: of what stands among zeros in the middle.
+        were not read (`FileWithoutHoles`); ``fate``: what was done with text between zeros.
         """
         if not self.count:
             return None

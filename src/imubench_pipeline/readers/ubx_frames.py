@@ -18,8 +18,8 @@ _CLASSES = frozenset(b"\x01\x02\x03\x04\x05\x06\x09\x0a\x0b\x0c\x0d\x10\x13\x21\
 class Frames:
     """The UBX messages in blocks of bytes: class and id, and payload; iterated over once.
 
-    NMEA and RTCM between them are passed over. After a damaged message the next one is looked
-    for right behind its first bytes, since its length may be what is damaged.
+    NMEA and RTCM between them are passed over. After a damaged message, the search goes on
+    behind its first bytes, since its length may be wrong.
 
     ``right``, ``wrong`` and ``cut`` count, by class and id, messages, those with a wrong checksum,
     and those that reach beyond the end of the log; ``read``: bytes read so far.
@@ -33,7 +33,7 @@ class Frames:
         self.read = 0
 
     def kinds(self) -> str:
-        """Say of which class and id most messages are."""
+        """Describe the most frequent class and id of messages."""
         most = self.right.most_common(10)
         return ", ".join(f"{key.hex(' ')} ({count})" for key, count in most) or "none"
 

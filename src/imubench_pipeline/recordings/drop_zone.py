@@ -143,7 +143,7 @@ def account_for(
 
 
 _FOLLOWED = 2
-"""Levels of folders of which links are followed: those of sensors, and of recordings."""
+"""Levels of folders where links are followed: sensors, and recordings."""
 
 
 def _every_file(folder: Path) -> Iterator[Path]:
@@ -226,7 +226,7 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
 
 
 def _is_dangling(path: Path) -> bool:
-    """Return whether a path is a link to what is not there now, as where a mount is away."""
+    """Return whether a path is a link whose target is missing, for example with a mount."""
     if not path.is_symlink():
         return False
     try:

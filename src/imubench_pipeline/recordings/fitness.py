@@ -53,7 +53,7 @@ BESIDE_MEASURED = "simulated_beside_measured"
 """Code of the doubt that leaves out simulated recordings, though they be included."""
 
 WITH_DOUBTS = {"error_budget", "datasheet"}
-"""Tables of a recording's own step whose rows say what is doubted of the recording."""
+"""Tables of one recording whose rows repeat the doubts about it."""
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     "knocks": _WHITE,

@@ -425,7 +425,7 @@ def ingest_as_planned(
                 check_opening(source, log, limits.opening)
             ingested = ingest(source, log, notes, limits, folder, provenance)
         sources = ingested.sources or {}
-        if not is_same():  # what was read, and what was digested, may be two logs
+        if not is_same():  # the samples and the digest may be from two logs
             sources = {name: file.distrusted() for name, file in sources.items()}
     except RecordingError as error:
         remove_kept(folder)

@@ -61,7 +61,7 @@ class Part:
             yield np.fromfile(self.stamps_path, np.float64, STAMP_BLOCK, offset=8 * start)
 
     def present(self) -> Iterator[NDArray[np.uint16]]:
-        """Yield which columns have a number in each record, in blocks like those of the stamps."""
+        """Yield bit masks of the columns with a number, in the same blocks as the stamps."""
         for start in range(0, self.rows, STAMP_BLOCK):
             yield np.fromfile(self.present_path, np.uint16, STAMP_BLOCK, offset=2 * start)
 
@@ -105,7 +105,7 @@ class PartWriter:
     ) -> None:
         """Count and write consecutive records: their stamps, s, and their samples, SI."""
         part = self._part
-        # Not `tofile`: what it hands to the C library may fail unseen when it is closed.
+        # Not `tofile`: it does not report a failed write when the C library closes the file.
         if time is not None:
             part.stamped = True
             self._stamps.write(np.ascontiguousarray(time).data)

@@ -2,7 +2,7 @@
 
 Phones and programs that merge logs write a row for each stamp and leave the cell of a sensor empty
 that has no new sample. A channel has a clock of its own where the records with a number lie on a
-uniform grid that is slower than that of all records, or where the records of all sensors together
+uniform grid that is slower than the grid of all records, or where all records together
 lie on no grid. Numbers that are missing at random do not lie on a slower grid: such a channel
 stays on the common one.
 """
@@ -27,10 +27,10 @@ from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _SAME_CLOCK = 0.5
-"""Share of the records of the sparser of two channels that those of one clock have in common."""
+"""Least share of common records, of the sparser channel, for two channels of one clock."""
 
 _WITHIN = 0.95
-"""Share of the records of a channel that lie in those of another, which it is read with."""
+"""Least share of the records of a channel that are also records of the channel it joins."""
 
 _APART = 0.05
 """Share of the records of a channel below which it is not read together with another one."""
@@ -81,7 +81,7 @@ class _Records:
     def base(self, bits: int, *, numbered: bool = False) -> TimeBase:
         """Return the time base of the records that have a number in one of some columns.
 
-        The stated rate is that of all records: it decides only whether steps of one and two are
+        The stated rate belongs to all records: it decides only whether steps of one and two are
         samples lost.
 
         Raises
@@ -280,7 +280,7 @@ def _written(part: Part, clocks: list[_Clock], records: _Records, scratch: Path)
 
 
 def _describe(of_clock: Part, clock: _Clock, part: Part) -> None:
-    """Give a part its time base, with what is to be said of it."""
+    """Set the time base of a part, with its findings."""
     names = ", ".join(name for name in of_clock.columns if name in clock.channels)
     base = clock.base
     findings = [replace(found, channel=name) for name in clock.channels for found in base.findings]

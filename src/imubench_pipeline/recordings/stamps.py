@@ -206,8 +206,8 @@ def tracked(stamps: Stamps, interval: float, longest_hole: float) -> Track:
 def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: float) -> bool:
     """Return whether the clock was set back before a record.
 
-    The stamps on both sides go forward, and their medians go back: those of stamps that scatter, or
-    of a record that comes late, do not.
+    The stamps on both sides increase, but their median decreases. Scattered stamps and late
+    records do not behave so.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: floa
     i : int
         Place of the record.
     step : float
-        From the stamp before to that of the record, s.
+        From the previous stamp to this one, s.
     interval : float
         Between samples, s.
     """

@@ -39,8 +39,8 @@ _MOST_HOLES, _MOST_POINTS = 100, 10_000_000
 
 _MOST_PAIRS = 10_000
 _FEWEST_OF_GROUP, _FEWEST_GROUPS, _REGULAR = 5, 5, 0.8
-"""Samples of a stamp, stamps, and the part of them that is alike, of which the rate is that of
-these alone."""
+"""Least samples per stamp, number of stamps, and share of equal groups, for which the rate is taken
+from the equal groups alone."""
 
 _MOST_SEGMENTS = 10_000
 """Each takes 0.1 ms in a step, however short it is."""
@@ -395,10 +395,10 @@ class Groups:
 
 
 def _irregular(groups: int, rate: float) -> Finding:
-    """Return the finding of stamps that stand for more or fewer samples than the others."""
+    """Return the finding of stamps with more or fewer samples than the others."""
     detail = (
-        f"{groups} stamps stand for more or fewer samples than all others do: the clock was set, "
-        f"or samples are lost; the rate of {rate:.6g} Hz is that of the others"
+        f"{groups} stamps have more or fewer samples than the others: the clock was set, "
+        f"or samples are lost; the rate of {rate:.6g} Hz is taken from the others"
     )
     return Finding("irregular_stamps", "warning", detail, groups)
 

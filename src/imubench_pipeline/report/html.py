@@ -99,7 +99,7 @@ def environment(system: System) -> jinja2.Environment:
 
 
 def _shown(value: Any) -> Any:
-    """Return what a template writes of a value: whatever is not there, as everywhere."""
+    """Return a value as templates write it: a missing one as a dash."""
     return NO_VALUE if value is None else value
 
 

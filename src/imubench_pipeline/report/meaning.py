@@ -217,7 +217,7 @@ def budget_bars(rows: Sequence[Row], system: System) -> list[dict[str, Any]]:
 
 
 def _total(rows: Iterable[Row]) -> Row | None:
-    """Return the row of the whole error among those of an error and a time."""
+    """Return the row of the total among the rows of an error and a time."""
     return next((row for row in rows if row["source"] == "total"), None)
 
 

@@ -204,7 +204,7 @@ def _page_unit(sign: str, dimension: str) -> PageUnit:
 def rates_text(rate: float, of_channels: Iterable[float]) -> str:
     """Return the rates of the channels of a recording, Hz, the highest first.
 
-    ``rate``: that of the recording, which says all where no channel has an Allan variance.
+    ``rate``: of the recording, Hz, used where no channel has an Allan variance.
     """
     rates = sorted({float(f"{each:.6g}") for each in of_channels}, reverse=True)
     texts = list(dict.fromkeys(map(number_text, rates))) or [number_text(rate)]

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
     )
     parser.add_argument(
-        "--width", type=_WIDTH, metavar="COLUMNS", help="default: that of the terminal, or 80"
+        "--width", type=_WIDTH, metavar="COLUMNS", help="default: the width of the terminal, or 80"
     )
 
 

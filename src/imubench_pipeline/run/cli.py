@@ -112,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _close_terminal() -> None:
-    """Drop what is left to print: where it cannot be written, Python would say so at the exit."""
+    """Discard unwritten output, about which Python would complain at exit."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
         return 2
     for made in ("logs", "config/sensors"):
         (folder / made).mkdir(parents=True, exist_ok=True)
-    # The configuration last: with it, the folder is that of a project.
+    # The configuration last: it makes the folder a project.
     for name, source in reversed(files.items()):
         output.file(name).write(source.read_text("utf-8"))
     print(f"{folder}: logs go to {folder / 'logs'}/<sensor>/; {folder / 'README.md'} says how")

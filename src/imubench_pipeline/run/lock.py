@@ -85,8 +85,8 @@ class Lock:
     def acquire_unless_inherited(self) -> None:
         """Take the lock, unless the caller of this process holds it for it.
 
-        A note of a run that did not reach its end stays only where the machine was restarted since:
-        what was on its way to the disk then is for `imubench nightly` to look at.
+        A note of a run that did not reach its end stays only if the machine was restarted since:
+        `imubench nightly` then checks the files that were being written.
 
         Raises
         ------

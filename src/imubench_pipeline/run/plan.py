@@ -219,7 +219,7 @@ class Plan:
             return settings | {"error": self._without_folders(str(error))}
 
     def _without_folders(self, reason: str) -> str:
-        """Return a reason without the folders above those of the run: it stands in tables."""
+        """Return a reason without absolute paths, for tables."""
         sensors = self.run.sensors
         for folder in (sensors,) if isinstance(sensors, Path) else sensors:
             if folder.is_absolute():
@@ -514,7 +514,7 @@ class Plan:
         return self._sensor_files(self.sensors, more)
 
     def sensor_file(self, sensor: str, *more: str) -> str:
-        """Return the datasheet of one sensor, as `catalogue` returns those of all."""
+        """Return the datasheet of one sensor, in the form of `catalogue`."""
         return self._sensor_files({sensor} & self.sensors.keys(), more)
 
     def _sensor_files(self, names: Iterable[str], more: Iterable[str]) -> str:

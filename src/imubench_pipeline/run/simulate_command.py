@@ -35,7 +35,7 @@ _PATIENCE = 3.0
 
 
 _DEPTH = 2
-"""Names from the drop zone to a log: that of the sensor, and of the recording."""
+"""Names from the drop zone to a log: sensor and recording."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -76,7 +76,7 @@ def write_log(
 def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) -> str:
     """Return the notes beside a log: what of its format the sensor file says otherwise.
 
-    ``name`` is that of its file, ``words`` says what the log is.
+    ``name``: file name of the log. ``words``: description of the log.
     """
     own = log.model_dump(exclude_unset=True, exclude_none=True)
     base = {} if sensor is None else sensor.model_dump(exclude_unset=True)

@@ -49,7 +49,7 @@ def curve_rows(folder: Path, sensor: str, recording: str, settings: str) -> Iter
     for channel, curve in measured.items():
         names = {"sensor": sensor, "recording": recording, "channel": channel}
         printed = list(comparables(datasheet, channel))
-        above_zero = curve.deviation > 0.0  # that of a periodic log is 0 at multiples of its period
+        above_zero = curve.deviation > 0.0  # 0 at multiples of the period of a periodic log
         tau, deviation = curve.tau[above_zero], curve.deviation[above_zero]
         for distance in curve_rms(printed, tau, deviation) if above_zero.any() else ():
             yield names | {

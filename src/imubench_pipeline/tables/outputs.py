@@ -112,12 +112,12 @@ class Output:
 
     @contextmanager
     def _explaining(self) -> Iterator[None]:
-        """Say of an error of writing which output it is of."""
+        """Name the output in errors of writing."""
         try:
             yield
         except OSError as error:
             # An error of writing names nothing, a temporary file, or a folder that is not there;
-            # any other is of what the command reads meanwhile.
+            # any other error comes from an input.
             real, name = Path(os.path.realpath(self.path)), error.filename
             temporary = (f"{real.parent}/.".replace("//", "/"), f"{real}/.")
             if name is None or str(name).startswith(temporary) or real.is_relative_to(name):
@@ -317,7 +317,7 @@ def check_outputs(options: argparse.Namespace, places: Callable[[Path], Iterable
     """
     values = list(vars(options).values())
     listed = [one for value in values for one in (value if isinstance(value, list) else [value])]
-    # A text is a file only where it looks so: the name of a sensor may be that of an output.
+    # A text counts as a file only with a suffix: a sensor may have the name of an output.
     texts = [Path(one) for one in listed if isinstance(one, str) and Path(one).suffix]
     inputs = [one for one in listed if isinstance(one, Path)] + texts
     for output in values:
@@ -328,7 +328,7 @@ def check_outputs(options: argparse.Namespace, places: Callable[[Path], Iterable
 
 
 def _is_at(path: Path, status: os.stat_result) -> bool:
-    """Return whether what is at a path is what has this status: any spelling, any hard link."""
+    """Return whether a path has this status, by any spelling or hard link."""
     try:
         return os.path.samestat(path.stat(), status)
     except (OSError, ValueError):

@@ -104,7 +104,7 @@ _JUDGED_BY = ("sigma", "lower", "upper", "within", "limit")
 
 
 def _judgeable(row: Row) -> Row:
-    """Return a row; a total that lacks a number by which it is judged has no figure."""
+    """Return a row; a total without the numbers for its verdict has no figure."""
     missing = [name for name in _JUDGED_BY if row[name] is None]
     if row["source"] != "total" or not missing:
         return row

@@ -26,7 +26,7 @@ from imubench_pipeline.readers.arrays.table import Column, Table, UnusableError
 from imubench_pipeline.readers.bounds import LARGEST_ARROW_BATCH
 
 METADATA = b"imubench"
-"""Key of what a Parquet file that this package has written says of itself, as JSON."""
+"""Metadata key of Parquet files that this package writes; the value is JSON."""
 
 _PARQUET, _FILE, _STREAM, _FEATHER_1 = b"PAR1", b"ARROW1", b"\xff\xff\xff\xff", b"FEA1"
 

@@ -1,4 +1,4 @@
-"""MATLAB files of version 4 (-v4): what stands before each of their variables.
+"""MATLAB files of version 4 (-v4): the header of each variable.
 
 A file is a sequence of variables: five integers of 4 bytes (type, rows, columns, whether it is
 complex, bytes of the name), the name with a zero behind it, and the figures, column by column. The
@@ -30,7 +30,7 @@ HEADER_BYTES = struct.calcsize(_FIELDS) + 64
 
 @dataclass(frozen=True)
 class Header:
-    """What stands before a variable."""
+    """Header of a variable."""
 
     name: str
     shape: tuple[int, int]

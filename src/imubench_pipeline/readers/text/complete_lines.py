@@ -209,7 +209,7 @@ class CompleteLines:
 
 
 def describe_missing_text(path: Path) -> str:
-    """Say what a file holds in which no line of text was found, as the end of a sentence."""
+    """Describe a file without a line of text, as the end of a sentence."""
     with closing(open_bytes(path)) as file:
         begin = file.filled(_SEEN)
     if not begin:

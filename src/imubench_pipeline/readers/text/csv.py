@@ -89,7 +89,7 @@ class CsvFile(LogFile):
                 rows += len(batch)
                 yield batch
         except _SecondSixtyError:
-            # Once more, for pyarrow knows no leap second: what was read is passed over.
+            # Read again, since pyarrow has no leap seconds, and skip the records already given.
             self.findings[:] = before
             time = TextTime(self, layout, as_text=True)
             for batch in self._batches(layout, columns, time):
@@ -208,7 +208,7 @@ class CsvFile(LogFile):
         if damaged:
             fate = f", with the text of {damaged} line{'s' if damaged > 1 else ''} that hold them"
             if self.log.time is None:
-                fate += "; state 'time', for without it what follows is shifted in time"
+                fate += "; state 'time', since without it all later samples are shifted in time"
         if (finding := lines.zeros(fate)) is not None:
             self.findings.append(finding)
 

@@ -82,7 +82,7 @@ SIMULATED = "SIMULATED by imubench, not measured"
 """A comment at the top of text logs that this package has simulated."""
 
 _MARKS = {SIMULATED, "SIMULATED, not measured"}
-"""The second is that of earlier versions."""
+"""The second one was written by earlier versions."""
 
 
 def states_simulated(lines: Iterable[str]) -> bool:

@@ -88,7 +88,7 @@ class Records:
         return lines if lines.isascii() else lines.decode("utf-8", "replace").encode()
 
     def _left_out(self, line: re.Match[bytes]) -> bytes:
-        """Count a line of which zeros hide a part; what is left may lack digits."""
+        """Count a line with zero bytes; digits may be missing from it."""
         self.damaged += bool(line[0].strip(b"\0 \t\r\n"))
         return b""
 

@@ -270,9 +270,9 @@ _WHOLE = re.compile(r"-?\d{1,19}")
 class TextTime:
     """Makes seconds of the stamps of a text log.
 
-    ``types`` says what pyarrow is to read, by position, a date in a column of its own first;
-    ``position`` is that of the stamps, and ``expected`` what a stamp is, for messages. ``as_text``:
-    pyarrow is not to read ISO 8601.
+    ``types`` has the type that pyarrow reads, by position, a date in a column of its own first;
+    ``position`` is the column of the stamps, and ``expected`` describes a stamp in messages.
+    ``as_text``: ISO 8601 is read as text, and not by pyarrow.
     """
 
     _text: TextStamps | None = None
