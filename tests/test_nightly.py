@@ -258,7 +258,7 @@ def test_a_recording_with_results_stays_in_its_place(tmp_path: Path) -> None:
     assert list(plan.recordings) == [("s", "a"), ("s", "b"), ("s", "c")]
     kept = plan.recordings["s", "b"]
     assert kept.held_back
-    assert not any(file.exists() for file in kept.files)
+    assert not any(file.exists() for file in kept.inputs)
     assert plan.bandwidth("s", "b") == 9.0
     left_out = planned(tmp_path).recordings
     assert "would both be" in str(left_out["s", "b"].error)

@@ -140,7 +140,7 @@ def test_a_name_that_cannot_be_used_rejects_its_log_only(
     for part in bad:
         assert not set("{}<>\n=") & set(part) and part.isprintable() and len(part) <= 120
     assert f"rename the {what}" in json.loads(plan.ingest_settings(*bad))["error"]
-    assert plan.recordings[bad].files == []
+    assert plan.recordings[bad].inputs == []
 
 
 def test_a_link_to_nowhere_rejects_its_log_only(project: dict[str, Any]) -> None:

@@ -54,24 +54,25 @@ class Recording:
 
     @property
     def files(self) -> list[Path]:
-        """What the recording depends on."""
-        if self.held_back:
-            # No such file, but what would be made of it is there: Snakemake takes that as it is,
-            # whatever became of the log, the settings or the code since.
-            return [self.path / "held back"]
-        if self.error or self.unavailable:
-            return []
-        logs = [self.path] if self.simulated else log_files(self.path)
+        """The files of its log and its notes as they are now; the folder if it cannot be listed."""
+        try:
+            logs = [self.path] if self.simulated else log_files(self.path)
+        except OSError:  # the ingest meets it again, and says so
+            logs = [self.path]
         return logs + ([self.notes] if self.notes else [])
 
     @property
     def inputs(self) -> list[Path]:
-        """Those of which the date says whether the recording is read again: no log, no notes.
+        """Files whose date decides whether Snakemake reads the recording again.
 
-        They stand in the settings of the ingest, by their content. A log has any date: of the
-        future, where the clock of its logger was wrong, or of long ago, where it was moved here.
+        Logs and notes are not among them: their content is in the settings of the ingest. A log may
+        have any date, of the future with a wrong clock of its logger, or of long ago if it was
+        moved here. If the recording is held back, the file does not exist but its results do:
+        Snakemake leaves them as they are.
         """
-        return self.files if self.held_back or self.simulated else []
+        if self.held_back:
+            return [self.path / "held back"]
+        return self.files if self.simulated else []
 
 
 @dataclass(frozen=True)
@@ -107,15 +108,6 @@ def found_logs(logs: Path) -> list[Recording]:
     return recordings
 
 
-def files_of(recording: Recording) -> list[Path]:
-    """Return the files of a recording as they lie in the drop zone now: its log, and its notes."""
-    try:
-        logs = log_files(recording.path)
-    except OSError:  # the ingest says so
-        logs = [recording.path]
-    return logs + ([recording.notes] if recording.notes else [])
-
-
 def account_for(
     logs: Path, recordings: Iterable[Recording], held_back: Iterable[Recording] = ()
 ) -> list[FoundFile]:
@@ -128,8 +120,8 @@ def account_for(
     recordings, held_back : iterable of Recording
         Those of a run; those that it leaves alone because they are still being written.
     """
-    owners = {file: recording for recording in recordings for file in files_of(recording)}
-    waiting = {file for recording in held_back for file in files_of(recording)}
+    owners = {file: recording for recording in recordings for file in recording.files}
+    waiting = {file for recording in held_back for file in recording.files}
     found = []
     for file in sorted(_every_file(logs)) if logs.is_dir() else ():
         place = os.fsencode(file.relative_to(logs)).decode(errors="backslashreplace")

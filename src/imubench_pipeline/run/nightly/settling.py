@@ -209,11 +209,7 @@ def _real(recording: Found) -> Iterable[Path]:
 
 
 def _signature(log: Recording) -> Signature:
-    try:
-        files = log.files or [log.path]
-    except OSError:
-        files = [log.path]
-    return tuple(_stamped(path) for path in files)
+    return tuple(_stamped(path) for path in log.files or [log.path])
 
 
 def _stamped(path: Path, below: Path | None = None) -> tuple[str, int, int]:
