@@ -130,6 +130,79 @@ def test_samples_that_a_slower_sensor_loses_are_holes_on_its_own_grid(tmp_path: 
         assert np.isfinite(log[name]).sum() == there[name].sum()
 
 
+@pytest.mark.parametrize("stamped", [True, False])
+@pytest.mark.parametrize("lost", [0.5, 0.7, 0.9])
+@pytest.mark.parametrize("every", [2, 3, 5])
+def test_a_slower_sensor_keeps_its_rate_however_much_it_loses(
+    tmp_path: Path, every: int, lost: float, stamped: bool
+) -> None:
+    rng = np.random.default_rng(7)
+    there = (NUMBER % every == 1) & (rng.random(ROWS) > lost)
+    masks = {"gyro_z": np.ones(ROWS, bool), "accel_x": there, "accel_z": there}
+    log = read(tmp_path, table_of(masks, TIMES if stamped else None))
+    assert log.rates == pytest.approx(
+        {"gyro_z": 100.0, "accel_x": 100.0 / every, "accel_z": 100.0 / every}
+    )
+    assert np.isfinite(log["accel_z"]).sum() == there.sum()
+    found = {(f.finding, f.severity, f.channel) for f in log.findings}
+    assert ("missing_samples", "warning", "accel_z") in found
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+def test_an_axis_that_loses_every_second_sample_keeps_the_rate_of_its_siblings(
+    tmp_path: Path, stamped: bool
+) -> None:
+    masks = {
+        "gyro_x": np.ones(ROWS, bool),
+        "gyro_z": NUMBER % 2 == 0,
+        "accel_x": NUMBER % 2 == 0,
+        "accel_z": NUMBER % 4 == 0,
+    }
+    log = read(tmp_path, table_of(masks, TIMES if stamped else None))
+    assert log.rates == pytest.approx(
+        {"gyro_x": 100.0, "gyro_z": 100.0, "accel_x": 50.0, "accel_z": 50.0}
+    )
+    found = {(f.finding, f.severity, f.channel) for f in log.findings}
+    assert {("empty_cells", "warning", name) for name in ("gyro_z", "accel_z")} <= found
+
+
+HALF = ROWS // 2
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+@pytest.mark.parametrize(("first", "then"), [(1, 2), (2, 4), (2, 6), (3, 1)])
+def test_a_sensor_that_changes_its_rate_is_named(
+    tmp_path: Path, first: int, then: int, stamped: bool
+) -> None:
+    there = NUMBER % np.where(NUMBER < HALF, first, then) == 0
+    masks = {"gyro_z": np.ones(ROWS, bool), "accel_z": there}
+    log = read(tmp_path, table_of(masks, TIMES if stamped else None))
+    rate = 100.0 / min(first, then)
+    assert log.rates == pytest.approx({"gyro_z": 100.0, "accel_z": rate})
+    (found,) = (f for f in log.findings if f.finding == "rate_changes")
+    assert (found.severity, found.channel) == ("warning", "accel_z")
+    assert found.value == pytest.approx(100.0 / max(first, then))
+    slow = (30.0, 60.0) if then > first else (0.0, 30.0)
+    assert (found.start, found.end) == pytest.approx(slow, abs=5.0)
+
+
+def test_a_log_that_changes_its_rate_is_named(tmp_path: Path) -> None:
+    chosen = (NUMBER < HALF) | (NUMBER % 2 == 0)
+    masks = {"gyro_z": np.ones(int(chosen.sum()), bool)}
+    log = read(tmp_path, table_of(masks, TIMES[chosen]))
+    assert log.rates == pytest.approx({"gyro_z": 100.0})
+    (found,) = (f for f in log.findings if f.finding == "rate_changes")
+    assert found.value == pytest.approx(50.0)
+    assert "N is 29 % low" in found.detail
+
+
+@pytest.mark.parametrize("lost", [0.1, 0.5, 0.7])
+def test_random_losses_are_no_change_of_rate(tmp_path: Path, lost: float) -> None:
+    there = np.random.default_rng(5).random(ROWS) >= lost
+    log = read(tmp_path, table_of({"gyro_z": np.ones(ROWS, bool), "accel_z": there}))
+    assert "rate_changes" not in {found.finding for found in log.findings}
+
+
 def test_a_stated_rate_says_that_every_fifth_sample_is_lost(tmp_path: Path) -> None:
     table = table_of({"gyro_z": np.ones(ROWS, bool), "accel_z": NUMBER % 5 != 4})
     as_rounded = read(tmp_path, table)

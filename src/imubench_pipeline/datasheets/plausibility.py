@@ -43,8 +43,9 @@ _OVER_TYPICAL = 4.0
 """Times the printed offset that one has: where typ and max are both printed, max is three times
 typ, and mounting adds to it."""
 
-_SLOWEST, _FASTEST = 0.105, 1e4
-"""Hz, of any log. 0.1 Hz is what stamps in ms at 100 Hz come to where they are taken for s."""
+MIN_RATE, MIN_RATE_STATED, _FASTEST = 1.05, 0.105, 1e4
+"""Limits of the sampling rate of any log, Hz. Stamps in ms that are read as s give at most 1 Hz for
+a log of 1 kHz, and 0.1 Hz for one of 100 Hz. A slower log is plausible if its rate is stated."""
 
 _READ_OVER = 100.0
 _SAMPLED_OVER = 10.0
@@ -163,26 +164,43 @@ def _values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]:
 
 
 def implausible_rates(
-    rates: Mapping[str, float], bandwidths: Mapping[str, float | None]
+    rates: Mapping[str, float],
+    bandwidths: Mapping[str, float | None],
+    stated: float | None = None,
 ) -> list[Finding]:
-    """Return the rates, Hz, that are far from what a sensor can do, each with what mends times.
+    """Return a finding for each sampling rate that no sensor is likely to have.
 
-    The bandwidths are the widest that the datasheet prints for each channel, Hz.
+    Parameters
+    ----------
+    rates : mapping of str to float
+        Rate of each channel, Hz.
+    bandwidths : mapping of str to float or None
+        Largest bandwidth that the data sheet prints for each channel, Hz.
+    stated : float or None
+        Rate in the sensor file, Hz.
+
+    Returns
+    -------
+    list of Finding
+        Their values are the factors that correct the times.
     """
+    slowest = MIN_RATE if stated is None else MIN_RATE_STATED
     by_rate: dict[tuple[float, float], list[str]] = {}
     for name, rate in rates.items():
         fastest = _fastest(bandwidths[name])
-        if not _SLOWEST <= rate <= fastest:
+        if not slowest <= rate <= fastest:
             by_rate.setdefault((rate, fastest), []).append(name)
     findings = []
     for (rate, fastest), names in by_rate.items():
         factor = time_factor(rate, fastest)
         longer = factor if factor > 1.0 else 1.0 / factor
         detail = (
-            f"the rate is {rate:.4g} Hz; expected {_SLOWEST:.1g} to {fastest:.5g} Hz: is the unit "
-            f"of time {longer:g} times as {'long' if factor > 1.0 else 'short'}? It would be "
-            f"{rate / factor:.4g} Hz then; mend 'unit' of 'time', or 'rate', in the sensor file"
+            f"the sampling rate is {rate:.4g} Hz; expected {slowest:.3g} to {fastest:.5g} Hz. If "
+            f"the unit of time is {longer:g} times as {'long' if factor > 1.0 else 'short'}, the "
+            f"rate is {rate / factor:.4g} Hz: correct 'unit' of 'time' in the sensor file"
         )
+        if MIN_RATE_STATED <= rate < slowest:
+            detail += f"; if {rate:.4g} Hz is right, state it there: 'rate: {rate:.4g} Hz'"
         channels = [None] if len(names) == len(rates) else names
         findings += [
             Finding("rate_implausible", "warning", detail, factor, channel) for channel in channels
@@ -224,7 +242,9 @@ def implausible(
     of = {quantity: expected(sensor, quantity) for quantity in QUANTITIES}
     rates = {name: level["rate"] for name, level in channels.items()}
     findings = implausible_rates(
-        rates, {name: of[quantity_of(name)].bandwidth for name in channels}
+        rates,
+        {name: of[quantity_of(name)].bandwidth for name in channels},
+        sensor.log.rate_hz if sensor else None,
     )
     if not findings:  # else the density is that of another time
         findings += _noise(channels, of)

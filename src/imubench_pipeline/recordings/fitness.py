@@ -57,6 +57,7 @@ WITH_DOUBTS = {"error_budget", "datasheet"}
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     "knocks": _WHITE,
+    "rate_changes": _WHITE,
     "held_samples": _WHITE,
     "step": _SLOW | {"bias"},
     "bias_step": _SLOW | {"bias"},

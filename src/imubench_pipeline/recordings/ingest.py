@@ -233,6 +233,7 @@ def _findings(
         columns = part.columns | part.left_out
         found = column_findings(columns, base.rate, settings, static=static)
         findings += [finding for finding in found if finding not in findings]
+        findings += part.findings
         if static:  # what is sensed of a turn looks like a knock
             findings += _knock_findings(part, base.rate, settings, scratch)
     findings += copied_channels(

@@ -21,7 +21,7 @@ from imubench_pipeline.recordings.recording import ROW_GROUP, LogWriter
 from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.sensor import UsedPart
 from imubench_pipeline.tables import checked_parquet, checked_row_group
-from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError
 
 STAMP_BLOCK = ROW_GROUP
 """Records of a block of stamps: as many as of a row group."""
@@ -52,6 +52,8 @@ class Part:
     """Records have stamps."""
     base: TimeBase | None = None
     """The time base, where it was found when the columns of a file were separated."""
+    findings: list[Finding] = field(default_factory=list)
+    """Of its columns, where they do not have the rate of its records throughout."""
     left_out: dict[str, ColumnSummary] = field(default_factory=dict)
     """Columns of the file that were then not written: they have too few samples to be used."""
 

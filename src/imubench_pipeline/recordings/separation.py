@@ -4,13 +4,14 @@ Phones and programs that merge logs write a row for each stamp and leave the cel
 that has no new sample. A channel has a clock of its own where the records with a number lie on a
 uniform grid that is slower than the grid of all records, or where all records together
 lie on no grid. Numbers that are missing at random do not lie on a slower grid: such a channel
-stays on the common one.
+stays on the common one. The axes of a gyro, or of an accelerometer, are sampled together: an axis
+with fewer numbers than another one has lost them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from imubench_pipeline.recordings.parts import STAMP_BLOCK, Part, new_part
 from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
@@ -34,6 +36,9 @@ _WITHIN = 0.95
 
 _APART = 0.05
 """Share of the records of a channel below which it is not read together with another one."""
+
+_MAX_STRIDE, _MIN_ON_STRIDE = 50, 0.98
+"""Records between two samples of a slower clock, at most; share of the samples that lie on it."""
 
 EVERY = -1
 """In the place of the bits of columns: all records, also those without a number."""
@@ -78,11 +83,11 @@ class _Records:
         for start in range(0, part.rows, STAMP_BLOCK):
             yield np.arange(start, min(start + STAMP_BLOCK, part.rows)) / (self._stated or 1.0)
 
-    def base(self, bits: int, *, numbered: bool = False) -> TimeBase:
+    def base(self, bits: int, *, numbered: bool = False, known: float | None = None) -> TimeBase:
         """Return the time base of the records that have a number in one of some columns.
 
         The stated rate belongs to all records: it decides only whether steps of one and two are
-        samples lost.
+        samples lost. ``known``: the interval, s, if it is known.
 
         Raises
         ------
@@ -97,13 +102,35 @@ class _Records:
                 yield block[has_one(present, bits)]
 
         settings = self._settings
-        base = timebase.from_stamps(stamps, None, settings)
+        base = timebase.from_stamps(stamps, None, settings, known=known)
         if self._stated and any(found.finding == "coarse_stamps" for found in base.findings):
             lossy = timebase.from_stamps(stamps, self._stated, settings)
             if abs(lossy.rate / self._stated - 1.0) <= settings.rate_tolerance:
                 base = lossy
         by_number = numbered or not self._part.stamped
         return replace(base, source="stated", rate_error=None) if by_number else base
+
+    def points(self, base: TimeBase, bits: int) -> Iterator[NDArray[np.int64]]:
+        """Yield the grid points, in the time base of all records, of those with a number."""
+        places = timebase.positions(base, self.times, self._settings)
+        for points, present in zip(places, self._part.present(), strict=True):
+            chosen = points[has_one(present, bits)]
+            yield chosen[chosen >= 0]
+
+    def stride(self, base: TimeBase, bits: int) -> int:
+        """Return the distance of the samples of a channel, in intervals of all records.
+
+        It is found however many samples are missing. 1: the samples lie on no slower clock of
+        which the interval is a multiple of that of all records.
+        """
+        hits = np.zeros(_MAX_STRIDE + 1)
+        total = 0
+        for points in self.points(base, bits):
+            total += len(points)
+            for stride in range(2, _MAX_STRIDE + 1):
+                hits[stride] += np.bincount(points % stride).max(initial=0)
+        strides = np.flatnonzero(hits >= _MIN_ON_STRIDE * max(total, 1))
+        return int(strides.max(initial=1))
 
 
 def has_one(present: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
@@ -149,43 +176,81 @@ def separate_clocks(
         base: TimeBase | None = whole()
     except RecordingError:
         base = None
-    on_grid = base is not None and (base.uniform or base.stamped)
+    grid = base if base is not None and (base.uniform or base.stamped) else None
     limit = (1.0 - settings.rate_tolerance) * (base.rate if base is not None else math.inf)
     own = {}
     for name in channels:
-        found = _own_clock(name, channels, part, records, on_grid=on_grid)
+        found = _own_clock(name, channels, part, records, grid)
         if found is not None:
             own[name] = found
-    if on_grid and all(found.rate >= limit for found in own.values()):
+    leaders = {name: _complete_sibling(name, own, records) for name in own}
+    own = {name: found for name, found in own.items() if leaders[name] is None}
+    if grid is not None and all(found.rate >= limit for found in own.values()):
+        part.findings = _rate_changes(channels, grid, records, part)
         return [part]
     clocks = _grouped(own, records, settings)
-    rest = _place(channels, own, clocks, records)
+    rest = _place(channels, own, clocks, records, leaders)
     if not clocks:
         return [part]
     if rest:
         clocks.append(_Clock(base or whole(), rest, EVERY))
     for clock in clocks:
         if clock.bits != EVERY:
-            clock.base = records.base(clock.bits)
+            clock.base = _base_of_group(clock, records, settings)
     return _written(part, clocks, records, scratch)
 
 
+def _complete_sibling(name: str, own: Mapping[str, TimeBase], records: _Records) -> str | None:
+    """Return the axis of the same sensor that has the numbers of this one, and the most others.
+
+    ``own``: time bases of the channels with a clock of their own.
+    """
+    siblings = [
+        other
+        for other in records.bit
+        if quantity_of(other) == quantity_of(name)
+        and records.count(other) > (1.0 + _APART) * records.count(name)
+        and records.common[name, other] >= _WITHIN * records.count(name)
+        and (other not in own or own[other].rate > (1.0 + _APART) * own[name].rate)
+    ]
+    return max(siblings, key=records.count, default=None)
+
+
+def _rate_changes(
+    channels: list[str], grid: TimeBase, records: _Records, part: Part
+) -> list[Finding]:
+    """Return a finding for each channel that has a lower rate in a part of the log."""
+    if not grid.stamped and part.stamped:  # stamps of arrival: losses cannot be located
+        return []
+    findings = []
+    for name in channels:
+        if records.count(name) < (1.0 - timebase.MIN_MISSING) * part.rows:
+            points = records.points(grid, records.bit[name])
+            findings += timebase.rate_changes(points, grid.rate, name)
+    return findings
+
+
 def _own_clock(
-    name: str, channels: list[str], part: Part, records: _Records, *, on_grid: bool
+    name: str, channels: list[str], part: Part, records: _Records, grid: TimeBase | None
 ) -> TimeBase | None:
     """Return the time base of the records of a channel; None where they have none of their own.
 
-    ``on_grid``: all records together lie on a grid.
+    ``grid``: that of all records, if they lie on a grid.
     """
     number = records.count(name)
+    bits = records.bit[name]
     try:
-        base = records.base(records.bit[name])
+        if grid is not None and number < (1.0 - _APART) * part.rows:
+            stride = records.stride(grid, bits)
+            if stride > 1:
+                return records.base(bits, known=stride / grid.rate)
+        base = records.base(bits)
         if base.stamped:
             return base
-        if on_grid or number == part.rows:
+        if grid is not None or number == part.rows:
             return None
         # Stamps of arrival: that a channel is in every second record, the numbers of these tell.
-        if records.base(records.bit[name], numbered=True).stamped:
+        if records.base(bits, numbered=True).stamped:
             return base
     except RecordingError:
         return None
@@ -214,18 +279,38 @@ def _grouped(
     return clocks
 
 
+def _base_of_group(clock: _Clock, records: _Records, settings: QualitySettings) -> TimeBase:
+    """Return the time base of the records in which any channel of a clock has a number."""
+    rate = clock.base.rate
+    base = records.base(clock.bits)
+    same = base.stamped and abs(base.rate / rate - 1.0) <= settings.rate_tolerance
+    return base if same or not clock.base.stamped else records.base(clock.bits, known=1.0 / rate)
+
+
 def _place(
-    channels: list[str], own: dict[str, TimeBase], clocks: list[_Clock], records: _Records
+    channels: list[str],
+    own: dict[str, TimeBase],
+    clocks: list[_Clock],
+    records: _Records,
+    leaders: Mapping[str, str | None],
 ) -> list[str]:
-    """Add channels with samples lost to the clock they are read with; return the others."""
+    """Add channels with samples lost to the clock they are read with; return the others.
+
+    ``leaders``: axes of the same sensor whose clock a channel has.
+    """
     rest = []
     for name in channels:
         if name in own:
             continue
+        leader = leaders.get(name)
         within = [
             clock
             for clock in clocks
-            if records.common[name, clock.channels[0]] >= _WITHIN * records.count(name)
+            if (
+                leader in clock.channels
+                if leader
+                else records.common[name, clock.channels[0]] >= _WITHIN * records.count(name)
+            )
         ]
         if within:
             clock = min(within, key=lambda clock: records.count(clock.channels[0]))

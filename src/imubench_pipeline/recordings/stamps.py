@@ -67,10 +67,9 @@ def typical_interval(stamps: Stamps) -> Interval | None:
         if len(steps):
             medians.append(float(np.quantile(steps, _MIDDLE, method="lower")))
             long = (steps > _LONG * medians[-1]) & (steps < _TWO * medians[-1])
-            rounded.append(_are_regular(np.flatnonzero(long)))
-            zeros = np.flatnonzero(np.diff(block[:_ENOUGH]) == 0.0)
-            share = len(zeros) / len(block[:_ENOUGH])
-            repeated.append(_NEGLIGIBLE <= share <= SHARED and _are_regular(zeros))
+            rounded.append(_are_regular(long))
+            zero = np.diff(block[:_ENOUGH]) == 0.0
+            repeated.append(_NEGLIGIBLE <= np.mean(zero) <= SHARED and _are_regular(zero))
     if not medians:
         return None
     median = float(np.median(medians))
@@ -107,12 +106,19 @@ def _advances(block: NDArray[np.float64]) -> NDArray[np.float64]:
     return steps
 
 
-def _are_regular(places: NDArray[np.int64]) -> bool:
-    """Return whether steps come at regular distances, as by rounding, and not as by losses."""
+def _are_regular(chosen: NDArray[np.bool_]) -> bool:
+    """Return whether some steps come at regular distances in the whole block.
+
+    Rounded stamps have them at two neighbouring distances. Losses have them at any distance, a
+    lower rate in a part of the block at one distance but in that part alone.
+    """
+    places = np.flatnonzero(chosen)
     if len(places) < 10:
         return False
     distances = np.diff(places)
-    return bool(np.mean(np.abs(distances - np.median(distances)) <= 1) > 0.9)
+    median = np.median(distances)
+    throughout = abs(len(chosen) / len(places) - median) <= 0.55 + 0.05 * median
+    return bool(throughout and np.mean(np.abs(distances - median) <= 1) > 0.9)
 
 
 _MARK = 1 << 10

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.recordings.stamps import (
     SET_BACK,
     SHARED,
+    Interval,
     Stamps,
     Track,
     is_set_back,
@@ -36,6 +37,13 @@ _SHORTEST, _LONGEST = 1e-18, 1e8
 
 _MOST_HOLES, _MOST_POINTS = 100, 10_000_000
 """Samples that may be missing for each that is there, and beside them: each takes memory."""
+
+MIN_MISSING = 0.01
+"""Share of missing samples from which it is tested whether the sampling rate changed."""
+
+_WINDOW, _MIN_REGULAR, _MIN_STRETCH = 32, 0.9, 0.05
+"""Samples of a window, share of them at one distance, and share of such windows, from which a part
+of a log has a lower rate."""
 
 _MOST_PAIRS = 10_000
 _FEWEST_OF_GROUP, _FEWEST_GROUPS, _REGULAR = 5, 5, 0.8
@@ -89,18 +97,31 @@ def without_stamps(rows: int, rate: float) -> TimeBase:
     return TimeBase(rate, "stated", rows, rows, ((0, rows),), uniform=True, stamped=False)
 
 
-def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings) -> TimeBase:
+def from_stamps(
+    stamps: Stamps,
+    stated: float | None,
+    settings: QualitySettings,
+    *,
+    known: float | None = None,
+) -> TimeBase:
     """Find the time base of stamps.
 
-    ``stamps``: gives the stamps in s, in blocks; called several times.
-    ``stated``: the rate that the sensor file states, Hz.
+    Parameters
+    ----------
+    stamps : callable
+        Yields the stamps in s, in blocks; called several times.
+    stated : float or None
+        The rate in the sensor file, Hz.
+    settings : QualitySettings
+    known : float or None
+        The sampling interval, s, if it is known although most samples are missing.
 
     Raises
     ------
     RecordingError
-        If the stamps do not advance.
+        If the stamps do not advance, or jump too often.
     """
-    typical = typical_interval(stamps)
+    typical = typical_interval(stamps) if known is None else Interval(known)
     if typical is None:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     interval = typical.mean
@@ -123,7 +144,7 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
             "holes"
         )
     # Many holes that are together longer than the log are pauses of the host, not losses.
-    bursts = track.grid > 2 * track.rows and track.holes > 0.05 * track.rows
+    bursts = known is None and track.grid > 2 * track.rows and track.holes > 0.05 * track.rows
     shared = track.duplicates > SHARED * track.rows
     if typical.has_repeats and interval == typical.mean:
         base = _arrival_order(stamps, track, stated, settings)
@@ -139,6 +160,9 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
         findings.append(_coarse(rate, 1.0 / typical.other))
     findings += _rate_findings(rate, stated, settings)
     findings += _drift_findings(track, settings)
+    if track.grid - track.rows > MIN_MISSING * track.grid:
+        follow = Track(track.interval, settings.longest_hole)
+        findings += rate_changes((follow.follow(block) for block in stamps()), rate)
     jitter = math.sqrt(track.scatter / max(track.steps, 1))
     uniform = track.grid == track.rows and len(track.starts) == 1 and not track.duplicates
     return TimeBase(
@@ -170,6 +194,58 @@ def positions(
     track = Track(base.tracking_interval, settings.longest_hole)
     for block in stamps():
         yield track.follow(block)
+
+
+def rate_changes(
+    points: Iterator[NDArray[np.int64]], rate: float, channel: str | None = None
+) -> list[Finding]:
+    """Return a finding if a part of a log has every second (third, ...) sample only.
+
+    Random losses do not look so: 32 samples in a row would have to be equally far apart.
+
+    Parameters
+    ----------
+    points : iterator of ndarray
+        Grid points of the samples, in blocks; below 0 for those left out.
+    rate : float
+        Of the grid, Hz.
+    """
+    samples: Counter[int] = Counter()
+    begin: dict[int, int] = {}
+    end: dict[int, int] = {}
+    total = 0
+    for block in points:
+        kept = block[block >= 0]
+        number = (len(kept) - 1) // _WINDOW
+        if number < 1:
+            continue
+        steps = np.diff(kept[: number * _WINDOW + 1]).reshape(number, _WINDOW)
+        typical = np.median(steps, axis=1).astype(np.int64)
+        regular = np.mean(steps == typical[:, None], axis=1) >= _MIN_REGULAR
+        total += number
+        for step in np.unique(typical[regular & (typical > 1)]).tolist():
+            windows = np.flatnonzero(regular & (typical == step))
+            samples[step] += len(windows)
+            begin.setdefault(step, int(kept[windows[0] * _WINDOW]))
+            end[step] = int(kept[(windows[-1] + 1) * _WINDOW])
+    findings = []
+    for step, count in sorted(samples.items()):
+        if count < _MIN_STRETCH * total:
+            continue
+        percent = 100.0 * (1.0 - math.sqrt(1.0 / step))
+        first, last = begin[step] / rate, end[step] / rate
+        name = f"{channel}: " if channel else ""
+        detail = (
+            f"{name}the sampling rate changes: {100.0 * count / total:.0f} % of the samples, "
+            f"from {first:.5g} s to {last:.5g} s, are {step} intervals apart ({rate / step:.5g} Hz "
+            f"instead of {rate:.5g} Hz). They are analysed at {rate:.5g} Hz with missing samples: "
+            f"if the sensor was set to the lower rate, their N is {percent:.0f} % low. Analyse the "
+            "parts separately, with 'use' in the notes"
+        )
+        findings.append(
+            Finding("rate_changes", "warning", detail, rate / step, channel, first, last)
+        )
+    return findings
 
 
 def _is(stated: float | None, interval: float, settings: QualitySettings) -> bool:
