@@ -1,9 +1,5 @@
 """From static logs of inertial sensors to a cross-IMU report: `snakemake -c2`."""
 
-if Path("config/config.yaml").exists():  # every setting has a default
-
-    configfile: "config/config.yaml"
-
 
 include: "workflow/rules/common.smk"  # the plan of the run, and what the rules share
 include: "workflow/rules/recordings.smk"  # one log: samples, curve, estimates, scores, errors

@@ -3,6 +3,7 @@
 import importlib
 import os
 import pkgutil
+import re
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ from pydantic import BaseModel, ValidationError, create_model
 from pydantic.fields import FieldInfo
 
 import imubench_pipeline.settings
+from imubench_pipeline.settings.config import Run
 from imubench_pipeline.settings.sensor import ColumnSource, RecordingNotes, Sensor
 from imubench_pipeline.settings.validation import ConfigError, Strict, parse
 from imubench_pipeline.settings.yaml_files import (
@@ -265,3 +267,44 @@ def test_two_devices_are_two(tmp_path: Path) -> None:
         (tmp_path / f"{name}.yaml").write_text(f"{log}model: {model}\n")
     sensors = read_folder(Sensor, tmp_path, "sensor")
     assert [sensor.model for sensor in sensors.values()] == ["1.1", "1.10", "017", "15"]
+
+
+@pytest.mark.parametrize("name", ["0017", "1.10", "1e2", "12:30", "0x10", "2026-01-01"])
+@pytest.mark.parametrize("key", ["logs", "results", "sensors", "simulated", "requirements"])
+def test_a_folder_may_look_like_a_number(key: str, name: str, tmp_path: Path) -> None:
+    file = tmp_path / "config.yaml"
+    file.write_text(f"{key}: {name}\n")
+    assert getattr(read_settings(Run, file), key) == Path(name)
+
+
+@pytest.mark.parametrize(
+    ("key", "written", "value"),
+    [
+        ("shortest", "1e2", 100),
+        ("shortest", "1.2E+3", 1200),
+        ("longest_hole", "1e2", 100.0),
+        ("longest_hole", "5.e-1", 0.5),
+    ],
+)
+def test_numbers_may_have_an_exponent(key: str, written: str, value: float, tmp_path: Path) -> None:
+    file = tmp_path / "config.yaml"
+    file.write_text(f"quality:\n  {key}: {written}\n")
+    assert getattr(read_settings(Run, file).quality, key) == value
+
+
+@pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        (b"logs: a\nresults: \x01b\n", "line 2: not readable as YAML: U+0001"),
+        (b"logs: a\n\nresults: b\xe9\n", "line 3: byte 0xE9 is not UTF-8"),
+        (b"logs: a\nresults: [1\n", "line 3: not readable as YAML"),
+        (b"logs: 0017\nquality: {shortest: 1.50}\n", "quality.shortest: found 1.50;"),
+    ],
+)
+def test_a_fault_is_found_by_its_line_and_as_written(
+    content: bytes, found: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "config.yaml"
+    file.write_bytes(content)
+    with pytest.raises(ConfigError, match=re.escape(found)):
+        read_settings(Run, file)

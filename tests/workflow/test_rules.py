@@ -74,3 +74,12 @@ def test_texts_of_the_configuration_are_as_they_are_written(tmp_path: Path) -> N
     assert "['0017', '12:30:45', None]" in done.stdout, done.stderr
     done = dry_run(tmp_path, ["-c1", "--config", 'exports={"axis": "2"}'])
     assert "['2', '12:30:45', None]" in done.stdout, done.stderr
+    other = tmp_path / "other.yaml"
+    other.write_text("exports: {axis: 1.10}\nresults: 0017\n")
+    done = dry_run(tmp_path, ["-c1", "--configfile", "other.yaml"])
+    assert "['1.10', '12:30:45', None]" in done.stdout, done.stderr
+    done = dry_run(tmp_path, ["-c1", "--configfile", "other.yaml", "--replace-workflow-config"])
+    assert "['1.10', None, (" in done.stdout, done.stderr
+    (tmp_path / "config/config.yaml").write_text("logs: a\nresults: [1\n")
+    done = dry_run(tmp_path, ["-c1"])
+    assert "config/config.yaml, line 3: not readable as YAML" in done.stdout

@@ -41,11 +41,17 @@ if path_modifier.modifies_prefixes or path_modifier.replace_prefix("x") != "x":
         "config, as results: <folder>"
     )
 
+given = workflow.config_settings
+replaced = given.replace_workflow_config and given.overwrite_config
+
 try:
-    if CONFIG.exists() and not workflow.modifier.skip_configfile:
-        # Snakemake has read it as YAML 1.1, in which 0017 is 15.
-        update_config(config, read_config(CONFIG))
-        update_config(config, workflow.config_settings.overwrite_config)
+    # Not by `configfile:`, which reads YAML 1.1, where 0017 is 15, and names no line of an error.
+    if not workflow.modifier.skip_configfile:
+        if CONFIG.exists() and not replaced:  # every setting has a default
+            update_config(config, read_config(CONFIG))
+        for file in given.configfiles:
+            update_config(config, read_config(file))
+        update_config(config, given.config)
     plan = Plan(config)
 except ConfigError as error:
     raise WorkflowError(str(error)) from None

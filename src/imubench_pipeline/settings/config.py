@@ -20,9 +20,11 @@ from imubench_pipeline.settings.validation import (
     Duration,
     FractionOfLog,
     Frequency,
+    NamedPath,
     Strict,
     Text,
     checked,
+    cut,
     parse,
 )
 from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
@@ -36,7 +38,7 @@ _difference = checked("temperature", "a difference, such as 10 K", to_si=differe
 
 _AccelerationDensity = Annotated[Text, checked("accel_density", "a density above 0")]
 
-Folders = Path | Annotated[tuple[Path, ...], Field(min_length=1)]
+Folders = NamedPath | Annotated[tuple[NamedPath, ...], Field(min_length=1)]
 
 
 class AllanSettings(Strict):
@@ -300,15 +302,15 @@ def _path_or_none(value: object) -> object:
 class Run(Strict):
     """One run: where the logs are, and the settings of each step."""
 
-    logs: Path = Field(Path("logs"), description="the drop zone: logs/<sensor>/<recording>")
-    results: Path = Field(Path("results"), description="where a run leaves its results")
+    logs: NamedPath = Field(Path("logs"), description="the drop zone: logs/<sensor>/<recording>")
+    results: NamedPath = Field(Path("results"), description="where a run leaves its results")
     sensors: Folders = Field(
         (CATALOGUE, Path("config/sensors")),
         description="folder of the sensor files, or several: what is in a later one counts; "
         "catalogue: those that come with the package",
     )
     simulated: Annotated[
-        Path | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
+        NamedPath | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
     ] = Field(
         _SIMULATED, description="simulated recordings; false, or no such file by default: none"
     )
@@ -349,9 +351,17 @@ def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --
 
 
 def read_config(file: Path) -> dict[str, Any]:
-    """Return the settings that stand in a configuration, unchecked; none where it is not there."""
+    """Return the settings in a configuration, unchecked; none if it does not exist.
+
+    Raises
+    ------
+    ConfigError
+        If it is not YAML, or has no keys.
+    """
     content = read_yaml(file) if file.is_file() else None
-    return content if isinstance(content, dict) else {}
+    if content is not None and not isinstance(content, dict):
+        raise ConfigError(f"{file}: found {cut(content)}, expected keys and values")
+    return content or {}
 
 
 def given_beside(run: Run, file: Path) -> list[str]:

@@ -36,6 +36,7 @@ from imubench_pipeline.settings.validation import (
     ConfigError,
     Duration,
     Frequency,
+    NamedPath,
     Strict,
     Text,
     checked,
@@ -306,7 +307,9 @@ class Simulated(Strict):
     """The file that lists what is simulated."""
 
     recordings: tuple[SimulatedRecording, ...] = ()
-    boards: tuple[Path, ...] = Field((), description="files of boards, from the folder of this one")
+    boards: tuple[NamedPath, ...] = Field(
+        (), description="files of boards, from the folder of this one"
+    )
 
 
 class Board(Surroundings):

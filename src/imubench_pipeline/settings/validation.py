@@ -7,6 +7,7 @@ import re
 import reprlib
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -104,6 +105,13 @@ def _between(ends: tuple[str, str]) -> tuple[str, str]:
         raise ValueError(f"found {ends[0]} to {ends[1]}; expected the lower temperature first")
     return ends
 
+
+def _as_written(value: object) -> object:
+    return str(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+NamedPath = Annotated[Path, BeforeValidator(_as_written, json_schema_input_type=Path)]
+"""A path; it may look like a number, such as a folder 0017."""
 
 FractionOfLog = Annotated[float, BeforeValidator(_fraction, json_schema_input_type=float | str)]
 _LONGEST_TEXT = 1000

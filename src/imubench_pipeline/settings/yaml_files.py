@@ -61,6 +61,8 @@ class Integer(int):
     def __str__(self) -> str:
         return self.written
 
+    __repr__ = __str__  # errors show what the file has
+
 
 class Decimal(float):
     """A number with decimals that keeps how it is written."""
@@ -69,6 +71,8 @@ class Decimal(float):
 
     def __str__(self) -> str:
         return self.written
+
+    __repr__ = __str__  # errors show what the file has
 
 
 class _Loader(_SAFE):
@@ -126,7 +130,7 @@ for _kind, _pattern, _first in (
     ("int", r"[-+]?(0x[0-9a-fA-F_]+|[0-9][0-9_]*)", list("-+0123456789")),
     (
         "float",
-        r"[-+]?[0-9][0-9_]*\.[0-9_]*([eE][-+][0-9]+)?|\.[0-9][0-9_]*([eE][-+][0-9]+)?"
+        r"[-+]?[0-9][0-9_]*(\.[0-9_]*)?([eE][-+]?[0-9]+)?|[-+]?\.[0-9][0-9_]*([eE][-+]?[0-9]+)?"
         r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
         list("-+0123456789."),
     ),
@@ -150,6 +154,10 @@ def read_yaml(path: Path) -> object:
     """
     try:
         text = _text_of(path)
+        if unseen := yaml.reader.Reader.NON_PRINTABLE.search(text):
+            line = text.count("\n", 0, unseen.start()) + 1
+            problem = f"U+{ord(unseen[0]):04X} is no printable character; remove it"
+            raise ConfigError(f"{path}, line {line}: not readable as YAML: {problem}")
         _check(text)
         return yaml.load(text, Loader=_Loader)
     except ConfigError:
@@ -160,9 +168,9 @@ def read_yaml(path: Path) -> object:
     except OSError as error:
         raise UnavailableSettingsError(f"{path}: cannot be read ({error.strerror})") from None
     except yaml.MarkedYAMLError as error:
-        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
+        where = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
         problem = cut(error.problem, str)
-        raise ConfigError(f"{path}{line}: not readable as YAML: {problem}") from None
+        raise ConfigError(f"{path}{where}: not readable as YAML: {problem}") from None
     except (yaml.YAMLError, ValueError) as error:
         raise ConfigError(f"{path}: not readable as YAML: {cut(error, str)}") from None
 
@@ -226,7 +234,14 @@ def _text_of(path: Path) -> str:
         raise ConfigError(
             f"{path}: larger than {LARGEST >> 20} MB; expected settings, not a log: check its name"
         )
-    return content.decode("utf-8")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise ConfigError(
+            f"{path}, line {line}: byte 0x{content[error.start]:02X} is not UTF-8; save the file "
+            "in that encoding"
+        ) from None
 
 
 def _check(text: str) -> None:
