@@ -90,6 +90,14 @@ def test_the_time_that_white_noise_needs(relative):
         assert sigma[-1] <= relative * EARTH_RATE * (1 + 1e-9) < sigma[-2]
 
 
+def test_a_goal_out_of_reach_has_no_row():
+    noisy = Outlook(NoiseModel(N=1e28), LATITUDE, 2.0, 32.0)
+    assert noisy.turns_needed(28.0, 0.1) is None
+    assert noisy.time_needed(28.0, 0.1) == math.inf
+    rows = list(prediction_rows(noisy, 28.0, [0.1], 600.0))
+    assert {row["of"] for row in rows} == {"time", "dwell"}
+
+
 @pytest.mark.parametrize("turns", [1, 5, 63, 64, 300])
 def test_what_is_reached_is_the_end_of_the_course(turns):
     outlook = Outlook(PAPER_MODEL, LATITUDE, 2.0, 8.0)

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from imubench_pipeline.recordings.quality import summary
-from imubench_pipeline.recordings.quality.summary import FIRST_SIZE, ColumnSummary
+from imubench_pipeline.recordings.quality.summary import FIRST_SIZE, LARGEST, ColumnSummary
 
 VALUES = st.sampled_from([-1.0, 0.0, 0.5, 2.0, np.nan, np.inf, -np.inf, 1e300, -1e76])
 
@@ -14,7 +14,7 @@ VALUES = st.sampled_from([-1.0, 0.0, 0.5, 2.0, np.nan, np.inf, -np.inf, 1e300, -
 def test_counts_are_those_of_the_whole_column(log: np.ndarray, pieces: int) -> None:
     column = ColumnSummary()
     back = [column.add(piece) for piece in np.array_split(log, pieces)]
-    beyond = np.abs(log) > 1e75
+    beyond = np.abs(log) > LARGEST
     finite = log[~np.isnan(log) & ~beyond]
     np.testing.assert_array_equal(np.concatenate(back), np.where(beyond, np.nan, log))
     assert column.present == len(finite)

@@ -52,7 +52,8 @@ def summary(results: Path) -> str:
     failed = list(left_out(failures))
     analysed = sum(row["status"] == "ok" for row in recordings)
     lines = [f"{counted(analysed, 'recording')} analysed, {len(rejected)} rejected"]
-    lines[0] += f", {len(recordings) - analysed - len(rejected)} failed" * bool(failed)
+    not_read = len(recordings) - analysed - len(rejected)
+    lines[0] += f", {not_read} failed" * (not_read > 0)
     lines[0] += f"; {simulated} of all are simulated, not measured" * (simulated > 0)
     lines += _bounded(f"  failed: {line}" for line in failed)
     lines += _bounded(f"  rejected: {line}" for line in rejected)

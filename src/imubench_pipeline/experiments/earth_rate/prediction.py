@@ -45,6 +45,9 @@ _BETWEEN = 15
 
 Row = dict[str, Any]
 
+MAX_TURNS = 10**12
+"""Turns of a goal; at one a second they take 30 000 years."""
+
 _POINTS = 60
 """Numbers of turns on the curve over time."""
 
@@ -108,8 +111,10 @@ class Outlook:
         time = (number + 1) * dwell + number * self.turning
         return Prediction(number, time, sigma_of(information[1:]))
 
-    def turns_needed(self, dwell: float, relative: float) -> int:
+    def turns_needed(self, dwell: float, relative: float) -> int | None:
         """Return how many turns give the Earth's rate to a relative standard deviation.
+
+        None: more than `MAX_TURNS`.
 
         The run lasts (turns + 1) dwells, s of data each, and as many turns; ``relative`` is of the
         Earth's rate: 0.01 is 1 %.
@@ -126,7 +131,9 @@ class Outlook:
         reached = np.flatnonzero(information >= wanted * (1.0 - _ROUNDING))
         if len(reached):
             return int(reached[0])
-        left = (wanted - information[-1]) / _growth(information)
+        left = (wanted - information[-1]) / max(_growth(information), math.ulp(0.0))
+        if left > MAX_TURNS:
+            return None
         return _SUMMED - 1 + math.ceil(left - _ROUNDING * left)
 
     def sigma_after(self, dwell: float, turns: int) -> float:
@@ -139,9 +146,12 @@ class Outlook:
         return float(sigma_of(np.array([last]))[0])
 
     def time_needed(self, dwell: float, relative: float) -> float:
-        """Return how long a run gives the Earth's rate to a relative standard deviation, s."""
+        """Return how long a run gives the Earth's rate to a relative standard deviation, s.
+
+        Infinity: it takes more than `MAX_TURNS`.
+        """
         turns = self.turns_needed(dwell, relative)
-        return (turns + 1) * dwell + turns * self.turning
+        return math.inf if turns is None else (turns + 1) * dwell + turns * self.turning
 
     def over_dwell(self, run_time: float) -> DwellCurve:
         """Return the bound of a run of a length, s, over the dwell, from one turn to short dwells.
@@ -240,6 +250,8 @@ def _rows(outlook: Outlook, dwell: float, goals: Sequence[float], run_time: floa
     most = 1
     for goal in sorted(goals, reverse=True):
         turns = outlook.turns_needed(dwell, goal)
+        if turns is None:
+            continue
         most = max(most, turns)
         time = (turns + 1) * dwell + turns * outlook.turning
         # What is reached: the last turn that is needed may give far more than was asked for.

@@ -184,8 +184,8 @@ def together(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Ar
     return pairs
 
 
-LARGEST = 1e75
-"""SI. What is larger was never measured; its fourth power would overflow. It counts as infinite."""
+LARGEST = 1e30
+"""Largest figure, SI, that is taken for a measurement. Larger ones count as infinite."""
 
 _PRESENT, _MISSING, _INFINITE, _LOW, _HIGH, _AT_LOW, _AT_HIGH = range(7)
 _LAST, _RUN, _LONGEST, _LONGEST_END, _REPEATS, _STEP, _TAKEN = range(7, 14)
