@@ -434,3 +434,10 @@ def test_the_logs_that_a_report_names_are_a_place(
         assert main(["schema", "run", "--output", name, "--force"]) == 2
         assert "belongs to the logs" in capsys.readouterr().err
     assert log.read_text() == "1,2\n" and [*log.parent.iterdir()] == [log]
+
+
+@pytest.mark.parametrize("place", ["results", "results/tables/new"])
+def test_a_project_is_not_made_in_results(lab: Path, place: str) -> None:
+    before = contents(lab)
+    assert main(["init", str(lab / place)]) == 2
+    assert contents(lab) == before

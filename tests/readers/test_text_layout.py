@@ -234,3 +234,20 @@ def test_a_rate_that_the_file_states(tmp_path: Path, lines: list[str], rate: flo
 def test_what_cannot_be_stated(keys: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         parse(LogFormat, {"rate": "1 Hz", "channels": TWO} | keys, "s.yaml")
+
+
+@pytest.mark.parametrize(
+    ("first", "then"), [("\n", "\r"), ("\r\n", "\r"), ("\r\n", "\n"), ("\n", "\r\n")]
+)
+@pytest.mark.parametrize("cut", ["", "1.5"])
+def test_line_breaks_that_change_lose_no_record(
+    tmp_path: Path, first: str, then: str, cut: str
+) -> None:
+    values = np.arange(400).reshape(200, 2) / 8
+    lines = [f"{a},{b}" for a, b in values]
+    text = "wx,ax" + first + first.join(lines[:120]) + first + then.join(lines[120:]) + then + cut
+    read, _, file = columns(written(tmp_path, text), log_format())
+    assert read["gyro_x"].tolist() == values[:, 0].tolist()
+    assert read["accel_x"].tolist() == values[:, 1].tolist()
+    found = {finding.finding for finding in file.findings}
+    assert found == ({"incomplete_last_record"} if cut else set())

@@ -204,7 +204,12 @@ def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
         (["bno055", "--hours", "1", "--temperature", "25"], "--temperature: '25' is not a number"),
         (["bno055", "--hours", "1", "--temperature", "3 m"], "no unit of temperature"),
         (["bno055", "--hours", "1", "--temperature", "no.csv"], "no.csv: no such file"),
-        (["bno055", "--hours", "1", "--channels", "gyro_q"], "no channel 'gyro_q'"),
+        (["bno055", "--hours", "1", "--channels", "gyro_q"], "--channels: found 'gyro_q'"),
+        (["bno055", "--hours", "1", "--channels", ""], "--channels: found ''"),
+        (
+            ["bno055", "--hours", "1", "--channels", "gyro_x, gyro_x"],
+            "found gyro_x twice; expected each channel once",
+        ),
         (["bno055", "--hours", "1", "--channels", "accel_x"], "no figures of accel_x"),
         (["ln_200", "--hours", "1"], "prints no noise"),
         (["no.yaml", "--hours", "1"], "no.yaml: no such file"),

@@ -6,7 +6,9 @@ import argparse
 import io
 import json
 import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from functools import partial
@@ -270,8 +272,11 @@ def _check(options: argparse.Namespace) -> int:
         made = ", simulated" * bool(quality.recording.get("simulated"))
         print(f"{sensor}/{recording}: {status}{made}")
         for finding in quality.findings:
-            detail = printable(finding["detail"])
-            print(f"  {finding['severity']:8} {finding['finding']}: {detail}")
+            line = f"  {finding['severity']:8} {finding['finding']}: {printable(finding['detail'])}"
+            if sys.stdout.isatty():  # elsewhere one line each, for programs such as grep
+                width = max(shutil.get_terminal_size().columns - 1, 40)
+                line = textwrap.fill(line, width, subsequent_indent=" " * 11)
+            print(line)
         sys.stdout.flush()
     return worst
 

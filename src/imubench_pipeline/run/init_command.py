@@ -7,6 +7,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
+from imubench_pipeline.run.places import has_results
 from imubench_pipeline.settings.shipped import project
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
@@ -50,6 +51,13 @@ def run(options: argparse.Namespace) -> int:
         print(
             f"{folder / there[0]}: exists already; expected a folder without it: choose "
             "another one, or rename that file",
+            file=sys.stderr,
+        )
+        return 2
+    absolute = folder.resolve()
+    if results := next((one for one in [absolute, *absolute.parents] if has_results(one)), None):
+        print(
+            f"{folder}: lies in the results of runs ({results}); expected a folder outside of them",
             file=sys.stderr,
         )
         return 2

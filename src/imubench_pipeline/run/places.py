@@ -52,7 +52,7 @@ def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
     """
     above = [path, *path.parents]
     given = [] if results is None else [results.absolute(), Path(os.path.realpath(results))]
-    found = [folder for folder in above if _has_results(folder)] + given
+    found = [folder for folder in above if has_results(folder)] + given
     yield Place(project() / "config", "config", "the configuration of the package")
     projects = [Path.cwd(), *above, *(folder for one in given for folder in one.parents)]
     for folder in dict.fromkeys(projects):
@@ -68,14 +68,15 @@ def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
         for name in _OF_WORKFLOW:
             yield Place(folder / name, "workflow", "the workflow")
         found.append(folder / run.results)
-    found += [folder / "results" for folder in projects if _has_results(folder / "results")]
+    found += [folder / "results" for folder in projects if has_results(folder / "results")]
     for folder in dict.fromkeys(found):
         if (logs := drop_zone_of(folder)) is not None:
             yield Place(logs.absolute(), "logs", "the logs")
         yield from (Place(folder / name, "results", "the results of runs") for name in _OF_RUNS)
 
 
-def _has_results(folder: Path) -> bool:
+def has_results(folder: Path) -> bool:
+    """Return whether runs left their results in a folder."""
     return (folder / "seals").is_dir() or (folder / "tables/recordings.parquet").is_file()
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from imubench_pipeline.settings.command_line import MOST_WHOLE, whole_number
 from imubench_pipeline.settings.shipped import folders
-from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.settings.validation import ConfigError, cut, parse
 from imubench_pipeline.settings.yaml_files import files_in, read_settings, read_yaml
 from imubench_pipeline.tables.outputs import OutputFile, add_output
 from imubench_pipeline.units import UnitError, naming, quantity_to_si
@@ -221,9 +221,13 @@ def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
     from imubench_pipeline.simulate.from_estimates import with_estimates
     from imubench_pipeline.simulate.imu import ImuModel
 
-    asked = [name.strip() for name in options.channels.split(",")] if options.channels else None
+    text: str | None = options.channels
+    asked = None if text is None else [name.strip() for name in text.split(",")]
     if unknown := [name for name in asked or [] if name not in CHANNELS]:
-        raise ConfigError(f"no channel {unknown[0]!r}; expected of {', '.join(CHANNELS)}")
+        expected = ", ".join(CHANNELS)
+        raise ConfigError(f"--channels: found {cut(unknown[0])}; expected some of {expected}")
+    if asked and (twice := [name for name in asked if asked.count(name) > 1]):
+        raise ConfigError(f"--channels: found {twice[0]} twice; expected each channel once")
     path = Path(options.sensor)
     if path.suffix in _YAML:
         if options.results:

@@ -172,8 +172,7 @@ class CompleteLines:
         """Return the next complete lines, none where the next line is not yet complete."""
         block = self._text.read(max(size - len(self.rest), _SEEN))
         if not block:
-            self._end()
-            return b""
+            return self._end()
         cut = block.rfind(b"\n") + 1
         if not cut:
             self.rest += block
@@ -195,8 +194,13 @@ class CompleteLines:
         """
         return self._text.zeros(self._path.name, fate)
 
-    def _end(self) -> None:
+    def _end(self) -> bytes:
+        """Return the lines after the last line feed that end in carriage returns."""
         self._ended = True
+        cut = self.rest.rfind(b"\r", 0, len(self.rest.rstrip(b"\r"))) + 1
+        if cut and self.rest.endswith(b"\r"):
+            cut = len(self.rest)
+        lines, self.rest = self.rest[:cut].replace(b"\r", b"\n"), self.rest[cut:]
         if self._text.ended_early:
             self._findings.append(ended_early(self._path))
         if self.rest.strip(b"\0\r\n\t "):
@@ -206,6 +210,7 @@ class CompleteLines:
                 f"out: {shown!r}"
             )
             self._findings.append(Finding("incomplete_last_record", "note", detail, 1))
+        return lines
 
 
 def describe_missing_text(path: Path) -> str:
