@@ -30,13 +30,14 @@ onstart:
 
 # Tables are read at the end of a run alone: a run should begin at once.
 onsuccess:
-    from imubench_pipeline.report.run_summary import summary
+    from imubench_pipeline.report.run_summary import summary, without_pages
     from imubench_pipeline.run.progress import OURS
 
     remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
     logger.info(summary(plan.run.results), extra=OURS)
-    if left_out := plan.faults.left_out():
-        raise WorkflowError(left_out)
+    incomplete = [plan.faults.left_out(), without_pages(plan.run.results)]
+    if any(incomplete):
+        raise WorkflowError("\n".join(filter(None, incomplete)))
 
 
 onerror:

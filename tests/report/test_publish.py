@@ -17,6 +17,7 @@ import pytest
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import theory
+from imubench_pipeline.report.folder import attempt_at_pages, failed_pages
 from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.publish import one_file, publish, published
 from imubench_pipeline.report.site import Site
@@ -49,6 +50,7 @@ KEPT = {"pages.json", "settings.json"}
 ASKED = {"robot": ROBOT}
 THEORY_FIGURE = "data:image/svg+xml;base64,PHN2Zy8+"
 PLOTTING = "var Plotly = {};"
+MADE = publishing._made
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -989,3 +991,39 @@ def test_settings_are_kept_beside_the_pages(report: Report) -> None:
 def test_tables_without_rows_are_tables() -> None:
     assert run().views == []
     assert list(pages(site({name: build(name, []) for name in TABLES})))[-1].path == "index.html"
+
+
+def test_a_page_that_fails_stops_no_other_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(site: Site) -> list[Any]:
+        return [
+            replace(page, context=lambda: {}["lost"]) if page.path == "fusion.html" else page
+            for page in pages(site)
+        ]
+
+    tables = joined(recording_rows("one", "day1"))
+    monkeypatch.setattr(publishing, "pages", broken)
+    monkeypatch.setattr(publishing, "_made", MADE)
+    for attempt in range(2):
+        assert attempt_at_pages(tmp_path) == attempt
+        made = site(tables)
+        written = publish(made, tmp_path)
+        assert made.failed == failed_pages(tmp_path) == {"fusion.html": "KeyError: 'lost'"}
+        assert ("recordings.html" in written) == (attempt == 0)
+        assert "KeyError: &#39;lost&#39;" in (tmp_path / "fusion.html").read_text()
+    assert "KeyError" in capsys.readouterr().err
+    assert "KeyError: &#39;lost&#39;" in one_file(site(tables))
+    monkeypatch.setattr(publishing, "pages", pages)
+    made = site(tables)
+    assert publish(made, tmp_path) == ["fusion.html"]
+    assert (made.failed, failed_pages(tmp_path), attempt_at_pages(tmp_path)) == ({}, {}, 0)
+
+
+def test_a_full_disk_is_no_fault_of_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> str:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(publishing, "_rendered", full)
+    with pytest.raises(OSError, match="No space"):
+        publish(site(joined(recording_rows("one", "day1"))), tmp_path)

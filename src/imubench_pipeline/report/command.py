@@ -78,7 +78,7 @@ def _write(site: Site, arguments: argparse.Namespace) -> int:
         page = one_file(site).encode()
         arguments.one_file.write(page)
         print(f"{arguments.one_file}: {len(page) / 1e6:.1f} MB")
-        return 0
+        return _status(site)
     say = _say if sys.stderr.isatty() else lambda _: None
     output: OutputFolder | None = arguments.output
     if output is None:
@@ -92,7 +92,14 @@ def _write(site: Site, arguments: argparse.Namespace) -> int:
             draw_comparison(site.tables, site.system, made / "figures")
             remove_old_pages(folder, made)
     print(f"{folder / 'index.html'}: {len(written)} files written")
-    return 0
+    return _status(site)
+
+
+def _status(site: Site) -> int:
+    """Return the exit status of a report: 1 if pages could not be made, which are named."""
+    for path, reason in site.failed.items():
+        print(f"{path}: could not be made: {reason}", file=sys.stderr)
+    return int(bool(site.failed))
 
 
 def _say(path: str) -> None:

@@ -3,10 +3,43 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+
+from imubench_pipeline.tables import write_content
 
 KEYS = "pages.json"
 """What each page of a report shows."""
+
+_FAILED = "failed_pages.json"
+
+
+def failed_pages(folder: Path) -> dict[str, str]:
+    """Return the pages of a report that could not be made, and why."""
+    return _read_failed(folder)[1]
+
+
+def attempt_at_pages(folder: Path) -> int:
+    """Return the number of the next attempt at pages that could not be made; 0: there are none."""
+    attempt, failed = _read_failed(folder)
+    return attempt + bool(failed)
+
+
+def write_failed_pages(failed: Mapping[str, str], folder: Path) -> None:
+    """Write which pages could not be made, and why."""
+    if failed:
+        content = {"attempt": attempt_at_pages(folder), "pages": dict(failed)}
+        write_content(json.dumps(content, indent=1) + "\n", folder / _FAILED)
+    else:
+        (folder / _FAILED).unlink(missing_ok=True)
+
+
+def _read_failed(folder: Path) -> tuple[int, dict[str, str]]:
+    try:
+        content = json.loads((folder / _FAILED).read_text("utf-8"))
+        return int(content["attempt"]), {str(k): str(v) for k, v in content["pages"].items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return 0, {}
 
 
 def is_report(folder: Path) -> bool:

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import json
+import traceback
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import jinja2
 import pyarrow as pa
 
-from imubench_pipeline.report.folder import KEYS
+from imubench_pipeline.report.folder import KEYS, write_failed_pages
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.plotting import plotting_script
 from imubench_pipeline.report.practical import units_of_pages
+from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.report.search import index
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.tables import read, read_json, write_content
+from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
@@ -56,7 +60,8 @@ Progress = Callable[[str], None]
 def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[str]:
     """Write the pages of the report whose data changed, and remove those that are no more.
 
-    ``say`` is told what is being written; returned is what was, below the folder.
+    A page that cannot be made says so in its place, is named in `Site.failed`, and is made again
+    by the next call. ``say`` is told what is being written; returned is what was, below the folder.
     """
     written = []
     for path, content in (_assets() | _search(site)).items():
@@ -79,13 +84,15 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     for page in every:
         if page.path not in unchanged:
             say(page.path)
-            rendered = _rendered(site, templates, page).encode()
-            shown[page.path] = _key(page.key, rendered)
+            rendered = _made(site, templates, page).encode()
+            if page.path not in site.failed:
+                shown[page.path] = _key(page.key, rendered)
             written += _put(folder, page.path, rendered)
     for path in _pages_there(site, folder) - keys.keys():
         (folder / path).unlink()
     _put(folder, _SETTINGS, _text(site.settings))
     _put(folder, KEYS, _text(shown))
+    write_failed_pages(site.failed, folder)
     return written
 
 
@@ -132,6 +139,23 @@ def _put(folder: Path, path: str, content: str | bytes) -> list[str]:
         return []
     write_content(data, target)
     return [path]
+
+
+def _made(
+    site: Site, templates: jinja2.Environment, page: Page, base: str = "base.html.jinja"
+) -> str:
+    """Return a page; if that fails, one that says why."""
+    try:
+        return _rendered(site, templates, page, base)
+    except OSError:  # such as a full disk, which is no fault of the page
+        raise
+    except Exception as error:
+        traceback.print_exc()
+        reason = one_line(describe_error(error))
+        site.failed[page.path] = reason
+        about = {"title": page.path, "reason": reason}
+        instead = replace(page, template="failed.html.jinja", context=lambda: about)
+        return _rendered(site, templates, instead, base)
 
 
 def _rendered(
@@ -181,7 +205,7 @@ def one_file(site: Site) -> str:
     templates = environment(site.system)
     common = {"site": site.shown(alone=True), "path": "index.html", "root": ""}
     shown = [
-        {"path": page.path, "content": _rendered(site, templates, page, "fragment.html.jinja")}
+        {"path": page.path, "content": _made(site, templates, page, "fragment.html.jinja")}
         for page in pages(site)
     ]
     assets = _assets()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.drop_zone import drop_zone_lines
+from imubench_pipeline.report.folder import failed_pages
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import LEFT_OUT
@@ -64,6 +65,13 @@ def summary(results: Path) -> str:
     lines += _bounded(leaders(ranking, recordings))
     lines.append(f"report: {results / 'report/index.html'}")
     return "\n".join(lines)
+
+
+def without_pages(results: Path) -> str:
+    """Return which pages of the report could not be made, and why; nothing if there are none."""
+    failed = failed_pages(results / "report")
+    lines = (f"\n  {one_line(f'{path}: {reason}')}" for path, reason in failed.items())
+    return "pages that could not be made; the next run tries again" * bool(failed) + "".join(lines)
 
 
 def failure(logs: Sequence[str], results: Path) -> str:

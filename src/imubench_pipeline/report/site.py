@@ -78,6 +78,7 @@ class Site:
     results: Path  # folder of the results, for what is kept of each recording alone
     entries: Sequence[Entry]  # the pages that there is one of, in the order of the navigation
     code: str = ""  # digest of the code that makes the pages
+    failed: dict[str, str] = field(default_factory=dict)  # pages that could not be made, and why
     _rows: dict[str, list[Row]] = field(default_factory=dict, init=False)
     _compared: dict[Name, ComparedRecording] = field(default_factory=dict, init=False)
 
