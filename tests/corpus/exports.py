@@ -129,6 +129,6 @@ FOLDERS = [
         "sensor logger without its file names",
         file(lambda: archive(LOGGER), "run.zip"),
         {"time": LOGGER_LOG["time"], "channels": {"gyro_x": {"column": "x", "unit": "rad/s"}}},
-        Rejected(r"run\.zip: expected one file, the folder has Annotation\.csv, .*'file:'"),
+        Rejected(r"run\.zip: expected one file, the archive has Annotation\.csv, .*'file:'"),
     ),
 ]

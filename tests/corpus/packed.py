@@ -167,7 +167,7 @@ ODD = [
         "zip archive of several logs",
         file(lambda: archive({"a.csv": TEXT, "b.csv": TEXT}), "log.zip"),
         STAMPED,
-        Rejected(r"log\.zip: expected one file, the folder has a\.csv, b\.csv"),
+        Rejected(r"log\.zip: expected one file, the archive has a\.csv, b\.csv"),
     ),
     Entry(
         "zip archive with a file without a name",
@@ -182,7 +182,7 @@ ODD = [
         "zip archive of thousands of logs",
         file(lambda: archive({f"{number}.csv": TEXT[:99] for number in range(2000)}), "log.zip"),
         STAMPED,
-        Rejected(r"log\.zip: expected one file, the folder has 0\.csv, 1\.csv, 10\.csv"),
+        Rejected(r"log\.zip: expected one file, the archive has 0\.csv, 1\.csv, 10\.csv"),
     ),
     Entry(
         "zip archive of thousands of pictures and a log",

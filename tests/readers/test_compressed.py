@@ -201,9 +201,9 @@ def test_what_is_not_in_an_archive_is_named(tmp_path: Path) -> None:
     path = written(tmp_path, zipped({"b.csv": b"1\n", "a.csv": b"1\n"}), "r.zip")
     with pytest.raises(RecordingError, match=r"r\.zip: no file 'sub/g\.csv' for gyro_x; the "):
         read(path, log_format(two_files()))
-    with pytest.raises(RecordingError, match=r"expected one file, the folder has a\.csv, b\.csv"):
+    with pytest.raises(RecordingError, match=r"expected one file, the archive has a\.csv, b\.csv"):
         read(path, log_format())
-    with pytest.raises(RecordingError, match=r"the folder has no file"):
+    with pytest.raises(RecordingError, match=r"the archive has no log"):
         read(written(tmp_path, zipped({}), "e.zip"), log_format())
 
 

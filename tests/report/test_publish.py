@@ -1024,6 +1024,7 @@ def test_a_full_disk_is_no_fault_of_a_page(tmp_path: Path, monkeypatch: pytest.M
     def full(*_: object) -> str:
         raise OSError(28, "No space left on device")
 
+    monkeypatch.setattr(publishing, "_made", MADE)
     monkeypatch.setattr(publishing, "_rendered", full)
     with pytest.raises(OSError, match="No space"):
         publish(site(joined(recording_rows("one", "day1"))), tmp_path)

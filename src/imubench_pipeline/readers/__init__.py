@@ -175,12 +175,18 @@ def only_log(path: Path, present: list[Path]) -> Path:
     RecordingError
         If there is another number of logs.
     """
+    if not present and not path.is_dir():
+        raise RecordingError(
+            f"{path.name}: the archive has no log: it is empty or cut short, or has folders, "
+            "hidden files and names outside of it (../) alone; pack the log again"
+        )
     logs = [file for file in present if file.parent == path] or present
     if 1 < len(logs) <= MOST_LOOKED_INTO and not path.is_dir():
         logs = list(islice(filter(holds_text, logs), 2))  # two are as bad as a thousand
     if len(logs) != 1:
+        kind = "folder" if path.is_dir() else "archive"
         raise RecordingError(
-            f"{path.name}: expected one file, the folder has {_names(path, present)}; name the "
+            f"{path.name}: expected one file, the {kind} has {_names(path, present)}; name the "
             "file of each channel with 'file:' in the sensor file"
         )
     return logs[0]
