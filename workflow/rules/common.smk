@@ -86,7 +86,11 @@ def say_if_idle():
             print(line, file=sys.stderr)
 
 
-if not {"--delete-all-output", "--delete-temp-output"}.isdisjoint(sys.argv):
+if not {
+    "--cleanup-metadata",
+    "--delete-all-output",
+    "--delete-temp-output",
+}.isdisjoint(sys.argv):
     take_lock()
 
 atexit.register(run_lock.release)
