@@ -183,7 +183,7 @@ def line_of(row: Row) -> dict[str, Any]:
         else f"{number_text(100.0 * inside, 3)} ± {percent_text(error, 2)}",
         "consistent": row["consistent"],
         "as_sure": _AS_SURE[row["consistent"]],
-        "of": counted(row["outages"], "outage", "outages") if row["outage"] else "",
+        "of": counted(row["outages"], "outage") if row["outage"] and row["outages"] else "",
     }
 
 

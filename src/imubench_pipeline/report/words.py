@@ -282,4 +282,7 @@ _ISO = re.compile(r"^(\d{4}-\d\d-\d\d)T(\d\d:\d\d(?::\d\d)?)(?:\.0+(?!\d))?")
 def noise_words(rows: Sequence[Row]) -> str:
     """Return by which noise model figures of a recording are weighed, in a sentence."""
     fitted = next((row for row in rows if row["model"]), None)
-    return f"Noise model: {fitted['model']}, from {fitted['model_from']}." if fitted else ""
+    if fitted is None:
+        return ""
+    origin = f", from {fitted['model_from']}" if fitted["model_from"] else ""
+    return f"Noise model: {fitted['model']}{origin}."
