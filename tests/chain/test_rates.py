@@ -203,6 +203,61 @@ def test_random_losses_are_no_change_of_rate(tmp_path: Path, lost: float) -> Non
     assert "rate_changes" not in {found.finding for found in log.findings}
 
 
+@pytest.mark.parametrize(("rate", "step"), [(125.0, 0.01), (1250.0, 0.001), (125.01, 0.01)])
+@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize("round_to", [np.round, np.floor])
+def test_five_samples_in_four_steps_of_the_stamps_are_all_taken(
+    tmp_path: Path, rate: float, step: float, round_to: np.ufunc, stated: bool
+) -> None:
+    times = round_to((NUMBER / rate + 0.037 * step) / step) * step
+    table = table_of({"gyro_z": np.ones(ROWS, bool)}, times)
+    sensor = table.sensor()
+    if stated:
+        sensor["log"]["rate"] = f"{rate} Hz"
+    table.write(tmp_path / "log.csv")
+    log = imu.read_log(tmp_path / "log.csv", sensor)
+    assert log.rates["gyro_z"] == pytest.approx(rate, rel=1e-3)
+    assert len(log["gyro_z"]) == ROWS
+
+
+@pytest.mark.parametrize("lost", [0.6, 0.7, 0.9])
+def test_a_stated_rate_places_the_samples_that_few_are_left_of(tmp_path: Path, lost: float) -> None:
+    chosen = np.random.default_rng(7).random(ROWS) > lost
+    table = table_of({"gyro_z": np.ones(int(chosen.sum()), bool)}, TIMES[chosen])
+    sensor = table.sensor()
+    sensor["log"]["rate"] = "100 Hz"
+    table.write(tmp_path / "log.csv")
+    log = imu.read_log(tmp_path / "log.csv", sensor)
+    assert log.rates["gyro_z"] == pytest.approx(100.0)
+    assert "missing_samples" in {found.finding for found in log.findings}
+
+
+@pytest.mark.parametrize("burst", [32, 100])
+def test_a_stated_rate_says_that_samples_come_in_bursts(tmp_path: Path, burst: int) -> None:
+    times = NUMBER // burst * (burst / 100.0) + 2e-4 * (NUMBER % burst)
+    table = table_of({"gyro_z": np.ones(ROWS, bool)}, times)
+    (missing,) = (f for f in read(tmp_path, table).findings if f.finding == "missing_samples")
+    assert "If the samples came in bursts" in missing.detail
+    sensor = table.sensor()
+    sensor["log"]["rate"] = "100 Hz"
+    assert imu.read_log(tmp_path / "log.csv", sensor).rates["gyro_z"] == pytest.approx(
+        100, rel=0.02
+    )
+
+
+def test_a_clock_that_changes_its_rate_beside_another_is_not_read_at_the_rate_of_both(
+    tmp_path: Path,
+) -> None:
+    accel_times = np.concatenate([np.arange(0, 30, 0.02), 30.0 + np.arange(1050) / 35.0])
+    times = np.union1d(TIMES, accel_times)
+    accel = np.isin(times, accel_times)
+    log = read(tmp_path, table_of({"gyro_z": np.isin(times, TIMES), "accel_z": accel}, times))
+    assert log.rates["gyro_z"] == pytest.approx(100.0)
+    assert log.rates["accel_z"] == pytest.approx(accel.sum() / 60.0, rel=0.01)
+    found = {(f.finding, f.severity, f.channel) for f in log.findings}
+    assert ("jittered_stamps", "warning", "accel_z") in found
+
+
 def test_a_stated_rate_says_that_every_fifth_sample_is_lost(tmp_path: Path) -> None:
     table = table_of({"gyro_z": np.ones(ROWS, bool), "accel_z": NUMBER % 5 != 4})
     as_rounded = read(tmp_path, table)

@@ -192,6 +192,11 @@ def separate_clocks(
     rest = _place(channels, own, clocks, records, leaders)
     if not clocks:
         return [part]
+    if grid is None:  # each in the order of its records
+        clocks += _grouped(
+            {name: records.base(records.bit[name]) for name in rest}, records, settings
+        )
+        rest = []
     if rest:
         clocks.append(_Clock(base or whole(), rest, EVERY))
     for clock in clocks:

@@ -25,6 +25,9 @@ _LONG, _TWO = 1.75, 2.2
 SHARED = 0.2
 """Share of the records that repeat a stamp above which each stamp belongs to a group of samples."""
 
+_MAX_ROUNDED = 1.05 * SHARED
+"""Share of repeated stamps up to which they are tested for being rounded."""
+
 _NEGLIGIBLE = 0.02
 """Share of repeated stamps below which it makes 1 % of N whether they are rounded or copies."""
 
@@ -69,7 +72,7 @@ def typical_interval(stamps: Stamps) -> Interval | None:
             long = (steps > _LONG * medians[-1]) & (steps < _TWO * medians[-1])
             rounded.append(_are_regular(long))
             zero = np.diff(block[:_ENOUGH]) == 0.0
-            repeated.append(_NEGLIGIBLE <= np.mean(zero) <= SHARED and _are_regular(zero))
+            repeated.append(_NEGLIGIBLE <= np.mean(zero) <= _MAX_ROUNDED and _are_regular(zero))
     if not medians:
         return None
     median = float(np.median(medians))

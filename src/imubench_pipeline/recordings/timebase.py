@@ -41,6 +41,9 @@ _MOST_HOLES, _MOST_POINTS = 100, 10_000_000
 MIN_MISSING = 0.01
 """Share of missing samples from which it is tested whether the sampling rate changed."""
 
+_COMPLETE = 0.05
+"""Difference of stated and mean rate up to which no sample is missing; a last burst may be cut."""
+
 _WINDOW, _MIN_REGULAR, _MIN_STRETCH = 32, 0.9, 0.05
 """Samples of a window, share of them at one distance, and share of such windows, from which a part
 of a log has a lower rate."""
@@ -145,12 +148,19 @@ def from_stamps(
         )
     # Many holes that are together longer than the log are pauses of the host, not losses.
     bursts = known is None and track.grid > 2 * track.rows and track.holes > 0.05 * track.rows
+    mean = _span(stamps) / max(track.rows - 1, 1)
+    complete = stated is not None and abs(mean * stated - 1.0) <= _COMPLETE
+    bursts |= complete and known is None and track.grid > 2 * track.rows
     shared = track.duplicates > SHARED * track.rows
     if typical.has_repeats and interval == typical.mean:
         base = _arrival_order(stamps, track, stated, settings)
         coarse = [] if stated else [_coarse(base.rate, 1.0 / (typical.other or interval))]
         return replace(base, findings=(*base.findings, *coarse))
     if track.off_grid > settings.jitter * track.rows or bursts or shared:
+        if stated and known is None and not complete:  # many samples may be missing
+            of_stated = from_stamps(stamps, stated, settings, known=1.0 / stated)
+            if of_stated.stamped and _is(stated, 1.0 / of_stated.rate, settings):
+                return of_stated
         return _arrival_order(stamps, track, stated, settings)
     _check_segments(len(track.starts))
     exact = track.mean_interval or interval
@@ -285,6 +295,13 @@ def _grid_findings(track: Track, interval: float) -> list[Finding]:
             f"{missing} of {track.grid} samples are missing ({track.holes} holes, the longest "
             f"{end - begin:.3g} s, from {begin:.5g} s on); they are left out of the clusters"
         )
+        if missing > 0.5 * track.grid:
+            share = (track.rows - track.duplicates) / track.grid
+            detail += (
+                f". If the samples came in bursts, and none is missing, the rate is "
+                f"{share / interval:.4g} Hz and N is {1.0 / math.sqrt(share):.2g} times as large: "
+                "state 'rate' in the sensor file"
+            )
         findings.append(Finding("missing_samples", severity, detail, missing, start=begin, end=end))
     if len(track.starts) > 1:
         times = [point * interval for point in track.starts[1:]]
