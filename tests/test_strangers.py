@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -16,12 +18,14 @@ import yaml
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.readers.arrays import file as arrays
 from imubench_pipeline.readers.arrays import hdf5
-from imubench_pipeline.recordings.drop_zone import found_logs
+from imubench_pipeline.recordings.drop_zone import account_for, found_logs
+from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.run.checking import check
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.tables import write
 from tests.workflow.project import put_log, put_sensor
 
 STAMPED = {
@@ -81,6 +85,36 @@ def test_a_file_of_no_text_for_a_name_is_rejected(tmp_path: Path) -> None:
     Path(f"{folder}/a\udcff.csv").write_text("1\n")
     (log,) = found_logs(tmp_path / "logs")
     assert log.error is not None and "a\\udcff.csv" in log.error
+
+
+@pytest.mark.parametrize("target", [".", "..", "../.."])
+def test_a_link_to_a_folder_that_it_lies_in_is_one_rejected_file(
+    tmp_path: Path, target: str
+) -> None:
+    logs = tmp_path / "logs"
+    for path in ("s/a.csv", "s/run/b.csv"):
+        put_log(logs / path, 1, samples=10)
+    (logs / "s/loop").symlink_to(target)
+    found = {log.name: log for log in found_logs(logs)}
+    assert found.keys() == {"a", "run", "loop"}
+    assert "links to a folder that it lies in" in (found["loop"].error or "")
+    files = {file.file: file.recording for file in account_for(logs, found.values())}
+    assert files == {"s/a.csv": "a", "s/run/b.csv": "run", "s/loop": "loop"}
+
+
+def test_odd_files_are_not_taken_for_changed(tmp_path: Path) -> None:
+    logs, results = tmp_path / "logs", tmp_path / "results"
+    for name in ("tab\t.csv", "line\nend.csv", "a.csv"):
+        put_log(logs / "s" / name, 1, samples=10)
+    os.mkfifo(logs / "s/pipe.csv")
+    (logs / "s/loop").symlink_to(".")
+    found = account_for(logs, found_logs(logs))
+    rows = [{"file": file.file, "status": "rejected"} for file in found]
+    write("files", rows, results / "tables/files.parquet")
+    (results / "report").mkdir()
+    told = {"results": str(results), "logs": str(logs)}
+    (results / "report/settings.json").write_text(json.dumps(told))
+    assert drop_zone_lines(results) == ["5 files in the drop zone = 5 rejected"]
 
 
 def test_two_logs_of_one_name_are_both_rejected_and_no_other(tmp_path: Path) -> None:

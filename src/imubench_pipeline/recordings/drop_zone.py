@@ -11,6 +11,7 @@ from pathlib import Path
 
 from imubench_pipeline.readers import is_endless, log_files
 from imubench_pipeline.settings.validation import cut
+from imubench_pipeline.tables.texts import printable
 
 PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
 """How the names of files end that are still being transferred."""
@@ -55,8 +56,9 @@ class Recording:
     @property
     def files(self) -> list[Path]:
         """The files of its log and its notes as they are now; the folder if it cannot be listed."""
+        alone = self.simulated or _holds_itself(self.path)
         try:
-            logs = [self.path] if self.simulated else log_files(self.path)
+            logs = [self.path] if alone else log_files(self.path)
         except OSError:  # the ingest meets it again, and says so
             logs = [self.path]
         return logs + ([self.notes] if self.notes else [])
@@ -124,7 +126,7 @@ def account_for(
     waiting = {file for recording in held_back for file in recording.files}
     found = []
     for file in sorted(_every_file(logs)) if logs.is_dir() else ():
-        place = os.fsencode(file.relative_to(logs)).decode(errors="backslashreplace")
+        place = printable(os.fsencode(file.relative_to(logs)).decode(errors="backslashreplace"))
         if owner := owners.get(file):
             found.append(FoundFile(place, owner.sensor, owner.name))
         elif file in waiting:
@@ -147,7 +149,8 @@ def _every_file(folder: Path) -> Iterator[Path]:
             with os.scandir(inside) as entries:
                 for entry in entries:
                     path = Path(entry.path)
-                    if entry.is_dir(follow_symlinks=level < _FOLLOWED):
+                    followed = level < _FOLLOWED and not _holds_itself(path)
+                    if entry.is_dir(follow_symlinks=followed):
                         waiting.append((path, level + 1))
                     else:
                         yield path
@@ -217,6 +220,16 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
         yield _found(sensor, path, name, fault, notes)
 
 
+def _holds_itself(path: Path) -> bool:
+    """Return whether a path is a link to a folder that it lies in."""
+    if not path.is_symlink():
+        return False
+    try:
+        return path.parent.resolve().is_relative_to(path.resolve())
+    except (OSError, RuntimeError):  # links in a circle
+        return False
+
+
 def _is_dangling(path: Path) -> bool:
     """Return whether a path is a link whose target is missing, for example with a mount."""
     if not path.is_symlink():
@@ -277,6 +290,8 @@ def _fault(path: Path, name: str) -> str | None:
                 f"it, and no end that repeats itself: rename the {what}"
             )
     try:
+        if _holds_itself(path):
+            return f"{shown} links to a folder that it lies in; expected a log: remove the link"
         if is_endless(path):
             return f"{shown} is neither a file nor a folder; expected a log"
         files = log_files(path)

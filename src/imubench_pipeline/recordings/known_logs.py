@@ -243,7 +243,7 @@ def is_changed(source: Path, folder: Path) -> bool:
     try:
         places = _places(source)
     except OSError:
-        return True
+        return known is not None
     return known is not None and (
         known.keys() != places.keys()
         or any(_is_another(path, known[name]) for name, path in places.items())

@@ -30,6 +30,7 @@ from imubench_pipeline.run.kernels import compile_once
 from imubench_pipeline.run.processes import BEGUN, DONE, FAILED, KILLED, LENGTH, Job
 from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import describe_error
+from imubench_pipeline.tables.findings import UnavailableError
 
 _LONGEST = 300
 """Letters of an error in one line."""
@@ -131,7 +132,8 @@ def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
             sys.stderr.flush()
         how = DONE
     except BaseException as error:
-        details["trace"] = _trace(error, str(job.script))
+        if not isinstance(error, UnavailableError):  # of the surroundings: its text says it all
+            details["trace"] = _trace(error, str(job.script))
         details["error"] = one_line(describe_error(error), _LONGEST)
         if isinstance(error, MemoryError):
             details["error"] += f"; limits.memory allows {(job.memory or 0) // 10**6} MB"
