@@ -93,9 +93,9 @@ def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
         told = [row for row in last if row["position_ratio"] is not None]
         if not told:
             continue
-        worse = [row for row in told if row["position_ratio_lower"] > _MATTERS]
-        no_worse = [row for row in told if row["position_ratio_upper"] < _MATTERS]
-        sure = [row for row in no_worse if row["position_ratio_lower"] > 1.0 / _MATTERS]
+        worse = [row for row in told if _limits(row)[0] > _MATTERS]
+        no_worse = [row for row in told if _limits(row)[1] < _MATTERS]
+        sure = [row for row in no_worse if _limits(row)[0] > 1.0 / _MATTERS]
         no_worse = [row for row in no_worse if row not in sure]
         open_ones = [row for row in told if row not in worse + sure + no_worse]
         smallest = next((row for row in own if row["smallest"]), None)
@@ -110,6 +110,12 @@ def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             else f"{TUNINGS[smallest['tuning']]}, {smallest['states']} states",
             "dishonest": _dishonest(own),
         }
+
+
+def _limits(row: Row) -> tuple[float, float]:
+    """Return the limits of the ratio of positions; of one that is not known, the widest."""
+    lower, upper = row["position_ratio_lower"], row["position_ratio_upper"]
+    return 0.0 if lower is None else lower, math.inf if upper is None else upper
 
 
 def _matters(

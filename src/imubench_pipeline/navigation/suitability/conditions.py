@@ -164,7 +164,7 @@ def parts_of(total: float, sources: Iterable[Row], least: float = 0.01) -> str |
     """
     if total <= 0.0:
         return None
-    shares = ((row, (row["sigma"] / total) ** 2) for row in sources)
+    shares = ((row, (row["sigma"] / total) ** 2) for row in sources if row["sigma"] is not None)
     shown = sorted((pair for pair in shares if pair[1] >= least), key=lambda pair: -pair[1])
     return "; ".join(f"{named(row)} {100 * share:.0f} %" for row, share in shown) or None
 
