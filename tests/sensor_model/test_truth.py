@@ -9,6 +9,7 @@ from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.settings.simulated_sensor import AxisSettings
 from imubench_pipeline.simulate.models import TrueFigure, axis_model, figures_of
 from imubench_pipeline.simulate.simulation import simulate
+from tests.conftest import few
 
 DEGREE = math.pi / 180
 AXIS: dict[str, Any] = {
@@ -130,11 +131,11 @@ def test_lines_are_numbered_on_their_own_by_their_frequency() -> None:
 
 @pytest.mark.parametrize(
     "settings",
-    [
-        {"B": "900 deg/h", "T_B": "200 s", "further": [{"B": "300 deg/h", "T_B": "3 s"}]},
-        {"sinusoids": [{"amplitude": "0.02 deg/s", "frequency": "3 Hz"},
-                       {"amplitude": "0.05 deg/s", "frequency": "1 Hz"}]},
-    ],
+    few(
+        [{"sinusoids": [{"amplitude": "0.02 deg/s", "frequency": "3 Hz"},
+                        {"amplitude": "0.05 deg/s", "frequency": "1 Hz"}]}],
+        [{"B": "900 deg/h", "T_B": "200 s", "further": [{"B": "300 deg/h", "T_B": "3 s"}]}],
+    ),
 )  # fmt: skip
 def test_components_are_numbered_as_those_of_an_estimate(settings: dict[str, Any]) -> None:
     axis = AxisSettings.model_validate({"N": "0.3 deg/sqrt(h)"} | settings)
