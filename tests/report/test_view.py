@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.report.view import ChannelView, RecordingView, recording_views
 from imubench_pipeline.tables import build, read, write_arrow
-from imubench_pipeline.tables.schemas import TABLES
+from imubench_pipeline.tables.schemas import ROWS, TABLES
 from tests.conftest import few
 from tests.report.tables import (
     MODEL,
@@ -67,7 +68,9 @@ def test_rows_go_to_their_recording_and_channel_whatever_their_order(seed: int) 
                 if (row["sensor"], row["recording"]) == (view.sensor, view.name)
             ]
             key = repr
-            assert sorted(map(key, view.rows(table))) == sorted(map(key, whole)), table
+            assert sorted(map(key, map(dict, view.rows(ROWS[table])))) == sorted(map(key, whole)), (
+                table
+            )
         for channel in view.channels():
             assert (channel.sensor, channel.recording) == (view.sensor, view.name)
             values = {
@@ -136,7 +139,7 @@ def test_errors_of_requirements_are_not_part_of_the_budget_of_a_recording() -> N
         "limits": [{"error": "heading", "after": "100 s", "at_most": "1 deg"}],
     }
     (view,) = recording_views(joined(recording_rows(requirements={"robot": robot})))
-    assert {row["requirement"] for row in view.rows("error_budget")} == {None, "robot"}
+    assert {row.requirement for row in view.rows(ErrorBudgetRow)} == {None, "robot"}
     assert {row["time"] for row in view.budget} == {60.0}
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.model.experiments import AlignmentRow
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.practical import degrees_text, duration_text, number_text, page_unit
 from imubench_pipeline.report.site import Site
@@ -24,7 +25,7 @@ def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
     """Return what is said of each sensor with gyros and accelerometers; arrays take its figures."""
     entries = []
     for view in site.views:
-        rows = view.rows("alignment")
+        rows = view.rows(AlignmentRow)
         if rows:
             about = rows[0]
             unit, fine = page_unit("gyro", "adev", site.system), page_unit("accel", "adev", "si")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.report.practical import (
     System,
     degrees_text,
@@ -180,7 +181,7 @@ def _direction(row: Row) -> str:
 
 def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
     """Return what the page of a static recording says of its bias; None without a direction."""
-    rows = [row for row in view.rows("calibration") if row["run"] == "at_rest"]
+    rows = [row for row in view.rows(CalibrationRow) if row["run"] == "at_rest"]
     if not rows:
         return None
     return {
@@ -197,7 +198,7 @@ def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
     """Return the lines of the page that has all calibrated recordings, by kind of run."""
     by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
     for view in site.calibrated:
-        rows = view.rows("calibration")
+        rows = view.rows(CalibrationRow)
         if not rows:
             continue
         if rows[0]["run"] == "positions":

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
+from imubench_pipeline.model.comparisons import DatasheetRow
 from imubench_pipeline.report.practical import (
     NO_VALUE,
     PageUnit,
@@ -117,7 +118,7 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
         recommended = view.recommended()
         own = [
             row
-            for row in view.rows("datasheet")
+            for row in view.rows(DatasheetRow)
             if row["method"] in (recommended[row["channel"]], *_BESIDE) and row["delta"] is not None
         ]
         for key, rows in _by_figure(own, "channel", *_FIGURE).items():

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import duration_text, number_text
@@ -109,7 +110,7 @@ def matrix(site: Site) -> dict[str, Any] | None:
     """Return the matrix of a report; None where nothing is asked of its sensors."""
     requirements = site.settings["requirements"]
     rows = {
-        (row["requirement"], row["sensor"]): row for row in site.rows("ranking") if row["decides"]
+        (row["requirement"], row["sensor"]): row for row in site.rows(RankingRow) if row["decides"]
     }
     if not rows:
         return None

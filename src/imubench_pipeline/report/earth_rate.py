@@ -6,6 +6,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.model.experiments import (
+    EarthRatePredictionRow,
+    EarthRatePublishedRow,
+    EarthRateRow,
+)
 from imubench_pipeline.report.alignment import alignments
 from imubench_pipeline.report.calibration import of_all
 from imubench_pipeline.report.payload import Arrays
@@ -32,14 +37,14 @@ def _context(site: Site) -> dict[str, Any]:
     published = [
         {**line, "view": view}
         for view in site.turned
-        for line in published_lines(view.rows("earth_rate_published"))
+        for line in published_lines(view.rows(EarthRatePublishedRow))
     ]
     predicted = list(_predicted(site))
     aligned = alignments(site, arrays)
     return {
         "truth": EARTH_RATE,
         "runs": runs,
-        "given": given_words([row for view in site.turned for row in view.rows("earth_rate")]),
+        "given": given_words([row for view in site.turned for row in view.rows(EarthRateRow)]),
         "rejected": [view for view in site.turned if view.left_out],
         "published": published,
         "verdict": published_words(published),
@@ -75,7 +80,7 @@ EARTH_RATE_PAGE = Entry(
 
 
 def _run(site: Site, view: RecordingView) -> dict[str, Any]:
-    rows = view.rows("earth_rate")
+    rows = view.rows(EarthRateRow)
     whole = [row for row in rows if row["part"] == "whole"]
     shown = [line(row) for row in rows if row["method"] in ESTIMATES]
     return {
@@ -96,7 +101,7 @@ def _predicted(site: Site) -> Iterator[dict[str, Any]]:
     """Yield what each sensor would need, once where several recordings say the same."""
     yielded: list[tuple[str, Any]] = []
     for view in [*site.turned, *site.predicted]:
-        rows = view.rows("earth_rate_prediction")
+        rows = view.rows(EarthRatePredictionRow)
         needed = needs(rows)
         if needed is None or (view.sensor, needed) in yielded:
             continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.report.decisions import unranked, word_of
 from imubench_pipeline.report.meaning import error_of_recording, limit_words, rankings
 from imubench_pipeline.report.plurals import counted
@@ -22,7 +23,7 @@ def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[
 
     A requirement by which the sensor is not judged is there, too. ``own``: its recordings.
     """
-    rows = site.rows("ranking")
+    rows = site.rows(RankingRow)
     own_rows = [row for row in rows if row["sensor"] == sensor]
     totals = {view.name: list(_totals(view)) for view in own if view.static}
     simulated = {view.full_name: view.simulated for view in own}
@@ -82,7 +83,7 @@ def _window(requirement: Requirement) -> str:
 
 
 def _totals(view: RecordingView) -> Iterator[Row]:
-    for row in view.rows("error_budget"):
+    for row in view.rows(ErrorBudgetRow):
         if row["requirement"] is not None and row["source"] == "total":
             yield row
 

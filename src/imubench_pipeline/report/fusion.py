@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from imubench_pipeline.model.comparisons import FusionRow, GradeRow
 from imubench_pipeline.report.practical import number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES
@@ -15,7 +16,7 @@ _PARAMETERS = {"N": "white noise", "B": "bias instability", "K": "random walk", 
 
 
 def _context(site: Site) -> dict[str, Any]:
-    lines = list(equal_numbers(site.rows("fusion")))
+    lines = list(equal_numbers(site.rows(FusionRow)))
     price_classes = {
         name: site.settings["sensors"].get(name, {}).get("price_class") for name in site.sensors
     }
@@ -28,8 +29,8 @@ def _context(site: Site) -> dict[str, Any]:
     return {
         "lines": lines,
         "matrices": list(matrices(lines)),
-        "grades": list(grade_lines(site.rows("grades"))),
-        "unprinted": unprinted_grades(site.rows("grades")),
+        "grades": list(grade_lines(site.rows(GradeRow))),
+        "unprinted": unprinted_grades(site.rows(GradeRow)),
         "filters": filters,
         "shared": shared_words(site.settings["settings"]["fusion"]["common"]),
         "price_classes": price_classes,

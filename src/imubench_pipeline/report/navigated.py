@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import NO_VALUE, number_text, percent_text
@@ -42,7 +43,7 @@ _MATTERS = 1.1
 
 
 def _context(site: Site) -> dict[str, Any]:
-    rows = site.rows("navigation")
+    rows = site.rows(NavigationRow)
     shown = [row for row in rows if row["position"] is not None]
     recordings = [view.row for view in site.views]
     apart = left_out(recordings)

@@ -14,6 +14,7 @@ from imubench_pipeline.experiments.papers.about import (
     Drawn,
     Verdict,
 )
+from imubench_pipeline.model.published import AccuracyRow, PublishedRow
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.practical import limit_digits, number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
@@ -23,7 +24,7 @@ from imubench_pipeline.typing import Row
 
 def _context(site: Site) -> dict[str, Any]:
     there = _pages(site)
-    rows = site.rows("published")
+    rows = site.rows(PublishedRow)
     arrays = Arrays()
     drawn = _drawn(site)
     payloads = [channel_payload(channel, channel.rate, arrays) for _, _, channel in drawn]
@@ -31,7 +32,7 @@ def _context(site: Site) -> dict[str, Any]:
     return {
         "bases": BASES,
         "verdicts": VERDICTS,
-        "panel": _panel(site.rows("accuracy")),
+        "panel": _panel(site.rows(AccuracyRow)),
         "papers": [
             _paper(paper, own, there)
             | {"figures": [figure for figure in drawn if figure[0] in paper.drawn]}
@@ -55,7 +56,7 @@ PAPERS_PAGE = Entry(
     context=_context,
     tables=("published", "accuracy"),
     views=_views,
-    exists=lambda site: bool(site.rows("published")),
+    exists=lambda site: bool(site.rows(PublishedRow)),
 )
 """The page of every table, figure and equation of the papers of which the run has logs."""
 

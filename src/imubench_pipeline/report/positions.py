@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.report.calibration import attitude_lines
 from imubench_pipeline.report.recording import about_of, summary_words
 from imubench_pipeline.report.site import Site
@@ -14,7 +15,7 @@ from imubench_pipeline.report.words import noise_words
 
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     """Return what the template needs; ``folder`` is the recording's."""
-    rows = view.rows("calibration")
+    rows = view.rows(CalibrationRow)
     number = rows[0]["rates"] if rows else None
     return {
         **about_of(site, view, [], folder),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.model.experiments import CalibrationPointRow, CalibrationRow
 from imubench_pipeline.report.calibration import (
     answer,
     earth_words,
@@ -26,8 +27,8 @@ from imubench_pipeline.typing import Row
 
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     """Return what the template needs; ``folder`` is the recording's."""
-    rows = view.rows("calibration")
-    points = view.rows("calibration_points")
+    rows = view.rows(CalibrationRow)
+    points = view.rows(CalibrationPointRow)
     return {
         **about_of(site, view, [], folder),
         "summary": _summary(view, points),

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.model.estimates import BacktestRow
+from imubench_pipeline.model.published import CoverageRow
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import log_paths, read_metadata
 from imubench_pipeline.report import compared_samples, thermal
@@ -57,7 +59,7 @@ def recording_key(site: Site, view: RecordingView, folder: Path) -> str:
     shown = ("envelope", "histogram", "samples_of_models")
     samples = [folder / f"{table}.parquet" for table in shown]
     own = [path.read_bytes() for path in samples if path.is_file()]
-    published = [row for row in site.rows("coverage") if row["sensor"] == view.sensor]
+    published = [row for row in site.rows(CoverageRow) if row["sensor"] == view.sensor]
     look = site.looks.get(view.sensor)
     return site.key_of(view.key, view.device_page, look, published, metadata_of(folder), *own)
 
@@ -93,7 +95,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "at_rest": at_rest(view, site.system),
         "budget": budgets[0] if budgets else None,
         "backtest": backtest_lines(
-            view.rows("backtest"), site.settings["requirements"], site.system
+            view.rows(BacktestRow), site.settings["requirements"], site.system
         ),
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
         "command": site.again(view, "scores"),

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from urllib.parse import quote
 
 from imubench_pipeline.experiments.papers.about import PAPERS
+from imubench_pipeline.model.published import PublishedRow
 from imubench_pipeline.report.glossary import glossary, term
 from imubench_pipeline.report.site import Site
 
@@ -40,7 +41,7 @@ def _entries(site: Site) -> Iterator[Found]:
     for entry in glossary().values():
         yield "term", entry.name, f"theory.html#{entry.section}", entry.short
     sections = {paper.name: paper.key for paper in PAPERS}
-    for row in site.rows("published"):
+    for row in site.rows(PublishedRow):
         title = f"{row['place']}: {row['quantity']}"
         words = f"{row['paper']} {row['printed_as']} {row['verdict']}"
         yield "paper", title, f"papers.html#{sections[row['paper']]}", words

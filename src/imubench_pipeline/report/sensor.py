@@ -7,6 +7,8 @@ from dataclasses import asdict
 from typing import Any
 from urllib.parse import urlencode
 
+from imubench_pipeline.model.comparisons import DriftRow, PooledRow, RankingRow, RepeatabilityRow
+from imubench_pipeline.model.published import CoverageRow
 from imubench_pipeline.navigation.drift import LEVEL
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
@@ -31,10 +33,10 @@ def sensor_page(site: Site, sensor: str) -> Page:
     key = site.key_of(
         *(view.key for view in own),
         *(view.device_page for view in own),
-        [row for row in site.rows("pooled") if row["sensor"] == sensor],
-        [row for row in site.rows("repeatability") if row["sensor"] == sensor],
-        [row for row in site.rows("ranking") if row["decides"] or row["sensor"] == sensor],
-        [row for row in site.rows("coverage") if row["sensor"] == sensor],
+        [row for row in site.rows(PooledRow) if row["sensor"] == sensor],
+        [row for row in site.rows(RepeatabilityRow) if row["sensor"] == sensor],
+        [row for row in site.rows(RankingRow) if row["decides"] or row["sensor"] == sensor],
+        [row for row in site.rows(CoverageRow) if row["sensor"] == sensor],
         site.looks[sensor],
     )
     return Page(
@@ -44,7 +46,7 @@ def sensor_page(site: Site, sensor: str) -> Page:
 
 def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, Any]:
     together = Comparison(site.compared(own), site.names)
-    pooled = [_pooled(row) for row in site.rows("pooled") if row["sensor"] == sensor]
+    pooled = [_pooled(row) for row in site.rows(PooledRow) if row["sensor"] == sensor]
     shown = own if len(own) <= _MANY else []
     simulated = {view.full_name: view.simulated for view in own}
     budget = [row for view in shown for row in view.budget]
@@ -66,7 +68,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
         "too_many": len(own) > _MANY,
         "deltas": list(_deltas(site, shown)),
-        "repeated": list(repeatability_lines(site.rows("repeatability"), sensor, site.system)),
+        "repeated": list(repeatability_lines(site.rows(RepeatabilityRow), sensor, site.system)),
         "page": {
             "grouped": "recording",
             "recordings": [view.name for view in own],
@@ -114,7 +116,7 @@ def _pooled(row: Row) -> Row:
 def device_page(site: Site, page: str) -> Page:
     """Return the page of a device: its recordings over time."""
     own = [view for view in site.views if view.device_page == page]
-    rows = [row for row in site.rows("drift") if site.device_page_of(row) == page]
+    rows = [row for row in site.rows(DriftRow) if site.device_page_of(row) == page]
     key = site.key_of(*(view.key for view in own), rows)
     return Page(page, "device.html.jinja", key, lambda: _device(site, own, rows))
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from imubench_pipeline.model.comparisons import ShortlistRow
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.typing import Row
 
 
 def _context(site: Site) -> dict[str, Any]:
-    rows = site.rows("shortlist")
+    rows = site.rows(ShortlistRow)
     asked = site.settings["requirements"]
     return {
         "boards": [

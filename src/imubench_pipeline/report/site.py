@@ -15,6 +15,10 @@ from typing import Any
 
 import pyarrow as pa
 
+from imubench_pipeline.model.comparisons import DriftRow, NavigationRow
+from imubench_pipeline.model.experiments import CalibrationRow, EarthRatePredictionRow
+from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.model.table import OfRecordingRow, R
 from imubench_pipeline.report.comparison import ComparedRecording, compared_recording
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, first_choices, units_of_pages
@@ -63,7 +67,7 @@ class Entry:
 
     def page(self, site: Site) -> Page:
         """Return the page of a report."""
-        shown = (site.rows(table) for table in self.tables)
+        shown = (site.tables[table].to_pylist() for table in self.tables)
         kept = (path.read_bytes() for path in self.files(site) if path.is_file())
         key = site.key_of([view.key for view in self.views(site)], *shown, *kept)
         return Page(self.file, f"{self.file}.jinja", key, lambda: self.context(site))
@@ -79,7 +83,7 @@ class Site:
     entries: Sequence[Entry]  # the pages that there is one of, in the order of the navigation
     code: str = ""  # digest of the code that makes the pages
     failed: dict[str, str] = field(default_factory=dict)  # pages that could not be made, and why
-    _rows: dict[str, list[Row]] = field(default_factory=dict, init=False)
+    _rows: dict[str, list[Any]] = field(default_factory=dict, init=False)
     _compared: dict[Name, ComparedRecording] = field(default_factory=dict, init=False)
 
     @property
@@ -145,12 +149,12 @@ class Site:
     @cached_property
     def navigated(self) -> bool:
         """Whether filters were tuned for a sensor."""
-        return bool(self.rows("navigation"))
+        return bool(self.rows(NavigationRow))
 
     @cached_property
     def calibrated(self) -> list[RecordingView]:
         """The recordings on a rate table, in positions, or at rest with a direction."""
-        named = self._named_in("calibration")
+        named = self._named_in(CalibrationRow)
         return [
             view
             for view in self.views
@@ -160,11 +164,11 @@ class Site:
     @cached_property
     def predicted(self) -> list[RecordingView]:
         """The recordings at rest by whose noise it is predicted what their sensor could find."""
-        named = self._named_in("earth_rate_prediction")
+        named = self._named_in(EarthRatePredictionRow)
         return [view for view in self.views if view.static and view.full_name in named]
 
-    def _named_in(self, table: str) -> set[Name]:
-        return {(row["sensor"], row["recording"]) for row in self.rows(table)}
+    def _named_in(self, of: type[OfRecordingRow]) -> set[Name]:
+        return {(row.sensor, row.recording) for row in self.rows(of)}
 
     def device_page_of(self, row: Row) -> str | None:
         """Return the page of the device of a row that names a recording."""
@@ -209,22 +213,22 @@ class Site:
         """Return the page of a sensor."""
         return f"sensors/{sensor}.html"
 
-    def rows(self, table: str) -> list[Row]:
-        """Return the rows of a joined table."""
-        if table not in self._rows:
-            self._rows[table] = self.tables[table].to_pylist()
-        return self._rows[table]
+    def rows(self, of: type[R]) -> list[R]:
+        """Return the rows of a joined table, by their class."""
+        if of.table not in self._rows:
+            self._rows[of.table] = of.rows_of(self.tables[of.table])
+        return self._rows[of.table]
 
     @cached_property
     def coverage(self) -> dict[tuple[str, str, str], str]:
         """Whether sensor, quantity and figure are published."""
-        rows = self.rows("coverage")
+        rows = self.rows(CoverageRow)
         return {(row["sensor"], row["quantity"], row["figure"]): row["published"] for row in rows}
 
     def changed_devices(self) -> list[dict[str, Any]]:
         """Return the recordings that show a change of their device, with what has changed."""
         devices: dict[tuple[str, str], dict[str, Any]] = {}
-        for row in self.rows("drift"):
+        for row in self.rows(DriftRow):
             if row["verdict"] != "changed":
                 continue
             device = devices.setdefault(

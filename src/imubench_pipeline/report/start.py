@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
+from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
+from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.model.recordings import FailureRow, FileRow
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
 from imubench_pipeline.report.decisions import matrix, strip
@@ -41,7 +45,7 @@ def _start(site: Site) -> dict[str, Any]:
         "rejected": [
             {"view": view, "reason": folded(view.row["reason"])} for view in views if view.rejected
         ],
-        "skipped": [row for row in site.rows("files") if row["status"] == "skipped"],
+        "skipped": [row for row in site.rows(FileRow) if row["status"] == "skipped"],
         "warned": [
             {
                 "view": view,
@@ -51,8 +55,8 @@ def _start(site: Site) -> dict[str, Any]:
             for view in warned
         ],
         "in_doubt": _in_doubt(site, warned),
-        "not_found": list(_without_result(site.turned, "earth_rate")),
-        "not_calibrated": list(_without_result(site.calibrated, "calibration")),
+        "not_found": list(_without_result(site.turned, EarthRateRow)),
+        "not_calibrated": list(_without_result(site.calibrated, CalibrationRow)),
         "changed": site.changed_devices(),
         "rankings": ranked,
         "next_steps": list(_next_steps(site)),
@@ -84,16 +88,18 @@ def _in_doubt(site: Site, warned: Sequence[RecordingView]) -> str:
 def _failures(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the steps that failed, with the recording that is left out for it."""
     views = {view.full_name: view for view in site.views}
-    for row in site.rows("failures"):
+    for row in site.rows(FailureRow):
         yield {**row, "view": views.get((row["sensor"], row["recording"]))}
 
 
-def _without_result(views: Sequence[RecordingView], table: str) -> Iterator[dict[str, Any]]:
+def _without_result(
+    views: Sequence[RecordingView], of: type[EarthRateRow] | type[CalibrationRow]
+) -> Iterator[dict[str, Any]]:
     """Yield the recordings of an experiment of which nothing could be estimated, and why."""
     for view in views:
-        rows = view.rows(table)
-        if rows and all(row["value"] is None for row in rows):
-            yield {"view": view, "reason": sentence(rows[0]["reason"])}
+        rows = view.rows(of)
+        if rows and all(row.value is None for row in rows):
+            yield {"view": view, "reason": sentence(rows[0].reason)}
 
 
 def summary(views: Sequence[RecordingView], several: bool = True) -> str:
@@ -160,7 +166,7 @@ def _grouped(rows: Sequence[Row]) -> list[tuple[str, str]]:
 
 def _rankings(site: Site) -> Iterator[dict[str, Any]]:
     simulated = {view.full_name: view.simulated for view in site.views}
-    rows = site.rows("ranking")
+    rows = site.rows(RankingRow)
     for ranking in rankings(rows, site.settings["requirements"], simulated, site.system):
         decisive = {
             row["sensor"]: row
@@ -189,7 +195,7 @@ def _next_steps(site: Site) -> Iterator[dict[str, Any]]:
     titles = {
         name: requirement["title"] for name, requirement in site.settings["requirements"].items()
     }
-    for row in site.rows("next_steps")[:_STEPS]:
+    for row in site.rows(NextStepRow)[:_STEPS]:
         about = "; ".join(titles[name] for name in listed_names(row["requirements"], titles))
         own = [
             view.simulated
@@ -259,7 +265,7 @@ def _datasheets(site: Site) -> dict[str, Any]:
         "figure": list(dict.fromkeys(line["quantity"] for line in lines)),
         "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
     }
-    coverage = list(coverage_tables(site.rows("coverage")))
+    coverage = list(coverage_tables(site.rows(CoverageRow)))
     return {"lines": lines, "filters": filters, "coverage": coverage}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from imubench_pipeline.model.published import AccuracyRow
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
@@ -17,7 +18,7 @@ def _context(site: Site) -> dict[str, Any]:
     return {
         "figure": figure_text(theory_figure(site.system)),
         "terms": glossary(),
-        "reading": words_of_reading(site.rows("accuracy")),
+        "reading": words_of_reading(site.rows(AccuracyRow)),
     }
 
 

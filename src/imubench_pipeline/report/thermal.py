@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import SENSOR
+from imubench_pipeline.model.estimates import LowPassRow, ParameterRow, TemperatureRow
 from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import sentence
@@ -23,6 +24,8 @@ _TRUTHS = {"bias": None}
 _SWITCHED = {"sensitivity": "sensitivity", "quadratic": "quadratic", "bias": "signal", SENSOR: "N"}
 """Unit of the page of what is shown in the units that the reader chooses."""
 
+_Figure = TemperatureRow | LowPassRow | ParameterRow
+
 _FIXED = {"lag": "s", "cutoff": "Hz"}
 _AT = np.array([100.0, 300.0, 1_000.0, 3_000.0, 10_000.0, 30_000.0])
 _AS_IT_COMES = (
@@ -37,15 +40,15 @@ _SEEN = 1.05
 def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table: temperature's, where its effect was sought; the low-pass's."""
     estimated = channel.parameters.get("likelihood", ())
-    before = {row["parameter"]: row for row in estimated if row["parameter"] == SENSOR}
-    low_pass = channel.low_pass | before
-    entries = (
+    before = {row.parameter: row for row in estimated if row.parameter == SENSOR}
+    low_pass: Mapping[str, _Figure] = {**channel.low_pass, **before}
+    entries: tuple[tuple[Mapping[str, _Figure], str, str, str], ...] = (
         *((channel.temperature, *names) for names in _TEMPERATURE),
         *((low_pass, *names) for names in _LOW_PASS),
     )
     for rows, name, term, words in entries:
         row = rows.get(name)
-        if row is None or row["status"] == "absent":
+        if row is None or row.status == "absent":
             continue
         truth = channel.truth.get(_TRUTHS.get(name, name) or "")
         yield {
@@ -53,13 +56,13 @@ def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
             "words": words,
             "unit": f"{channel.quantity}.{_SWITCHED[name]}" if name in _SWITCHED else None,
             "sign": _FIXED.get(name),
-            "value": row["value"],
-            "lower": row["lower"],
-            "upper": row["upper"],
-            "digits": limit_digits(row["lower"], row["upper"], 4),
-            "status": "" if row["status"] == "ok" else row["status"],
-            "truth": truth["value"] if truth else None,
-            "why": sentence(row["reason"]),
+            "value": row.value,
+            "lower": row.lower,
+            "upper": row.upper,
+            "digits": limit_digits(row.lower, row.upper, 4),
+            "status": "" if row.status == "ok" else row.status,
+            "truth": truth.value if truth else None,
+            "why": sentence(row.reason),
         }
 
 
@@ -69,15 +72,15 @@ def answer(channel: ChannelView, system: System) -> list[str]:
     temperature, low_pass = channel.temperature, channel.low_pass
     if temperature:
         sensitivity = temperature["sensitivity"]
-        if sensitivity["compensated"]:
+        if sensitivity.compensated:
             unit = page_unit(channel.quantity, "sensitivity", system)
             lines.append(
-                f"The bias follows the temperature by {unit.text(sensitivity['value'], 3)} "
+                f"The bias follows the temperature by {unit.text(sensitivity.value, 3)} "
                 f"{unit.sign}.{_falls(channel)}"
             )
             lines.append(_AS_IT_COMES)
         else:
-            lines.append(f"Temperature is not taken out: {sensitivity['reason']}.")
+            lines.append(f"Temperature is not taken out: {sensitivity.reason}.")
         lines.append(f"T₀, the mean temperature, is {number_text(temperature['T_0']['value'])} °C.")
     if low_pass and low_pass["cutoff"]["status"] == "absent":
         lines.append("The spectrum shows no low-pass of the sensor.")

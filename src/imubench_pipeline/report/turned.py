@@ -7,6 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.model.experiments import (
+    EarthRatePredictionRow,
+    EarthRatePublishedRow,
+    EarthRateRow,
+    EarthRateSeriesRow,
+    TurningRow,
+)
 from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
@@ -49,13 +56,13 @@ ESTIMATES = ("filter", "pairs", "triples")
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     """Return what the template needs; ``folder`` is the recording's."""
     arrays = Arrays()
-    rows = view.rows("earth_rate")
+    rows = view.rows(EarthRateRow)
     channel = rows[0]["channel"] if rows else ""
     whole = [row for row in rows if row["part"] == "whole"]
-    turning = view.rows("turning")
+    turning = view.rows(TurningRow)
     parts = list(dict.fromkeys(row["part"] for row in rows if row["value"] is not None))
     envelope = rows_of_samples(folder, "envelope")
-    prediction = view.rows("earth_rate_prediction")
+    prediction = view.rows(EarthRatePredictionRow)
     return {
         **about_of(site, view, [], folder),
         "channel": channel,
@@ -70,8 +77,8 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "latitude": latitude_text(rows) if rows else "",
         "parts": parts,
         "has_samples": any(row["channel"] == channel for row in envelope),
-        "has_drift": any(row["quantity"] == "drift" for row in view.rows("earth_rate_series")),
-        "published": list(published_lines(view.rows("earth_rate_published"))),
+        "has_drift": any(row["quantity"] == "drift" for row in view.rows(EarthRateSeriesRow)),
+        "published": list(published_lines(view.rows(EarthRatePublishedRow))),
         "needs": needs(prediction),
         "has_prediction": bool(prediction),
         "stretches": list(_stretches(turning)),
@@ -254,7 +261,7 @@ def _payload(
 ) -> dict[str, Any]:
     """Return what the figures of dwells and estimates are drawn from."""
     dwells = [row for row in turning if row["what"] == "dwell"]
-    series = view.rows("earth_rate_series")
+    series = view.rows(EarthRateSeriesRow)
     return {
         "channel": rows[0]["channel"] if rows else "",
         "truth": rows[0]["truth"] if rows else None,

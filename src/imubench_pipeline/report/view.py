@@ -15,11 +15,25 @@ from numpy.typing import NDArray
 from pandas.util import hash_array
 
 from imubench_pipeline.estimators.rows import estimate_of
+from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow, ErrorBudgetRow
+from imubench_pipeline.model.estimates import (
+    DeterministicRow,
+    FixedBiasRow,
+    LineRow,
+    LowPassRow,
+    ModelRow,
+    ParameterRow,
+    ScoreRow,
+    SimulatedTruthRow,
+    TemperatureRow,
+)
+from imubench_pipeline.model.published import PublishedFigureRow
+from imubench_pipeline.model.recordings import FindingRow, RecordingRow
+from imubench_pipeline.model.table import ChannelRow, R
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.sensor import AT_REST
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.tables.schemas import BY_RECORDING
-from imubench_pipeline.typing import Row
 
 Name = tuple[str, str]
 """Sensor and recording."""
@@ -49,35 +63,35 @@ class ChannelView:
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
     rate: float = math.nan
-    parameters: dict[str, list[Row]] = field(default_factory=dict)
+    parameters: dict[str, list[ParameterRow]] = field(default_factory=dict)
     recommended: str = ""
     reconstruction: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
-    scores: dict[str, Row] = field(default_factory=dict)
-    datasheet: list[Row] = field(default_factory=list)
-    datasheet_curve: list[Row] = field(default_factory=list)
-    true_components: dict[str, list[Row]] = field(default_factory=dict)
-    models: list[Row] = field(default_factory=list)
-    lines: list[Row] = field(default_factory=list)
+    scores: dict[str, ScoreRow] = field(default_factory=dict)
+    datasheet: list[DatasheetRow] = field(default_factory=list)
+    datasheet_curve: list[DatasheetCurveRow] = field(default_factory=list)
+    true_components: dict[str, list[SimulatedTruthRow]] = field(default_factory=dict)
+    models: list[ModelRow] = field(default_factory=list)
+    lines: list[LineRow] = field(default_factory=list)
     spectrum: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    findings: list[Row] = field(default_factory=list)
-    published: list[Row] = field(default_factory=list)
+    findings: list[FindingRow] = field(default_factory=list)
+    published: list[PublishedFigureRow] = field(default_factory=list)
     fixed_bias: float | None = None
-    temperature: dict[str, Row] = field(default_factory=dict)
-    low_pass: dict[str, Row] = field(default_factory=dict)
-    deterministic: list[Row] = field(default_factory=list)
+    temperature: dict[str, TemperatureRow] = field(default_factory=dict)
+    low_pass: dict[str, LowPassRow] = field(default_factory=dict)
+    deterministic: list[DeterministicRow] = field(default_factory=list)
     compensated: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     _models: dict[str, NoiseModel] = field(default_factory=dict)
 
     @property
-    def truth(self) -> dict[str, Row]:
+    def truth(self) -> dict[str, SimulatedTruthRow]:
         """The true parameters of a simulation, of a repeated term the first."""
         return {name: rows[0] for name, rows in self.true_components.items()}
 
     @property
     def warnings(self) -> list[str]:
         """Terms of what puts the results of the channel in doubt, each once."""
-        serious = [row["finding"] for row in self.findings if row["severity"] != "note"]
-        if any(row["chosen"] and row["verdict"] == "not explained" for row in self.models):
+        serious = [row.finding for row in self.findings if row.severity != "note"]
+        if any(row.chosen and row.verdict == "not explained" for row in self.models):
             serious.append("verdict_not_explained")
         return list(dict.fromkeys(serious))
 
@@ -107,9 +121,9 @@ class ChannelView:
             self._models[method] = estimate_of(method, self.parameters[method]).model
         return self._models[method]
 
-    def named(self, method: str, symbol: str) -> list[Row]:
+    def named(self, method: str, symbol: str) -> list[ParameterRow]:
         """Return the rows of a parameter of a method, one a component."""
-        return [row for row in self.parameters[method] if row["parameter"] == symbol]
+        return [row for row in self.parameters[method] if row.parameter == symbol]
 
 
 @dataclass
@@ -120,7 +134,7 @@ class RecordingView:
     are asked for, and are not kept.
     """
 
-    row: Row  # of the table ``recordings``
+    row: RecordingRow  # of the table ``recordings``
     parts: Mapping[str, pa.Table]  # its rows of each table
     # returns the digests of all recordings, by sensor and name
     keys: Callable[[], Mapping[Name, str]]
@@ -131,12 +145,12 @@ class RecordingView:
     @property
     def sensor(self) -> str:
         """Name of the sensor file."""
-        return str(self.row["sensor"])
+        return self.row.sensor
 
     @property
     def name(self) -> str:
         """Name of the recording."""
-        return str(self.row["recording"])
+        return self.row.recording
 
     @property
     def full_name(self) -> Name:
@@ -146,22 +160,22 @@ class RecordingView:
     @property
     def simulated(self) -> bool:
         """Made from known parameters, not measured."""
-        return bool(self.row["simulated"])
+        return self.row.simulated
 
     @property
     def left_out(self) -> bool:
         """Whether it could not be used, or a step failed for it."""
-        return bool(self.row["status"] != "ok")
+        return self.row.status != "ok"
 
     @property
     def rejected(self) -> bool:
         """Whether it could not be used."""
-        return bool(self.row["status"] == "rejected")
+        return self.row.status == "rejected"
 
     @property
     def static(self) -> bool:
         """Whether it could be used, and its sensor was at rest all the time."""
-        return not self.left_out and self.row["kind"] == AT_REST
+        return not self.left_out and self.row.kind == AT_REST
 
     @property
     def key(self) -> str:
@@ -169,25 +183,24 @@ class RecordingView:
         return self.keys()[self.full_name]
 
     @cached_property
-    def findings(self) -> list[Row]:
+    def findings(self) -> list[FindingRow]:
         """What is wrong with it or worth knowing, but that it is left out."""
-        return [row for row in self.rows("findings") if row["finding"] not in LEFT_OUT]
+        return [row for row in self.rows(FindingRow) if row.finding not in LEFT_OUT]
 
     @property
-    def warnings(self) -> list[Row]:
+    def warnings(self) -> list[FindingRow]:
         """The findings that put results in doubt."""
-        return [row for row in self.findings if row["severity"] == "warning"]
+        return [row for row in self.findings if row.severity == "warning"]
 
     @property
-    def budget(self) -> list[Row]:
+    def budget(self) -> list[ErrorBudgetRow]:
         """Its errors after the times of the settings."""
-        return [row for row in self.rows("error_budget") if row["requirement"] is None]
+        return [row for row in self.rows(ErrorBudgetRow) if row.requirement is None]
 
-    def rows(self, table: str) -> list[Row]:
-        """Return its rows of a table."""
-        part = self.parts[table]
-        rows: list[Row] = part.to_pylist() if part.num_rows else []
-        return rows
+    def rows(self, of: type[R]) -> list[R]:
+        """Return its rows of a table, by their class."""
+        part = self.parts[of.table]
+        return of.rows_of(part) if part.num_rows else []
 
     def recommended(self) -> dict[str, str]:
         """Return the method to use for each channel."""
@@ -211,8 +224,8 @@ def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     divided = {name: _by(tables[name], "sensor", "recording") for name in BY_RECORDING}
     keys = cache(partial(_keys, tables))
     views = []
-    for row in tables["recordings"].to_pylist():
-        name = (row["sensor"], row["recording"])
+    for row in RecordingRow.rows_of(tables["recordings"]):
+        name = (row.sensor, row.recording)
         parts = {
             table: by_recording[name] if name in by_recording else tables[table].slice(0, 0)
             for table, by_recording in divided.items()
@@ -231,41 +244,45 @@ def _channels(view: RecordingView) -> list[ChannelView]:
         tau, adev, lower, upper = _floats(part, *_CURVE).values()
         rate = float(part["cluster_size"][0].as_py() / tau[0])
         channels[name] = ChannelView(*named, tau, adev, lower, upper, rate)
-    for row in view.rows("parameters"):
-        channel = channels[row["channel"]]
-        channel.parameters.setdefault(row["method"], []).append(row)
-        if row["recommended"]:
-            channel.recommended = row["method"]
+    for row in view.rows(ParameterRow):
+        channel = channels[row.channel]
+        channel.parameters.setdefault(row.method, []).append(row)
+        if row.recommended:
+            channel.recommended = row.method
     for (name, method), part in _by(view.parts["reconstruction"], "channel", "method").items():
         channels[name].reconstruction[method] = _floats(part, *_CURVE, "reconstructed")
-    for table in ("models", "lines", "deterministic", "datasheet", "datasheet_curve"):
-        for row in view.rows(table):
-            getattr(channels[row["channel"]], table).append(row)
+    of_channel: tuple[type[ChannelRow], ...] = (
+        ModelRow,
+        LineRow,
+        DeterministicRow,
+        DatasheetRow,
+        DatasheetCurveRow,
+    )
+    for of in of_channel:
+        for one in view.rows(of):
+            getattr(channels[one.channel], of.table).append(one)
     for (name,), part in _by(view.parts["spectrum"], "channel").items():
         columns = ("frequency", "ordinates", "density", "fitted", "used")
         channels[name].spectrum = _floats(part, *columns)
     for (name,), part in _by(view.parts["allan_compensated"], "channel").items():
         channels[name].compensated = _floats(part, *_CURVE)
-    for table, key in (
-        ("scores", "method"),
-        ("temperature", "parameter"),
-        ("low_pass", "parameter"),
-    ):
-        for row in view.rows(table):
-            getattr(channels[row["channel"]], table)[row[key]] = row
-    for row in view.rows("fixed_bias"):
-        channels[row["channel"]].fixed_bias = row["value"]
-    for row in view.rows("simulated_truth"):
-        if row["channel"] in channels:
-            true = channels[row["channel"]].true_components.setdefault(row["parameter"], [])
-            true.append(row)
-    for row in view.rows("published_figures"):
-        if row["channel"] in channels:
-            channels[row["channel"]].published.append(row)
+    for score in view.rows(ScoreRow):
+        channels[score.channel].scores[score.method] = score
+    for thermal in view.rows(TemperatureRow):
+        channels[thermal.channel].temperature[thermal.parameter] = thermal
+    for low_pass in view.rows(LowPassRow):
+        channels[low_pass.channel].low_pass[low_pass.parameter] = low_pass
+    for bias in view.rows(FixedBiasRow):
+        channels[bias.channel].fixed_bias = bias.value
+    for truth in view.rows(SimulatedTruthRow):
+        if truth.channel in channels:
+            components = channels[truth.channel].true_components
+            components.setdefault(truth.parameter, []).append(truth)
+    for printed in view.rows(PublishedFigureRow):
+        if printed.channel in channels:
+            channels[printed.channel].published.append(printed)
     for name, channel in channels.items():
-        channel.findings = [
-            finding for finding in view.findings if finding["channel"] in (None, name)
-        ]
+        channel.findings = [finding for finding in view.findings if finding.channel in (None, name)]
     return list(channels.values())
 
 

@@ -33,7 +33,7 @@ from imubench_pipeline.steps.noise_source import (
 )
 from imubench_pipeline.steps.positions import attitude_rows, true_angles
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.tables.of_experiments import CALIBRATION_TABLES
+from imubench_pipeline.tables.schemas import CALIBRATED
 from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
 
@@ -60,7 +60,7 @@ def calibration_tables(
     `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
     of `imubench_pipeline.run.plan.Plan.experiment_settings`. A rejected recording has no rows.
     """
-    rows: dict[str, list[Row]] = {name: [] for name in CALIBRATION_TABLES}
+    rows: dict[str, list[Row]] = {name: [] for name in CALIBRATED}
     logs = kept_logs(folder)
     if not logs:
         return rows

@@ -42,7 +42,7 @@ from imubench_pipeline.steps.noise_source import (
     segments_reason,
 )
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.tables.of_experiments import EARTH_RATE_TABLES
+from imubench_pipeline.tables.schemas import TURNED
 from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
 
@@ -82,7 +82,7 @@ def earth_rate_tables(
     settings : str
         As `imubench_pipeline.run.plan.Plan.experiment_settings` gives them.
     """
-    rows: dict[str, list[Row]] = {name: [] for name in EARTH_RATE_TABLES}
+    rows: dict[str, list[Row]] = {name: [] for name in TURNED}
     sections = json.loads(settings)
     logs = kept_logs(folder)
     if not logs:

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv as pacsv
 
-from imubench_pipeline.tables.columns import Column
+from imubench_pipeline.model.table import TypedColumn
 from imubench_pipeline.tables.parquet import SEAL, checked_parquet, seal_broken, write_sealed
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 from imubench_pipeline.tables.texts import printable, with_safe_cells
@@ -29,7 +29,7 @@ class TableError(ValueError):
     """Rows that do not fit the schema of their table."""
 
 
-def columns_of(table: str) -> tuple[Column, ...]:
+def columns_of(table: str) -> tuple[TypedColumn, ...]:
     """Return the columns of a table, or of the table that a file of a recording has rows of."""
     return TABLES[PARTS_OF.get(table, table)]
 

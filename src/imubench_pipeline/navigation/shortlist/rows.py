@@ -11,6 +11,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from imubench_pipeline.model.comparisons import ShortlistRow
+from imubench_pipeline.model.table import names_of
 from imubench_pipeline.navigation.error_budget.in_use import BIASES, Figure
 from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
 from imubench_pipeline.navigation.error_budget.parts import Budget
@@ -21,7 +23,6 @@ from imubench_pipeline.navigation.shortlist.figures import End, Figures, figures
 from imubench_pipeline.navigation.suitability.abilities import Abilities, abilities, judge
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
-from imubench_pipeline.tables.of_navigation import SHORTLIST
 from imubench_pipeline.typing import Row
 
 VERDICTS: Mapping[str, str] = {
@@ -82,7 +83,7 @@ def _judged(
     sensor: Sensor,
     figures: Mapping[str, Figures | str],
 ) -> dict[str, Any]:
-    row: dict[str, Any] = dict.fromkeys(column.name for column in SHORTLIST)
+    row: dict[str, Any] = dict.fromkeys(names_of(ShortlistRow))
     row["price_class"] = price_class = sensor.price_class
     lacking, unknown = judge(requirement.must, _before_buying(sensor))
     if lacking:

@@ -1,0 +1,1 @@
+"""What the program knows, typed: the rows of every table, and what passes between rooms."""

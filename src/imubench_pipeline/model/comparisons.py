@@ -1,0 +1,564 @@
+"""Sensors compared: with their data sheets, over time, with each other and with requirements."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from imubench_pipeline.model.table import (
+    ChannelRow,
+    Column,
+    OfRecordingRow,
+    SensorRow,
+    TableRow,
+    table,
+)
+
+
+@table("drift")
+class DriftRow(SensorRow):
+    """A row of the table ``drift``."""
+
+    device: Annotated[str, Column("of which the recordings are compared")]
+    channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
+    parameter: Annotated[
+        str,
+        Column("N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
+    ]
+    recording: Annotated[str, Column("name of the recording")]
+    position: Annotated[int, Column("place in the order of the device's recordings, from 1")]
+    started: Annotated[str | None, Column("date and time of the first sample, where known")] = None
+    value: Annotated[float | None, Column("estimate of this recording", "as in unit")] = None
+    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    unit: Annotated[str, Column("SI unit")]
+    expected: Annotated[
+        float | None,
+        Column("what the earlier recordings let one expect", "as in unit"),
+    ] = None
+    expected_lower: Annotated[
+        float | None,
+        Column("lower 95 % limit of the estimate expected", "as in unit"),
+    ] = None
+    expected_upper: Annotated[
+        float | None,
+        Column("upper 95 % limit of the estimate expected", "as in unit"),
+    ] = None
+    change: Annotated[float | None, Column("value / expected - 1; null for a bias")] = None
+    p_value: Annotated[
+        float | None,
+        Column("chance of such a difference, if the device has not changed"),
+    ] = None
+    verdict: Annotated[str | None, Column("changed or as before; null: cannot be judged")] = None
+    reason: Annotated[str | None, Column("in words")] = None
+
+
+@table("pooled")
+class PooledRow(SensorRow):
+    """A row of the table ``pooled``."""
+
+    device: Annotated[str | None, Column("null: all recordings of the sensor")] = None
+    channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
+    parameter: Annotated[
+        str,
+        Column("N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
+    ]
+    recordings: Annotated[int, Column("recordings pooled")]
+    left_out: Annotated[int, Column("recordings that have no value to pool")]
+    value: Annotated[float | None, Column("pooled estimate", "as in unit")] = None
+    lower: Annotated[
+        float | None,
+        Column("lower 95 % limit, the spread between recordings included", "as in unit"),
+    ] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    unit: Annotated[str, Column("SI unit")]
+    spread: Annotated[
+        float | None,
+        Column("standard deviation between recordings", "as in unit"),
+    ] = None
+    spread_lower: Annotated[
+        float | None,
+        Column("lower 95 % limit of the spread", "as in unit"),
+    ] = None
+    spread_upper: Annotated[
+        float | None,
+        Column("upper 95 % limit of the spread", "as in unit"),
+    ] = None
+    p_value: Annotated[
+        float | None,
+        Column("chance of such differences, if the recordings agree"),
+    ] = None
+    verdict: Annotated[str | None, Column("agree or differ, at 1 %")] = None
+    reason: Annotated[str | None, Column("in words")] = None
+    doubts: Annotated[str | None, Column("of the recordings pooled; empty: none")] = None
+
+
+@table("datasheet")
+class DatasheetRow(ChannelRow):
+    """A row of the table ``datasheet``."""
+
+    method: Annotated[
+        str,
+        Column("of the estimate; mean: of the log; temperature: the thermal fit"),
+    ]
+    quantity: Annotated[str, Column("N, bias_instability, K, T_B, allan_deviation, offset, ...")]
+    statistic: Annotated[
+        str,
+        Column("what is compared: N, adev_minimum, plateau (0.664 B), K, T_B, mean, sensitivity"),
+    ]
+    printed: Annotated[
+        float | None,
+        Column("figure as printed; null: the verdict says why", "as in unit"),
+    ] = None
+    unit: Annotated[str | None, Column("unit as printed")] = None
+    kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
+    condition: Annotated[str | None, Column("as printed")] = None
+    sidedness: Annotated[str | None, Column("of a noise density, as assumed in this row")] = None
+    comparable: Annotated[
+        float | None,
+        Column("the printed figure in the convention of measured", "SI"),
+    ] = None
+    comparable_lower: Annotated[
+        float | None,
+        Column("least figure that is printed of it, such as typ", "SI"),
+    ] = None
+    comparable_upper: Annotated[
+        float | None,
+        Column("largest figure that is printed of it, such as max", "SI"),
+    ] = None
+    measured: Annotated[float | None, Column("estimate of the same quantity", "SI")] = None
+    lower: Annotated[float | None, Column("lower 95 % limit of measured", "SI")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit of measured", "SI")] = None
+    delta: Annotated[float | None, Column("measured / comparable - 1")] = None
+    delta_lower: Annotated[float | None, Column("least that both intervals allow")] = None
+    delta_upper: Annotated[float | None, Column("largest that both intervals allow")] = None
+    verdict: Annotated[str, Column("better than typ, as printed, worse than typ, not sure, ...")]
+    reason: Annotated[str | None, Column("in words")] = None
+    doubts: Annotated[str | None, Column("of the recording; empty: none")] = None
+
+
+@table("repeatability")
+class RepeatabilityRow(SensorRow):
+    """A row of the table ``repeatability``."""
+
+    device: Annotated[str, Column("whose recordings are compared")]
+    channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
+    recordings: Annotated[int, Column("turn-ons that count")]
+    power_cycled: Annotated[str, Column("between all of them: yes or unknown")]
+    printed: Annotated[float | None, Column("bias repeatability as printed", "as in unit")] = None
+    unit: Annotated[str | None, Column("unit as printed")] = None
+    kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
+    condition: Annotated[str | None, Column("as printed")] = None
+    comparable: Annotated[float | None, Column("the printed figure", "SI")] = None
+    measured: Annotated[
+        float | None,
+        Column("standard deviation of the fixed bias between recordings", "SI"),
+    ] = None
+    lower: Annotated[float | None, Column("lower 95 % limit of measured", "SI")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit of measured", "SI")] = None
+    delta: Annotated[float | None, Column("measured / comparable - 1")] = None
+    verdict: Annotated[str, Column("as of the table datasheet")]
+    reason: Annotated[str | None, Column("in words, with the conditions")] = None
+
+
+@table("datasheet_curve")
+class DatasheetCurveRow(ChannelRow):
+    """A row of the table ``datasheet_curve``."""
+
+    sidedness: Annotated[str | None, Column("of the noise density, as assumed in this row")] = None
+    N: Annotated[
+        float | None,
+        Column("line N / sqrt(tau) of the datasheet", "rad/s or m/s^2 times sqrt(s)"),
+    ] = None
+    floor: Annotated[
+        float | None,
+        Column("bias instability of the datasheet", "rad/s or m/s^2"),
+    ] = None
+    rms: Annotated[
+        float | None,
+        Column("RMS over tau of measured Allan deviation minus the lines'", "rad/s or m/s^2"),
+    ] = None
+    rms_log10: Annotated[
+        float | None,
+        Column("RMS over tau of the difference of log10", "decades"),
+    ] = None
+
+
+@table("error_budget")
+class ErrorBudgetRow(OfRecordingRow):
+    """A row of the table ``error_budget``."""
+
+    requirement: Annotated[str | None, Column("that asks; null: the times of the settings")] = None
+    axis: Annotated[str, Column("worst or median axis of the sensor")]
+    gyro: Annotated[str | None, Column("channel that answers")] = None
+    accel: Annotated[str | None, Column("channel that answers")] = None
+    error: Annotated[
+        str,
+        Column("attitude, heading, velocity, position; north: heading found at rest"),
+    ]
+    time: Annotated[float, Column("of dead reckoning; of rest for north", "s")]
+    source: Annotated[str, Column("total, or what the error comes of")]
+    sigma: Annotated[
+        float | None,
+        Column("standard deviation; null where reason says why", "as in unit"),
+    ] = None
+    lower: Annotated[float | None, Column("lower 95 % limit of a total", "as in unit")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit of a total", "as in unit")] = None
+    drawn: Annotated[
+        str | None,
+        Column("parameters behind the limits: jointly, or one by one"),
+    ] = None
+    within: Annotated[float | None, Column("chance that the total is within limit")] = None
+    limit: Annotated[
+        float | None,
+        Column("largest standard deviation that is allowed", "as in unit"),
+    ] = None
+    unit: Annotated[str, Column("SI unit")]
+    reached_after: Annotated[
+        float | None,
+        Column("time after which the limit is reached; null: never", "s"),
+    ] = None
+    cause: Annotated[
+        str | None,
+        Column("of a source: noise, start, turn_on_bias, temperature, ..."),
+    ] = None
+    origin: Annotated[
+        str | None,
+        Column("of a source: measured, datasheet, requirement or not known"),
+    ] = None
+    kind: Annotated[str | None, Column("of a printed figure: typ, max, 1sigma, ...")] = None
+    convention: Annotated[str | None, Column("how a figure became a standard deviation")] = None
+    largest: Annotated[
+        float | None,
+        Column("1 sigma with which the limit is kept", "as in largest_unit"),
+    ] = None
+    largest_unit: Annotated[str | None, Column("SI unit of the figure")] = None
+    reason: Annotated[str | None, Column("what is not known")] = None
+    doubts: Annotated[str | None, Column("of the recording; empty: none")] = None
+
+
+@table("ranking")
+class RankingRow(TableRow):
+    """A row of the table ``ranking``."""
+
+    requirement: Annotated[str, Column("file under config/requirements, without .yaml")]
+    sensor: Annotated[str, Column("name of the sensor file")]
+    rank: Annotated[int | None, Column("1 is the best; null: not ranked")] = None
+    tied_with: Annotated[str | None, Column("sensors whose intervals overlap")] = None
+    verdict: Annotated[str, Column("passes, probably passes, probably fails, surely fails, ...")]
+    decides: Annotated[bool, Column("the limit with the least margin")]
+    recording: Annotated[str | None, Column("that answers: of several, nearest to sigma")] = None
+    error: Annotated[str, Column("as in error_budget")]
+    time: Annotated[float, Column("as in error_budget; of an outage with trajectory", "s")]
+    trajectory: Annotated[str | None, Column("of an outage of GNSS; null: an error budget")] = None
+    at_most: Annotated[float | None, Column("the limit as it was asked for", "as in unit")] = None
+    confidence: Annotated[
+        float | None,
+        Column("chance of an error within it that was asked for"),
+    ] = None
+    limit: Annotated[
+        float | None,
+        Column("the same as a standard deviation: the largest allowed", "as in unit"),
+    ] = None
+    sigma: Annotated[
+        float | None,
+        Column("standard deviation of the error, of the next specimen", "as in unit"),
+    ] = None
+    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    unit: Annotated[str, Column("SI unit")]
+    margin: Annotated[float | None, Column("limit over sigma")] = None
+    chance: Annotated[
+        float | None,
+        Column("that sigma is within limit, as far as logs and specimens tell"),
+    ] = None
+    limit_verdict: Annotated[str, Column("of this limit alone")]
+    source: Annotated[str | None, Column("the largest contribution")] = None
+    share: Annotated[float | None, Column("its part of the variance")] = None
+    reached_after: Annotated[
+        float | None,
+        Column("time after which the limit is reached", "s"),
+    ] = None
+    conditions: Annotated[
+        str | None,
+        Column("on which the verdict holds; why a sensor is excluded"),
+    ] = None
+    parts: Annotated[str | None, Column("every source of 1 % of the variance or more")] = None
+    reason: Annotated[str | None, Column("what is not known")] = None
+    doubts: Annotated[str | None, Column("of the recording; empty: none")] = None
+    left_out: Annotated[str | None, Column("recordings that do not decide, and why")] = None
+    specimens: Annotated[int | None, Column("devices that the figures stand on")] = None
+    recordings: Annotated[int | None, Column("recordings that they stand on")] = None
+    longest_log: Annotated[float | None, Column("duration of the longest of them", "s")] = None
+    spread: Annotated[
+        float | None,
+        Column("standard deviation of ln sigma between specimens; null: unknown"),
+    ] = None
+    spread_of: Annotated[
+        str | None,
+        Column("specimens; recordings (of one specimen); other sensors (of one specimen)"),
+    ] = None
+    evidence: Annotated[
+        str | None,
+        Column("of this limit: strong or weak; null: nothing is known"),
+    ] = None
+    evidence_reasons: Annotated[
+        str | None,
+        Column("one_specimen, short_log, wide_interval, few_axes, or codes of the table doubts"),
+    ] = None
+    unless: Annotated[
+        str | None,
+        Column("what the verdict would be, if what is doubted were mended"),
+    ] = None
+    unless_verdict: Annotated[
+        str | None,
+        Column("of the sensor, with the unit that is in doubt mended"),
+    ] = None
+    unless_margin: Annotated[float | None, Column("its margin")] = None
+    logged_verdict: Annotated[str | None, Column("of what was left out, as it was logged")] = None
+    logged_margin: Annotated[float | None, Column("its margin")] = None
+    backtest_channel: Annotated[
+        str | None,
+        Column("that the error mostly comes of; null: not tested"),
+    ] = None
+    backtest_ratio: Annotated[
+        float | None,
+        Column("error that its log shows of its part, over the predicted one"),
+    ] = None
+    backtest_ratio_lower: Annotated[
+        float | None,
+        Column("lower end of where it lies in 95 % of logs"),
+    ] = None
+    backtest_ratio_upper: Annotated[float | None, Column("upper end")] = None
+    backtest_windows: Annotated[int | None, Column("of the log, overlapping")] = None
+
+
+@table("next_steps")
+class NextStepRow(SensorRow):
+    """A row of the table ``next_steps``."""
+
+    recording: Annotated[str | None, Column("name of the recording; null: a new one")] = None
+    requirements: Annotated[str, Column("whose verdicts it is about")]
+    action: Annotated[
+        str,
+        Column("check_unit, find_figures, add_channels, record_again, log_longer or add_specimens"),
+    ]
+    verdicts_turned: Annotated[int, Column("verdicts that it may change, or settle")]
+    verdicts_strengthened: Annotated[int, Column("verdicts whose evidence it makes stronger")]
+    duration: Annotated[float | None, Column("length of the log that it takes", "s")] = None
+    specimens: Annotated[int | None, Column("how many more specimens it takes")] = None
+    text: Annotated[str, Column("in words")]
+
+
+@table("shortlist")
+class ShortlistRow(TableRow):
+    """A row of the table ``shortlist``."""
+
+    requirement: Annotated[str, Column("file under config/requirements, without .yaml")]
+    sensor: Annotated[str, Column("of the catalogue")]
+    price_class: Annotated[str | None, Column("as stated")] = None
+    best_margin: Annotated[
+        float | None,
+        Column("limit over error, of the best that the datasheet allows"),
+    ] = None
+    worst_margin: Annotated[
+        float | None,
+        Column("of the worst that it allows; null: not known"),
+    ] = None
+    decides: Annotated[str | None, Column("the limit with the least margin at the best")] = None
+    verdict: Annotated[
+        str,
+        Column("cannot pass, worth logging, passes at its worst, or not judged"),
+    ]
+    measured_margin_of: Annotated[
+        str | None,
+        Column("logs or simulated logs; null: not measured"),
+    ] = None
+    measured_margin: Annotated[
+        float | None,
+        Column("limit over error by its logs: see the table ranking"),
+    ] = None
+    measured_verdict: Annotated[str | None, Column("as of the table ranking")] = None
+    assumed: Annotated[str | None, Column("what is not printed, and what stands for it")] = None
+    reason: Annotated[str | None, Column("what it lacks, or why it is not judged")] = None
+
+
+@table("fusion")
+class FusionRow(TableRow):
+    """A row of the table ``fusion``."""
+
+    quantity: Annotated[str, Column("gyro or accel")]
+    tau: Annotated[float, Column("averaging time at which they are compared", "s")]
+    sensor: Annotated[str, Column("of which several are averaged")]
+    recording: Annotated[str | None, Column("that answers for it: of its median channel")] = None
+    channel: Annotated[str | None, Column("that answers")] = None
+    simulated: Annotated[bool | None, Column("that recording is simulated")] = None
+    adev: Annotated[
+        float | None,
+        Column("Allan deviation of one of them, by its noise model", "rad/s or m/s^2"),
+    ] = None
+    floor: Annotated[
+        float | None,
+        Column("part of it that all have in common: any number keeps it", "rad/s or m/s^2"),
+    ] = None
+    common_share: Annotated[float | None, Column("the same as a part of the variance")] = None
+    temperature_share: Annotated[
+        float | None,
+        Column("part of the variance that temperature adds: common"),
+    ] = None
+    other: Annotated[str, Column("sensor of which one is to be equalled")]
+    other_recording: Annotated[str | None, Column("that answers for it")] = None
+    other_channel: Annotated[str | None, Column("that answers")] = None
+    other_simulated: Annotated[bool | None, Column("that one is simulated")] = None
+    other_adev: Annotated[float | None, Column("its Allan deviation", "rad/s or m/s^2")] = None
+    n: Annotated[
+        float | None,
+        Column("how many equal it, not rounded; below 1: one is better"),
+    ] = None
+    lower: Annotated[
+        float | None,
+        Column("lower 95 % limit of n; null: no number is enough"),
+    ] = None
+    upper: Annotated[
+        float | None,
+        Column("upper 95 % limit of n; null: no number may be enough"),
+    ] = None
+    reachable: Annotated[bool | None, Column("some number is enough")] = None
+    reason: Annotated[str | None, Column("why there is no n or no limit")] = None
+    doubts: Annotated[str | None, Column("of both recordings; empty: none")] = None
+
+
+@table("grades")
+class GradeRow(TableRow):
+    """A row of the table ``grades``."""
+
+    quantity: Annotated[str, Column("gyro or accel")]
+    sensor: Annotated[str, Column("of which several are averaged")]
+    recording: Annotated[str, Column("that answers for it: of its middle channel")]
+    channel: Annotated[str, Column("that answers")]
+    simulated: Annotated[bool, Column("that recording is simulated")]
+    grade: Annotated[str, Column("sensor of the class that is to be reached, by its datasheet")]
+    grade_name: Annotated[str, Column("its vendor and model")]
+    option: Annotated[str | None, Column("of that one")] = None
+    statistic: Annotated[str, Column("N, or sigma_min: the lowest point of the curve")]
+    value: Annotated[float | None, Column("of one of them", "SI")] = None
+    lower: Annotated[float | None, Column("lower 95 % limit", "SI")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "SI")] = None
+    printed: Annotated[float | None, Column("of the grade, in the same convention", "SI")] = None
+    n: Annotated[
+        float | None,
+        Column("how many equal it, not rounded, if they have nothing in common"),
+    ] = None
+    n_lower: Annotated[float | None, Column("by the lower limit")] = None
+    n_upper: Annotated[float | None, Column("by the upper limit")] = None
+    reason: Annotated[str | None, Column("why there is no n")] = None
+
+
+@table("navigation")
+class NavigationRow(SensorRow):
+    """A row of the table ``navigation``."""
+
+    recording: Annotated[str, Column("whose estimates tune the filter")]
+    trajectory: Annotated[str | None, Column("field, car, drone or rest")] = None
+    outage: Annotated[
+        float | None,
+        Column("length of the outages of GNSS; null: epochs with GNSS", "s"),
+    ] = None
+    tuning: Annotated[
+        str,
+        Column(
+            "method of the estimate, datasheet, datasheet_misread, times_ten, table_1, overbound,"
+            " or true: the model of the simulated sensor",
+        ),
+    ]
+    recommended: Annotated[bool | None, Column("the recommended estimate")] = None
+    model: Annotated[
+        str | None,
+        Column("terms of gyros and of accelerometers in the filter"),
+    ] = None
+    states: Annotated[
+        int | None,
+        Column("of the filter, position, velocity and attitude included"),
+    ] = None
+    signals: Annotated[
+        str | None,
+        Column(
+            "errors of the sensor: simulated by the truth of its recording, by its estimate, or "
+            "pieces of its log",
+        ),
+    ] = None
+    assumed: Annotated[
+        str | None,
+        Column("of another sensor, as the recording does not have it"),
+    ] = None
+    runs: Annotated[int | None, Column("that a row is of")] = None
+    outages: Annotated[int | None, Column("of this length in all runs")] = None
+    position: Annotated[
+        float | None,
+        Column("rms of the error in the plane, at the end of outages or at all fixes", "m"),
+    ] = None
+    position_lower: Annotated[
+        float | None,
+        Column("lower 95 % limit, by the scatter of the runs", "m"),
+    ] = None
+    position_upper: Annotated[float | None, Column("upper 95 % limit", "m")] = None
+    position_predicted: Annotated[float | None, Column("rms that the filter expects", "m")] = None
+    position_ratio: Annotated[
+        float | None,
+        Column("rms over that of the true model on the same signals"),
+    ] = None
+    position_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
+    position_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
+    velocity: Annotated[
+        float | None,
+        Column("rms of the error in the plane, at the end of outages or at all fixes", "m/s"),
+    ] = None
+    velocity_lower: Annotated[
+        float | None,
+        Column("lower 95 % limit, by the scatter of the runs", "m/s"),
+    ] = None
+    velocity_upper: Annotated[float | None, Column("upper 95 % limit", "m/s")] = None
+    velocity_predicted: Annotated[float | None, Column("rms that the filter expects", "m/s")] = None
+    velocity_ratio: Annotated[
+        float | None,
+        Column("rms over that of the true model on the same signals"),
+    ] = None
+    velocity_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
+    velocity_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
+    heading: Annotated[
+        float | None,
+        Column("rms of the error about the vertical, at the end of outages or at all fixes", "rad"),
+    ] = None
+    heading_lower: Annotated[
+        float | None,
+        Column("lower 95 % limit, by the scatter of the runs", "rad"),
+    ] = None
+    heading_upper: Annotated[float | None, Column("upper 95 % limit", "rad")] = None
+    heading_predicted: Annotated[float | None, Column("rms that the filter expects", "rad")] = None
+    heading_ratio: Annotated[
+        float | None,
+        Column("rms over that of the true model on the same signals"),
+    ] = None
+    heading_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
+    heading_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
+    nees_inside: Annotated[
+        float | None,
+        Column("share of epochs with NEES within its 95 % bounds"),
+    ] = None
+    nees_error: Annotated[float | None, Column("standard error of that share")] = None
+    nees_position: Annotated[float | None, Column("likewise of the position alone")] = None
+    nees_velocity: Annotated[float | None, Column("of the velocity")] = None
+    nees_attitude: Annotated[float | None, Column("of the attitude")] = None
+    nees_gyro: Annotated[
+        float | None,
+        Column("of the biases of the gyros; null: not known, or flicker"),
+    ] = None
+    nees_accel: Annotated[float | None, Column("of the biases of the accelerometers")] = None
+    consistent: Annotated[
+        bool | None,
+        Column("that share, with twice its error, is 0.9 to 1; null: the runs do not tell"),
+    ] = None
+    smallest: Annotated[
+        bool | None,
+        Column("of the consistent tunings that with the fewest states"),
+    ] = None
+    reason: Annotated[str | None, Column("why there is no such tuning")] = None

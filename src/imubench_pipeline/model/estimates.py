@@ -1,0 +1,516 @@
+"""What is estimated from a recording: curves, spectra, parameters and models."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from imubench_pipeline.model.table import ChannelRow, Column, OfRecordingRow, table
+
+
+@table("allan")
+class AllanRow(ChannelRow):
+    """A row of the table ``allan``."""
+
+    tau: Annotated[float, Column("cluster length, cluster_size / rate", "s")]
+    cluster_size: Annotated[int, Column("samples in a cluster")]
+    adev: Annotated[float, Column("Allan deviation", "rad/s or m/s^2")]
+    lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
+    edf: Annotated[
+        float | None,
+        Column("equivalent degrees of freedom of the Allan variance"),
+    ] = None
+    edf_upper: Annotated[
+        float | None,
+        Column("those of the upper 95 % limit: more where few clusters remain"),
+    ] = None
+    edf_source: Annotated[
+        str,
+        Column("what they follow from: fitted spectrum, or power law at this tau"),
+    ]
+    averaged: Annotated[
+        float | None,
+        Column(
+            "samples that a cluster really averages: fewer than its size where samples are missing",
+        ),
+    ] = None
+    exponent: Annotated[
+        int | None,
+        Column("noise type: 0 white, -1 flicker, -2 random walk, 1 and 2 phase noise"),
+    ] = None
+    share: Annotated[
+        float | None,
+        Column("part of the differences that missing samples leave"),
+    ] = None
+
+
+@table("parameters")
+class ParameterRow(ChannelRow):
+    """A row of the table ``parameters``."""
+
+    method: Annotated[str, Column("estimation method")]
+    recommended: Annotated[bool, Column("the method to use for this channel")]
+    model: Annotated[str, Column("the terms of the model, such as N+GM+K")]
+    component: Annotated[int, Column("number of a repeated term, from 1")]
+    parameter: Annotated[
+        str,
+        Column(
+            "Q, N, B, T_B, K, R; N_sensor (white density before a low-pass or an interpolation "
+            "that shows); amplitude and frequency of a line; of the curve of the model: B_curve "
+            "(bias instability of the curve: highest Allan deviation of all F and GM terms over "
+            "0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)",
+        ),
+    ]
+    value: Annotated[
+        float | None,
+        Column("estimate; null where status says why", "as in unit"),
+    ] = None
+    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    unit: Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
+    status: Annotated[str, Column("ok, doubtful, not_shown, at_bound, not_identified or absent")]
+    reason: Annotated[str | None, Column("why there is no plain value")] = None
+    duration_needed: Annotated[
+        float | None,
+        Column("length of a log that gives the value to 10 %", "s"),
+    ] = None
+    fitted: Annotated[
+        float | None,
+        Column("what the model has where there is no value; no estimate", "as in unit"),
+    ] = None
+
+
+@table("models")
+class ModelRow(ChannelRow):
+    """A row of the table ``models``."""
+
+    model: Annotated[str, Column("the terms: Q, N, F (flicker), GM, K, R")]
+    chosen: Annotated[bool, Column("the model of method likelihood: the lowest BIC")]
+    free: Annotated[int, Column("free parameters")]
+    log_likelihood: Annotated[float, Column("up to a constant of the channel")]
+    bic: Annotated[float, Column("-2 log likelihood + free log(bins); + 4: GM for K, + 6: Q, R")]
+    aic: Annotated[float, Column("-2 log likelihood + 2 free")]
+    weight: Annotated[float, Column("of the model among the candidates, by BIC")]
+    deviance: Annotated[
+        float | None,
+        Column("mean of a bin; about 1 where the model is right"),
+    ] = None
+    chance: Annotated[float | None, Column("of so poor a fit, if the model is right")] = None
+    verdict: Annotated[str, Column("explained or not explained")]
+    note: Annotated[
+        str | None,
+        Column("where it is furthest from the spectrum; what AIC says"),
+    ] = None
+    bins: Annotated[int, Column("bins of the spectrum used")]
+    band: Annotated[float | None, Column("highest frequency used", "Hz")] = None
+    band_source: Annotated[str | None, Column("how it was found")] = None
+
+
+@table("lines")
+class LineRow(ChannelRow):
+    """A row of the table ``lines``."""
+
+    kind: Annotated[str, Column("sinusoid; band of noise; alias of a faster line in block means")]
+    frequency: Annotated[float, Column("of the line", "Hz")]
+    frequency_lower: Annotated[float | None, Column("lower 95 % limit", "Hz")] = None
+    frequency_upper: Annotated[float | None, Column("upper 95 % limit", "Hz")] = None
+    amplitude: Annotated[float, Column("of the sinusoid", "rad/s or m/s^2")]
+    amplitude_lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
+    amplitude_upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
+    ratio: Annotated[float | None, Column("highest density over that of the noise")] = None
+    false_alarm: Annotated[
+        float | None,
+        Column("chance of one like it in a channel without lines"),
+    ] = None
+    width: Annotated[float | None, Column("how wide it is", "Hz")] = None
+
+
+@table("envelope")
+class EnvelopeRow(ChannelRow):
+    """A row of the table ``envelope``."""
+
+    start: Annotated[float, Column("begin of a part of the log, from the first sample", "s")]
+    end: Annotated[float, Column("its end", "s")]
+    low: Annotated[float | None, Column("least sample; degC for temperature", "SI")] = None
+    high: Annotated[float | None, Column("largest sample", "SI")] = None
+    mean: Annotated[float | None, Column("mean of the samples", "SI")] = None
+    samples: Annotated[int, Column("samples present")]
+
+
+@table("samples_of_models")
+class ModelSampleRow(ChannelRow):
+    """A row of the table ``samples_of_models``."""
+
+    of: Annotated[
+        str,
+        Column("log; before: of the model that the curve reads; after: of the estimate"),
+    ]
+    what: Annotated[
+        str,
+        Column("deviation of all samples; stretch: each sample; envelope: over time"),
+    ]
+    start: Annotated[float, Column("from the first sample", "s")]
+    end: Annotated[float, Column("its end", "s")]
+    low: Annotated[float | None, Column("of an envelope: least sample", "SI")] = None
+    high: Annotated[float | None, Column("largest sample", "SI")] = None
+    mean: Annotated[
+        float | None,
+        Column("mean of the samples, the sample, or the deviation", "SI"),
+    ] = None
+
+
+@table("histogram")
+class HistogramRow(ChannelRow):
+    """A row of the table ``histogram``."""
+
+    lower: Annotated[float, Column("lower edge of the bin", "SI")]
+    upper: Annotated[float, Column("upper edge of the bin", "SI")]
+    count: Annotated[int, Column("samples in it")]
+
+
+@table("spectrum")
+class SpectrumRow(ChannelRow):
+    """A row of the table ``spectrum``."""
+
+    frequency: Annotated[float, Column("mean of the bin", "Hz")]
+    lower: Annotated[float, Column("lower end of the bin", "Hz")]
+    upper: Annotated[float, Column("upper end of the bin", "Hz")]
+    ordinates: Annotated[float, Column("degrees of freedom of the bin")]
+    density: Annotated[float, Column("measured, two-sided", "(rad/s)^2/Hz or (m/s^2)^2/Hz")]
+    fitted: Annotated[
+        float | None,
+        Column("of the chosen model", "(rad/s)^2/Hz or (m/s^2)^2/Hz"),
+    ] = None
+    used: Annotated[bool, Column("inside the band, and clear of lines")]
+
+
+@table("fixed_bias")
+class FixedBiasRow(ChannelRow):
+    """A row of the table ``fixed_bias``."""
+
+    value: Annotated[float, Column("mean of the samples", "as in unit")]
+    unit: Annotated[str, Column("SI unit of value")]
+
+
+@table("temperature")
+class TemperatureRow(ChannelRow):
+    """A row of the table ``temperature``."""
+
+    compensated: Annotated[bool, Column("taken out of the noise: method compensated")]
+    parameter: Annotated[
+        str,
+        Column("T_0 (mean temperature), sensitivity, quadratic, lag, bias (at T_0)"),
+    ]
+    value: Annotated[
+        float | None,
+        Column("estimate; null where status says why", "as in unit"),
+    ] = None
+    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    unit: Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
+    status: Annotated[str, Column("ok, doubtful, not_shown, at_bound, not_identified or absent")]
+    reason: Annotated[str | None, Column("why there is no plain value")] = None
+    fitted: Annotated[
+        float | None,
+        Column("what the model has where there is no value; no estimate", "as in unit"),
+    ] = None
+
+
+@table("allan_compensated")
+class CompensatedAllanRow(ChannelRow):
+    """A row of the table ``allan_compensated``."""
+
+    tau: Annotated[float, Column("cluster length", "s")]
+    adev: Annotated[
+        float,
+        Column("Allan deviation of the log less what temperature adds", "rad/s or m/s^2"),
+    ]
+    lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
+    edf: Annotated[
+        float | None,
+        Column("equivalent degrees of freedom of the Allan variance"),
+    ] = None
+    edf_upper: Annotated[
+        float | None,
+        Column("those of the upper 95 % limit: more where few clusters remain"),
+    ] = None
+    edf_source: Annotated[
+        str,
+        Column("what they follow from: fitted spectrum, or power law at this tau"),
+    ]
+    temperature: Annotated[
+        float,
+        Column("Allan deviation of what temperature adds", "rad/s or m/s^2"),
+    ]
+
+
+@table("low_pass")
+class LowPassRow(ChannelRow):
+    """A row of the table ``low_pass``."""
+
+    kind: Annotated[str | None, Column("analogue, bilinear or boxcar; null: none shows")] = None
+    order: Annotated[
+        int | None,
+        Column("of the filter: 1, or that of Butterworth; null: none shows"),
+    ] = None
+    parameter: Annotated[
+        str,
+        Column("cutoff (-3 dB), floor (white noise that does not pass the filter)"),
+    ]
+    value: Annotated[
+        float | None,
+        Column("estimate; null where status says why", "as in unit"),
+    ] = None
+    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    unit: Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
+    status: Annotated[str, Column("ok, doubtful, not_shown, at_bound, not_identified or absent")]
+    reason: Annotated[str | None, Column("why there is no plain value")] = None
+    fitted: Annotated[
+        float | None,
+        Column("what the model has where there is no value; no estimate", "as in unit"),
+    ] = None
+
+
+@table("reconstruction")
+class ReconstructionRow(ChannelRow):
+    """A row of the table ``reconstruction``."""
+
+    method: Annotated[str, Column("estimation method")]
+    tau: Annotated[float, Column("cluster length", "s")]
+    adev: Annotated[float, Column("median of the ensemble of simulated logs", "rad/s or m/s^2")]
+    lower: Annotated[float, Column("lower 95 % limit of the ensemble", "rad/s or m/s^2")]
+    upper: Annotated[float, Column("upper 95 % limit of the ensemble", "rad/s or m/s^2")]
+    reconstructed: Annotated[
+        float,
+        Column("Allan deviation of the full-length simulated log", "rad/s or m/s^2"),
+    ]
+
+
+@table("scores")
+class ScoreRow(ChannelRow):
+    """A row of the table ``scores``."""
+
+    method: Annotated[str, Column("estimation method")]
+    rms: Annotated[
+        float | None,
+        Column(
+            "RMS over tau of the model's less the measured Allan deviation; each tau counts by "
+            "how sure the measured one is",
+            "rad/s or m/s^2",
+        ),
+    ] = None
+    rms_log10: Annotated[
+        float | None,
+        Column("the same of the difference of log10", "decades"),
+    ] = None
+    drawn: Annotated[
+        float | None,
+        Column("rms of one simulated log in the model's place: median of many", "rad/s or m/s^2"),
+    ] = None
+    drawn_lower: Annotated[
+        float | None,
+        Column("lower end of the range of 90 % of them", "rad/s or m/s^2"),
+    ] = None
+    drawn_upper: Annotated[float | None, Column("upper end", "rad/s or m/s^2")] = None
+    drawn_log10: Annotated[
+        float | None,
+        Column("rms_log10 of one simulated log: median of many", "decades"),
+    ] = None
+    drawn_log10_lower: Annotated[
+        float | None,
+        Column("lower end of the range of 90 % of them", "decades"),
+    ] = None
+    drawn_log10_upper: Annotated[float | None, Column("upper end", "decades")] = None
+    whole: Annotated[
+        float | None,
+        Column("RMS of one simulated log, every tau alike: median of many", "rad/s or m/s^2"),
+    ] = None
+    whole_lower: Annotated[
+        float | None,
+        Column("lower end of the range of 90 % of them", "rad/s or m/s^2"),
+    ] = None
+    whole_upper: Annotated[float | None, Column("upper end", "rad/s or m/s^2")] = None
+    beats: Annotated[
+        float | None,
+        Column(
+            "chance that a log simulated of it has a lower whole than one of the recommended "
+            "method: 0.5 for the same model",
+        ),
+    ] = None
+    inside_band: Annotated[
+        float | None,
+        Column("share of the measured curve inside the 95 % band"),
+    ] = None
+    reason: Annotated[str | None, Column("why there is no score")] = None
+
+
+@table("simulated_truth")
+class SimulatedTruthRow(ChannelRow):
+    """A row of the table ``simulated_truth``."""
+
+    parameter: Annotated[str, Column("as in parameters, temperature and low_pass; bias")]
+    component: Annotated[int, Column("number of a repeated term, from 1")]
+    value: Annotated[float, Column("true value of the simulation", "as in unit")]
+    unit: Annotated[str, Column("SI unit of value")]
+    assumed: Annotated[bool, Column("not published by the source: chosen")]
+    source: Annotated[str, Column("where the parameters are published")]
+
+
+@table("backtest")
+class BacktestRow(ChannelRow):
+    """A row of the table ``backtest``."""
+
+    requirement: Annotated[str, Column("that has the limit")]
+    error: Annotated[
+        str,
+        Column("attitude, heading, velocity, position: the part of it of this channel"),
+    ]
+    time: Annotated[float, Column("of dead reckoning", "s")]
+    window: Annotated[
+        float | None,
+        Column("at rest right before, over which the bias is the mean", "s"),
+    ] = None
+    windows: Annotated[
+        int | None,
+        Column("of the log, overlapping; those with gaps are left out"),
+    ] = None
+    independent: Annotated[
+        float | None,
+        Column("windows that would scatter as little, if independent"),
+    ] = None
+    measured: Annotated[
+        float | None,
+        Column("rms of the error over the windows of the log as it is", "as in unit"),
+    ] = None
+    predicted: Annotated[
+        float | None,
+        Column("standard deviation by the noise model of the channel", "as in unit"),
+    ] = None
+    predicted_lower: Annotated[
+        float | None,
+        Column("lower 95 % limit, by the models drawn", "as in unit"),
+    ] = None
+    predicted_upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    ratio: Annotated[float | None, Column("measured over predicted")] = None
+    ratio_lower: Annotated[
+        float | None,
+        Column("lower end of where it lies in 95 % of logs, the model right"),
+    ] = None
+    ratio_upper: Annotated[float | None, Column("upper end")] = None
+    chance: Annotated[
+        float | None,
+        Column("of such a ratio or a larger one, if the model is right"),
+    ] = None
+    verdict: Annotated[str | None, Column("as predicted, more or less than predicted")] = None
+    contradicted: Annotated[
+        bool | None,
+        Column("1.1 times the prediction or more, sure at 1 % for all rows of the recording"),
+    ] = None
+    unit: Annotated[str, Column("SI unit")]
+    taken_out: Annotated[
+        str | None,
+        Column("in the log, not in the model: kinds of deterministic"),
+    ] = None
+    duration_needed: Annotated[
+        float | None,
+        Column("length of a log that can be tested so", "s"),
+    ] = None
+    reason: Annotated[str | None, Column("why it cannot be done")] = None
+
+
+@table("drawn_deviations")
+class DrawnDeviationRow(ChannelRow):
+    """A row of the table ``drawn_deviations``."""
+
+    tau: Annotated[float, Column("averaging time", "s")]
+    draw: Annotated[
+        int | None,
+        Column("place of a noise model drawn, the lowest first; null: the estimate itself"),
+    ] = None
+    adev: Annotated[float, Column("Allan deviation of the noise model", "rad/s or m/s^2")]
+    unknown: Annotated[
+        str | None,
+        Column("parameters that matter and that the log does not tell"),
+    ] = None
+
+
+@table("deterministic")
+class DeterministicRow(ChannelRow):
+    """A row of the table ``deterministic``."""
+
+    kind: Annotated[
+        str,
+        Column("bias_step, warm_up_drift or periodic_drift: taken out of the noise"),
+    ]
+    start: Annotated[float, Column("of the part that has it, from the first sample", "s")]
+    end: Annotated[float, Column("its end; of a step both are its place", "s")]
+    size: Annotated[float, Column("of a step; of a warm-up at its start; amplitude", "as in unit")]
+    size_lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
+    size_upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    unit: Annotated[str, Column("SI unit of the sizes")]
+    time: Annotated[
+        float | None,
+        Column("time constant of a warm-up, period of periodic drift", "s"),
+    ] = None
+    time_lower: Annotated[float | None, Column("lower 95 % limit", "s")] = None
+    time_upper: Annotated[float | None, Column("upper 95 % limit", "s")] = None
+    place_error: Annotated[
+        float | None,
+        Column("half width of the 95 % interval of a step's place", "s"),
+    ] = None
+    gain: Annotated[float | None, Column("twice the log likelihood that is lost without it")] = None
+
+
+@table("draws")
+class DrawRow(ChannelRow):
+    """A row of the table ``draws``."""
+
+    method: Annotated[str, Column("estimation method: likelihood, likelihood_gm or compensated")]
+    draw: Annotated[int, Column("number of the draw, from 0: a noise model that the log allows")]
+    component: Annotated[int, Column("number of a repeated term, from 1")]
+    Q: Annotated[
+        float | None,
+        Column("quantization noise; null: the model has none", "rad or m/s", single=True),
+    ] = None
+    N: Annotated[
+        float | None,
+        Column("white noise; null: it has none", "rad/s/sqrt(Hz) or m/s^2/sqrt(Hz)", single=True),
+    ] = None
+    B: Annotated[
+        float | None,
+        Column("bias instability; null: it has none", "rad/s or m/s^2", single=True),
+    ] = None
+    T_B: Annotated[
+        float | None,
+        Column("correlation time; null where B is flicker noise", "s", single=True),
+    ] = None
+    K: Annotated[
+        float | None,
+        Column("random walk; null: it has none", "rad/s/sqrt(s) or m/s^2/sqrt(s)", single=True),
+    ] = None
+    R: Annotated[
+        float | None,
+        Column("ramp; null: it has none", "rad/s^2 or m/s^3", single=True),
+    ] = None
+
+
+@table("error_growth")
+class ErrorGrowthRow(OfRecordingRow):
+    """A row of the table ``error_growth``."""
+
+    axis: Annotated[str, Column("worst: of all axes; or x, y or z alone, where there are several")]
+    gyro: Annotated[str, Column("channel that answers")]
+    accel: Annotated[str | None, Column("channel that answers")] = None
+    window: Annotated[
+        float,
+        Column("at rest right before, from which biases and tilt are taken", "s"),
+    ]
+    error: Annotated[str, Column("attitude, heading, velocity or position")]
+    time: Annotated[float, Column("of dead reckoning", "s")]
+    source: Annotated[str, Column("total, or what the error comes of")]
+    sigma: Annotated[float, Column("standard deviation", "as in unit")]
+    lower: Annotated[float | None, Column("lower 95 % limit of a total", "as in unit")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit of a total", "as in unit")] = None
+    unit: Annotated[str, Column("SI unit")]

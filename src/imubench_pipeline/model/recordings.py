@@ -1,0 +1,109 @@
+"""What is known of each recording: its state, findings, doubts and failed steps."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from imubench_pipeline.model.table import Column, OfRecordingRow, SensorRow, TableRow, table
+
+
+@table("recordings")
+class RecordingRow(SensorRow):
+    """A row of the table ``recordings``."""
+
+    device: Annotated[str, Column("specimen of the sensor; by default the recording's name")]
+    recording: Annotated[str, Column("name of the recording")]
+    kind: Annotated[str, Column("static, two_position, rate_table or positions")]
+    started: Annotated[str | None, Column("date and time of the first sample, where known")] = None
+    power_cycled: Annotated[bool | None, Column("without power before it; null: not known")] = None
+    simulated: Annotated[bool, Column("made from known parameters, not measured")]
+    status: Annotated[str, Column("ok, rejected, or failed: a step of its analysis did")]
+    reason: Annotated[str | None, Column("why a recording is rejected or failed")] = None
+    rate: Annotated[float | None, Column("sampling rate used", "Hz")] = None
+    rate_from: Annotated[str | None, Column("where it is from: stamps, or stated")] = None
+    rate_error: Annotated[
+        float | None,
+        Column("its standard deviation, as the stamps' scatter tells", "Hz"),
+    ] = None
+    samples: Annotated[int | None, Column("samples present in the longest channel")] = None
+    duration: Annotated[float | None, Column("from the first to the last sample", "s")] = None
+    temperature_min: Annotated[float | None, Column("lowest temperature", "degC")] = None
+    temperature_max: Annotated[float | None, Column("highest temperature", "degC")] = None
+    fitness: Annotated[
+        str | None,
+        Column("fit, fit with doubts or unfit; null: not analysed"),
+    ] = None
+    decides: Annotated[bool | None, Column("enters rankings, pools and exports")] = None
+    doubts: Annotated[str | None, Column("what puts its figures in doubt; empty: nothing")] = None
+
+
+@table("files")
+class FileRow(TableRow):
+    """A row of the table ``files``."""
+
+    file: Annotated[str, Column("its place in the drop zone")]
+    sensor: Annotated[str | None, Column("null: the file is skipped")] = None
+    recording: Annotated[str | None, Column("that it belongs to; null: it is skipped")] = None
+    status: Annotated[str, Column("analysed, rejected, failed or skipped")]
+    reason: Annotated[str | None, Column("why it is not analysed")] = None
+
+
+@table("doubts")
+class DoubtRow(OfRecordingRow):
+    """A row of the table ``doubts``."""
+
+    channel: Annotated[
+        str | None,
+        Column("the channel concerned; null: the whole recording"),
+    ] = None
+    code: Annotated[
+        str,
+        Column("a finding; not_explained: the spectrum; doubtful: a parameter's status"),
+    ]
+    fitness: Annotated[
+        str,
+        Column("unfit: the figures may be of something else; else fit with doubts"),
+    ]
+    parameters: Annotated[str | None, Column("on which it bears; null: on all")] = None
+    factor: Annotated[
+        float | None,
+        Column("by which it may change a value, where that is known"),
+    ] = None
+    start: Annotated[
+        float | None,
+        Column("begin of the part concerned, from the first sample", "s"),
+    ] = None
+    end: Annotated[float | None, Column("its end", "s")] = None
+    reason: Annotated[str, Column("in words")]
+
+
+@table("findings")
+class FindingRow(OfRecordingRow):
+    """A row of the table ``findings``."""
+
+    channel: Annotated[
+        str | None,
+        Column("the channel concerned; null: the whole recording"),
+    ] = None
+    finding: Annotated[str, Column("what was found")]
+    severity: Annotated[str, Column("note, warning or fatal")]
+    detail: Annotated[str, Column("in words, with what to do")]
+    value: Annotated[float | None, Column("its size", "as the finding says")] = None
+    start: Annotated[
+        float | None,
+        Column("begin of the part concerned, from the first sample", "s"),
+    ] = None
+    end: Annotated[float | None, Column("its end", "s")] = None
+
+
+@table("failures")
+class FailureRow(SensorRow):
+    """A row of the table ``failures``."""
+
+    recording: Annotated[
+        str | None,
+        Column("that is left out; null: a step of the whole sensor"),
+    ] = None
+    step: Annotated[str, Column("of the workflow, which failed")]
+    cause: Annotated[str, Column("error, killed, or time: it ran past its time")]
+    reason: Annotated[str, Column("in one line; the log of the step has the rest")]

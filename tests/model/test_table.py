@@ -1,0 +1,92 @@
+"""Rows of tables as classes: columns, Arrow types and units derive from them."""
+
+import ast
+import math
+from typing import Annotated
+
+import pyarrow as pa
+import pytest
+
+from imubench_pipeline.model.estimates import ParameterRow, ScoreRow
+from imubench_pipeline.model.table import Column, SensorRow, TableRow, columns_of, names_of, table
+from imubench_pipeline.tables import build, schema
+from imubench_pipeline.tables.schemas import ROWS, TABLES
+from tests.test_architecture import PACKAGE
+
+MAX_SUBSCRIPTS = 2110
+"""Columns of rows that are taken by a string outside of `tables/`; the number may only fall."""
+
+
+@table("example")
+class ExampleRow(SensorRow):
+    """All types of columns."""
+
+    count: Annotated[int, Column("how many")]
+    size: Annotated[float | None, Column("how large", "Hz")] = None
+    many: Annotated[float | None, Column("of very many", single=True)] = None
+    right: Annotated[bool | None, Column("yes or no")] = None
+
+
+def test_columns_derive_from_the_fields() -> None:
+    found = [(c.name, c.type, c.unit, c.meaning, c.required) for c in columns_of(ExampleRow)]
+    assert found == [
+        ("sensor", pa.string(), "-", "name of the sensor file", True),
+        ("count", pa.int64(), "-", "how many", True),
+        ("size", pa.float64(), "Hz", "how large", False),
+        ("many", pa.float32(), "-", "of very many", False),
+        ("right", pa.bool_(), "-", "yes or no", False),
+    ]
+
+
+def test_a_row_needs_what_is_required_and_has_no_other_columns() -> None:
+    row = ExampleRow(sensor="s", count=3)
+    assert (row.size, row.right) == (None, None)
+    with pytest.raises(TypeError, match="count"):
+        ExampleRow(sensor="s")  # type: ignore[call-arg]  # what is tested
+    with pytest.raises(AttributeError):
+        row.number  # type: ignore[attr-defined]  # noqa: B018  # what is tested
+    with pytest.raises(AttributeError):
+        row.count = 4  # type: ignore[misc]  # what is tested
+
+
+def test_a_row_is_a_mapping_of_its_columns() -> None:
+    row = ExampleRow(sensor="s", count=3)
+    assert dict(row) == {"sensor": "s", "count": 3, "size": None, "many": None, "right": None}
+    assert row == dict(row) and row | {"count": 4} == {**row, "count": 4}
+    assert "size" in row and "number" not in row
+
+
+def test_rows_come_back_from_their_table() -> None:
+    rows = [
+        ScoreRow(sensor="s", recording="r", channel="gyro_x", method="curve", rms=1.0),
+        ScoreRow(sensor="s", recording="r", channel="gyro_y", method="curve"),
+    ]
+    content = build("scores", rows)
+    assert content.schema == schema("scores")
+    assert ScoreRow.rows_of(content) == rows
+
+
+def test_every_table_has_a_class_with_its_name() -> None:
+    assert ROWS.keys() == TABLES.keys()
+    for name, row in ROWS.items():
+        assert issubclass(row, TableRow) and row.table == name
+        assert names_of(row) == tuple(column.name for column in TABLES[name])
+    assert ROWS["parameters"] is ParameterRow
+
+
+def test_what_is_not_finite_becomes_null() -> None:
+    row = ScoreRow(sensor="s", recording="r", channel="gyro_x", method="curve", rms=math.nan)
+    assert ScoreRow.rows_of(build("scores", [row]))[0].rms is None
+
+
+def test_no_more_columns_are_taken_by_a_string() -> None:
+    columns = {column.name for of in TABLES.values() for column in of}
+    number = sum(
+        isinstance(node, ast.Subscript)
+        and isinstance(node.slice, ast.Constant)
+        and node.slice.value in columns
+        for path in PACKAGE.rglob("*.py")
+        if path.relative_to(PACKAGE).parts[0] != "tables"
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    )
+    assert number <= MAX_SUBSCRIPTS, f"{number} columns are taken by a string"
