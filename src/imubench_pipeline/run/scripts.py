@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from inspect import signature
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+from snakemake.script import script as script_of_snakemake
 from snakemake.sourcecache import LocalSourceFile, SourceCache, infer_source_file
 
 from imubench_pipeline.run.faults import Faults, Of
@@ -15,6 +18,8 @@ from imubench_pipeline.run.processes import Job, Processes, StepError
 from imubench_pipeline.run.resources import Limit, Limits
 from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import QUALITY, Failure, failure_of, write_empty
+
+_SIGNATURE = signature(script_of_snakemake)
 
 
 class Scripts:
@@ -39,31 +44,31 @@ class Scripts:
         self._limits = limits
         self._processes = Processes()
 
-    def __call__(
-        self,
-        path: str,
-        basedir: str,
-        input: Any,
-        output: Any,
-        params: Any,
-        wildcards: Any,
-        threads: int,
-        resources: Any,
-        log: Any,
-        *others: Any,
-    ) -> None:
+    def __call__(self, *values: Any, **named: Any) -> None:
         """Run a script to its end, or leave its outputs empty.
 
-        `path` and `basedir` are the script and the folder of the rule, the others as Snakemake has
-        them; of `others` the last but two and the last but one are where it keeps what it fetches.
+        Parameters
+        ----------
+        *values, **named
+            What Snakemake gives its own function `script`, by whose signature they have names.
 
         Raises
         ------
         StepError
             If the run cannot go on without the script.
         """
-        script = _fetched(path, basedir, *others[-3:-1])
-        job = Job(script, input, output, params, wildcards, Path(log[0]), results=self._results)
+        given = SimpleNamespace(**_SIGNATURE.bind(*values, **named).arguments)
+        script = _path_of(given)
+        params = given.params
+        job = Job(
+            script,
+            given.input,
+            given.output,
+            params,
+            given.wildcards,
+            Path(given.log[0]),
+            results=self._results,
+        )
         job.log.unlink(missing_ok=True)
         attempt = params.get("attempt")
         try:
@@ -116,12 +121,13 @@ class Scripts:
 _VERBS = {"error": "failed: ", "killed": "was killed twice: ", "time": ""}
 
 
-def _fetched(path: str, basedir: str, *caches: Any) -> Path:
-    """Return where a script lies, which may be that of a workflow from elsewhere."""
-    source = infer_source_file(path, infer_source_file(basedir))
+def _path_of(given: SimpleNamespace) -> Path:
+    """Return the path of a script; Snakemake caches one of a workflow from elsewhere."""
+    source = infer_source_file(given.path, infer_source_file(given.basedir))
     if isinstance(source, LocalSourceFile):
         return Path(source.get_path_or_uri(secret_free=True))
-    return Path(SourceCache(*caches).get_path(source))
+    cache = SourceCache(given.sourcecache_path, given.runtime_sourcecache_path)
+    return Path(cache.get_path(source))
 
 
 def _before(inputs: Any, folder: Path) -> Failure | None:
