@@ -142,7 +142,16 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ways(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Ways:
     folder = tmp_path_factory.mktemp("deployed")
     checkout = with_logs(in_checkout(folder / "checkout"), logs)
-    targets = ["tables", "fusion", "papers", "ranking", "shortlist", "repeatability", "catalogue"]
+    targets = [
+        "tables",
+        "files",
+        "fusion",
+        "papers",
+        "ranking",
+        "shortlist",
+        "repeatability",
+        "catalogue",
+    ]
     targets.append("exports")
     ended(snakemake("-c1", *targets, "--config", *GIVEN), checkout)
     package = installed(built(folder), folder / "venv")
