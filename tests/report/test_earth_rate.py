@@ -2,11 +2,17 @@
 
 import shutil
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from imubench_pipeline.model.experiments import (
+    EarthRatePredictionRow,
+    EarthRatePublishedRow,
+    EarthRateRow,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.earth_rate import published_words
 from imubench_pipeline.report.pages import pages
@@ -175,13 +181,12 @@ def test_all_pages_stand_in_one_file(made: Site) -> None:
 
 
 def _best_of(tried: list[float], nearly: list[float], best: float) -> str:
-    rows: list[dict[str, Any]] = [
-        {"of": "goal", "goal": 1.0, "dwell": 28.0, "turns": 1, "time": 58.0, "sigma": 1.0,
-         "heading": 0.1}
-    ]  # fmt: skip
+    predicted = partial(EarthRatePredictionRow, sensor="s", recording="run", channel="gyro_x",
+                        latitude=0.0, turns=1)  # fmt: skip
+    rows = [predicted(of="goal", goal=1.0, dwell=28.0, time=58.0, sigma=1.0, heading=0.1)]
     rows += [
-        {"of": "dwell", "dwell": dwell, "turns": 1, "time": 600.0, "relative": 0.1,
-         "best": dwell == best, "nearly_best": dwell in nearly}
+        predicted(of="dwell", dwell=dwell, time=600.0, relative=0.1, best=dwell == best,
+                  nearly_best=dwell in nearly)
         for dwell in tried
     ]  # fmt: skip
     found = needs(rows)
@@ -190,8 +195,10 @@ def _best_of(tried: list[float], nearly: list[float], best: float) -> str:
 
 
 def test_sentences() -> None:
-    row = {"method": "filter", "value": 30 * HOUR, "upper": 32 * HOUR, "truth": 15.04 * HOUR,
-           "off_sigma": 15.0, "reason": None}  # fmt: skip
+    estimate = partial(EarthRateRow, sensor="s", recording="run", channel="gyro_x", part="whole",
+                       parameter="rate", unit="rad/s", truth=15.04 * HOUR,
+                       latitude=0.0)  # fmt: skip
+    row = estimate(method="filter", value=30 * HOUR, upper=32 * HOUR, status="ok", off_sigma=15.0)
     assert "15 standard deviations away" in answer([row], "practical")
     assert "So far off is not noise" in answer([row], "practical")
     assert answer([], "practical") == "Nothing was found of the turns of this recording."
@@ -202,18 +209,19 @@ def test_sentences() -> None:
     assert "shortest that was tried; up to 20 s" in _best_of([300.0, 20.0, 5.0], [20.0, 5.0], 5.0)
     assert "From 19 s to 21 s" in _best_of([300.0, 21.0, 20.0, 19.0, 5.0], [21.0, 20.0, 19.0], 20.0)
     assert "All others" in _best_of([300.0, 20.0, 5.0], [20.0], 20.0)
-    lines = [PUBLISHED | {"recording": "a", "off": "1 σ", "verdict": "within the noise"}]
-    assert published_words(lines) == (
+    names = {"sensor": "s", "recording": "a", "verdict": "within the noise"}
+    assert published_words([EarthRatePublishedRow(**PUBLISHED | names)]) == (
         "All 1 published estimates lie within what the noise allows. "
         "A filter that does not know the rate has a σ that is 0.78 % less than that of the mean "
         "over pairs in these runs: that is all that it improves."
     )
-    given = {"part": "whole", "status": "given", "method": "known_rate", "settled": 900.0}
-    other = given | {"settled": None, "method": "known_rate_radians"}
+    given = estimate(status="given", method="known_rate", settled=900.0)
+    later = estimate(status="given", method="known_rate", settled=1800.0)
+    other = estimate(status="given", method="known_rate_radians")
     assert (
         "it stays after 15 min of data with P₀ in (°/s)²; not by the end with P₀ in (rad/s)²"
         in (given_words([given, other]))
     )
-    assert "after 15 min to 30 min of data" in given_words([given, given | {"settled": 1800.0}])
+    assert "after 15 min to 30 min of data" in given_words([given, later])
     assert given_words([]) == ""
     assert published_words([]) == "" and needs([]) is None

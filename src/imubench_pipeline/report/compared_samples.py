@@ -52,8 +52,11 @@ def payload(rows: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
             drawn[channel][of] = {
                 "name": NAMES[of],
                 "end": envelope[-1]["end"],
-                **{name: arrays.even(numbers(envelope, name)) for name in ("low", "high", "mean")},
-                "stretch": arrays.even(numbers(stretch, "mean")),
+                **{
+                    name: arrays.even(numbers(row[name] for row in envelope))
+                    for name in ("low", "high", "mean")
+                },
+                "stretch": arrays.even(numbers(row["mean"] for row in stretch)),
                 "stretch_end": stretch[-1]["end"],
             }
     return drawn

@@ -24,21 +24,17 @@ from imubench_pipeline.report.turned import (
     latitude_text,
     line,
     needs,
+    off_words,
     prediction_payload,
     published_lines,
 )
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.typing import Row
 
 
 def _context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
     runs = [_run(site, view) for view in site.turned]
-    published = [
-        {**line, "view": view}
-        for view in site.turned
-        for line in published_lines(view.rows(EarthRatePublishedRow))
-    ]
+    published = [row for view in site.turned for row in view.rows(EarthRatePublishedRow)]
     predicted = list(_predicted(site))
     aligned = alignments(site, arrays)
     return {
@@ -46,7 +42,11 @@ def _context(site: Site) -> dict[str, Any]:
         "runs": runs,
         "given": given_words([row for view in site.turned for row in view.rows(EarthRateRow)]),
         "rejected": [view for view in site.turned if view.left_out],
-        "published": published,
+        "published": [
+            {**line, "view": view}
+            for view in site.turned
+            for line in published_lines(view.rows(EarthRatePublishedRow))
+        ],
         "verdict": published_words(published),
         "needs": predicted,
         "alignments": aligned,
@@ -55,7 +55,7 @@ def _context(site: Site) -> dict[str, Any]:
         "page": {
             "looks": {},
             "channels": [],
-            "published": [_drawn(line) for line in published],
+            "published": [_drawn(row) for row in published],
             "predictions": {
                 line["place"]: prediction_payload(line["rows"], arrays) for line in predicted
             },
@@ -81,18 +81,18 @@ EARTH_RATE_PAGE = Entry(
 
 def _run(site: Site, view: RecordingView) -> dict[str, Any]:
     rows = view.rows(EarthRateRow)
-    whole = [row for row in rows if row["part"] == "whole"]
-    shown = [line(row) for row in rows if row["method"] in ESTIMATES]
+    whole = [row for row in rows if row.part == "whole"]
+    shown = [row for row in rows if row.method in ESTIMATES]
     return {
         "view": view,
-        "answer": view.row["reason"] if view.left_out else answer(whole, site.system),
+        "answer": view.row.reason if view.left_out else answer(whole, site.system),
         "parts": [
             {
                 "part": part,
-                "duration": next(row["duration"] for row in shown if row["part"] == part),
-                "lines": {row["method"]: row for row in shown if row["part"] == part},
+                "duration": next(row.duration for row in shown if row.part == part),
+                "lines": {row.method: line(row) for row in shown if row.part == part},
             }
-            for part in dict.fromkeys(row["part"] for row in shown)
+            for part in dict.fromkeys(row.part for row in shown)
         ],
     }
 
@@ -111,43 +111,45 @@ def _predicted(site: Site) -> Iterator[dict[str, Any]]:
         yield needed | {"view": view, "place": place, "rows": rows, "latitude": latitude}
 
 
-def _drawn(line: Row) -> dict[str, Any]:
-    name = line["recording"] + ("" if line["part"] == "whole" else f", {line['part']}")
-    numbers = ("published", "truth", "sigma", "simulated")
-    return {"name": name} | {key: line[key] for key in numbers}
+def _drawn(row: EarthRatePublishedRow) -> dict[str, Any]:
+    return {
+        "name": row.recording + ("" if row.part == "whole" else f", {row.part}"),
+        "published": row.published,
+        "truth": row.truth,
+        "sigma": row.sigma,
+        "simulated": row.simulated,
+    }
 
 
-def published_words(lines: Sequence[Row]) -> str:
-    """Return whether published estimates (`published_lines`) are within the noise, in sentences."""
-    if not lines:
+def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
+    """Return whether published estimates are within the noise, in sentences."""
+    if not rows:
         return ""
-    beyond = [line for line in lines if line["verdict"] == "beyond the noise"]
+    beyond = [row for row in rows if row.verdict == "beyond the noise"]
     names = ", ".join(
-        line["recording"]
-        + ("" if line["part"] == "whole" else f" ({line['part']})")
-        + f" by {line['off']}"
-        for line in beyond
+        row.recording + ("" if row.part == "whole" else f" ({row.part})") + f" by {off_words(row)}"
+        for row in beyond
     )
     if not beyond:
         return (
-            f"All {len(lines)} published estimates lie within what the noise allows. {_gain(lines)}"
+            f"All {len(rows)} published estimates lie within what the noise allows. {_gain(rows)}"
         )
-    within = len(lines) - len(beyond)
+    within = len(rows) - len(beyond)
     return (
         f"{counted(within, 'published estimate lies', 'published estimates lie')} within what the "
-        f"noise of the source's own figures allows, {len(beyond)} of {len(lines)} do not: {names}. "
+        f"noise of the source's own figures allows, {len(beyond)} of {len(rows)} do not: {names}. "
         "No filter takes that off: it is no noise, but another error of those runs, such as a "
         "sensor that warms up, turns that are miscounted, or samples of the turns in the means. "
-        + _gain(lines)
+        + _gain(rows)
     )
 
 
-def _gain(lines: Sequence[Row]) -> str:
+def _gain(rows: Sequence[EarthRatePublishedRow]) -> str:
     """Return how much better a filter is than the mean over pairs, in a sentence."""
     gains = [
-        1.0 - line["sigma_filter"] / line["sigma"]
-        for line in lines
-        if line["sigma_filter"] is not None and line["sigma"]
+        1.0 - row.sigma_filter / row.sigma
+        for row in rows
+        if row.sigma_filter is not None and row.sigma
     ]
     if not gains:
         return ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -296,7 +296,10 @@ def samples_payload(
         payload["envelope"][channel] = {
             "start": rows[0]["start"],
             "end": rows[-1]["end"],
-            **{name: arrays.even(numbers(rows, name)) for name in ("low", "high", "mean")},
+            **{
+                name: arrays.even(numbers(row[name] for row in rows))
+                for name in ("low", "high", "mean")
+            },
         }
     for channel, rows in _by_channel(histogram).items():
         payload["histogram"][channel] = {
@@ -318,6 +321,6 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.7g}")
 
 
-def numbers(rows: Sequence[Row], name: str) -> list[float]:
-    """Return a column of rows; NaN where it has no value."""
-    return [np.nan if row[name] is None else row[name] for row in rows]
+def numbers(values: Iterable[float | None]) -> list[float]:
+    """Return the values of a column; NaN where there is none."""
+    return [np.nan if value is None else value for value in values]
