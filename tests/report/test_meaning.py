@@ -1,9 +1,11 @@
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.report.meaning import budget_tables, budget_words, rankings
 from imubench_pipeline.settings.requirements import Requirement
@@ -18,7 +20,7 @@ def white(N: float) -> Estimate:
     return Estimate("likelihood", {"N": Parameter(N, lower=0.9 * N, upper=1.1 * N)})
 
 
-def errors() -> list[dict[str, Any]]:
+def errors() -> list[ErrorBudgetRow]:
     requirement = Requirement.model_validate(ROBOT)
     questions = [*standard([60.0], 60.0, math.pi / 4, ["worst"])]
     questions += of_requirement("robot", requirement)
@@ -30,13 +32,13 @@ def errors() -> list[dict[str, Any]]:
     ):
         names = {"sensor": sensor, "recording": "r"}
         rows += error_rows(names, estimates, questions, draws=50, seed=1)
-    return build("error_budget", rows).to_pylist()
+    return ErrorBudgetRow.rows_of(build("error_budget", rows))
 
 
 def test_sensors_stand_in_their_order_with_what_decides() -> None:
     requirements = {"robot": Requirement.model_validate(ROBOT)}
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
-    table = build("ranking", ranking_rows(errors(), requirements, about)).to_pylist()
+    table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
     (shown,) = rankings(table, {"robot": ROBOT}, SIMULATED, "practical")
     assert [(g["rank"], g["sensor"], g["verdict"]) for g in shown["groups"]] == [
         (1, "good", "passes"),
@@ -54,8 +56,8 @@ def test_sensors_stand_in_their_order_with_what_decides() -> None:
 def test_a_verdict_stands_beside_what_is_doubted_of_its_logs() -> None:
     requirements = {"robot": Requirement.model_validate(ROBOT)}
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
-    table = build("ranking", ranking_rows(errors(), requirements, about)).to_pylist()
-    doubted = [row | {"doubts": "knocks" if row["sensor"] != "good" else ""} for row in table]
+    table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
+    doubted = [replace(row, doubts="knocks" if row.sensor != "good" else "") for row in table]
     (shown,) = rankings(doubted, {"robot": ROBOT}, SIMULATED, "practical")
     # Of the third nothing is known, and the reason says why.
     assert [group["doubts"] for group in shown["groups"]] == ["", "knocks", ""]
@@ -92,7 +94,7 @@ def budget(**changes: Any) -> list[dict[str, Any]]:
 
 
 def shown(rows: list[dict[str, Any]], system: Any = "practical") -> dict[str, Any]:
-    (table,) = budget_tables(build("error_budget", rows).to_pylist(), {}, system)
+    (table,) = budget_tables(ErrorBudgetRow.rows_of(build("error_budget", rows)), {}, system)
     return table
 
 
@@ -149,7 +151,7 @@ def test_what_is_assumed_is_said_once_with_the_errors_that_it_is_about() -> None
 
 
 def test_what_requirements_ask_for_is_no_part_of_a_budget() -> None:
-    rows = build("error_budget", budget(requirement="x")).to_pylist()
+    rows = ErrorBudgetRow.rows_of(build("error_budget", budget(requirement="x")))
     assert list(budget_tables(rows, {}, "si")) == []
 
 
@@ -164,7 +166,7 @@ def ranked(**changes: Any) -> dict[str, Any]:
            "lower": 0.004, "upper": 0.006, "unit": "rad", "margin": 2.0, "chance": 0.987,
            "limit_verdict": "passes", "source": "gyro N", "share": 0.75,
            "reached_after": 7200.0}  # fmt: skip
-    rows = build("ranking", [row | changes]).to_pylist()
+    rows = RankingRow.rows_of(build("ranking", [row | changes]))
     (one,) = rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
     (group,) = one["groups"]
     (limit,) = group["limits"]
@@ -204,7 +206,7 @@ def test_tied_sensors_stand_in_the_order_of_their_margins(margins: list[float]) 
          "limit_verdict": "passes", "limit": 1.0, "sigma": 1 / margin, "chance": 1.0}
         for margin in margins
     ]  # fmt: skip
-    (one,) = rankings(build("ranking", rows).to_pylist(), {"robot": ROBOT}, {}, "si")
+    (one,) = rankings([RankingRow(**row) for row in rows], {"robot": ROBOT}, {}, "si")
     assert [group["sensor"] for group in one["groups"]] == ["s3", "s2", "s1"]
 
 
@@ -216,9 +218,10 @@ def test_a_requirement_that_nothing_answers_has_no_groups() -> None:
 def test_of_tied_sensors_one_without_conditions_is_named_first() -> None:
     requirements = {"robot": Requirement.model_validate(ROBOT)}
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
-    table = build("ranking", ranking_rows(errors(), requirements, about)).to_pylist()
-    tied = [row | {"rank": 1} for row in table if row["sensor"] != "gyro"]
+    table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
     verdicts = {"good": "passes if", "poor": "probably passes"}
-    given = [row | {"verdict": verdicts[row["sensor"]]} for row in tied]
+    given = [
+        replace(row, rank=1, verdict=verdicts[row.sensor]) for row in table if row.sensor != "gyro"
+    ]
     (shown,) = rankings(given, {"robot": ROBOT}, SIMULATED, "practical")
     assert [group["sensor"] for group in shown["groups"]] == ["poor", "good"]

@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.report.practical import PageUnit
 from imubench_pipeline.report.words import (
     counted,
@@ -23,9 +25,10 @@ UNIT = PageUnit("°/h", 2.0)
 HOUR = 3600.0
 
 
-def row(status: str = "ok", **values: Any) -> dict[str, Any]:
-    nothing = dict.fromkeys(("value", "lower", "upper", "duration_needed", "reason"))
-    return nothing | {"parameter": "K", "status": status} | values
+def row(status: str = "ok", **values: Any) -> ParameterRow:
+    return ParameterRow(sensor="s", recording="r", channel="gyro_x", method="likelihood",
+                        recommended=True, model="N+K", component=1, parameter="K", unit="rad/s^1.5",
+                        status=status, **values)  # fmt: skip
 
 
 def test_a_value_that_is_known_needs_no_words() -> None:
@@ -63,7 +66,7 @@ def test_a_value_that_is_known_needs_no_words() -> None:
         ),
     ],
 )
-def test_why_a_parameter_has_no_plain_value(given_: dict[str, Any], sentence: str) -> None:
+def test_why_a_parameter_has_no_plain_value(given_: ParameterRow, sentence: str) -> None:
     assert untold(given_, UNIT, 3 * HOUR) == sentence
 
 
@@ -89,7 +92,7 @@ def test_a_log_of_unknown_length_is_not_spoken_of() -> None:
         (row(lower=1.0, upper=2.0), ""),
     ],
 )
-def test_how_well_a_value_is_known(given_: dict[str, Any], words: str) -> None:
+def test_how_well_a_value_is_known(given_: ParameterRow, words: str) -> None:
     assert precision(given_, UNIT) == words
 
 
@@ -160,10 +163,11 @@ def test_weak_evidence_and_what_a_unit_would_turn_stand_with_the_verdict() -> No
 
 
 def weak(reasons: str | None, **values: Any) -> str:
-    about = {"verdict": "passes", "evidence": "weak" if reasons else "strong",
-             "evidence_reasons": reasons, "recordings": 1, "specimens": 1, "spread_of": None,
-             "longest_log": 660.0}  # fmt: skip
-    return verdict_words(about | values)
+    about = {"evidence_reasons": reasons, "recordings": 1, "specimens": 1, "longest_log": 660.0}
+    stands = RankingRow(requirement="robot", sensor="s", verdict="passes", decides=True,
+                        error="heading", time=60.0, unit="rad", limit_verdict="passes",
+                        evidence="weak" if reasons else "strong", **about | values)  # fmt: skip
+    return verdict_words(stands)
 
 
 def test_what_makes_evidence_weak_is_said_in_words() -> None:

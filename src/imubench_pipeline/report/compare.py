@@ -125,7 +125,7 @@ def _recording(view: RecordingView) -> dict[str, Any]:
 
 def _units(site: Site, error: str) -> dict[str, Any]:
     """Return the unit of an axis, and those of a number: from which size in SI, sign and factor."""
-    dimension = DIMENSIONS[error]  # type: ignore[index]  # a key of it
+    dimension = DIMENSIONS[error]
     axis = unit_of(dimension, site.system)
     sized = units_by_size(dimension, site.system)
     return {

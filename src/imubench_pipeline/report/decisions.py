@@ -183,7 +183,7 @@ def _column(name: str, declared: Mapping[str, Any], answer: str) -> Column:
     return Column(name, requirement.title, short, limits, answer)
 
 
-def _drawn(row: Row) -> list[float]:
+def _drawn(row: RankingRow) -> list[float]:
     """Return the margins of a row that are drawn."""
     known = [row[name] for name in ("logged_margin", "unless_margin") if row[name] is not None]
     if row["margin"] is None:
@@ -218,7 +218,7 @@ def _empty(site: Site, requirement: str, sensor: str) -> Cell:
     return Cell(requirement, sensor, word, 0, None, None, "", "", reason, (), -math.inf)
 
 
-def _cell(row: Row, scale: Scale) -> Cell:
+def _cell(row: RankingRow, scale: Scale) -> Cell:
     word = word_of(row)
     judged = word != "not judged"
     shown = margin(row) if judged else None
@@ -263,7 +263,7 @@ def _reason(row: Row) -> str:
     return str(row["reason"] or "too little is known")
 
 
-def _otherwise(row: Row, scale: Scale) -> list[tuple[str, Told, float]]:
+def _otherwise(row: RankingRow, scale: Scale) -> list[tuple[str, Told, float]]:
     """Return the margins that a recording in doubt would have."""
     named = (("as logged", "logged_margin"), ("mended", "unless_margin"))
     return [

@@ -15,7 +15,6 @@ from imubench_pipeline.report.told import of_ranking
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import requirement_words, spread_words
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.typing import Row
 
 
 def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
@@ -66,7 +65,7 @@ def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[
         }
 
 
-def _otherwise(row: Row) -> Iterator[tuple[str, str, str]]:
+def _otherwise(row: RankingRow) -> Iterator[tuple[str, str, str]]:
     """Yield what the verdict would be: in which case, the verdict and its margin."""
     for words, name in (("As logged", "logged"), ("With the unit mended", "unless")):
         size = row[f"{name}_margin"]
@@ -82,13 +81,13 @@ def _window(requirement: Requirement) -> str:
     return "turn-on biases that nothing has taken off" if requirement.turn_on else ""
 
 
-def _totals(view: RecordingView) -> Iterator[Row]:
+def _totals(view: RecordingView) -> Iterator[ErrorBudgetRow]:
     for row in view.rows(ErrorBudgetRow):
         if row["requirement"] is not None and row["source"] == "total":
             yield row
 
 
-def _recording(site: Site, view: RecordingView, totals: Sequence[Row]) -> dict[str, Any]:
+def _recording(site: Site, view: RecordingView, totals: Sequence[ErrorBudgetRow]) -> dict[str, Any]:
     axes = counted(len(view.recommended()), "axis", "axes")
     temperature = ""
     if view.row["temperature_min"] is not None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.navigation.suitability.conditions import parts_of
 from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.practical import (
@@ -19,7 +20,6 @@ from imubench_pipeline.report.practical import (
 from imubench_pipeline.report.told import Between, Told, margin, of_budget, of_ranking
 from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
-from imubench_pipeline.typing import Row
 
 Simulated = Mapping[tuple[str, str], bool]
 
@@ -35,7 +35,10 @@ _QUARTER_TURN = math.pi / 2.0
 
 
 def rankings(
-    rows: Sequence[Row], requirements: Mapping[str, Any], simulated: Simulated, system: System
+    rows: Sequence[RankingRow],
+    requirements: Mapping[str, Any],
+    simulated: Simulated,
+    system: System,
 ) -> Iterator[dict[str, Any]]:
     """Yield each requirement with the sensors in their order, and how they stand to its limits.
 
@@ -44,134 +47,148 @@ def rankings(
     """
     for name, declared in requirements.items():
         requirement = Requirement.model_validate(declared)
-        own = [row for row in rows if row["requirement"] == name]
+        own = [row for row in rows if row.requirement == name]
         groups = []
-        for sensor in sorted(dict.fromkeys(row["sensor"] for row in own), key=_order(own)):
-            limits = [row for row in own if row["sensor"] == sensor]
-            recordings = {row["recording"] for row in limits}
-            stands = next(row for row in limits if row["decides"])
+        for sensor in sorted(dict.fromkeys(row.sensor for row in own), key=_order(own)):
+            limits = [row for row in own if row.sensor == sensor]
+            recordings = {row.recording for row in limits}
+            stands = next(row for row in limits if row.decides)
             groups.append(
                 {
                     "sensor": sensor,
                     "simulated": all(
-                        simulated.get((sensor, recording), False) for recording in recordings
+                        recording is not None and simulated.get((sensor, recording), False)
+                        for recording in recordings
                     ),
-                    "rank": limits[0]["rank"] or "–",
-                    "tied_with": limits[0]["tied_with"],
-                    "verdict": stands["verdict"],
-                    "conditions": stands["conditions"],
-                    "weak": evidence_words(stands) if stands["rank"] else "",
-                    "doubts": (stands["doubts"] or "") if stands["rank"] else "",
-                    "unless": stands["unless"],
+                    "rank": limits[0].rank or "–",
+                    "tied_with": limits[0].tied_with,
+                    "verdict": stands.verdict,
+                    "conditions": stands.conditions,
+                    "weak": evidence_words(stands) if stands.rank else "",
+                    "doubts": (stands.doubts or "") if stands.rank else "",
+                    "unless": stands.unless,
                     "limits": [_limit(row, system) for row in limits],
                 }
             )
         yield {"name": name, "requirement": requirement, "groups": groups}
 
 
-def _order(rows: Sequence[Row]) -> Any:
+def _order(rows: Sequence[RankingRow]) -> Any:
     """Return a key that puts the ranked sensors first, of one rank those that pass as they are.
 
     A sensor of which little is known has a large margin and conditions.
     """
     places: dict[str, tuple[int, int, float]] = {}
     for row in rows:
-        if row["decides"]:
-            rank, margin = row["rank"] or 10**6, row["margin"] or 0.0
-            place = _MERIT.index(row["verdict"]) if row["verdict"] in _MERIT else len(_MERIT)
-            places[row["sensor"]] = (rank, place // 2, -margin)
+        if row.decides:
+            rank, margin = row.rank or 10**6, row.margin or 0.0
+            place = _MERIT.index(row.verdict) if row.verdict in _MERIT else len(_MERIT)
+            places[row.sensor] = (rank, place // 2, -margin)
     return places.__getitem__
 
 
 _MERIT = ("passes", "probably passes", "passes if", "probably passes if")
 
 
-def _limit(row: Row, system: System) -> dict[str, Any]:
-    has_sigma = row["sigma"] is not None
-    reached = row["reached_after"]
+def _limit(row: RankingRow, system: System) -> dict[str, Any]:
+    reached = row.reached_after
     size = margin(row)
     return {
         "limit": limit_words(row),
         "allowed": _allowed(row, system),
-        "sigma": _expected(row, system) if has_sigma else "–",
-        "interval": _interval(row, system) if has_sigma else "–",
+        "sigma": _expected(row, system),
+        "interval": _interval(row, system),
         "margin": size[0] if size else "–",
         "margins": Between(size[1], size[2]) if size else "",
-        "chance": of_ranking(row, "chance", _percent(row["chance"]), "%") if has_sigma else "–",
-        "source": f"{row['source']} ({_percent(row['share'])})" if row["source"] else "–",
-        "parts": (row["parts"] or "–").split("; "),
+        "chance": "–"
+        if row.sigma is None
+        else of_ranking(row, "chance", _percent(row.chance), "%"),
+        "source": f"{row.source} ({_percent(row.share)})" if row.source else "–",
+        "parts": (row.parts or "–").split("; "),
         "reached": duration_text(reached) if reached is not None else "–",
-        "decides": row["decides"],
-        "reason": row["reason"] or "",
+        "decides": row.decides,
+        "reason": row.reason or "",
         "backtest": standing_text(row),
     }
 
 
-def _allowed(row: Row, system: System) -> Told:
-    unit = unit_of(DIMENSIONS[row["error"]], system, row["limit"])
-    return of_ranking(row, "limit", f"{unit.text(row['limit'], 3)} {unit.sign}", unit.sign)
+def _allowed(row: RankingRow, system: System) -> Told:
+    unit = unit_of(DIMENSIONS[row.error], system, row.limit)
+    return of_ranking(row, "limit", f"{unit.text(row.limit, 3)} {unit.sign}", unit.sign)
 
 
-Place = Callable[[Row, str, str, str], Told]
-"""Gives a number, of a row and a column, its place: `told.of_ranking` or `told.of_budget`."""
+ErrorRow = RankingRow | ErrorBudgetRow
+"""A row of an error after a time."""
 
 
-def _expected(row: Row, system: System, place: Place = of_ranking) -> str:
-    """Return the error of a row, which has one."""
-    unit = unit_of(DIMENSIONS[row["error"]], system, row["sigma"])
-    text = _shown(row, unit)
-    return place(row, "sigma", text, unit.sign) if _sensible(row, row["sigma"]) else text
+def _place(row: ErrorRow, column: str, text: str, unit: str) -> Told:
+    """Return a number of a row with its place in the tables."""
+    if isinstance(row, RankingRow):
+        return of_ranking(row, column, text, unit)
+    return of_budget(row, column, text, unit)
 
 
-def _interval(row: Row, system: System, place: Place = of_ranking) -> str:
+def _expected(row: ErrorRow, system: System) -> str:
+    """Return the error of a row; a dash where it is not known."""
+    if row.sigma is None:
+        return NO_VALUE
+    unit = unit_of(DIMENSIONS[row.error], system, row.sigma)
+    text = _shown(row, row.sigma, unit)
+    return _place(row, "sigma", text, unit.sign) if _sensible(row, row.sigma) else text
+
+
+def _interval(row: ErrorRow, system: System) -> str:
     """Return the limits of the error of a row, in the unit of the error."""
-    if not _sensible(row, row["sigma"]) or row["lower"] is None or row["upper"] is None:
-        return "–"
-    unit = unit_of(DIMENSIONS[row["error"]], system, row["sigma"])
-    digits = unit.digits(row["sigma"], row["lower"], row["upper"])
+    if row.sigma is None or row.lower is None or row.upper is None:
+        return NO_VALUE
+    if not _sensible(row, row.sigma):
+        return NO_VALUE
+    unit = unit_of(DIMENSIONS[row.error], system, row.sigma)
+    digits = unit.digits(row.sigma, row.lower, row.upper)
     lower, upper = (
-        place(row, name, unit.text(row[name], digits), unit.sign) for name in ("lower", "upper")
+        _place(row, name, unit.text(value, digits), unit.sign)
+        for name, value in (("lower", row.lower), ("upper", row.upper))
     )
     return Between(lower, upper)
 
 
-def error_of_recording(total: Row, system: System) -> tuple[str, str]:
+def error_of_recording(total: ErrorBudgetRow, system: System) -> tuple[str, str]:
     """Return the error of a recording and its limits, of a total of ``error_budget``."""
-    if total["sigma"] is None:
+    if total.sigma is None:
         return "–", ""
-    return _expected(total, system, of_budget), _interval(total, system, of_budget)
+    return _expected(total, system), _interval(total, system)
 
 
-def limit_words(row: Row) -> str:
-    """Return the error and the time of a limit, of a row of ``ranking`` or ``error_budget``."""
-    drive = f" without GNSS ({row['trajectory']})" if row.get("trajectory") else ""
-    return f"{_NAMES[row['error']]}, {duration_text(row['time'])}{drive}"
+def limit_words(row: RankingRow) -> str:
+    """Return the error and the time of a limit, of a row of ``ranking``."""
+    drive = f" without GNSS ({row.trajectory})" if row.trajectory else ""
+    return f"{_NAMES[row.error]}, {duration_text(row.time)}{drive}"
 
 
 def budget_tables(
-    rows: Sequence[Row], simulated: Simulated, system: System
+    rows: Sequence[ErrorBudgetRow], simulated: Simulated, system: System
 ) -> Iterator[dict[str, Any]]:
     """Yield the error budget of each recording: a line an error and axis, a column a time.
 
     Of the table ``error_budget``, less what requirements ask for, and which recordings are
     simulated.
     """
-    own = [row for row in rows if row["requirement"] is None]
-    for key in dict.fromkeys((row["sensor"], row["recording"]) for row in own):
-        parts = [row for row in own if (row["sensor"], row["recording"]) == key]
-        times = list(dict.fromkeys(row["time"] for row in parts))
+    own = [row for row in rows if row.requirement is None]
+    for key in dict.fromkeys((row.sensor, row.recording) for row in own):
+        parts = [row for row in own if (row.sensor, row.recording) == key]
+        times = list(dict.fromkeys(row.time for row in parts))
         lines: dict[tuple[str, tuple[float | None, ...]], dict[str, Any]] = {}
         missing: dict[str, None] = {}
-        for error, axis in dict.fromkeys((row["error"], row["axis"]) for row in parts):
-            chosen = [row for row in parts if (row["error"], row["axis"]) == (error, axis)]
-            sigmas = tuple(row["sigma"] for row in chosen if row["source"] == "total")
+        for error, axis in dict.fromkeys((row.error, row.axis) for row in parts):
+            chosen = [row for row in parts if (row.error, row.axis) == (error, axis)]
+            sigmas = tuple(row.sigma for row in chosen if row.source == "total")
             if not any(sigmas):
-                missing[f"{_NAMES[error]}: {chosen[0]['reason'] or 'not known'}"] = None
+                missing[f"{_NAMES[error]}: {chosen[0].reason or 'not known'}"] = None
             elif (error, sigmas) in lines:
                 # One channel is the worst and the median.
                 lines[error, sigmas]["axis"] += f", {axis}"
             else:
-                cells = [_cell([r for r in chosen if r["time"] == t], system) for t in times]
+                cells = [_cell([r for r in chosen if r.time == t], system) for t in times]
                 lines[error, sigmas] = {"error": _NAMES[error], "axis": axis, "cells": cells}
         yield {
             "sensor": key[0],
@@ -184,41 +201,41 @@ def budget_tables(
         }
 
 
-def budget_bars(rows: Sequence[Row], system: System) -> list[dict[str, Any]]:
+def budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[dict[str, Any]]:
     """Return a bar for each error and time of the worst axes: the parts of its variance.
 
     Of the rows of the table ``error_budget`` of one recording.
     """
-    own = [row for row in rows if row["requirement"] is None]
-    worst = [row for row in own if row["axis"] == own[0]["axis"]]
-    groups: dict[tuple[Any, float], list[Row]] = {}
+    own = [row for row in rows if row.requirement is None]
+    worst = [row for row in own if row.axis == own[0].axis]
+    groups: dict[tuple[str, float], list[ErrorBudgetRow]] = {}
     for row in worst:
-        groups.setdefault((row["error"], row["time"]), []).append(row)
+        groups.setdefault((row.error, row.time), []).append(row)
     bars = []
     for (error, time), parts in sorted(
         groups.items(), key=lambda group: _ERRORS.index(group[0][0])
     ):
         total = _total(parts)
-        sigma = total["sigma"] if total else None
+        sigma = total.sigma if total else None
         if not total or not sigma:
             continue
-        size = _shown(total, unit_of(DIMENSIONS[error], system, sigma))
+        size = _shown(total, sigma, unit_of(DIMENSIONS[error], system, sigma))
         bars.append(
             {
                 "label": f"{error} {duration_text(time)}: {size}",
                 "shares": [
-                    [row["source"], float(f"{(row['sigma'] / sigma) ** 2:.3g}")]
+                    [row.source, float(f"{(row.sigma / sigma) ** 2:.3g}")]
                     for row in parts
-                    if row["source"] != "total" and row["sigma"]
+                    if row.source != "total" and row.sigma
                 ],
             }
         )
     return bars
 
 
-def _total(rows: Iterable[Row]) -> Row | None:
+def _total(rows: Iterable[ErrorBudgetRow]) -> ErrorBudgetRow | None:
     """Return the row of the total among the rows of an error and a time."""
-    return next((row for row in rows if row["source"] == "total"), None)
+    return next((row for row in rows if row.source == "total"), None)
 
 
 def _notes(lines: Iterable[Mapping[str, Any]]) -> Iterator[str]:
@@ -232,35 +249,35 @@ def _notes(lines: Iterable[Mapping[str, Any]]) -> Iterator[str]:
         yield f"{', '.join(errors).capitalize()}: {note}"
 
 
-def _cell(rows: Sequence[Row], system: System) -> dict[str, Any]:
+def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> dict[str, Any]:
     """Return an error with its interval, and what it comes of."""
     total = _total(rows)
-    if total is None or total["sigma"] is None:
-        reason = (total or {}).get("reason") or ""
-        return {"lines": [NO_VALUE], "note": reason, "class": "number none"}
-    unit = unit_of(DIMENSIONS[total["error"]], system, total["sigma"])
-    lines = [_shown(total, unit)]
-    if _sensible(total, total["sigma"]):
-        digits = unit.digits(total["sigma"], total["lower"], total["upper"])
+    if total is None or total.sigma is None:
+        reason = total.reason if total else None
+        return {"lines": [NO_VALUE], "note": reason or "", "class": "number none"}
+    unit = unit_of(DIMENSIONS[total.error], system, total.sigma)
+    lines = [_shown(total, total.sigma, unit)]
+    if _sensible(total, total.sigma):
+        digits = unit.digits(total.sigma, total.lower, total.upper)
         lines.append(interval_text(total, unit, digits))
-    sources = [row for row in rows if row["source"] != "total"]
-    if total["sigma"] > 0.0:
-        lines += (parts_of(total["sigma"], sources) or "").split("; ")
-    return {"lines": lines, "note": total["reason"] or "", "class": "number"}
+    sources = [row for row in rows if row.source != "total"]
+    if total.sigma > 0.0:
+        lines += (parts_of(total.sigma, sources) or "").split("; ")
+    return {"lines": lines, "note": total.reason or "", "class": "number"}
 
 
-def _sensible(row: Row, sigma: float) -> bool:
+def _sensible(row: ErrorRow, sigma: float) -> bool:
     """Tell whether an error is below a quarter turn, beyond which an angle means nothing."""
-    return DIMENSIONS[row["error"]] != "angle" or sigma <= _QUARTER_TURN
+    return DIMENSIONS[row.error] != "angle" or sigma <= _QUARTER_TURN
 
 
-def _shown(row: Row, unit: PageUnit) -> str:
+def _shown(row: ErrorRow, sigma: float, unit: PageUnit) -> str:
     """Return the error of a row with its unit, with the digits that its limits leave."""
-    if not _sensible(row, row["sigma"]):
-        north = row["error"] == "north"
+    if not _sensible(row, sigma):
+        north = row.error == "north"
         return "not to be found" if north else f"over {unit.text(_QUARTER_TURN, 3)} {unit.sign}"
-    digits = unit.digits(row["sigma"], row["lower"], row["upper"])
-    return f"{unit.text(row['sigma'], digits)} {unit.sign}"
+    digits = unit.digits(sigma, row.lower, row.upper)
+    return f"{unit.text(sigma, digits)} {unit.sign}"
 
 
 def _percent(share: float | None) -> str:

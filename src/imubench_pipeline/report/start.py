@@ -210,7 +210,7 @@ def _next_steps(site: Site) -> Iterator[dict[str, Any]]:
         }
 
 
-def _basis(site: Site, row: Row) -> str:
+def _basis(site: Site, row: RankingRow) -> str:
     """Return on which data a sensor is judged, and what puts them in doubt."""
     own = [v for v in site.views if v.sensor == row["sensor"] and v.static]
     chosen = next((view for view in own if view.name == row["recording"]), None)

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from markupsafe import Markup
 
 from imubench_pipeline.estimators.digits import digits_by
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.report.practical import number_text
-from imubench_pipeline.typing import Row
 
 
 class Told(str):
@@ -53,37 +53,37 @@ class Between(str):
         return Markup("{} to {}").format(*self.ends)
 
 
-def of_ranking(row: Row, column: str, text: str, unit: str = "") -> Told:
+def of_ranking(row: RankingRow, column: str, text: str, unit: str = "") -> Told:
     """Return a number of a row of the table ``ranking``."""
-    return _told("ranking", row, ("requirement", "sensor"), column, text, unit)
+    return _told(row, (row.requirement, row.sensor), column, text, unit)
 
 
-def of_budget(row: Row, column: str, text: str, unit: str = "") -> Told:
+def of_budget(row: ErrorBudgetRow, column: str, text: str, unit: str = "") -> Told:
     """Return a number of a total of the table ``error_budget``, of a requirement."""
-    names = ("requirement", "sensor", "recording")
-    return _told("error_budget", row, names, column, text, unit)
+    names = (row.requirement or "", row.sensor, row.recording)
+    return _told(row, names, column, text, unit)
 
 
-def _told(table: str, row: Row, names: Iterable[str], column: str, text: str, unit: str) -> Told:
-    key = (table, *(row[name] for name in names), row["error"], f"{row['time']:g}", column)
-    return Told(text, "/".join(key), unit)
+def _told(
+    row: RankingRow | ErrorBudgetRow, names: Iterable[str], column: str, text: str, unit: str
+) -> Told:
+    return Told(text, "/".join([row.table, *names, row.error, f"{row.time:g}", column]), unit)
 
 
-def margin(row: Row) -> tuple[Told, Told, Told] | None:
+def margin(row: RankingRow) -> tuple[Told, Told, Told] | None:
     """Return the margin of a row of the table ``ranking`` with its 95 % limits, if there is one."""
-    if row["margin"] is None:
+    if row.margin is None:
         return None
     low, high = margin_limits(row)
-    digits = digits_by(row["margin"], low, high)
-    named = (("margin", row["margin"]), ("limit:upper", low), ("limit:lower", high))
+    digits = digits_by(row.margin, low, high)
+    named = (("margin", row.margin), ("limit:upper", low), ("limit:lower", high))
     first, lower, upper = (of_ranking(row, name, number_text(x, digits)) for name, x in named)
     return first, lower, upper
 
 
-def margin_limits(row: Row) -> tuple[float | None, float | None]:
+def margin_limits(row: RankingRow) -> tuple[float | None, float | None]:
     """Return the 95 % limits of the margin of a row of the table ``ranking`` that has one."""
-    low, high = (_over(row["limit"], row[end]) for end in ("upper", "lower"))
-    return low, high
+    return _over(row.limit, row.upper), _over(row.limit, row.lower)
 
 
 def _over(limit: float | None, error: float | None) -> float | None:

@@ -8,6 +8,9 @@ from typing import Any
 
 from markupsafe import Markup
 
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED, in_words
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
@@ -19,7 +22,6 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.validation import Strict
-from imubench_pipeline.typing import Row
 
 _ROUGH = 0.3
 """Half of an interval over its value from which a percentage would hide its asymmetry."""
@@ -36,71 +38,71 @@ _VERDICTS = (
 )
 
 
-def untold(row: Row, unit: PageUnit, duration: float | None) -> str:
+def untold(row: ParameterRow, unit: PageUnit, duration: float | None) -> str:
     """Return in a sentence why a parameter has no plain value, or what it is of; may be empty.
 
     Of a row of ``parameters``, and the length of the recording, s.
     """
-    symbol, status = symbol_text(row["parameter"]), row["status"]
+    symbol, status = symbol_text(row.parameter), row.status
     if status == "ok":
-        return f"{symbol}: {row['reason'].rstrip('.')}." if row["reason"] else ""
+        return f"{symbol}: {row.reason.rstrip('.')}." if row.reason else ""
     if status == "absent":
         below = ""
-        if row["upper"] is not None:
-            below = f": it is below {unit.text(row['upper'], 2)} {unit.sign}"
+        if row.upper is not None:
+            below = f": it is below {unit.text(row.upper, 2)} {unit.sign}"
         return f"The data do not ask for {symbol}{below}."
     if status == "not_identified":
         of = f" from {duration_text(duration)} of data" if duration else ""
         between = ""
-        if row["lower"] is not None and row["upper"] is not None:
-            ends = f"{unit.text(row['lower'], 2)} and {unit.text(row['upper'], 2)} {unit.sign}"
+        if row.lower is not None and row.upper is not None:
+            ends = f"{unit.text(row.lower, 2)} and {unit.text(row.upper, 2)} {unit.sign}"
             between = f" (it lies between {ends})"
         return f"{symbol} cannot be told{of}{between}{_enough(row, duration)}."
-    reason = (row["reason"] or status.replace("_", " ")).rstrip(".")
+    reason = (row.reason or status.replace("_", " ")).rstrip(".")
     return f"{symbol}: {reason}{_enough(row, duration)}."
 
 
-def _enough(row: Row, duration: float | None) -> str:
-    needed = row["duration_needed"]
+def _enough(row: ParameterRow, duration: float | None) -> str:
+    needed = row.duration_needed
     if needed is None or (duration is not None and needed <= duration):
         return ""
     return f"; {duration_text(needed)} would do for 10 %"
 
 
-def precision(row: Row, unit: PageUnit) -> str:
+def precision(row: ParameterRow, unit: PageUnit) -> str:
     """Return how well a value is known: ``± 4 %``, or its interval; empty where not known."""
-    if row["value"] is None or row["lower"] is None or row["upper"] is None or not row["value"]:
+    if row.value is None or row.lower is None or row.upper is None or not row.value:
         return ""
-    half = (row["upper"] - row["lower"]) / 2.0 / abs(row["value"])
+    half = (row.upper - row.lower) / 2.0 / abs(row.value)
     if half > _ROUGH:
         return interval_text(row, unit, 2)
     return f"± {percent_text(half, 2)}"
 
 
-def verdict_words(row: Row) -> str:
+def verdict_words(row: RankingRow) -> str:
     """Return a verdict, a row of ``ranking`` that decides, with what makes its evidence weak."""
     weak = evidence_words(row)
-    return f"{row['verdict']}, on weak evidence ({weak})" if weak else row["verdict"]
+    return f"{row.verdict}, on weak evidence ({weak})" if weak else row.verdict
 
 
-def evidence_words(row: Row) -> str:
+def evidence_words(row: RankingRow) -> str:
     """Return what makes the evidence of a verdict weak; empty where it is strong or not known."""
-    if row["evidence"] != "weak":
+    if row.evidence != "weak":
         return ""
-    reasons = (row["evidence_reasons"] or "reason not stated").split(", ")
+    reasons = (row.evidence_reasons or "reason not stated").split(", ")
     return "; ".join(_weakness(code, row) for code in reasons)
 
 
-def _weakness(code: str, row: Row) -> str:
+def _weakness(code: str, row: RankingRow) -> str:
     match code:
         case "one_specimen":
-            borrowed = row["spread_of"] == "other sensors"
+            borrowed = row.spread_of == "other sensors"
             return "one specimen" + ", with the spread of other sensors" * borrowed
         case "short_log":
-            length = duration_text(row["longest_log"])
-            return f"one log of {length}" if row["recordings"] == 1 else f"no log beyond {length}"
-        case "wide_interval" if row["spread_of"] == "specimens":
-            return f"wide interval from {row['specimens']} specimens"
+            length = duration_text(row.longest_log)
+            return f"one log of {length}" if row.recordings == 1 else f"no log beyond {length}"
+        case "wide_interval" if row.spread_of == "specimens":
+            return f"wide interval from {row.specimens} specimens"
         case "few_axes":
             return "fewer than three axes"
         case "not_explained":
@@ -110,9 +112,9 @@ def _weakness(code: str, row: Row) -> str:
     return code.replace("_", " ")
 
 
-def spread_words(row: Row) -> str:
+def spread_words(row: RankingRow) -> str:
     """Return how much specimens differ, of a row of ``ranking`` that says so."""
-    return ", ".join(filter(None, (percent_text(row["spread"], 2), _SPREAD_OF[row["spread_of"]])))
+    return ", ".join(filter(None, (percent_text(row.spread, 2), _SPREAD_OF[row.spread_of])))
 
 
 _SPREAD_OF: Mapping[str | None, str] = {
@@ -279,10 +281,10 @@ def started_text(started: str | None) -> str:
 _ISO = re.compile(r"^(\d{4}-\d\d-\d\d)T(\d\d:\d\d(?::\d\d)?)(?:\.0+(?!\d))?")
 
 
-def noise_words(rows: Sequence[Row]) -> str:
+def noise_words(rows: Sequence[EarthRateRow | CalibrationRow]) -> str:
     """Return by which noise model figures of a recording are weighed, in a sentence."""
-    fitted = next((row for row in rows if row["model"]), None)
+    fitted = next((row for row in rows if row.model), None)
     if fitted is None:
         return ""
-    origin = f", from {fitted['model_from']}" if fitted["model_from"] else ""
-    return f"Noise model: {fitted['model']}{origin}."
+    origin = f", from {fitted.model_from}" if fitted.model_from else ""
+    return f"Noise model: {fitted.model}{origin}."

@@ -17,7 +17,7 @@ from imubench_pipeline.units import difference_to_si, quantity_to_si
 Error = Literal["attitude", "heading", "velocity", "position", "north"]
 """What is limited; ``north`` is the heading that a gyro at rest finds from the Earth's rate."""
 
-DIMENSIONS: Mapping[Error, str] = {
+DIMENSIONS: Mapping[str, str] = {
     "attitude": "angle",
     "heading": "angle",
     "velocity": "velocity",
