@@ -5,6 +5,8 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.report.run_summary import failure, leaders, one_line, summary, warnings
 from imubench_pipeline.tables import write
 
@@ -71,7 +73,7 @@ def test_the_recording_with_the_worst_warnings_comes_first() -> None:
         finding("broken", "saturated", "fatal"),
         finding("rejected", "rejected", "fatal"),
     ]
-    assert list(warnings(rows)) == [
+    assert list(warnings([FindingRow(**row) for row in rows])) == [
         "broken/run: 1 warning: saturated",
         "many/run: 4 warnings: knock (2), gap, warm up",
         "few/run: 1 warning: gap",
@@ -87,7 +89,10 @@ def test_a_line_says_which_sensor_leads_a_requirement() -> None:
         standing("short", requirement="vague", verdict="not enough data"),
         standing("c", requirement="dear", rank=None, verdict="outside the price class"),
     ]
-    assert list(leaders(rows, [recording("best"), recording("made", simulated=True)])) == [
+    ranking = [RankingRow(**row) for row in rows]
+    recordings = [RecordingRow(**recording("best")),
+                  RecordingRow(**recording("made", simulated=True))]  # fmt: skip
+    assert list(leaders(ranking, recordings)) == [
         "robot: best: passes, on weak evidence, tied with other",
         "hard: no sensor fulfils it; nearest is made (simulated): surely fails",
         "vague: short: not enough data",

@@ -10,6 +10,7 @@ import pytest
 import imubench_pipeline as imu
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.report.terminal import logs
+from imubench_pipeline.tables import build
 from tests.chain.logs import Table, analysed, checked, noise, project
 
 ROWS = 6000
@@ -288,5 +289,6 @@ def test_every_command_takes_both_sensors_at_their_rates(tmp_path: Path) -> None
     }
     for name, sigma, rate in (("gyro_z", np.radians(0.1), 100.0), ("accel_z", 0.02, 50.0)):
         assert N[name]["lower"] < sigma / np.sqrt(rate) < N[name]["upper"]
-    head = str(next(iter(logs(found, "practical", 200))))
+    tables = {name: build(name, rows) for name, rows in found.items()}
+    head = str(next(iter(logs(tables, "practical", 200))))
     assert head == "log: 60 s at 100 and 50 Hz, 2 channels"

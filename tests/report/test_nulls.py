@@ -198,10 +198,9 @@ def test_the_terminal_and_the_summaries_come(table: str, whole: Tables, tmp_path
 
 
 def _terminal(tables: Tables, results: Path) -> str:
-    rows = {name: tables[name].to_pylist() for name in TERMINAL}
     asked = {"requirement": None, "channel": None, "method": None}
     console = Console(file=StringIO(), width=120)
-    for part in terminal.parts(rows, system="practical", width=120, **asked):
+    for part in terminal.parts(tables, system="practical", width=120, **asked):
         console.print(part)
     found = nightly.load_tables(results)
     nightly.state_of(found, datetime(2026, 1, 1, tzinfo=UTC), {}, {})

@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from imubench_pipeline.model.recordings import FileRow
 from imubench_pipeline.recordings.drop_zone import account_for, found_logs
 from imubench_pipeline.recordings.known_logs import is_changed
 from imubench_pipeline.report.folder import drop_zone_of
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.texts import printable
-from imubench_pipeline.typing import Row
 
 _OUTCOMES = ("analysed", "rejected", "failed", "skipped")
 _MAX_LINES = 10
@@ -28,7 +28,7 @@ def drop_zone_lines(results: Path) -> list[str]:
         Folder of the results of runs.
     """
     try:
-        files = read("files", [results / "tables/files.parquet"]).to_pylist()
+        files = FileRow.rows_of(read("files", [results / "tables/files.parquet"]))
     except (OSError, ValueError):
         return []  # what is missing or damaged is reported elsewhere
     logs = drop_zone_of(results)
@@ -40,30 +40,30 @@ def drop_zone_lines(results: Path) -> list[str]:
     return [*balance(files), absent] if files else []
 
 
-def balance(files: Sequence[Row]) -> Iterator[str]:
+def balance(files: Sequence[FileRow]) -> Iterator[str]:
     """Yield how many files were analysed, rejected and skipped, and why files were skipped.
 
     Parameters
     ----------
-    files : sequence of mapping
+    files : sequence of FileRow
         Rows of the table ``files``.
     """
     if not files:
         return
-    counts = Counter(row["status"] for row in files)
+    counts = Counter(row.status for row in files)
     parts = [f"{counts[name]} {name}" for name in _OUTCOMES if counts[name]]
     yield f"{counted(len(files), 'file')} in the drop zone = {' + '.join(parts)}"
-    skipped = [row for row in files if row["status"] == "skipped"]
+    skipped = [row for row in files if row.status == "skipped"]
     for row in skipped[:_MAX_LINES]:
-        yield printable(f"  skipped: {row['file']}: {row['reason']}")
+        yield printable(f"  skipped: {row.file}: {row.reason}")
     if (more := len(skipped) - _MAX_LINES) > 0:
         yield f"  and {more} more in tables/files.csv"
 
 
-def _changes(files: Iterable[Row], logs: Path, results: Path) -> Iterator[str]:
+def _changes(files: Iterable[FileRow], logs: Path, results: Path) -> Iterator[str]:
     """Yield which files were added to the drop zone, removed or changed since the last run."""
     recordings = found_logs(logs)
-    before = {row["file"] for row in files}
+    before = {row.file for row in files}
     now = {found.file for found in account_for(logs, recordings)}
     changed = {
         f"{log.sensor}/{log.path.name}"

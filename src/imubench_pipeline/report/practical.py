@@ -201,7 +201,7 @@ def _page_unit(sign: str, dimension: str) -> PageUnit:
     return PageUnit(sign, 1.0 / factor)
 
 
-def rates_text(rate: float, of_channels: Iterable[float]) -> str:
+def rates_text(rate: float | None, of_channels: Iterable[float]) -> str:
     """Return the rates of the channels of a recording, Hz, the highest first.
 
     ``rate``: of the recording, Hz, used where no channel has an Allan variance.

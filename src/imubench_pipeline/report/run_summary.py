@@ -6,14 +6,16 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Protocol
 
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
 from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.report.folder import failed_pages
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import LEFT_OUT
-from imubench_pipeline.typing import Row
 
 _NEEDED = ("recordings", "findings", "ranking", "failures")
 _MOST_LINES = 10
@@ -37,21 +39,20 @@ _INTERRUPTED = "Terminating processes on user request"
 
 def summary(results: Path) -> str:
     """Return what a finished run says; nothing where there are no tables."""
-    tables = {name: results / f"tables/{name}.parquet" for name in _NEEDED}
-    if not all(path.is_file() for path in tables.values()):
+    paths = {name: results / f"tables/{name}.parquet" for name in _NEEDED}
+    if not all(path.is_file() for path in paths.values()):
         return ""
     try:
-        recordings, findings, ranking, failures = (
-            read(name, [path]).to_pylist() for name, path in tables.items()
-        )
+        tables = {name: read(name, [path]) for name, path in paths.items()}
     except (OSError, ValueError) as error:
         # A run for one file alone may stand beside older tables: it succeeded all the same.
         return one_line(f"no summary: {error}")
+    recordings = RecordingRow.rows_of(tables["recordings"])
     rejected = list(rejections(recordings))
-    warned = list(warnings(findings))
-    simulated = sum(row["simulated"] for row in recordings)
-    failed = list(left_out(failures))
-    analysed = sum(row["status"] == "ok" for row in recordings)
+    warned = list(warnings(FindingRow.rows_of(tables["findings"])))
+    simulated = sum(row.simulated for row in recordings)
+    failed = list(left_out(FailureRow.rows_of(tables["failures"])))
+    analysed = sum(row.status == "ok" for row in recordings)
     lines = [f"{counted(analysed, 'recording')} analysed, {len(rejected)} rejected"]
     not_read = len(recordings) - analysed - len(rejected)
     lines[0] += f", {not_read} failed" * (not_read > 0)
@@ -62,7 +63,7 @@ def summary(results: Path) -> str:
     if warned:
         lines.append(f"warnings in {len(warned)} of the recordings:")
         lines += _bounded(f"  {line}" for line in warned)
-    lines += _bounded(leaders(ranking, recordings))
+    lines += _bounded(leaders(RankingRow.rows_of(tables["ranking"]), recordings))
     lines.append(f"report: {results / 'report/index.html'}")
     return "\n".join(lines)
 
@@ -114,29 +115,45 @@ def _failed_steps(log: str, results: Path) -> Iterator[str]:
         yield what + f" ({cluster_log})" * bool(cluster_log)
 
 
-def rejections(recordings: Iterable[Row]) -> Iterator[str]:
+def rejections(recordings: Iterable[RecordingRow]) -> Iterator[str]:
     """Yield a line for each rejected recording: its name and the reason."""
     for row in recordings:
-        if row["status"] == "rejected":
-            reason = row["reason"] or "no reason is kept"
-            yield one_line(f"{row['sensor']}/{row['recording']}: {reason}")
+        if row.status == "rejected":
+            reason = row.reason or "no reason is kept"
+            yield one_line(f"{row.sensor}/{row.recording}: {reason}")
 
 
-def left_out(failures: Iterable[Row]) -> Iterator[str]:
+class Failed(Protocol):
+    """A step that failed, for a recording or for a whole sensor."""
+
+    @property
+    def sensor(self) -> str:
+        """Name of the sensor file."""
+
+    @property
+    def recording(self) -> str | None:
+        """The recording that is left out."""
+
+    @property
+    def reason(self) -> str:
+        """Why it failed."""
+
+
+def left_out(failures: Iterable[Failed]) -> Iterator[str]:
     """Yield a line for each step that failed: what is left out for it, and why."""
     for row in failures:
-        of = f"{row['sensor']}/{row['recording']}" if row["recording"] else row["sensor"]
-        yield one_line(f"{of}: {row['reason']}")
+        of = f"{row.sensor}/{row.recording}" if row.recording else row.sensor
+        yield one_line(f"{of}: {row.reason}")
 
 
-def warnings(findings: Iterable[Row]) -> Iterator[str]:
+def warnings(findings: Iterable[FindingRow]) -> Iterator[str]:
     """Yield a line for each recording that has warnings, the one with the worst first."""
     by_recording: dict[str, Counter[str]] = {}
     left_out: Counter[str] = Counter()
     for row in serious(findings):
-        name = f"{row['sensor']}/{row['recording']}"
-        by_recording.setdefault(name, Counter())[row["finding"].replace("_", " ")] += 1
-        left_out[name] += row["severity"] == "fatal"
+        name = f"{row.sensor}/{row.recording}"
+        by_recording.setdefault(name, Counter())[row.finding.replace("_", " ")] += 1
+        left_out[name] += row.severity == "fatal"
     for name in sorted(
         by_recording, key=lambda name: (-left_out[name], -by_recording[name].total())
     ):
@@ -146,28 +163,28 @@ def warnings(findings: Iterable[Row]) -> Iterator[str]:
         yield one_line(f"{name}: {counted(by_recording[name].total(), 'warning')}: {kinds}")
 
 
-def serious(findings: Iterable[Row]) -> Iterator[Row]:
+def serious(findings: Iterable[FindingRow]) -> Iterator[FindingRow]:
     """Yield the findings that put results in doubt: no notes, nor that a recording is left out."""
     for row in findings:
-        if row["severity"] != "note" and row["finding"] not in LEFT_OUT:
+        if row.severity != "note" and row.finding not in LEFT_OUT:
             yield row
 
 
-def leaders(ranking: Iterable[Row], recordings: Iterable[Row]) -> Iterator[str]:
+def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -> Iterator[str]:
     """Yield a line for each requirement: the sensor that comes first, and whether it passes."""
-    deciding = [row for row in ranking if row["decides"]]
-    simulated = {(row["sensor"], row["recording"]) for row in recordings if row["simulated"]}
-    for name in dict.fromkeys(row["requirement"] for row in deciding):
-        first = [row for row in deciding if row["requirement"] == name and row["rank"] == 1]
+    deciding = [row for row in ranking if row.decides]
+    simulated = {(row.sensor, row.recording) for row in recordings if row.simulated}
+    for name in dict.fromkeys(row.requirement for row in deciding):
+        first = [row for row in deciding if row.requirement == name and row.rank == 1]
         if not first:
             yield one_line(f"{name}: no sensor can be ranked")
             continue
-        best = max(first, key=lambda row: row["margin"] or 0.0)
-        shown = best["sensor"] + " (simulated)" * ((best["sensor"], best["recording"]) in simulated)
-        if best["verdict"].endswith("fails"):
+        best = max(first, key=lambda row: row.margin or 0.0)
+        shown = best.sensor + " (simulated)" * ((best.sensor, best.recording) in simulated)
+        if best.verdict.endswith("fails"):
             shown = f"no sensor fulfils it; nearest is {shown}"
-        tied = f", tied with {best['tied_with']}" if best["tied_with"] else ""
-        weak = ", on weak evidence" * (best["evidence"] == "weak")
+        tied = f", tied with {best.tied_with}" if best.tied_with else ""
+        weak = ", on weak evidence" * (best.evidence == "weak")
         yield one_line(f"{name}: {shown}: {in_words(best)}{weak}{tied}")
 
 

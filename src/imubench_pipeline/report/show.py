@@ -5,16 +5,15 @@ from __future__ import annotations
 import argparse
 import io
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from imubench_pipeline.settings.command_line import whole_number
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from rich.console import RenderableType
-
-Rows = list[Mapping[str, Any]]
 
 _NEEDED = ("recordings", "findings", "failures", "ranking", "next_steps", "parameters")
 _WIDTH = whole_number(40, 10_000, "40 to 10000 columns")
@@ -96,7 +95,7 @@ class _ShowError(ValueError):
     """What was asked for is not there; the text says what is."""
 
 
-def _load(results: Path) -> dict[str, Rows]:
+def _load(results: Path) -> dict[str, pa.Table]:
     from imubench_pipeline.tables import TableError, read, tables_of_run
 
     try:
@@ -104,7 +103,7 @@ def _load(results: Path) -> dict[str, Rows]:
     except TableError as error:
         raise _ShowError(str(error)) from error
     try:
-        return {name: read(name, [path]).to_pylist() for name, path in paths.items()}
+        return {name: read(name, [path]) for name, path in paths.items()}
     except (OSError, ValueError) as error:
         raise _ShowError(f"{error}\n`snakemake -c2` makes the tables again") from error
 
@@ -118,7 +117,7 @@ def _where(results: Path) -> str:
     return f"No report at {page}; `snakemake -c2` makes it"
 
 
-def _check(rows: Rows, column: str, asked: str | None) -> None:
-    existing = list(dict.fromkeys(row[column] for row in rows))
+def _check(table: pa.Table, column: str, asked: str | None) -> None:
+    existing = table[column].unique().to_pylist()
     if asked is not None and asked not in existing:
         raise _ShowError(f"no {column} {asked!r}; there are: {', '.join(existing) or 'none'}")

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
-from typing import Any
+from typing import Any, TypeVar
 
+import pyarrow as pa
 from rich.console import RenderableType
 from rich.text import Text
 
+from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
+from imubench_pipeline.model.estimates import AllanRow, ParameterRow
+from imubench_pipeline.model.recordings import DoubtRow, FailureRow, FindingRow, RecordingRow
+from imubench_pipeline.model.table import OfRecordingRow
 from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.parameters import shown_symbols
@@ -26,9 +31,10 @@ from imubench_pipeline.report.run_summary import left_out, one_line, rejections,
 from imubench_pipeline.report.terminal_table import fitting
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.typing import Row
 
-About = Mapping[tuple[str, str], Row]
+R = TypeVar("R", bound=OfRecordingRow)
+
+About = Mapping[tuple[str, str], RecordingRow]
 """The row of the table ``recordings`` of each sensor and recording."""
 
 _TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
@@ -47,7 +53,7 @@ _BESIDE = 34
 
 
 def parts(
-    tables: Mapping[str, Sequence[Row]],
+    tables: Mapping[str, pa.Table],
     *,
     requirement: str | None,
     channel: str | None,
@@ -61,89 +67,99 @@ def parts(
     decides; parameters are of one channel or all, by one method or the recommended one. The width
     is in columns of the terminal.
     """
-    about = {(row["sensor"], row["recording"]): row for row in tables["recordings"]}
-    yield _compared(tables["recordings"])
-    yield from _listed("Failed", left_out(tables["failures"]))
-    yield from _listed("Rejected", rejections(tables["recordings"]))
-    yield from _listed("Warnings", map(_finding, serious(tables["findings"])), cut=True)
-    yield from _listed("What to do next", map(_next_step, tables["next_steps"][:_STEPS]))
-    yield from _ranking_tables(tables["ranking"], requirement, about, system, width)
+    recordings = RecordingRow.rows_of(tables["recordings"])
+    about = {(row.sensor, row.recording): row for row in recordings}
+    yield _compared(recordings)
+    yield from _listed("Failed", left_out(FailureRow.rows_of(tables["failures"])))
+    yield from _listed("Rejected", rejections(recordings))
+    findings = FindingRow.rows_of(tables["findings"])
+    yield from _listed("Warnings", map(_finding, serious(findings)), cut=True)
+    steps = NextStepRow.rows_of(tables["next_steps"].slice(0, _STEPS))
+    yield from _listed("What to do next", map(_next_step, steps))
+    ranking = RankingRow.rows_of(tables["ranking"])
+    yield from _ranking_tables(ranking, requirement, about, system, width)
     chosen = [
         row
-        for row in tables["parameters"]
-        if (row["recommended"] if method is None else row["method"] == method)
-        and channel in (None, row["channel"])
+        for row in ParameterRow.rows_of(tables["parameters"])
+        if (row.recommended if method is None else row.method == method)
+        and channel in (None, row.channel)
     ]
     which = f"method {method}" if method else "the recommended method"
     yield from _parameter_tables(chosen, f"{which}, with 95 % intervals", about, system, width)
 
 
-def logs(
-    tables: Mapping[str, Sequence[Row]], system: System, width: int
-) -> Iterator[RenderableType]:
+def logs(tables: Mapping[str, pa.Table], system: System, width: int) -> Iterator[RenderableType]:
     """Yield what a few logs tell, one after the other: what they are, what is wrong, parameters.
 
     The width is in columns of the terminal.
     """
-    for row in tables["recordings"]:
-        key = (row["sensor"], row["recording"])
-        own = {
-            name: [line for line in rows if (line["sensor"], line["recording"]) == key]
-            for name, rows in tables.items()
-        }
-        yield Text(
-            one_line(row["recording"]) + _length(row, own["parameters"], own["allan"]), style="bold"
-        )
-        if row["status"] != "ok":
-            yield Text(f"  {row['status']}: {one_line(row['reason'] or '', _LONGEST_FINDING)}\n")
+    every_finding = FindingRow.rows_of(tables["findings"])
+    every_doubt = DoubtRow.rows_of(tables["doubts"])
+    every_parameter = ParameterRow.rows_of(tables["parameters"])
+    allan = AllanRow.rows_of(tables["allan"])
+    for row in RecordingRow.rows_of(tables["recordings"]):
+        findings, parameters = _of(row, every_finding), _of(row, every_parameter)
+        length = _length(row, parameters, _of(row, allan))
+        yield Text(one_line(row.recording) + length, style="bold")
+        if row.status != "ok":
+            yield Text(f"  {row.status}: {one_line(row.reason or '', _LONGEST_FINDING)}\n")
             continue
-        yield from _listed("Warnings", map(_of_log, serious(own["findings"])))
-        yield from _listed("In doubt", map(_doubt, own["doubts"]))
-        notes = [line for line in own["findings"] if line["severity"] == "note"]
+        yield from _listed("Warnings", map(_of_log, serious(findings)))
+        yield from _listed("In doubt", map(_doubt, _of(row, every_doubt)))
+        notes = [line for line in findings if line.severity == "note"]
         yield from _listed("Notes", map(_of_log, notes), cut=True)
-        recommended = [line for line in own["parameters"] if line["recommended"]]
-        yield from _parameter_tables(recommended, "95 % intervals below", {key: row}, system, width)
-        if not own["parameters"]:
-            static = row["kind"] == "static"
+        about = {(row.sensor, row.recording): row}
+        recommended = [line for line in parameters if line.recommended]
+        yield from _parameter_tables(recommended, "95 % intervals below", about, system, width)
+        if not parameters:
+            static = row.kind == "static"
             why = (
                 "no channel can be analysed"
                 if static
                 else "no noise is estimated of a turned sensor"
             )
-            yield Text(f"  {row['kind'].replace('_', ' ')}: {why}\n")
+            yield Text(f"  {row.kind.replace('_', ' ')}: {why}\n")
 
 
-def _length(row: Row, parameters: Sequence[Row], allan: Sequence[Row]) -> str:
+def _of(recording: RecordingRow, rows: Iterable[R]) -> list[R]:
+    """Return the rows that are of a recording."""
+    key = (recording.sensor, recording.recording)
+    return [row for row in rows if (row.sensor, row.recording) == key]
+
+
+def _length(
+    row: RecordingRow, parameters: Sequence[ParameterRow], allan: Sequence[AllanRow]
+) -> str:
     """Return how long a log is, and of what."""
-    if row["duration"] is None:
+    if row.duration is None:
         return ""
-    channels = len({line["channel"] for line in parameters})
-    rates = [line["cluster_size"] / line["tau"] for line in allan]
-    words = [f"{duration_text(row['duration'])} at {rates_text(row['rate'], rates)}"]
+    channels = len({line.channel for line in parameters})
+    rates = [line.cluster_size / line.tau for line in allan]
+    words = [f"{duration_text(row.duration)} at {rates_text(row.rate, rates)}"]
     words += [counted(channels, "channel")]
-    if row["temperature_min"] is not None:
-        low, high = (number_text(row[f"temperature_{end}"], 3) for end in ("min", "max"))
+    if row.temperature_min is not None:
+        low, high = (number_text(end, 3) for end in (row.temperature_min, row.temperature_max))
         words.append(f"{low} to {high} °C")
-    return ": " + ", ".join(words) + ", simulated" * row["simulated"]
+    return ": " + ", ".join(words) + ", simulated" * row.simulated
 
 
-def _of_log(row: Row) -> str:
-    name = row["finding"].replace("_", " ")
-    place = f"{row['channel']} ({name})" if row["channel"] else name
-    return one_line(f"{place}: {row['detail']}", _LONGEST_FINDING)
+def _of_log(row: FindingRow) -> str:
+    name = row.finding.replace("_", " ")
+    place = f"{row.channel} ({name})" if row.channel else name
+    return one_line(f"{place}: {row.detail}", _LONGEST_FINDING)
 
 
-def _doubt(row: Row) -> str:
-    about = " ".join(filter(None, (row["channel"], row["parameters"]))) or "all"
-    return one_line(f"{about}: {row['reason']}", _LONGEST_FINDING)
+def _doubt(row: DoubtRow) -> str:
+    about = " ".join(filter(None, (row.channel, row.parameters))) or "all"
+    return one_line(f"{about}: {row.reason}", _LONGEST_FINDING)
 
 
 def _parameter_tables(
-    rows: Sequence[Row], which: str, about: About, system: System, width: int
+    rows: Sequence[ParameterRow], which: str, about: About, system: System, width: int
 ) -> Iterator[RenderableType]:
     """Yield a table for the gyroscopes, and one for the accelerometers."""
     for quantity, title in _TITLES.items():
-        own = [row for row in rows if quantity_of(row["channel"]) == quantity]
+        own = [row for row in rows if quantity_of(row.channel) == quantity]
         if own:
             heads, lines = _parameter_lines(quantity, own, about, system)
             yield fitting(f"{title}: {which}", heads, lines, width, names=0)
@@ -151,23 +167,23 @@ def _parameter_tables(
             yield Text()
 
 
-def _remarks(rows: Iterable[Row]) -> Iterator[str]:
+def _remarks(rows: Iterable[ParameterRow]) -> Iterator[str]:
     """Yield what values without a doubt are of, where that is said: each remark once."""
     channels: dict[str, dict[str, None]] = {}
     for row in rows:
-        if row["status"] == "ok" and row["reason"]:
-            remark = f"{symbol_text(row['parameter'])}: {row['reason']}"
-            channels.setdefault(remark, {})[row["channel"]] = None
+        if row.status == "ok" and row.reason:
+            remark = f"{symbol_text(row.parameter)}: {row.reason}"
+            channels.setdefault(remark, {})[row.channel] = None
     for remark, of in channels.items():
         yield one_line(f"{', '.join(of)}: {remark}", _LONGEST_FINDING)
 
 
-def _compared(recordings: Sequence[Row]) -> Text:
+def _compared(recordings: Sequence[RecordingRow]) -> Text:
     rejected, failed = (
-        sum(row["status"] == status for row in recordings) for status in ("rejected", "failed")
+        sum(row.status == status for row in recordings) for status in ("rejected", "failed")
     )
-    simulated = sum(row["simulated"] for row in recordings)
-    sensors = len({row["sensor"] for row in recordings})
+    simulated = sum(row.simulated for row in recordings)
+    sensors = len({row.sensor for row in recordings})
     return Text(
         f"Recordings: {len(recordings)} of {sensors} sensors; "
         f"{len(recordings) - rejected - failed} analysed, {rejected} rejected"
@@ -186,26 +202,30 @@ def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[
         yield Text()
 
 
-def _finding(row: Row) -> str:
-    place = " ".join(filter(None, (f"{row['sensor']}/{row['recording']}", row["channel"])))
-    name = row["finding"].replace("_", " ")
-    return one_line(f"{place} ({name}): {row['detail']}", _LONGEST_FINDING)
+def _finding(row: FindingRow) -> str:
+    place = " ".join(filter(None, (f"{row.sensor}/{row.recording}", row.channel)))
+    name = row.finding.replace("_", " ")
+    return one_line(f"{place} ({name}): {row.detail}", _LONGEST_FINDING)
 
 
-def _next_step(row: Row) -> str:
-    return one_line(f"{row['sensor']}: {row['text']} ({row['requirements']})", _LONGEST_FINDING)
+def _next_step(row: NextStepRow) -> str:
+    return one_line(f"{row.sensor}: {row.text} ({row.requirements})", _LONGEST_FINDING)
 
 
 def _ranking_tables(
-    rows: Sequence[Row], requirement: str | None, about: About, system: System, width: int
+    rows: Sequence[RankingRow],
+    requirement: str | None,
+    about: About,
+    system: System,
+    width: int,
 ) -> Iterator[RenderableType]:
     # The table tells neither title nor rest before, and neither is shown.
     asked = {
         name: Requirement.model_construct(title=name, static_window="-", limits=())
-        for name in dict.fromkeys(row["requirement"] for row in rows)
+        for name in dict.fromkeys(row.requirement for row in rows)
         if requirement in (None, name)
     }
-    simulated = {key: row["simulated"] for key, row in about.items()}
+    simulated = {key: row.simulated for key, row in about.items()}
     limit = "limit" if requirement else "limit that decides"
     heads = ["", "sensor", "verdict", "error of allowed (1σ)", limit, "margin"]
     for ranking in rankings(rows, asked, simulated, system):
@@ -248,26 +268,26 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
 
 
 def _parameter_lines(
-    quantity: str, rows: Sequence[Row], about: About, system: System
+    quantity: str, rows: Sequence[ParameterRow], about: About, system: System
 ) -> tuple[list[str], list[list[str | Text]]]:
     """Return the heads and a line a channel, with a column a parameter that some channel has."""
     symbols = shown_symbols(rows)
     units = {symbol: page_unit(quantity, symbol, system) for symbol in symbols}
-    by_channel: dict[tuple[str, str, str], list[Row]] = {}
+    by_channel: dict[tuple[str, str, str], list[ParameterRow]] = {}
     for row in rows:
-        name = (row["sensor"], row["recording"], row["channel"])
+        name = (row.sensor, row.recording, row.channel)
         by_channel.setdefault(name, []).append(row)
     lines: list[list[str | Text]] = []
     alone = len(about) == 1  # its name stands above
     for (sensor, recording, channel), own in by_channel.items():
-        row = about[sensor, recording]
-        badge = " (simulated)" * row["simulated"]
+        log = about[sensor, recording]
+        badge = " (simulated)" * log.simulated
         shown = channel if alone else f"{sensor} / {recording} {channel}{badge}"
         cells = (
             _cell(
-                [estimate for estimate in own if estimate["parameter"] == symbol],
+                [estimate for estimate in own if estimate.parameter == symbol],
                 unit,
-                row["duration"],
+                log.duration,
             )
             for symbol, unit in units.items()
         )
@@ -278,20 +298,20 @@ def _parameter_lines(
     ], lines
 
 
-def _cell(rows: Sequence[Row], unit: PageUnit, duration: float | None) -> str:
+def _cell(rows: Sequence[ParameterRow], unit: PageUnit, duration: float | None) -> str:
     """Return the value of each component with its interval, or why there is none."""
     lines = []
     for row in rows:
-        status = row["status"].replace("_", " ")
-        if row["value"] is None:
+        status = row.status.replace("_", " ")
+        if row.value is None:
             lines.append(status)
         else:
-            lines.append(unit.text(row["value"]) + f" ({status})" * (status != "ok"))
-        if status == "absent" and row["upper"] is not None:
-            lines.append(f"below {unit.text(row['upper'], 3)}")
-        elif row["lower"] is not None and row["upper"] is not None:
-            lines.append(f"{unit.text(row['lower'], 3)} to {unit.text(row['upper'], 3)}")
-        needed = row["duration_needed"]
+            lines.append(unit.text(row.value) + f" ({status})" * (status != "ok"))
+        if status == "absent" and row.upper is not None:
+            lines.append(f"below {unit.text(row.upper, 3)}")
+        elif row.lower is not None and row.upper is not None:
+            lines.append(f"{unit.text(row.lower, 3)} to {unit.text(row.upper, 3)}")
+        needed = row.duration_needed
         if status != "ok" and needed is not None and needed > (duration or 0.0):
             lines.append(f"({duration_text(needed)} would do)")
     return "\n".join(lines) or "–"

@@ -96,6 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
+    from imubench_pipeline.model.recordings import FailureRow
     from imubench_pipeline.report.run_summary import left_out
     from imubench_pipeline.run.analysis.chain import Analysis
     from imubench_pipeline.run.analysis.project import Stated, lay_out
@@ -118,9 +119,9 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
         _print(tables, arguments.units)
         if arguments.output is not None:
             _say("making the page and the figures: some seconds")
-            printed = tables["failures"].to_pylist()
+            printed = FailureRow.rows_of(tables["failures"])
             tables = analysis.for_pages()
-            later = [row for row in tables["failures"].to_pylist() if row not in printed]
+            later = [row for row in FailureRow.rows_of(tables["failures"]) if row not in printed]
             for line in left_out(later):
                 _say(f"left out of the page: {line}")
             _write(plan, tables, arguments)
@@ -149,9 +150,7 @@ def _print(tables: Mapping[str, pa.Table], system: System) -> None:
     from imubench_pipeline.report.show import show
     from imubench_pipeline.report.terminal import logs
 
-    needed = ("recordings", "findings", "failures", "doubts", "parameters", "allan")
-    rows = {name: tables[name].to_pylist() for name in needed}
-    show(lambda width: logs(rows, system, width))
+    show(lambda width: logs(tables, system, width))
 
 
 def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Namespace) -> None:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
+from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.report.run_summary import serious
 from imubench_pipeline.run.nightly.settling import Signature
 from imubench_pipeline.tables import read
@@ -157,13 +158,14 @@ def state_of(
         for row in tables["recordings"]
         if row["status"] == "rejected"
     }
+    findings = [FindingRow(**row) for row in tables["findings"]]
     return State(
         finished=finished,
         logs=dict(logs),
         recordings={
             name: Known(digest, rejected.get(name)) for name, digest in _digests(tables).items()
         },
-        warned=sorted({warned(row) for row in serious(tables["findings"])}, key=str),
+        warned=sorted({warned(row) for row in serious(findings)}, key=str),
         drifted=sorted({drifted(row) for row in changes(tables["drift"])}),
         leaders=leading(tables["ranking"]),
         skipped=dict(skipped),

@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.report.run_summary import leaders, left_out, one_line, serious
 from imubench_pipeline.run.nightly.state import (
     Known,
@@ -175,7 +177,7 @@ def compared(
         ],
         "warnings": [
             NewWarning.model_validate({**row, "recording": name_in(row)})
-            for row in serious(tables["findings"])
+            for row in serious(FindingRow(**row) for row in tables["findings"])
             if name_in(row) not in written_to and warned(row) not in known_warnings
         ],
         "drift": [
@@ -201,12 +203,13 @@ def _first(was: State, now: State, tables: Mapping[str, Rows]) -> Iterator[First
     for name, leader in now.leaders.items():
         if name in was.leaders and leader == was.leaders[name]:
             continue
-        of_it = [row for row in tables["ranking"] if row["requirement"] == name]
+        of_it = [RankingRow(**row) for row in tables["ranking"] if row["requirement"] == name]
+        recordings = [RecordingRow(**row) for row in tables["recordings"]]
         yield First(
             requirement=name,
             sensor=leader and leader.sensor,
             before=_shown(was.leaders.get(name)),
-            said=next(leaders(of_it, tables["recordings"])),
+            said=next(leaders(of_it, recordings)),
         )
 
 
@@ -237,7 +240,7 @@ def in_words(summary: Summary) -> str:
     failed = "failed, left out of a report that is there, and tried again next time"
     rejected = sorted(summary.rejected, key=lambda rejection: not rejection.new)
     sections = {
-        failed: [*left_out([row.model_dump() for row in summary.failed])],
+        failed: [*left_out(summary.failed)],
         "new": summary.new,
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
         "removed": summary.removed,
