@@ -1,7 +1,10 @@
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from imubench_pipeline.model.comparisons import RepeatabilityRow
+from imubench_pipeline.model.published import CoverageRow
 from imubench_pipeline.report.datasheets import (
     coverage_tables,
     curve_distances,
@@ -200,7 +203,7 @@ def test_who_publishes_what_is_counted() -> None:
         *covered("c", {"N": "no", "temperature_coefficient": "yes"}, as_printed="7 ppm/K"),
         *covered("c", {"N": "no", "offset": "no"}, quantity="accel"),
     ]
-    gyro, accel = coverage_tables(build("coverage", rows).to_pylist())
+    gyro, accel = coverage_tables(CoverageRow.rows_of(build("coverage", rows)))
     assert gyro["figures"] == ["N", "temperature coefficient"]
     assert gyro["counts"] == ["2 of 3 looked up", "1 of 2 looked up; 1 not looked up"]
     assert [line["name"] for line in gyro["lines"]] == ["V A", "V B", "V C"]
@@ -217,11 +220,24 @@ def test_who_publishes_what_is_counted() -> None:
 
 
 def test_the_spread_of_turn_ons_stands_beside_what_is_printed() -> None:
-    row = {"sensor": "a", "device": "1", "channel": "gyro_x", "recordings": 3, "printed": 4.0,
-           "unit": "deg/h", "kind": "typ", "condition": None, "comparable": 4 * HOUR,
-           "measured": 2 * HOUR, "lower": HOUR, "upper": 12 * HOUR, "delta": -0.5,
-           "verdict": "not sure", "reason": "why"}  # fmt: skip
-    (line,) = repeatability_lines([row, row | {"sensor": "b"}], "a", "practical")
+    row = RepeatabilityRow(
+        sensor="a",
+        device="1",
+        channel="gyro_x",
+        recordings=3,
+        power_cycled="yes",
+        printed=4.0,
+        unit="deg/h",
+        kind="typ",
+        comparable=4 * HOUR,
+        measured=2 * HOUR,
+        lower=HOUR,
+        upper=12 * HOUR,
+        delta=-0.5,
+        verdict="not sure",
+        reason="why",
+    )
+    (line,) = repeatability_lines([row, replace(row, sensor="b")], "a", "practical")
     assert (line["printed"], line["about"], line["delta"]) == ("4 deg/h", "typ", "−50 %")
     assert line["measured"] == ["2", "1 to 12"]
     assert (line["unit"], line["channel"], line["recordings"]) == ("°/h", "gyro x", 3)

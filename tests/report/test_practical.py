@@ -6,6 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from imubench_pipeline.model.comparisons import DatasheetRow
 from imubench_pipeline.report import practical
 from imubench_pipeline.report.practical import (
     PageUnit,
@@ -246,5 +247,19 @@ def test_what_is_not_there_is_a_dash() -> None:
     assert number_text(None) == number_text(float("nan")) == "–"
     assert practical.duration_text(None) == practical.percent_text(None) == "–"
     assert practical.degrees_text(None) == "–"
-    assert practical.printed_text({"printed": None, "unit": "deg/h"}) == "–"
-    assert practical.printed_text({"printed": 4.0, "unit": None}) == "4"
+    assert practical.printed_text(figure(printed=None, unit="deg/h")) == "–"
+    assert practical.printed_text(figure(printed=4.0, unit=None)) == "4"
+
+
+def figure(*, printed: float | None, unit: str | None) -> DatasheetRow:
+    return DatasheetRow(
+        sensor="a",
+        recording="r",
+        channel="gyro_x",
+        method="mean",
+        quantity="offset",
+        statistic="mean",
+        printed=printed,
+        unit=unit,
+        verdict="not sure",
+    )

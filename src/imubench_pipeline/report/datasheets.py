@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from imubench_pipeline.model.comparisons import DatasheetRow
+from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
+from imubench_pipeline.model.published import CoverageRow
 from imubench_pipeline.report.practical import (
     NO_VALUE,
     PageUnit,
@@ -17,7 +18,6 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.typing import Row
 
 _STATISTIC_NAMES = {
     "N": "N",
@@ -48,62 +48,63 @@ def delta_rows(
 
     ``coverage`` tells whether sensor, quantity and figure are published.
     """
-    own = [row for row in view.datasheet if row["method"] in (view.recommended, *_BESIDE)]
-    for rows in _by_figure(own, *_FIGURE).values():
+    own = [row for row in view.datasheet if row.method in (view.recommended, *_BESIDE)]
+    for rows in _by_figure(own).values():
         first = rows[0]
-        published = first["printed"] is not None
-        figure = "B" if first["quantity"] == "bias_instability" else first["quantity"]
+        published = first.printed is not None
+        figure = "B" if first.quantity == "bias_instability" else first.quantity
         verdict, why = one_verdict(rows)
         yield {
             "quantity": _figure_name(first),
             "published": published,
             "coverage": coverage.get((view.sensor, view.quantity, figure), "not looked up"),
             "printed": printed_text(first),
-            "about": ", ".join(filter(None, (first["kind"], first["condition"]))),
+            "about": ", ".join(filter(None, (first.kind, first.condition))),
             "readings": [_reading(row, view.quantity, system) for row in rows],
             "verdict": verdict,
             "reason": why if published else "",
         }
 
 
-def _reading(row: Row, quantity: str, system: System) -> dict[str, Any]:
+def _reading(row: DatasheetRow, quantity: str, system: System) -> dict[str, Any]:
     """Return one way to read a printed figure, and what was measured beside it."""
-    unit = page_unit(quantity, _SYMBOLS.get(row["quantity"], "B"), system)
+    unit = page_unit(quantity, _SYMBOLS.get(row.quantity, "B"), system)
     return {
         "as": _read_as(row),
-        "comparable": unit.text(row["comparable"]),
+        "comparable": unit.text(row.comparable),
         "measured": _with_limits(row, unit),
-        "unit": "" if row["comparable"] is None and row["measured"] is None else unit.sign,
+        "unit": "" if row.comparable is None and row.measured is None else unit.sign,
         "delta": _shares_with_limits(row),
-        "value": row["delta"],
+        "value": row.delta,
     }
 
 
-def _by_figure(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
-    """Return the readings of each printed figure, by what names it."""
-    figures: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        figures.setdefault(tuple(row[name] for name in names), []).append(row)
-    return figures
-
-
-_FIGURE = ("quantity", "printed", "unit", "kind", "condition")
+_Figure = tuple[str, str, float | None, str | None, str | None, str | None]
 """What names a printed figure of a channel, however it is read."""
 
 
-def one_verdict(readings: Sequence[Row]) -> tuple[str, str]:
+def _by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]]:
+    """Return the readings of each printed figure, by what names it."""
+    figures: dict[_Figure, list[DatasheetRow]] = {}
+    for row in rows:
+        name = (row.channel, row.quantity, row.printed, row.unit, row.kind, row.condition)
+        figures.setdefault(name, []).append(row)
+    return figures
+
+
+def one_verdict(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
     """Return the verdict on a printed figure, of the rows of its readings, and its reason.
 
     A bias instability is judged by the minimum of the curve, which is what vendors print. A density
     of which the datasheet does not say whether it is one-sided has a verdict where both readings
     have the same.
     """
-    minima = [row for row in readings if row["statistic"] == "adev_minimum"]
+    minima = [row for row in readings if row.statistic == "adev_minimum"]
     judged = minima or list(readings)
-    verdicts = list(dict.fromkeys(row["verdict"] for row in judged))
+    verdicts = list(dict.fromkeys(row.verdict for row in judged))
     if len(verdicts) == 1:
-        return verdicts[0], judged[0]["reason"] or ""
-    each = "; ".join(f"as {row['sidedness']}: {row['verdict']}" for row in judged)
+        return verdicts[0], judged[0].reason or ""
+    each = "; ".join(f"as {row.sidedness}: {row.verdict}" for row in judged)
     return DEPENDS, each
 
 
@@ -113,19 +114,19 @@ DEPENDS = "depends on sidedness"
 
 def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterator[dict[str, Any]]:
     """Yield each printed figure of a channel against all recordings of the sensor."""
-    groups: dict[tuple[Any, ...], list[list[Row]]] = {}
+    groups: dict[tuple[str, bool, _Figure], list[list[DatasheetRow]]] = {}
     for view in views:
         recommended = view.recommended()
         own = [
             row
             for row in view.rows(DatasheetRow)
-            if row["method"] in (recommended[row["channel"]], *_BESIDE) and row["delta"] is not None
+            if row.method in (recommended[row.channel], *_BESIDE) and row.delta is not None
         ]
-        for key, rows in _by_figure(own, "channel", *_FIGURE).items():
-            groups.setdefault((view.sensor, view.simulated, *key), []).append(rows)
-    for (sensor, simulated, channel, *_), group in groups.items():
+        for figure, rows in _by_figure(own).items():
+            groups.setdefault((view.sensor, view.simulated, figure), []).append(rows)
+    for (sensor, simulated, (channel, *_)), group in groups.items():
         first = group[0][0]
-        unit = page_unit(quantity_of(channel), _SYMBOLS.get(first["quantity"], "B"), system)
+        unit = page_unit(quantity_of(channel), _SYMBOLS.get(first.quantity, "B"), system)
         verdicts = Counter(one_verdict(rows)[0] for rows in group)
         readings = [
             [row for rows in group for row in rows if _read_as(row) == name]
@@ -137,10 +138,10 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
             "channel": channel,
             "quantity": _figure_name(first),
             "printed": printed_text(first),
-            "about": first["kind"] or "",
+            "about": first.kind or "",
             "unit": unit.sign,
             "readings": [_over_recordings(rows, unit) for rows in readings],
-            "delta": median(row["delta"] for row in readings[0]),
+            "delta": median(_deltas(readings[0])),
             "recordings": len(group),
             "verdicts": ", ".join(
                 verdict if len(group) == 1 else f"{verdict} ({count})"
@@ -149,53 +150,58 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
         }
 
 
-def _over_recordings(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
+def _deltas(rows: Iterable[DatasheetRow]) -> list[float]:
+    return [row.delta for row in rows if row.delta is not None]
+
+
+def _over_recordings(rows: Sequence[DatasheetRow], unit: PageUnit) -> dict[str, Any]:
     """Return one way to read a printed figure against all recordings of a sensor."""
-    deltas = sorted(row["delta"] for row in rows)
-    measured = sorted(row["measured"] for row in rows if row["measured"] is not None) or [None]
+    deltas = sorted(_deltas(rows))
+    measured = sorted(row.measured for row in rows if row.measured is not None)
+    ends = (measured[0], measured[-1]) if measured else (None, None)
     return {
         "as": _read_as(rows[0]),
-        "comparable": unit.text(rows[0]["comparable"]),
-        "measured": _range([unit.text(value, 3) for value in (measured[0], measured[-1])]),
+        "comparable": unit.text(rows[0].comparable),
+        "measured": _range([unit.text(value, 3) for value in ends]),
         "difference": _range([_percent(value) for value in (deltas[0], deltas[-1])]),
     }
 
 
 def repeatability_lines(
-    rows: Sequence[Row], sensor: str, system: System
+    rows: Sequence[RepeatabilityRow], sensor: str, system: System
 ) -> Iterator[dict[str, Any]]:
     """Yield how the fixed biases of each device of a sensor differ, against what is printed.
 
     Of the table ``repeatability``.
     """
     for row in rows:
-        if row["sensor"] != sensor:
+        if row.sensor != sensor:
             continue
-        unit = page_unit(quantity_of(row["channel"]), "adev", system)
+        unit = page_unit(quantity_of(row.channel), "adev", system)
         yield {
-            "device": row["device"],
-            "channel": row["channel"].replace("_", " "),
-            "recordings": row["recordings"],
+            "device": row.device,
+            "channel": row.channel.replace("_", " "),
+            "recordings": row.recordings,
             "printed": printed_text(row),
-            "about": ", ".join(filter(None, (row["kind"], row["condition"]))),
-            "comparable": unit.text(row["comparable"]),
+            "about": ", ".join(filter(None, (row.kind, row.condition))),
+            "comparable": unit.text(row.comparable),
             "measured": _with_limits(row, unit),
             "unit": unit.sign,
-            "delta": _percent(row["delta"]),
-            "verdict": row["verdict"],
-            "reason": row["reason"] or "",
+            "delta": _percent(row.delta),
+            "verdict": row.verdict,
+            "reason": row.reason or "",
         }
 
 
-def _figure_name(row: Row) -> str:
-    return _STATISTIC_NAMES.get(row["statistic"], row["quantity"].replace("_", " "))
+def _figure_name(row: DatasheetRow) -> str:
+    return _STATISTIC_NAMES.get(row.statistic, row.quantity.replace("_", " "))
 
 
-def _read_as(row: Row) -> str:
+def _read_as(row: DatasheetRow) -> str:
     """Return how a reading takes the printed figure, where there is more than one way."""
-    if row["sidedness"]:
-        return f"read as {row['sidedness']}"
-    return _STATISTICS.get(row["statistic"], "")
+    if row.sidedness:
+        return f"read as {row.sidedness}"
+    return _STATISTICS.get(row.statistic, "")
 
 
 _STATISTICS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
@@ -209,54 +215,53 @@ def curve_distances(view: ChannelView, system: System) -> Iterator[str]:
     """Yield how far the curve is from the lines of the datasheet, in words."""
     unit = page_unit(view.quantity, "adev", system)
     for row in view.datasheet_curve:
-        reading = f", density read as {row['sidedness']}" if row["sidedness"] else ""
-        away = row["rms_log10"]
+        reading = f", density read as {row.sidedness}" if row.sidedness else ""
+        away = row.rms_log10
         decades = NO_VALUE if away is None else f"{away:.3f}"
-        yield f"{unit.text(row['rms'], 3)} {unit.sign}, {decades} decades{reading}"
+        yield f"{unit.text(row.rms, 3)} {unit.sign}, {decades} decades{reading}"
 
 
 def _percent(share: float | None) -> str:
     return "–" if share is None else f"{round(100 * share):+d} %".replace("-", "−")
 
 
-def _with_limits(row: Row, unit: PageUnit) -> list[str]:
+def _with_limits(row: DatasheetRow | RepeatabilityRow, unit: PageUnit) -> list[str]:
     """Return what was measured, and its 95 % limits below it."""
-    value, lower, upper = row["measured"], row["lower"], row["upper"]
+    value, lower, upper = row.measured, row.lower, row.upper
     if value is None or lower is None or upper is None:
         return [unit.text(value)]
     digits = unit.digits(value, lower, upper)
     return [unit.text(value, digits), f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"]
 
 
-def _shares_with_limits(row: Row) -> list[str]:
+def _shares_with_limits(row: DatasheetRow) -> list[str]:
     """Return the difference, and its 95 % limits below it."""
-    lower, upper = row["delta_lower"], row["delta_upper"]
+    lower, upper = row.delta_lower, row.delta_upper
     if lower is None or upper is None:
-        return [_percent(row["delta"])]
-    return [_percent(row["delta"]), f"{_percent(lower)} to {_percent(upper)}"]
+        return [_percent(row.delta)]
+    return [_percent(row.delta), f"{_percent(lower)} to {_percent(upper)}"]
 
 
-def coverage_tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
     """Yield a table a quantity: a line a sensor, a column a figure, of the table ``coverage``."""
     for quantity, title in _TITLES.items():
-        own = [row for row in rows if row["quantity"] == quantity]
-        figures = list(dict.fromkeys(row["figure"] for row in own))
+        own = [row for row in rows if row.quantity == quantity]
+        figures = list(dict.fromkeys(row.figure for row in own))
         lines: dict[str, dict[str, Any]] = {}
         for row in own:
-            name = f"{row['vendor']} {row['model']}"
+            name = f"{row.vendor} {row.model}"
             line = lines.setdefault(
-                row["sensor"], {"name": name, "document": row["document"] or "–", "cells": {}}
+                row.sensor, {"name": name, "document": row.document or "–", "cells": {}}
             )
-            line["cells"][row["figure"]] = {
-                "text": _SIGNS[row["published"]],
-                "note": row["as_printed"] or "",
-                "class": "" if row["published"] == "yes" else "none",
+            line["cells"][row.figure] = {
+                "text": _SIGNS[row.published],
+                "note": row.as_printed or "",
+                "class": "" if row.published == "yes" else "none",
             }
         if not lines:
             continue
         published = {
-            figure: Counter(r["published"] for r in own if r["figure"] == figure)
-            for figure in figures
+            figure: Counter(r.published for r in own if r.figure == figure) for figure in figures
         }
         yield {
             "title": title,

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 from functools import cache
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
@@ -221,11 +221,23 @@ def degrees_text(angle: float | None, digits: int = 4) -> str:
     return NO_VALUE if angle is None else f"{number_text(math.degrees(angle), digits)}°"
 
 
-def printed_text(row: Mapping[str, Any]) -> str:
+def printed_text(row: Printed) -> str:
     """Return the figure of a datasheet as it is printed; `NO_VALUE` where there is none."""
-    if row["printed"] is None:
+    if row.printed is None:
         return NO_VALUE
-    return f"{row['printed']:g} {row['unit'] or ''}".rstrip()
+    return f"{row.printed:g} {row.unit or ''}".rstrip()
+
+
+class Printed(Protocol):
+    """A figure of a datasheet, as it is printed."""
+
+    @property
+    def printed(self) -> float | None:
+        """The number."""
+
+    @property
+    def unit(self) -> str | None:
+        """Its unit."""
 
 
 def duration_text(seconds: float | None) -> str:
