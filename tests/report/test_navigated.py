@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.report.navigated import NAVIGATION, TUNINGS, answers, ranking
 from imubench_pipeline.settings.config import Method
 from imubench_pipeline.tables import build
@@ -48,8 +49,8 @@ def ratio(value: float, lower: float, upper: float) -> dict[str, float]:
     }
 
 
-def rows(*changes: dict[str, Any]) -> list[Any]:
-    return build("navigation", [navigation_row(**one) for one in changes]).to_pylist()
+def rows(*changes: dict[str, Any]) -> list[NavigationRow]:
+    return NavigationRow.rows_of(build("navigation", [navigation_row(**one) for one in changes]))
 
 
 def test_a_tuning_matters_where_it_surely_costs_a_tenth() -> None:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
 
 from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import NO_VALUE, number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
-from imubench_pipeline.typing import Row
 
 TUNINGS = {
     "true": "true model",
@@ -44,11 +43,11 @@ _MATTERS = 1.1
 
 def _context(site: Site) -> dict[str, Any]:
     rows = site.rows(NavigationRow)
-    shown = [row for row in rows if row["position"] is not None]
+    shown = [row for row in rows if row.position is not None]
     recordings = [view.row for view in site.views]
     apart = left_out(recordings)
-    doubts = {(row["sensor"], row["recording"]): row["doubts"] for row in recordings}
-    deciding = [row for row in shown if (row["sensor"], row["recording"]) not in apart]
+    doubts = {(row.sensor, row.recording): row.doubts for row in recordings}
+    deciding = [row for row in shown if (row.sensor, row.recording) not in apart]
     return {
         "answers": [
             answer | {"doubts": doubts.get((answer["sensor"], answer["recording"]))}
@@ -56,19 +55,15 @@ def _context(site: Site) -> dict[str, Any]:
         ],
         "ranking": list(ranking(deciding)),
         "apart": {
-            row["sensor"]: apart[key]
-            for row in shown
-            if (key := (row["sensor"], row["recording"])) in apart
+            row.sensor: apart[key] for row in shown if (key := (row.sensor, row.recording)) in apart
         },
         "lines": [line_of(row) for row in shown],
-        "lacking": [
-            dict(row) | {"tuning": TUNINGS[row["tuning"]]} for row in rows if row["reason"]
-        ],
+        "lacking": [dict(row) | {"tuning": TUNINGS[row.tuning]} for row in rows if row.reason],
         "filters": {
-            "trajectory": list(dict.fromkeys(row["trajectory"] for row in shown)),
+            "trajectory": list(dict.fromkeys(row.trajectory for row in shown)),
             "outage": list(dict.fromkeys(_outage(row) for row in shown)),
-            "tuning": list(dict.fromkeys(TUNINGS[row["tuning"]] for row in shown)),
-            "sensor": list(dict.fromkeys(site.names[row["sensor"]] for row in shown)),
+            "tuning": list(dict.fromkeys(TUNINGS[row.tuning] for row in shown)),
+            "sensor": list(dict.fromkeys(site.names[row.sensor] for row in shown)),
         },
     }
 
@@ -83,15 +78,17 @@ NAVIGATION = Entry(
 """The page of filters that were tuned by what is known of the sensors."""
 
 
-def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     """Yield, for each sensor, trajectory and kind of signals, whether the tuning matters.
 
     By the position after the longest outage, over that of the true model on the same signals.
     """
-    for key, own in _grouped(rows, "sensor", "trajectory", "signals"):
-        longest = max(row["outage"] or 0.0 for row in own)
-        last = [row for row in own if row["outage"] == longest and row["tuning"] != "true"]
-        told = [row for row in last if row["position_ratio"] is not None]
+    for (sensor, trajectory, signals), own in _grouped(
+        rows, lambda row: (row.sensor, row.trajectory, row.signals)
+    ):
+        longest = max(row.outage or 0.0 for row in own)
+        last = [row for row in own if row.outage == longest and row.tuning != "true"]
+        told = [row for row in last if row.position_ratio is not None]
         if not told:
             continue
         worse = [row for row in told if _limits(row)[0] > _MATTERS]
@@ -99,11 +96,14 @@ def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
         sure = [row for row in no_worse if _limits(row)[0] > 1.0 / _MATTERS]
         no_worse = [row for row in no_worse if row not in sure]
         open_ones = [row for row in told if row not in worse + sure + no_worse]
-        smallest = next((row for row in own if row["smallest"]), None)
-        yield dict(zip(("sensor", "trajectory", "signals"), key, strict=True)) | {
-            "recording": own[0]["recording"],
-            "runs": own[0]["runs"],
-            "words": _SIGNALS[key[2]],
+        smallest = next((row for row in own if row.smallest), None)
+        yield {
+            "sensor": sensor,
+            "trajectory": trajectory,
+            "signals": signals,
+            "recording": own[0].recording,
+            "runs": own[0].runs,
+            "words": _SIGNALS[signals],
             "outage": f"{number_text(longest)} s",
             "matters": _matters(worse, sure, no_worse, open_ones),
             "smallest": None
@@ -113,103 +113,124 @@ def answers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
         }
 
 
-def _limits(row: Row) -> tuple[float, float]:
+def _limits(row: NavigationRow) -> tuple[float, float]:
     """Return the limits of the ratio of positions; of one that is not known, the widest."""
-    lower, upper = row["position_ratio_lower"], row["position_ratio_upper"]
+    return _known_or_widest(row.position_ratio_lower, row.position_ratio_upper)
+
+
+def _known_or_widest(lower: float | None, upper: float | None) -> tuple[float, float]:
     return 0.0 if lower is None else lower, math.inf if upper is None else upper
 
 
 def _matters(
-    worse: Sequence[Row], sure: Sequence[Row], no_worse: Sequence[Row], open_ones: Sequence[Row]
+    worse: Sequence[NavigationRow],
+    sure: Sequence[NavigationRow],
+    no_worse: Sequence[NavigationRow],
+    open_ones: Sequence[NavigationRow],
 ) -> str:
     parts = []
     if worse:
         by = ", ".join(
-            f"{TUNINGS[row['tuning']]} {number_text(row['position_ratio'], 3)} times"
-            for row in worse
+            f"{TUNINGS[row.tuning]} {number_text(row.position_ratio, 3)} times" for row in worse
         )
         parts.append(f"It matters: {by} the error of the true model")
     if sure:
-        names = ", ".join(TUNINGS[row["tuning"]] for row in sure)
+        names = ", ".join(TUNINGS[row.tuning] for row in sure)
         parts.append(f"no difference of a tenth: {names}")
     if no_worse:
-        names = ", ".join(TUNINGS[row["tuning"]] for row in no_worse)
+        names = ", ".join(TUNINGS[row.tuning] for row in no_worse)
         parts.append(f"no worse by a tenth: {names}")
     if open_ones:
-        names = ", ".join(TUNINGS[row["tuning"]] for row in open_ones)
+        names = ", ".join(TUNINGS[row.tuning] for row in open_ones)
         parts.append(f"these runs do not tell of {names}")
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _dishonest(rows: Sequence[Row]) -> str | None:
+def _dishonest(rows: Sequence[NavigationRow]) -> str | None:
     """Return which tunings are surely not as sure as they claim."""
-    names = dict.fromkeys(TUNINGS[row["tuning"]] for row in rows if row["consistent"] is False)
+    names = dict.fromkeys(TUNINGS[row.tuning] for row in rows if row.consistent is False)
     return ", ".join(names) or None
 
 
-def ranking(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+def ranking(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     """Yield the sensors by the position after the longest outage, tuned as is recommended."""
-    for (trajectory,), own in _grouped(rows, "trajectory"):
-        chosen = [row for row in own if row["recommended"] and row["signals"] != "log"]
-        longest = max((row["outage"] or 0.0 for row in chosen), default=0.0)
-        last = sorted(
-            (row for row in chosen if row["outage"] == longest), key=lambda row: row["position"]
-        )
+    for trajectory, own in _grouped(rows, lambda row: row.trajectory):
+        chosen = [row for row in own if row.recommended and row.signals != "log"]
+        longest = max((row.outage or 0.0 for row in chosen), default=0.0)
+        last = sorted((row for row in chosen if row.outage == longest), key=_position)
         for place, row in enumerate(last, start=1):
-            ties = [
-                other["sensor"]
-                for other in last
-                if other is not row
-                and other["position_lower"] <= row["position_upper"]
-                and row["position_lower"] <= other["position_upper"]
-            ]
+            ties = [other.sensor for other in last if other is not row and _overlap(row, other)]
             yield line_of(row) | {"place": place, "ties": ties, "trajectory": trajectory}
 
 
-def line_of(row: Row) -> dict[str, Any]:
+def _position(row: NavigationRow) -> float:
+    """Return the error of the position; of one that is not known, the largest."""
+    return math.inf if row.position is None else row.position
+
+
+def _overlap(one: NavigationRow, other: NavigationRow) -> bool:
+    """Tell whether the limits of two positions overlap."""
+    lower, upper = _known_or_widest(one.position_lower, one.position_upper)
+    other_lower, other_upper = _known_or_widest(other.position_lower, other.position_upper)
+    return other_lower <= upper and lower <= other_upper
+
+
+def line_of(row: NavigationRow) -> dict[str, Any]:
     """Return a row as the page shows it."""
-    inside, error = row["nees_inside"], row["nees_error"]
+    inside, error = row.nees_inside, row.nees_error
     return {
-        **{name: row[name] for name in ("sensor", "trajectory", "states", "model", "assumed")},
+        "sensor": row.sensor,
+        "trajectory": row.trajectory,
+        "states": row.states,
+        "model": row.model,
+        "assumed": row.assumed,
         "outage": _outage(row),
-        "seconds": row["outage"] or 0.0,
-        "signals": _SIGNALS[row["signals"]],
-        "tuning": TUNINGS[row["tuning"]],
-        "recommended": row["recommended"],
-        "position": row["position"],
-        "position_text": _figure(row, "position", 1.0),
-        "ratio": row["position_ratio"],
-        "ratio_text": _figure(row, "position_ratio", 1.0),
-        "velocity_text": _figure(row, "velocity", 1.0),
-        "heading_text": _figure(row, "heading", 180.0 / math.pi),
-        "expected": number_text(row["position_predicted"], 3),
+        "seconds": row.outage or 0.0,
+        "signals": _SIGNALS[row.signals],
+        "tuning": TUNINGS[row.tuning],
+        "recommended": row.recommended,
+        "position": row.position,
+        "position_text": _figure(row.position, row.position_lower, row.position_upper),
+        "ratio": row.position_ratio,
+        "ratio_text": _figure(
+            row.position_ratio, row.position_ratio_lower, row.position_ratio_upper
+        ),
+        "velocity_text": _figure(row.velocity, row.velocity_lower, row.velocity_upper),
+        "heading_text": _figure(row.heading, row.heading_lower, row.heading_upper, 180.0 / math.pi),
+        "expected": number_text(row.position_predicted, 3),
         "inside": None if inside is None else 100.0 * inside,
         "inside_text": ""
         if inside is None or error is None
         else f"{number_text(100.0 * inside, 3)} ± {percent_text(error, 2)}",
-        "consistent": row["consistent"],
-        "as_sure": _AS_SURE[row["consistent"]],
-        "of": counted(row["outages"], "outage") if row["outage"] and row["outages"] else "",
+        "consistent": row.consistent,
+        "as_sure": _AS_SURE[row.consistent],
+        "of": counted(row.outages, "outage") if row.outage and row.outages else "",
     }
 
 
-def _outage(row: Row) -> str:
-    return "none" if row["outage"] is None else f"{number_text(row['outage'])} s"
+def _outage(row: NavigationRow) -> str:
+    return "none" if row.outage is None else f"{number_text(row.outage)} s"
 
 
-def _figure(row: Row, name: str, factor: float) -> str:
-    if row[name] is None:
+def _figure(
+    value: float | None, lower: float | None, upper: float | None, factor: float = 1.0
+) -> str:
+    if value is None:
         return "–"
-    value, low, high = (
-        number_text(None if size is None else factor * size, 3)
-        for size in (row[f"{name}{end}"] for end in ("", "_lower", "_upper"))
+    text, low, high = (
+        number_text(None if size is None else factor * size, 3) for size in (value, lower, upper)
     )
-    return value if low == high else f"{value} ({low} to {high})"
+    return text if low == high else f"{text} ({low} to {high})"
 
 
-def _grouped(rows: Sequence[Row], *names: str) -> Iterator[tuple[tuple[str, ...], list[Row]]]:
-    groups: dict[tuple[str, ...], list[Row]] = {}
+_Key = TypeVar("_Key")
+
+
+def _grouped(
+    rows: Sequence[NavigationRow], key: Callable[[NavigationRow], _Key]
+) -> Iterator[tuple[_Key, list[NavigationRow]]]:
+    groups: dict[_Key, list[NavigationRow]] = {}
     for row in rows:
-        groups.setdefault(tuple(row[name] for name in names), []).append(row)
+        groups.setdefault(key(row), []).append(row)
     yield from groups.items()
