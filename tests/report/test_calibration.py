@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.calibration import answer, earth_words, scatter_words
 from imubench_pipeline.report.publish import publish
@@ -106,16 +107,31 @@ def test_what_gave_nothing_stands_on_the_start_page(read: dict[str, Read]) -> No
     assert "rate table" in read["recordings.html"].text
 
 
+def calibrated(parameter: str, **given: float | None) -> CalibrationRow:
+    about: dict[str, Any] = {"sensor": "s", "recording": "table", "channel": "gyro_x"}
+    about |= {"run": "rate_table", "parameter": parameter, "unit": "rad/s", "status": "ok"}
+    return CalibrationRow(**about | given)
+
+
 def test_sentences() -> None:
-    bias = {"parameter": "bias", "value": 1e-3, "lower": 0.9e-3, "upper": 1.1e-3, "reason": None}
+    bias = calibrated("bias", value=1e-3, lower=0.9e-3, upper=1.1e-3)
     assert answer([bias], "si") == "The bias is 0.001 ± 0.0001 rad/s (95 %)."
     assert answer([], "si") == "Nothing was found of this recording."
-    bent = {"parameter": "linearity", "value": 0.0125, "chance": 1e-3}
+    bent = calibrated("linearity", value=0.0125, chance=1e-3)
     assert "A straight line does not fit" in answer([bias, bent], "si")
     assert "from the line is 1.25 % of the largest rate" in answer([bias, bent], "si")
-    assert scatter_words([{"scatter": None}]) == ""
-    assert "scatter more than the noise" in scatter_words([{"scatter": 1e-4}])
-    assert earth_words([{"earth_rate": None}], "si").endswith("is a part of the bias.")
-    turned = {"earth_rate": 1e-5, "earth_rate_sigma": 1e-6, "half_width": None,
-              "latitude": math.pi / 4, "heading": 0.5, "elevation": 0.0}  # fmt: skip
+    assert scatter_words([calibrated("bias", scatter=None)]) == ""
+    assert "scatter more than the noise" in scatter_words([calibrated("bias", scatter=1e-4)])
+    assert earth_words([calibrated("bias", earth_rate=None)], "si").endswith(
+        "is a part of the bias."
+    )
+    turned = calibrated(
+        "bias",
+        earth_rate=1e-5,
+        earth_rate_sigma=1e-6,
+        half_width=None,
+        latitude=math.pi / 4,
+        heading=0.5,
+        elevation=0.0,
+    )
     assert "it is sure to 1×10⁻⁶ rad/s (1σ)." in earth_words([turned], "si")

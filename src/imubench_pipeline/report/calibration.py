@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.model.experiments import CalibrationRow
@@ -18,7 +18,6 @@ from imubench_pipeline.report.practical import (
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import noise_words, sentence
-from imubench_pipeline.typing import Row
 
 WORDS = {
     "bias": "bias at the start",
@@ -46,78 +45,83 @@ _DOUBTED = 0.05
 """Chance below which a straight line is doubted."""
 
 
-def answer(rows: Sequence[Row], system: System) -> str:
+def answer(rows: Sequence[CalibrationRow], system: System) -> str:
     """Return scale factor and bias of a recording in a sentence, or why there are none.
 
     Of its rows of the table ``calibration``, as all below.
     """
-    by_parameter = {row["parameter"]: row for row in rows}
+    by_parameter = {row.parameter: row for row in rows}
     bias = by_parameter.get("bias")
     if bias is None:
         return "Nothing was found of this recording."
-    if bias["value"] is None:
-        return sentence(bias["reason"])
+    if bias.value is None:
+        return sentence(bias.reason)
     unit = page_unit("gyro", "adev", system)
-    text = f"The bias is {_around(bias, unit.text)} {unit.sign} (95 %)"
+    text = (
+        f"The bias is {_around(bias.value, bias.lower, bias.upper, unit.text)} {unit.sign} (95 %)"
+    )
     scale = by_parameter.get("scale_factor")
-    if scale is not None and scale["value"] is not None:
-        error = {
-            name: None if scale[name] is None else _PPM * (scale[name] - 1.0)
-            for name in ("value", "lower", "upper")
-        }
-        text = f"The scale factor is off by {_around(error, number_text)} ppm. " + text
+    if scale is not None and scale.value is not None:
+        error, lower, upper = (
+            None if size is None else _PPM * (size - 1.0)
+            for size in (scale.value, scale.lower, scale.upper)
+        )
+        off = _around(error, lower, upper, number_text)
+        text = f"The scale factor is off by {off} ppm. " + text
     text += ". "
     straight = by_parameter.get("linearity")
-    if straight is not None and straight["chance"] is not None:
-        doubted = straight["chance"] < _DOUBTED
-        largest = number_text(_PERCENT * straight["value"], 3)
+    if straight is not None and straight.chance is not None and straight.value is not None:
+        doubted = straight.chance < _DOUBTED
+        largest = number_text(_PERCENT * straight.value, 3)
         text += f"The largest deviation from the line is {largest} % of the largest rate. "
         text += f"A straight line {'does not fit' if doubted else 'fits'}: noise alone departs as "
-        text += f"far from it with a chance of {percent_text(straight['chance'], 2)}."
+        text += f"far from it with a chance of {percent_text(straight.chance, 2)}."
     return text.strip()
 
 
-def _around(row: Row, as_text: Any) -> str:
+def _around(
+    value: float | None,
+    lower: float | None,
+    upper: float | None,
+    as_text: Callable[[float | None, int], str],
+) -> str:
     half = None
-    if row["lower"] is not None and row["upper"] is not None:
-        half = (row["upper"] - row["lower"]) / 2.0
-    digits = limit_digits(row["lower"], row["upper"], 3)
-    return f"{as_text(row['value'], digits)} ± {as_text(half, 2)}"
+    if lower is not None and upper is not None:
+        half = (upper - lower) / 2.0
+    digits = limit_digits(lower, upper, 3)
+    return f"{as_text(value, digits)} ± {as_text(half, 2)}"
 
 
-def lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+def lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table of what was found; a figure that is no rate as text."""
     for row in rows:
-        if row["status"] == "not_observable" and row["parameter"] in ("earth_rate", "heading"):
+        if row.status == "not_observable" and row.parameter in ("earth_rate", "heading"):
             continue
         line = {
             **row,
-            "words": WORDS[row["parameter"]],
-            "digits": limit_digits(row["lower"], row["upper"], 4),
-            "is_rate": row["unit"] == "rad/s",
-            "percent": None if row["chance"] is None else percent_text(row["chance"], 2),
-            "why": sentence(row["reason"]),
+            "words": WORDS[row.parameter],
+            "digits": limit_digits(row.lower, row.upper, 4),
+            "is_rate": row.unit == "rad/s",
+            "percent": None if row.chance is None else percent_text(row.chance, 2),
+            "why": sentence(row.reason),
         }
         yield line | _texts(row)
 
 
-def _texts(row: Row) -> dict[str, str]:
+def _texts(row: CalibrationRow) -> dict[str, str]:
     """Return a ratio with its limits as text."""
-    name = row["parameter"]
-    if row["value"] is None or name not in _OF_RATIO:
+    name = row.parameter
+    if row.value is None or name not in _OF_RATIO:
         return dict.fromkeys(("text", "limits", "sigma_text", "truth_text"), "–")
+    shown = (row.value, row.lower, row.upper, row.truth)
     if name == "scale_factor":
-        digits = limit_digits(row["lower"], row["upper"], 4)
-        value, low, high, true = (
-            "–" if row[key] is None else number_text(row[key], digits)
-            for key in ("value", "lower", "upper", "truth")
-        )
-        sigma = "–" if row["sigma"] is None else f"{number_text(_PPM * row['sigma'], 3)} ppm"
+        digits = limit_digits(row.lower, row.upper, 4)
+        value, low, high, true = (number_text(size, digits) for size in shown)
+        sigma = "–" if row.sigma is None else f"{number_text(_PPM * row.sigma, 3)} ppm"
     else:
         _, per = _OF_RATIO[name]
         value, low, high, true, sigma = (
-            "–" if row[key] is None else number_text(per * row[key], 3)
-            for key in ("value", "lower", "upper", "truth", "sigma")
+            number_text(None if size is None else per * size, 3) for size in (*shown, row.sigma)
         )
     return {
         "text": value + _OF_RATIO[name][0],
@@ -127,18 +131,18 @@ def _texts(row: Row) -> dict[str, str]:
     }
 
 
-def not_observable(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
     """Return what a recording cannot tell, each with the reason."""
     return [
-        {"words": WORDS[row["parameter"]], "why": sentence(row["reason"]), **row}
+        {"words": WORDS[row.parameter], "why": sentence(row.reason), **row}
         for row in rows
-        if row["status"] == "not_observable"
+        if row.status == "not_observable"
     ]
 
 
-def scatter_words(rows: Sequence[Row]) -> str:
+def scatter_words(rows: Sequence[CalibrationRow]) -> str:
     """Return whether the scatter is that of the noise model, in a sentence."""
-    chance = next((row["scatter"] for row in rows if row["scatter"] is not None), None)
+    chance = next((row.scatter for row in rows if row.scatter is not None), None)
     if chance is None:
         return ""
     text = percent_text(chance, 2)
@@ -151,41 +155,41 @@ def scatter_words(rows: Sequence[Row]) -> str:
     return f"The scatter of the means is that of the noise model: as much or more in {text}."
 
 
-def earth_words(rows: Sequence[Row], system: System) -> str:
+def earth_words(rows: Sequence[CalibrationRow], system: System) -> str:
     """Return what was taken off for the rotation of the Earth, in a sentence."""
-    row = next((row for row in rows if row["earth_rate"] is not None), None)
+    row = next((row for row in rows if row.earth_rate is not None), None)
     if row is None:
         return "What the Earth's rotation adds along the axis is a part of the bias."
     unit = page_unit("gyro", "adev", system)
     text = (
-        f"The Earth's rate along the axis, {unit.text(row['earth_rate'], 4)} {unit.sign} (latitude "
-        f"{degrees_text(row['latitude'])}, {_direction(row)}), is taken off"
+        f"The Earth's rate along the axis, {unit.text(row.earth_rate, 4)} {unit.sign} (latitude "
+        f"{degrees_text(row.latitude)}, {_direction(row)}), is taken off"
     )
-    if row["half_width"]:
-        text += f"; with no heading it is within ± {unit.text(row['half_width'], 3)} {unit.sign}"
-    elif row["earth_rate_sigma"]:
+    if row.half_width:
+        text += f"; with no heading it is within ± {unit.text(row.half_width, 3)} {unit.sign}"
+    elif row.earth_rate_sigma:
         text += (
-            f"; by the direction it is sure to {unit.text(row['earth_rate_sigma'], 2)} {unit.sign} "
+            f"; by the direction it is sure to {unit.text(row.earth_rate_sigma, 2)} {unit.sign} "
             "(1σ)"
         )
     return text + "."
 
 
-def _direction(row: Row) -> str:
-    elevation = f"elevation {degrees_text(row['elevation'])}"
-    if row["heading"] is not None:
-        return f"heading {degrees_text(row['heading'])}, {elevation}"
-    upright = row["elevation"] is not None and abs(math.cos(row["elevation"])) < 1e-6
+def _direction(row: CalibrationRow) -> str:
+    elevation = f"elevation {degrees_text(row.elevation)}"
+    if row.heading is not None:
+        return f"heading {degrees_text(row.heading)}, {elevation}"
+    upright = row.elevation is not None and abs(math.cos(row.elevation)) < 1e-6
     return elevation if upright else f"{elevation}, no heading"
 
 
 def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
     """Return what the page of a static recording says of its bias; None without a direction."""
-    rows = [row for row in view.rows(CalibrationRow) if row["run"] == "at_rest"]
+    rows = [row for row in view.rows(CalibrationRow) if row.run == "at_rest"]
     if not rows:
         return None
     return {
-        "channel": rows[0]["channel"],
+        "channel": rows[0].channel,
         "lines": [line for line in lines(rows) if line["status"] != "not_observable"],
         "open": not_observable(rows),
         "noise": noise_words(rows),
@@ -201,10 +205,10 @@ def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
         rows = view.rows(CalibrationRow)
         if not rows:
             continue
-        if rows[0]["run"] == "positions":
+        if rows[0].run == "positions":
             by_run["positions"].append({"view": view, "lines": list(attitude_lines(rows))})
             continue
-        by_run[rows[0]["run"]].append(
+        by_run[rows[0].run].append(
             {
                 "view": view,
                 "lines": {line["parameter"]: line for line in lines(rows)},
@@ -215,24 +219,24 @@ def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
     return by_run
 
 
-def attitude_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+def attitude_lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
     """Yield roll, pitch and heading in degrees, of rows of ``calibration`` of one recording."""
     for row in rows:
         value, lower, upper, truth = (
-            None if row[name] is None else math.degrees(row[name])
-            for name in ("value", "lower", "upper", "truth")
+            None if angle is None else math.degrees(angle)
+            for angle in (row.value, row.lower, row.upper, row.truth)
         )
         digits = limit_digits(lower, upper, 3)
         off = None
-        if value is not None and truth is not None:
-            off = math.remainder(value - truth, 360.0) / math.degrees(row["sigma"])
+        if value is not None and truth is not None and row.sigma is not None:
+            off = math.remainder(value - truth, 360.0) / math.degrees(row.sigma)
         yield {
-            "words": row["parameter"],
+            "words": row.parameter,
             "value": "–" if value is None else f"{number_text(value, digits)}°",
             "limits": ""
             if lower is None or upper is None
             else f"{number_text(lower, digits)}° to {number_text(upper, digits)}°",
             "truth": "–" if truth is None else f"{number_text(truth, digits)}°",
             "off": "–" if off is None else f"{number_text(off, 2)} σ",
-            "why": sentence(row["reason"]),
+            "why": sentence(row.reason),
         }

@@ -10,7 +10,6 @@ from imubench_pipeline.model.comparisons import FusionRow, GradeRow
 from imubench_pipeline.report.practical import number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES
-from imubench_pipeline.typing import Row
 
 _PARAMETERS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
 
@@ -62,24 +61,27 @@ def shared_words(common: Mapping[str, float]) -> str:
     )
 
 
-def equal_numbers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table: pairs of which the first is the worse one, or not known."""
     for row in rows:
-        if row["adev"] is not None and row["other_adev"] is not None:
-            if row["adev"] <= row["other_adev"]:
+        if row.adev is not None and row.other_adev is not None:
+            if row.adev <= row.other_adev:
                 continue
-        elif row["sensor"] > row["other"]:
+        elif row.sensor > row.other:
             continue  # what is not known of a pair is said once
         yield {
-            **{name: row[name] for name in ("sensor", "other", "n", "reason")},
-            "quantity": QUANTITY_NAMES[row["quantity"]],
-            "symbol": f"{row['quantity']}.adev",
-            "simulated": bool(row["simulated"]),
-            "other_simulated": bool(row["other_simulated"]),
-            "tau": f"{number_text(row['tau'])} s",
-            "seconds": row["tau"],
-            "adev": row["adev"],
-            "other_adev": row["other_adev"],
+            "sensor": row.sensor,
+            "other": row.other,
+            "n": row.n,
+            "reason": row.reason,
+            "quantity": QUANTITY_NAMES[row.quantity],
+            "symbol": f"{row.quantity}.adev",
+            "simulated": bool(row.simulated),
+            "other_simulated": bool(row.other_simulated),
+            "tau": f"{number_text(row.tau)} s",
+            "seconds": row.tau,
+            "adev": row.adev,
+            "other_adev": row.other_adev,
             "number": _number(row),
             "limits": _limits(row),
             "common": _common(row),
@@ -115,35 +117,35 @@ _MOST = 40
 """Sensors of a matrix that can still be read."""
 
 
-def grade_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+def grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table of how many reach a class: a sensor and an option each.
 
     What is not printed of the class is said once of all sensors.
     """
-    groups: dict[tuple[str, ...], dict[str, Row]] = {}
+    groups: dict[tuple[str, ...], dict[str, GradeRow]] = {}
     for row in rows:
-        key = (row["quantity"], row["sensor"], row["grade"], row["option"] or "")
+        key = (row.quantity, row.sensor, row.grade, row.option or "")
         # A density of which the side is not printed is there twice: the first reading is shown.
-        groups.setdefault(key, {}).setdefault(row["statistic"], row)
+        groups.setdefault(key, {}).setdefault(row.statistic, row)
     for (quantity, sensor, _, option), by in groups.items():
-        if not any(row["printed"] for row in by.values()):
+        if not any(row.printed for row in by.values()):
             continue
         yield {
             "quantity": QUANTITY_NAMES[quantity],
             "sensor": sensor,
-            "simulated": any(row["simulated"] for row in by.values()),
-            "grade": next(row["grade_name"] for row in by.values()),
+            "simulated": any(row.simulated for row in by.values()),
+            "grade": next(row.grade_name for row in by.values()),
             "option": option,
             "symbol": quantity,
             "cells": [
                 {
                     "name": name,
-                    "value": row["value"] if row else None,
-                    "printed": row["printed"] if row else None,
-                    "n": row["n"] if row else None,
-                    "number": "–" if row is None or row["n"] is None else _whole(row["n"]),
+                    "value": row.value if row else None,
+                    "printed": row.printed if row else None,
+                    "n": row.n if row else None,
+                    "number": "–" if row is None or row.n is None else _whole(row.n),
                     "limits": "" if row is None else _number_limits(row),
-                    "reason": (row["reason"] or "") if row else "",
+                    "reason": (row.reason or "") if row else "",
                 }
                 for name in ("N", "sigma_min")
                 for row in (by.get(name),)
@@ -151,51 +153,51 @@ def grade_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
         }
 
 
-def unprinted_grades(rows: Sequence[Row]) -> dict[str, str]:
+def unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
     """Return the sensors of the class of which nothing is printed of a quantity, and why."""
-    groups: dict[tuple[str, str], list[Row]] = {}
+    groups: dict[tuple[str, str], list[GradeRow]] = {}
     for row in rows:
-        groups.setdefault((row["quantity"], row["grade_name"]), []).append(row)
+        groups.setdefault((row.quantity, row.grade_name), []).append(row)
     return {
-        f"{name}, {QUANTITY_NAMES[quantity].lower()}": own[0]["reason"]
+        f"{name}, {QUANTITY_NAMES[quantity].lower()}": own[0].reason or ""
         for (quantity, name), own in groups.items()
-        if not any(row["printed"] for row in own)
+        if not any(row.printed for row in own)
     }
 
 
-def _number_limits(row: Row) -> str:
-    if row["n_upper"] is None:
+def _number_limits(row: GradeRow) -> str:
+    if row.n_upper is None:
         return ""
-    upper = _whole(row["n_upper"])
-    if row["n"] is None or row["n_lower"] is None:
+    upper = _whole(row.n_upper)
+    if row.n is None or row.n_lower is None:
         return f"at most {upper}"
-    lower = _whole(row["n_lower"])
+    lower = _whole(row.n_lower)
     return "" if lower == upper else f"{lower} to {upper}"
 
 
-def _common(row: Row) -> str:
-    if row["common_share"] is None:
+def _common(row: FusionRow) -> str:
+    if row.common_share is None:
         return "–"
-    text = percent_text(row["common_share"])
-    of_temperature = row["temperature_share"]
+    text = percent_text(row.common_share)
+    of_temperature = row.temperature_share
     if of_temperature:
         text += f" (temperature {percent_text(of_temperature)})"
     return text
 
 
-def _number(row: Row) -> str:
+def _number(row: FusionRow) -> str:
     """Return the least whole number of sensors that is enough."""
-    if row["reachable"] is False:
+    if row.reachable is False:
         return "no number"
-    return "–" if row["n"] is None else _whole(row["n"])
+    return "–" if row.n is None else _whole(row.n)
 
 
-def _limits(row: Row) -> str:
-    if row["lower"] is None:
+def _limits(row: FusionRow) -> str:
+    if row.lower is None:
         return ""
-    if row["upper"] is None:
-        return f"{_whole(row['lower'])} or more"
-    lower, upper = _whole(row["lower"]), _whole(row["upper"])
+    if row.upper is None:
+        return f"{_whole(row.lower)} or more"
+    lower, upper = _whole(row.lower), _whole(row.upper)
     return lower if lower == upper else f"{lower} to {upper}"
 
 
