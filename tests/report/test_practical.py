@@ -206,17 +206,16 @@ def test_times_are_told_in_the_unit_in_which_they_are_easily_read(
 
 def test_an_interval_needs_both_ends() -> None:
     unit = PageUnit("x", 10.0)
-    assert interval_text({"lower": 0.1234, "upper": 2.0}, unit) == "1.23 to 20"
-    assert interval_text({"lower": 0.1234, "upper": 2.0}, unit, 2) == "1.2 to 20"
-    for row in ({"lower": None, "upper": 2.0}, {"lower": 0.1, "upper": None}):
-        assert interval_text(row, unit) == "–"
+    assert interval_text(0.1234, 2.0, unit) == "1.23 to 20"
+    assert interval_text(0.1234, 2.0, unit, 2) == "1.2 to 20"
+    for lower, upper in ((None, 2.0), (0.1, None)):
+        assert interval_text(lower, upper, unit) == "–"
 
 
 @given(magnitudes, st.floats(1e-4, 1.0), st.integers(2, 4))
 def test_the_ends_of_an_interval_are_seen_to_differ(lower: float, width: float, least: int) -> None:
     upper = lower + abs(lower) * width
-    row = {"lower": lower, "upper": upper}
-    begin, _, end = interval_text(row, PageUnit("x", 1.0), least).partition(" to ")
+    begin, _, end = interval_text(lower, upper, PageUnit("x", 1.0), least).partition(" to ")
     assert number_of(begin) < number_of(end)
     digits = limit_digits(lower, upper, least)
     assert least <= digits <= 7

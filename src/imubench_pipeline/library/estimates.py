@@ -323,11 +323,10 @@ def _rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
     ]
     for component, symbol, parameter in sorted(components, key=lambda c: (c[0], order[c[1]])):
         unit = page_unit(estimate.quantity, symbol, "practical")
-        limits = {"lower": parameter.lower, "upper": parameter.upper}
         if parameter.value is None and not parameter.lower and parameter.upper is not None:
             interval = f"below {unit.text(parameter.upper, 3)}"
         else:
-            interval = interval_text(limits, unit)
+            interval = interval_text(parameter.lower, parameter.upper, unit)
         yield [
             estimate.channel,
             symbol_text(symbol) + (f" {component}" if component > 1 else ""),

@@ -259,7 +259,7 @@ def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> dict[str, Any]:
     lines = [_shown(total, total.sigma, unit)]
     if _sensible(total, total.sigma):
         digits = unit.digits(total.sigma, total.lower, total.upper)
-        lines.append(interval_text(total, unit, digits))
+        lines.append(interval_text(total.lower, total.upper, unit, digits))
     sources = [row for row in rows if row.source != "total"]
     if total.sigma > 0.0:
         lines += (parts_of(total.sigma, sources) or "").split("; ")

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 from functools import cache
-from typing import Any, Literal, Protocol
+from typing import Literal, Protocol
 
 from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
@@ -258,9 +258,8 @@ def limit_digits(lower: float | None, upper: float | None, least: int = 3) -> in
     return min(max(least, math.ceil(math.log10(ratio)) + 1), _MOST_DIGITS)
 
 
-def interval_text(row: Mapping[str, Any], unit: PageUnit, least: int = 3) -> str:
-    """Return ``lower to upper`` of a row of a table; a dash where they are not known."""
-    lower, upper = row["lower"], row["upper"]
+def interval_text(lower: float | None, upper: float | None, unit: PageUnit, least: int = 3) -> str:
+    """Return ``lower to upper``; a dash where they are not known."""
     if lower is None or upper is None:
         return NO_VALUE
     digits = limit_digits(lower, upper, least)

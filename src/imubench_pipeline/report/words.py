@@ -75,7 +75,7 @@ def precision(row: ParameterRow, unit: PageUnit) -> str:
         return ""
     half = (row.upper - row.lower) / 2.0 / abs(row.value)
     if half > _ROUGH:
-        return interval_text(row, unit, 2)
+        return interval_text(row.lower, row.upper, unit, 2)
     return f"± {percent_text(half, 2)}"
 
 
