@@ -19,7 +19,6 @@ from imubench_pipeline.report.told import Told, margin, margin_limits, of_rankin
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.typing import Row
 
 WORDS: Mapping[str, str] = {
     "passes": "chance of 97.5 % or more",
@@ -109,9 +108,7 @@ class Column:
 def matrix(site: Site) -> dict[str, Any] | None:
     """Return the matrix of a report; None where nothing is asked of its sensors."""
     requirements = site.settings["requirements"]
-    rows = {
-        (row["requirement"], row["sensor"]): row for row in site.rows(RankingRow) if row["decides"]
-    }
+    rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
     if not rows:
         return None
     scale = Scale.of(value for row in rows.values() for value in _drawn(row))
@@ -185,17 +182,17 @@ def _column(name: str, declared: Mapping[str, Any], answer: str) -> Column:
 
 def _drawn(row: RankingRow) -> list[float]:
     """Return the margins of a row that are drawn."""
-    known = [row[name] for name in ("logged_margin", "unless_margin") if row[name] is not None]
-    if row["margin"] is None:
+    known = [size for size in (row.logged_margin, row.unless_margin) if size is not None]
+    if row.margin is None:
         return known
-    return [row["margin"], *(limit for limit in margin_limits(row) if limit is not None)]
+    return [row.margin, *(limit for limit in margin_limits(row) if limit is not None)]
 
 
-def word_of(row: Row) -> str:
+def word_of(row: RankingRow) -> str:
     """Return the word of a row of the table ``ranking`` that decides."""
-    if row["verdict"] == "not enough data" and row["margin"] is not None:
+    if row.verdict == "not enough data" and row.margin is not None:
         return "open"
-    return _WORD_OF.get(row["verdict"], "not judged")
+    return _WORD_OF.get(row.verdict, "not judged")
 
 
 def unranked(own: Iterable[RecordingView]) -> str:
@@ -203,7 +200,7 @@ def unranked(own: Iterable[RecordingView]) -> str:
     at_rest = [view for view in own if view.static]
     if not at_rest:
         return "no recording at rest"
-    return "; ".join(dict.fromkeys(view.row["doubts"] for view in at_rest if view.row["doubts"]))
+    return "; ".join(dict.fromkeys(view.row.doubts for view in at_rest if view.row.doubts))
 
 
 def _why(site: Site, sensor: str) -> str:
@@ -224,21 +221,21 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
     shown = margin(row) if judged else None
     low, high = margin_limits(row) if shown else (None, None)
     bar = None
-    if low is not None and high is not None:
-        bar = (scale.place(row["margin"]), scale.place(low), scale.place(high))
+    if row.margin is not None and low is not None and high is not None:
+        bar = (scale.place(row.margin), scale.place(low), scale.place(high))
     ranked = list(WORDS)
     return Cell(
-        row["requirement"],
-        row["sensor"],
+        row.requirement,
+        row.sensor,
         word,
         _conditions(row) if judged else 0,
         shown,
         bar,
         evidence_words(row) if judged else "",
-        row["doubts"] or "",
+        row.doubts or "",
         "" if judged else _reason(row),
         [] if judged else _otherwise(row, scale),
-        _order(len(WORDS) - ranked.index(word), row["margin"]) if judged else -math.inf,
+        _order(len(WORDS) - ranked.index(word), row.margin) if judged else -math.inf,
     )
 
 
@@ -247,29 +244,32 @@ def _order(place: int, size: float | None) -> float:
     return round(10.0 * place + min(max(log, -_LOGS), _LOGS), 4)
 
 
-def _conditions(row: Row) -> int:
+def _conditions(row: RankingRow) -> int:
     """Return on how many conditions a verdict rests."""
-    return len((row["conditions"] or "").split("; ")) if row["verdict"].endswith(" if") else 0
+    return len((row.conditions or "").split("; ")) if row.verdict.endswith(" if") else 0
 
 
-def _reason(row: Row) -> str:
+def _reason(row: RankingRow) -> str:
     """Return in a few words why a sensor is not judged."""
-    if row["verdict"] == EXCLUDED:
-        return str(row["conditions"])
-    if row["verdict"] != "not enough data":
-        return str(row["verdict"])
-    if row["left_out"]:
-        return "in doubt" if row["doubts"] else str(row["left_out"])
-    return str(row["reason"] or "too little is known")
+    if row.verdict == EXCLUDED:
+        return str(row.conditions)
+    if row.verdict != "not enough data":
+        return str(row.verdict)
+    if row.left_out:
+        return "in doubt" if row.doubts else str(row.left_out)
+    return str(row.reason or "too little is known")
 
 
 def _otherwise(row: RankingRow, scale: Scale) -> list[tuple[str, Told, float]]:
     """Return the margins that a recording in doubt would have."""
-    named = (("as logged", "logged_margin"), ("mended", "unless_margin"))
+    named = (
+        ("as logged", "logged_margin", row.logged_margin),
+        ("mended", "unless_margin", row.unless_margin),
+    )
     return [
-        (words, of_ranking(row, name, number_text(row[name], 3)), scale.place(row[name]))
-        for words, name in named
-        if row[name] is not None
+        (words, of_ranking(row, name, number_text(size, 3)), scale.place(size))
+        for words, name, size in named
+        if size is not None
     ]
 
 
@@ -278,7 +278,7 @@ def strip(site: Site) -> list[dict[str, Any]]:
     views = site.views
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected
-    seconds = sum(view.row["duration"] or 0.0 for view in views)
+    seconds = sum(view.row.duration or 0.0 for view in views)
     doubted = sum(bool(view.warnings) for view in views)
     parts = [
         (len(site.sensors), counted(len(site.sensors), "sensor"), "#sensors"),

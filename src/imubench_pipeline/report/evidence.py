@@ -23,42 +23,39 @@ def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[
     A requirement by which the sensor is not judged is there, too. ``own``: its recordings.
     """
     rows = site.rows(RankingRow)
-    own_rows = [row for row in rows if row["sensor"] == sensor]
+    own_rows = [row for row in rows if row.sensor == sensor]
     totals = {view.name: list(_totals(view)) for view in own if view.static}
     simulated = {view.full_name: view.simulated for view in own}
     requirements = site.settings["requirements"] if rows else {}
     for ranking in rankings(own_rows, requirements, simulated, site.system):
         name, requirement = ranking["name"], ranking["requirement"]
         about = {"name": name, "title": requirement.title, "asked": requirement_words(requirement)}
-        stands = next((r for r in own_rows if r["requirement"] == name and r["decides"]), None)
+        stands = next((r for r in own_rows if r.requirement == name and r.decides), None)
         if stands is None:
             yield about | {"row": None, "word": "not judged", "why": unranked(own)}
             continue
         (group,) = ranking["groups"]
         judged = sum(
-            row["rank"] is not None and row["decides"] and row["requirement"] == name
-            for row in rows
+            row.rank is not None and row.decides and row.requirement == name for row in rows
         )
         yield about | {
             "row": stands,
             "word": word_of(stands),
             "group": group,
-            "place": f"rank {stands['rank']} of {judged} that could be judged"
-            if stands["rank"]
-            else "",
-            "conditions": (stands["conditions"] or "").split("; ")
-            if stands["verdict"].endswith(" if")
+            "place": f"rank {stands.rank} of {judged} that could be judged" if stands.rank else "",
+            "conditions": (stands.conditions or "").split("; ")
+            if stands.verdict.endswith(" if")
             else [],
-            "spread": spread_words(stands) if stands["spread"] is not None else "",
+            "spread": spread_words(stands) if stands.spread is not None else "",
             "otherwise": list(_otherwise(stands)),
             "window": _window(requirement),
             "limits": [
                 limit_words(row)
                 for row in own_rows
-                if row["requirement"] == name and row["trajectory"] is None
+                if row.requirement == name and row.trajectory is None
             ],
             "recordings": [
-                _recording(site, view, [t for t in totals[view.name] if t["requirement"] == name])
+                _recording(site, view, [t for t in totals[view.name] if t.requirement == name])
                 for view in own
                 if view.static
             ],
@@ -67,11 +64,12 @@ def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[
 
 def _otherwise(row: RankingRow) -> Iterator[tuple[str, str, str]]:
     """Yield what the verdict would be: in which case, the verdict and its margin."""
-    for words, name in (("As logged", "logged"), ("With the unit mended", "unless")):
-        size = row[f"{name}_margin"]
+    for words, name, size, verdict in (
+        ("As logged", "logged_margin", row.logged_margin, row.logged_verdict),
+        ("With the unit mended", "unless_margin", row.unless_margin, row.unless_verdict),
+    ):
         if size is not None:
-            text = of_ranking(row, f"{name}_margin", number_text(size, 3))
-            yield words, row[f"{name}_verdict"], text
+            yield words, verdict or "", of_ranking(row, name, number_text(size, 3))
 
 
 def _window(requirement: Requirement) -> str:
@@ -83,22 +81,23 @@ def _window(requirement: Requirement) -> str:
 
 def _totals(view: RecordingView) -> Iterator[ErrorBudgetRow]:
     for row in view.rows(ErrorBudgetRow):
-        if row["requirement"] is not None and row["source"] == "total":
+        if row.requirement is not None and row.source == "total":
             yield row
 
 
 def _recording(site: Site, view: RecordingView, totals: Sequence[ErrorBudgetRow]) -> dict[str, Any]:
     axes = counted(len(view.recommended()), "axis", "axes")
     temperature = ""
-    if view.row["temperature_min"] is not None:
-        ends = (number_text(view.row[f"temperature_{end}"], 3) for end in ("min", "max"))
+    if view.row.temperature_min is not None:
+        limits = (view.row.temperature_min, view.row.temperature_max)
+        ends = (number_text(limit, 3) for limit in limits)
         temperature = " to ".join(ends) + " °C"
     return {
         "view": view,
-        "device": view.row["device"],
-        "length": f"{duration_text(view.row['duration'])}, {axes}",
+        "device": view.row.device,
+        "length": f"{duration_text(view.row.duration)}, {axes}",
         "temperature": temperature,
-        "decides": view.row["decides"] is not False,
-        "doubts": view.row["doubts"] or "",
+        "decides": view.row.decides is not False,
+        "doubts": view.row.doubts or "",
         "errors": [error_of_recording(total, site.system) for total in totals],
     }
