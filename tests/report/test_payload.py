@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow
 from imubench_pipeline.report.palette import sensor_appearances
 from imubench_pipeline.report.payload import (
     Arrays,
@@ -219,18 +220,43 @@ def test_a_datasheet_is_drawn_in_the_convention_of_what_is_measured() -> None:
     assert line["label"] == "noise density 0.005 deg/s/sqrt(Hz) (typ, read as two-sided)"
 
 
+def part_of(
+    channel: str,
+    start: float,
+    end: float,
+    low: float | None = None,
+    high: float | None = None,
+    mean: float | None = None,
+) -> EnvelopeRow:
+    """A part of the samples of a log; without samples, one that has none."""
+    return EnvelopeRow(
+        sensor="s",
+        recording="r",
+        channel=channel,
+        start=start,
+        end=end,
+        low=low,
+        high=high,
+        mean=mean,
+        samples=0 if mean is None else 100,
+    )
+
+
 def test_samples_are_drawn_by_channel_with_holes_where_there_are_none() -> None:
-    names = {"sensor": "s", "recording": "r"}
     envelope = [
-        names | {"channel": "gyro_x", "start": 0.0, "end": 5.0, "low": -1.0, "high": 1.0,
-                 "mean": 0.5},
-        names | {"channel": "temperature", "start": 0.0, "end": 9.0, "low": 20.0, "high": 21.0,
-                 "mean": 20.5},
-        names | {"channel": "gyro_x", "start": 5.0, "end": 9.0, "low": None, "high": None,
-                 "mean": None},
-    ]  # fmt: skip
+        part_of("gyro_x", 0.0, 5.0, -1.0, 1.0, 0.5),
+        part_of("temperature", 0.0, 9.0, 20.0, 21.0, 20.5),
+        part_of("gyro_x", 5.0, 9.0),
+    ]
     histogram = [
-        names | {"channel": "gyro_x", "lower": float(i), "upper": i + 1.0, "count": count}
+        HistogramRow(
+            sensor="s",
+            recording="r",
+            channel="gyro_x",
+            lower=float(i),
+            upper=i + 1.0,
+            count=count,
+        )
         for i, count in enumerate([1, 10, 0, 1000])
     ]
     arrays = Arrays()

@@ -47,7 +47,7 @@ def compared_recording(view: RecordingView, system: System) -> ComparedRecording
                 "asked": asked,
                 "model": model_words(channel, method),
                 "cells": {
-                    symbol: cell(channel, method, symbol, view.row["duration"], system)
+                    symbol: cell(channel, method, symbol, view.row.duration, system)
                     for symbol in shown
                 },
             }

@@ -51,7 +51,7 @@ _OF_KIND: Mapping[str, tuple[str, recording.Context]] = {
 def pages(site: Site) -> Iterator[Page]:
     """Yield the pages of the report, the start page last: it stands for the finished report."""
     for view in site.views:
-        kind = "" if view.left_out else view.row["kind"]
+        kind = "" if view.left_out else view.row.kind
         yield recording.page_of(site, view, *_OF_KIND.get(kind, _STATIC))
     for sensor in site.sensors:
         yield sensor_page(site, sensor)

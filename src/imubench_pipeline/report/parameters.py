@@ -10,6 +10,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import PARAMETERS, SENSOR, SHOWN
 from imubench_pipeline.estimators.model_choice import LEAST_SHARE, relative
+from imubench_pipeline.model.estimates import ParameterRow, SimulatedTruthRow
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
     PageUnit,
@@ -19,15 +20,14 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import model_text, untold
-from imubench_pipeline.typing import Row
 
 
-def shown_symbols(rows: Iterable[Row]) -> list[str]:
+def shown_symbols(rows: Iterable[ParameterRow]) -> list[str]:
     """Return the parameters of the papers' model, and those others that estimates have.
 
     N_sensor stands with the low-pass.
     """
-    estimated = {row["parameter"] for row in rows if row["status"] != "absent"}
+    estimated = {row.parameter for row in rows if row.status != "absent"}
     return [s for s in SHOWN if s in PARAMETERS or (s in estimated and s != SENSOR)]
 
 
@@ -57,12 +57,12 @@ def model_words(channel: ChannelView, method: str) -> str:
     Those of the likelihood allow for all models that the log does not tell from the best, so that
     the papers' model alone has others, even where it is the best.
     """
-    text = model_text(channel.parameters[method][0]["model"])
+    text = model_text(channel.parameters[method][0].model)
     if method != "likelihood" or not channel.models:
         return text
-    shares = relative(np.array([row["aic"] for row in channel.models]))
+    shares = relative(np.array([row.aic for row in channel.models]))
     others = sum(
-        share >= LEAST_SHARE and not row["chosen"] and "R" not in row["model"].split("+")
+        share >= LEAST_SHARE and not row.chosen and "R" not in row.model.split("+")
         for share, row in zip(shares, channel.models, strict=True)
     )
     return f"{text} or {counted(others, 'other')}" if others else text
@@ -76,44 +76,43 @@ def cell(
     rows = channel.named(method, symbol)
     parts = [
         {
-            "value": row["value"],
-            "lower": None if row["status"] == "absent" else row["lower"],
-            "upper": row["upper"],
-            "status": "" if row["status"] == "ok" else row["status"],
+            "value": row.value,
+            "lower": None if row.status == "absent" else row.lower,
+            "upper": row.upper,
+            "status": "" if row.status == "ok" else row.status,
         }
         for row in rows
     ]
-    digits = max((digits_of(row, unit) for row in rows), default=3)
+    digits = max((digits_of(unit, row.value, row.lower, row.upper) for row in rows), default=3)
     words = [sentence for row in rows if (sentence := untold(row, unit, duration))]
     return {
         "parts": parts,
         "words": " ".join(words),
-        "value": rows[0]["value"] if rows else None,
+        "value": rows[0].value if rows else None,
         "digits": digits,
     }
 
 
-def digits_of(row: Row, unit: PageUnit) -> int:
+def digits_of(unit: PageUnit, value: float | None, lower: float | None, upper: float | None) -> int:
     """Return with how many digits a parameter and its limits are printed in a unit.
 
     Those that its interval leaves, and no fewer than tell the limits apart.
     """
-    value, lower, upper = row["value"], row["lower"], row["upper"]
     if value is None or lower is None or upper is None:
         return limit_digits(lower, upper)
     return max(unit.digits(value, lower, upper), limit_digits(lower, upper, 2))
 
 
-def _truth(rows: Sequence[Row]) -> dict[str, Any]:
+def _truth(rows: Sequence[SimulatedTruthRow]) -> dict[str, Any]:
     if not rows:
         return {"parts": [], "words": "The simulation has none.", "value": None, "digits": 3}
     parts = [
         {
-            "value": row["value"],
+            "value": row.value,
             "lower": None,
             "upper": None,
-            "status": "assumed" if row["assumed"] else "",
+            "status": "assumed" if row.assumed else "",
         }
         for row in rows
     ]
-    return {"parts": parts, "words": rows[0]["source"], "value": rows[0]["value"], "digits": 3}
+    return {"parts": parts, "words": rows[0].source, "value": rows[0].value, "digits": 3}

@@ -5,18 +5,19 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
 from imubench_pipeline.estimators.estimate import COMPARED
+from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow
+from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.noise import NoiseModel, Term
 from imubench_pipeline.report.palette import Appearance, method_appearance
 from imubench_pipeline.report.practical import printed_text
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
-from imubench_pipeline.typing import Row
 
 FOREST = (*COMPARED, "B", "T_B")
 """The parameters that are drawn across sensors."""
@@ -223,17 +224,17 @@ def datasheet_lines(view: ChannelView) -> list[dict[str, Any]]:
     """Return the lines of the datasheet that can be drawn beside the curve of a channel."""
     lines = []
     for row in view.datasheet:
-        if row["method"] != view.recommended or row["comparable"] is None:
+        if row.method != view.recommended or row.comparable is None:
             continue
-        if row["statistic"] not in ("N", "adev_minimum"):
+        if row.statistic not in ("N", "adev_minimum"):
             continue
-        name = {"N": "noise density", "adev_minimum": "bias instability"}[row["statistic"]]
-        reading = f"read as {row['sidedness']}" if row["sidedness"] else ""
-        about = filter(None, (row["kind"], reading))
+        name = {"N": "noise density", "adev_minimum": "bias instability"}[row.statistic]
+        reading = f"read as {row.sidedness}" if row.sidedness else ""
+        about = filter(None, (row.kind, reading))
         lines.append(
             {
-                "of": row["statistic"],
-                "value": row["comparable"],
+                "of": row.statistic,
+                "value": row.comparable,
                 "label": f"{name} {printed_text(row)} ({', '.join(about)})",
             }
         )
@@ -245,8 +246,8 @@ def _estimates(view: ChannelView, method: str) -> dict[str, Any]:
     by_symbol: dict[str, list[list[Any]]] = {}
     for symbol in FOREST:
         for row in view.named(method, symbol):
-            numbers = (_rounded(row[name]) for name in ("value", "lower", "upper"))
-            by_symbol.setdefault(symbol, []).append([*numbers, row["status"]])
+            numbers = (_rounded(number) for number in (row.value, row.lower, row.upper))
+            by_symbol.setdefault(symbol, []).append([*numbers, row.status])
     return by_symbol
 
 
@@ -272,7 +273,7 @@ def _spectrum(
             name: arrays.log(np.sqrt(fitted * chdtri(freedom, beyond) / freedom))
             for name, beyond in (("lower", 0.975), ("upper", 0.025))
         },
-        "model": next((row["model"] for row in view.models if row["chosen"]), ""),
+        "model": next((row.model for row in view.models if row.chosen), ""),
         "smooth": arrays.log(smooth),
         "terms": []
         if not rate
@@ -281,38 +282,40 @@ def _spectrum(
             for name, term in _named_terms(model)
         ],
         "lines": [
-            {"frequency": row["frequency"], "amplitude": row["amplitude"], "kind": row["kind"]}
+            {"frequency": row.frequency, "amplitude": row.amplitude, "kind": row.kind}
             for row in view.lines
         ],
     }
 
 
 def samples_payload(
-    envelope: Sequence[Row], histogram: Sequence[Row], arrays: Arrays
+    envelope: Sequence[EnvelopeRow], histogram: Sequence[HistogramRow], arrays: Arrays
 ) -> dict[str, Any]:
     """Return the envelope of the samples of a recording and their histogram, by channel."""
     payload: dict[str, Any] = {"envelope": {}, "histogram": {}}
     for channel, rows in _by_channel(envelope).items():
         payload["envelope"][channel] = {
-            "start": rows[0]["start"],
-            "end": rows[-1]["end"],
-            **{
-                name: arrays.even(numbers(row[name] for row in rows))
-                for name in ("low", "high", "mean")
-            },
+            "start": rows[0].start,
+            "end": rows[-1].end,
+            "low": arrays.even(numbers(row.low for row in rows)),
+            "high": arrays.even(numbers(row.high for row in rows)),
+            "mean": arrays.even(numbers(row.mean for row in rows)),
         }
-    for channel, rows in _by_channel(histogram).items():
+    for channel, bins in _by_channel(histogram).items():
         payload["histogram"][channel] = {
-            "edges": arrays.exact([rows[0]["lower"], *(row["upper"] for row in rows)]),
-            "count": arrays.log([row["count"] for row in rows]),
+            "edges": arrays.exact([bins[0].lower, *(row.upper for row in bins)]),
+            "count": arrays.log([row.count for row in bins]),
         }
     return payload
 
 
-def _by_channel(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    channels: dict[str, list[Row]] = {}
+_OfChannel = TypeVar("_OfChannel", bound=ChannelRow)
+
+
+def _by_channel(rows: Sequence[_OfChannel]) -> dict[str, list[_OfChannel]]:
+    channels: dict[str, list[_OfChannel]] = {}
     for row in rows:
-        channels.setdefault(row["channel"], []).append(row)
+        channels.setdefault(row.channel, []).append(row)
     return channels
 
 

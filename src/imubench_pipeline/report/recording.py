@@ -6,8 +6,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.model.estimates import BacktestRow
+from imubench_pipeline.model.estimates import (
+    BacktestRow,
+    EnvelopeRow,
+    HistogramRow,
+    ModelRow,
+    ModelSampleRow,
+    ScoreRow,
+)
 from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import log_paths, read_metadata
 from imubench_pipeline.report import compared_samples, thermal
@@ -33,7 +41,6 @@ from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.report.words import model_text, precision, sentence, started_text
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.typing import Row
 
 _EXACT = 1e-9
 """Relative error of a rate that is not worth a word."""
@@ -59,30 +66,31 @@ def recording_key(site: Site, view: RecordingView, folder: Path) -> str:
     shown = ("envelope", "histogram", "samples_of_models")
     samples = [folder / f"{table}.parquet" for table in shown]
     own = [path.read_bytes() for path in samples if path.is_file()]
-    published = [row for row in site.rows(CoverageRow) if row["sensor"] == view.sensor]
+    published = [row for row in site.rows(CoverageRow) if row.sensor == view.sensor]
     look = site.looks.get(view.sensor)
     return site.key_of(view.key, view.device_page, look, published, metadata_of(folder), *own)
 
 
-def rows_of_samples(folder: Path, table: str) -> list[Row]:
+def rows_of_samples(folder: Path, of: type[R]) -> list[R]:
     """Return the rows of a table of samples in the folder of a recording, if any."""
-    path = folder / f"{table}.parquet"
-    return list(read(table, [path]).to_pylist()) if path.is_file() else []
+    path = folder / f"{of.table}.parquet"
+    return of.rows_of(read(of.table, [path])) if path.is_file() else []
 
 
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     """Return what the template needs; ``folder`` is the recording's."""
     arrays = Arrays()
-    envelope, histogram = (rows_of_samples(folder, table) for table in ("envelope", "histogram"))
+    envelope = rows_of_samples(folder, EnvelopeRow)
+    histogram = rows_of_samples(folder, HistogramRow)
     order = {"fatal": 0, "warning": 1, "note": 2}
     channels = view.channels()
     names = {channel.channel for channel in channels}
     numbered = [
-        {**row, "number": i, "linked": row["channel"] in names}
-        for i, row in enumerate(sorted(view.findings, key=lambda r: order[r["severity"]]), start=1)
+        {**row, "number": i, "linked": row.channel in names}
+        for i, row in enumerate(sorted(view.findings, key=lambda r: order[r.severity]), start=1)
     ]
     samples = samples_payload(envelope, histogram, arrays)
-    of_models = rows_of_samples(folder, "samples_of_models")
+    of_models = rows_of_samples(folder, ModelSampleRow)
     budgets = list(budget_tables(view.budget, {view.full_name: view.simulated}, site.system))
     return {
         **about_of(site, view, channels, folder),
@@ -125,10 +133,10 @@ def _summary(view: RecordingView, channels: int) -> str:
         why = "could not be used" if view.rejected else "could not be analysed: a step failed"
         return f"This recording {why}; nothing of it is in the comparison."
     row, parts = view.row, []
-    if row["started"]:
-        parts.append(f"from {started_text(row['started'])}")
-    if row["temperature_min"] is not None:
-        low, high = (number_text(row[f"temperature_{end}"], 3) for end in ("min", "max"))
+    if row.started:
+        parts.append(f"from {started_text(row.started)}")
+    if row.temperature_min is not None:
+        low, high = (number_text(end, 3) for end in (row.temperature_min, row.temperature_max))
         parts.append(f"{low} to {high} °C")
     parts.append(counted(channels, "channel"))
     warnings = len(view.warnings)
@@ -136,22 +144,23 @@ def _summary(view: RecordingView, channels: int) -> str:
     return summary_words(view, parts)
 
 
-def _inside(score: Row) -> str:
+def _inside(score: ScoreRow) -> str:
     """Return the part of the curve inside the band of one reconstruction."""
-    inside = score["inside_band"]
+    inside = score.inside_band
     return NO_VALUE if inside is None else f"{100 * inside:.0f} %"
 
 
-def _drawn(score: Row) -> tuple[str, str]:
+def _drawn(score: ScoreRow) -> tuple[str, str]:
     """Return the score of one reconstruction and its range, in decades."""
-    low, high = (number_text(score[f"drawn_log10_{end}"], 2) for end in ("lower", "upper"))
-    return number_text(score["drawn_log10"], 2), f"{low} to {high}"
+    ends = (score.drawn_log10_lower, score.drawn_log10_upper)
+    low, high = (number_text(end, 2) for end in ends)
+    return number_text(score.drawn_log10, 2), f"{low} to {high}"
 
 
 def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
     """Return length and rate of a recording, and parts that say more, as a sentence."""
     row = view.row
-    length = f"{duration_text(row['duration'])} at {rates_text(row['rate'], view.rates)}"
+    length = f"{duration_text(row.duration)} at {rates_text(row.rate, view.rates)}"
     kind = "Simulated from known parameters, not measured: " if view.simulated else ""
     return kind + ", ".join([length, *parts]) + "."
 
@@ -161,14 +170,14 @@ def _channel(
     view: RecordingView,
     channel: ChannelView,
     samples: Mapping[str, Any],
-    of_models: Sequence[Row],
+    of_models: Sequence[ModelSampleRow],
 ) -> dict[str, Any]:
-    symbols, lines = methods_table(channel, view.row["duration"], site.system)
+    symbols, lines = methods_table(channel, view.row.duration, site.system)
     used = next(line for line in lines if line["recommended"])
     for line in lines:
         score = channel.scores.get(line["method"] or "")
-        scored = score is not None and score["rms_log10"] is not None
-        line["score"] = number_text(score["rms_log10"], 2) if scored and score else "–"
+        scored = score is not None and score.rms_log10 is not None
+        line["score"] = number_text(score.rms_log10, 2) if scored and score else "–"
         line["drawn"] = _drawn(score) if scored and score else ("–", "")
         line["inside"] = _inside(score) if scored and score else "–"
     best = channel.models[0] if channel.models else None
@@ -184,11 +193,11 @@ def _channel(
         "model": _model_words(channel),
         "models": [
             {
-                "model": row["model"],
-                "chosen": row["chosen"],
-                "above": number_text(row["bic"] - best["bic"], 3) if best else "",
-                "deviance": number_text(row["deviance"], 3),
-                "verdict": row["verdict"],
+                "model": row.model,
+                "chosen": row.chosen,
+                "above": number_text(row.bic - best.bic, 3) if best else "",
+                "deviance": number_text(row.deviance, 3),
+                "verdict": row.verdict,
             }
             for row in _best(channel.models)
         ],
@@ -234,10 +243,10 @@ def _answer(channel: ChannelView, system: System) -> str:
     for symbol in ("N", "B_curve", "B", "T_B", "K"):
         unit = page_unit(channel.quantity, symbol, system)
         for row in channel.named(channel.recommended, symbol)[:1]:
-            if row["value"] is not None:
-                doubt = "doubtful" if row["status"] == "doubtful" else ""
+            if row.value is not None:
+                doubt = "doubtful" if row.status == "doubtful" else ""
                 certainty = ", ".join(filter(None, [precision(row, unit), doubt]))
-                size = unit.text(row["value"], digits_of(row, unit))
+                size = unit.text(row.value, digits_of(unit, row.value, row.lower, row.upper))
                 text = f"{symbol_text(symbol)} {size} {unit.sign}"
                 parts.append(f"{text} ({certainty})" if certainty else text)
     if channel.fixed_bias is not None:
@@ -246,9 +255,9 @@ def _answer(channel: ChannelView, system: System) -> str:
     return "; ".join(parts) + "."
 
 
-def _best(models: Sequence[Row]) -> Sequence[Row]:
+def _best(models: Sequence[ModelRow]) -> Sequence[ModelRow]:
     """Return the models that come close, and that of the papers."""
-    return [row for i, row in enumerate(models) if i < _SHOWN_MODELS or row["model"] == "N+GM+K"]
+    return [row for i, row in enumerate(models) if i < _SHOWN_MODELS or row.model == "N+GM+K"]
 
 
 def _model_words(channel: ChannelView) -> str:
@@ -256,12 +265,12 @@ def _model_words(channel: ChannelView) -> str:
         return ""
     best = channel.models[0]
     text = (
-        f"{model_text(best['model'])} is the model that the data favour ({best['verdict']}). The "
-        f"deviance of a bin is {number_text(best['deviance'], 3)}; it is about 1 where the model "
+        f"{model_text(best.model)} is the model that the data favour ({best.verdict}). The "
+        f"deviance of a bin is {number_text(best.deviance, 3)}; it is about 1 where the model "
         "is right."
     )
-    notes = (best["note"] or "").split("; ")
-    band = f"Band: {best['band_source'].removeprefix('found: ')}" if best["band_source"] else ""
+    notes = (best.note or "").split("; ")
+    band = f"Band: {best.band_source.removeprefix('found: ')}" if best.band_source else ""
     return " ".join(filter(None, [text, *(sentence(n) for n in notes), sentence(band)]))
 
 
@@ -299,29 +308,27 @@ def _provenance(
 ) -> Iterator[tuple[str, str]]:
     """Yield where a recording comes from, as names and texts; ``folder`` is the recording's."""
     row, metadata = view.row, metadata_of(folder)
-    yield "Recording", f"{row['sensor']} / {row['recording']}"
-    yield "Device", str(row["device"])
-    yield "Kind", row["kind"] + (", simulated" if row["simulated"] else "")
-    yield "Started", started_text(row["started"]) or "not stated in the log"
+    yield "Recording", f"{row.sensor} / {row.recording}"
+    yield "Device", str(row.device)
+    yield "Kind", row.kind + (", simulated" if row.simulated else "")
+    yield "Started", started_text(row.started) or "not stated in the log"
     if "reader" in metadata:
         yield "Read as", str(metadata["reader"] or "found by its content")
-    if row["rate"] is not None:
+    if row.rate is not None:
         error = ""
-        if row["rate_error"] is not None and row["rate_error"] > _EXACT * row["rate"]:
-            error = f" ± {number_text(row['rate_error'], 2)} Hz"
+        if row.rate_error is not None and row.rate_error > _EXACT * row.rate:
+            error = f" ± {number_text(row.rate_error, 2)} Hz"
         yield (
             "Rate",
-            f"{number_text(row['rate'], 7)} Hz{error}, {_RATE_FROM.get(row['rate_from'], '')}",
+            f"{number_text(row.rate, 7)} Hz{error}, {_RATE_FROM.get(row.rate_from or '', '')}",
         )
         rates = {channel.channel: number_text(channel.rate, 6) for channel in channels}
         if len(set(rates.values())) > 1:
             yield "Rate of each", ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
-    if row["samples"] is not None:
-        yield "Samples", f"{row['samples']:,}".replace(",", " ")
+    if row.samples is not None:
+        yield "Samples", f"{row.samples:,}".replace(",", " ")
     segments: Sequence[Any] = metadata.get("segments", [])
     if len(segments) > 1:
         yield "Segments", str(len(segments))
-    for truth in {
-        parameter["source"] for channel in channels for parameter in channel.truth.values()
-    }:
+    for truth in {parameter.source for channel in channels for parameter in channel.truth.values()}:
         yield "Simulated from", truth

@@ -81,15 +81,15 @@ def answer(channel: ChannelView, system: System) -> list[str]:
             lines.append(_AS_IT_COMES)
         else:
             lines.append(f"Temperature is not taken out: {sensitivity.reason}.")
-        lines.append(f"T₀, the mean temperature, is {number_text(temperature['T_0']['value'])} °C.")
-    if low_pass and low_pass["cutoff"]["status"] == "absent":
+        lines.append(f"T₀, the mean temperature, is {number_text(temperature['T_0'].value)} °C.")
+    if low_pass and low_pass["cutoff"].status == "absent":
         lines.append("The spectrum shows no low-pass of the sensor.")
     elif low_pass:
-        order = low_pass["cutoff"]["order"]
+        order = low_pass["cutoff"].order
         kind = "of first order" if order == 1 else "as a Butterworth filter"
         kind += f" of order {order}" if order not in (None, 1) else ""
-        if low_pass["cutoff"]["value"] is not None:
-            cutoff = number_text(low_pass["cutoff"]["value"])
+        if low_pass["cutoff"].value is not None:
+            cutoff = number_text(low_pass["cutoff"].value)
             lines.append(f"The sensor's own low-pass cuts off at {cutoff} Hz, {kind}.")
     return lines
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.model.estimates import EnvelopeRow
 from imubench_pipeline.model.experiments import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
@@ -60,7 +61,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     whole = [row for row in rows if row.part == "whole"]
     turning = view.rows(TurningRow)
     parts = list(dict.fromkeys(row.part for row in rows if row.value is not None))
-    envelope = rows_of_samples(folder, "envelope")
+    envelope = rows_of_samples(folder, EnvelopeRow)
     prediction = view.rows(EarthRatePredictionRow)
     return {
         **about_of(site, view, [], folder),

@@ -4,7 +4,6 @@ import csv
 import math
 import re
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -71,9 +70,10 @@ def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report)
             same(rows[symbol]["ratios"][0], ratio, 1e-5)
             assert words(ratio) in rows[symbol]["texts"][1]
             # With the digits that other pages print of it.
-            unit, row = page_unit(quantity_of(channel), symbol, "practical"), asdict(own)
-            kept = (float(f"{row[name]:.7g}") for name in ("value", "lower", "upper"))
-            value, *ends = (unit.text(number, digits_of(row, unit)) for number in kept)
+            unit = page_unit(quantity_of(channel), symbol, "practical")
+            shown = (own.value, own.lower, own.upper)
+            kept = (float(f"{number:.7g}") for number in shown)
+            value, *ends = (unit.text(number, digits_of(unit, *shown)) for number in kept)
             assert rows[symbol]["texts"][3] == f"{value} {unit.sign}{' to '.join(ends)}"
         for tau in (1.0, 10.0, 100.0):
             pair = (made.fused(log, channel) for log in (first, second))
