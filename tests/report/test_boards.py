@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.model.published import PublishedFigureRow
 from imubench_pipeline.report.boards import BOARDS, published_lines
 from imubench_pipeline.report.pages import pages
 from imubench_pipeline.report.publish import publish
@@ -333,7 +334,9 @@ def test_the_page_is_written_again_only_if_its_recordings_or_words_change() -> N
 
 def line(**changes: Any) -> dict[str, Any]:
     names = {"sensor": "imu", "recording": "sim_pair", "channel": "gyro_x"}
-    (found,) = published_lines(build("published_figures", [names | PRINTED | changes]).to_pylist())
+    (found,) = published_lines(
+        PublishedFigureRow.rows_of(build("published_figures", [names | PRINTED | changes]))
+    )
     return found
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from imubench_pipeline.model.published import PublishedFigureRow
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.practical import limit_digits, number_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
-from imubench_pipeline.typing import Row
 
 _ALIKE = 0.05
 """Relative difference up to which found and printed are one figure."""
@@ -95,16 +95,16 @@ def _channel(site: Site, channel: ChannelView, figures: Mapping[str, str | None]
     }
 
 
-def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+def published_lines(rows: Sequence[PublishedFigureRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of what a source prints of a channel, of rows of ``published_figures``."""
     for row in rows:
-        quantity = row["channel"].split("_")[0]
-        ours = row["datasheet"] if row["of"] == "datasheet" else row["value"]
-        ratio = ours / row["means"] if ours and row["means"] else None
+        quantity = row.channel.split("_")[0]
+        ours = row.datasheet if row.of == "datasheet" else row.value
+        ratio = ours / row.means if ours and row.means else None
         yield {
             **row,
-            "unit": f"{quantity}.{_UNIT.get(row['parameter'], row['parameter'])}",
-            "digits": limit_digits(row["lower"], row["upper"], 4),
+            "unit": f"{quantity}.{_UNIT.get(row.parameter, row.parameter)}",
+            "digits": limit_digits(row.lower, row.upper, 4),
             "ratio": "–" if ratio is None else number_text(ratio, 3),
             "differs": ratio is not None and abs(ratio - 1.0) > _ALIKE,
         }

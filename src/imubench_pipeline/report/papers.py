@@ -19,7 +19,6 @@ from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.practical import limit_digits, number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
-from imubench_pipeline.typing import Row
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -37,7 +36,7 @@ def _context(site: Site) -> dict[str, Any]:
             _paper(paper, own, there)
             | {"figures": [figure for figure in drawn if figure[0] in paper.drawn]}
             for paper in PAPERS
-            if (own := [row for row in rows if row["paper"] == paper.name])
+            if (own := [row for row in rows if row.paper == paper.name])
         ],
         "page": {"looks": looks(used), "channels": payloads, "arrays": arrays.texts},
     }
@@ -76,32 +75,31 @@ def _drawn(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
     ]
 
 
-def _panel(rows: Sequence[Row]) -> dict[str, Any]:
+def _panel(rows: Sequence[AccuracyRow]) -> dict[str, Any]:
     """Return how far each method is from the bound: a line a method, a cell a parameter."""
-    symbols = list(dict.fromkeys(row["parameter"] for row in rows))
-    by = {(row["method"], row["parameter"]): row for row in rows}
+    symbols = list(dict.fromkeys(row.parameter for row in rows))
+    by = {(row.method, row.parameter): row for row in rows}
     return {
-        "logs": rows[0]["logs"] if rows else 0,
+        "logs": rows[0].logs if rows else 0,
         "symbols": symbols,
         "bounds": [
-            percent_text(next(r["bound"] for r in rows if r["parameter"] == symbol))
-            for symbol in symbols
+            percent_text(next(r.bound for r in rows if r.parameter == symbol)) for symbol in symbols
         ],
         "lines": [
             {"method": method, "cells": [_cell(by[method, symbol]) for symbol in symbols]}
-            for method in dict.fromkeys(row["method"] for row in rows)
+            for method in dict.fromkeys(row.method for row in rows)
         ],
     }
 
 
-def _cell(row: Row) -> dict[str, str]:
-    if row["rmse"] is None:
+def _cell(row: AccuracyRow) -> dict[str, str]:
+    if row.rmse is None:
         return {"error": "no value", "ratio": ""}
-    low, high = (number_text(row[f"ratio_{end}"], 2) for end in ("lower", "upper"))
-    given = "" if row["given"] == row["logs"] else f", in {row['given']} logs"
+    low, high = (number_text(end, 2) for end in (row.ratio_lower, row.ratio_upper))
+    given = "" if row.given == row.logs else f", in {row.given} logs"
     return {
-        "error": f"{percent_text(row['rmse'])}{given}",
-        "ratio": f"{number_text(row['ratio'], 3)} ({low} to {high})",
+        "error": f"{percent_text(row.rmse)}{given}",
+        "ratio": f"{number_text(row.ratio, 3)} ({low} to {high})",
     }
 
 
@@ -122,14 +120,14 @@ _COUNTED: dict[Verdict, tuple[str, str]] = {
 }
 
 
-def _paper(paper: About, rows: Sequence[Row], there: set[str]) -> dict[str, Any]:
-    verdicts = Counter(row["verdict"] for row in rows)
+def _paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[str, Any]:
+    verdicts = Counter(row.verdict for row in rows)
     return {
         "about": paper,
         "lines": [
             {
                 **row,
-                "page": row["page"] if (row["page"] or "").split("#")[0] in there else None,
+                "page": row.page if (row.page or "").split("#")[0] in there else None,
                 **cells(row),
             }
             for row in rows
@@ -140,32 +138,32 @@ def _paper(paper: About, rows: Sequence[Row], there: set[str]) -> dict[str, Any]
             if verdicts[verdict]
         ],
         "filters": {
-            "place": list(dict.fromkeys(row["place"] for row in rows)),
-            "verdict": list(dict.fromkeys(row["verdict"] for row in rows)),
-            "basis": list(dict.fromkeys(row["basis"] for row in rows)),
+            "place": list(dict.fromkeys(row.place for row in rows)),
+            "verdict": list(dict.fromkeys(row.verdict for row in rows)),
+            "basis": list(dict.fromkeys(row.basis for row in rows)),
         },
     }
 
 
-def cells(row: Row) -> dict[str, str]:
+def cells(row: PublishedRow) -> dict[str, str]:
     """Return what is found, the ratio and its tolerance of a row of ``published``, as texts.
 
     What is found is in the unit of the paper, so that it can be held beside what is printed.
     """
     found = ""
-    if row["found"] is not None:
-        digits = limit_digits(row["lower"], row["upper"], 3)
-        shown = (row[name] for name in ("found", "lower", "upper"))
+    if row.found is not None:
+        digits = limit_digits(row.lower, row.upper, 3)
+        shown = (row.found, row.lower, row.upper)
         value, lower, upper = (
-            None if x is None else number_text(x / row["scale"], digits) for x in shown
+            None if x is None else number_text(x / row.scale, digits) for x in shown
         )
-        unit = "" if row["printed_unit"] == "-" else f" {row['printed_unit']}"
+        unit = "" if row.printed_unit == "-" else f" {row.printed_unit}"
         found = f"{value}{unit}"
         if lower is not None and upper is not None:
             found += f" ({lower} to {upper})"
-    words = "; ".join(filter(None, (found, row["found_words"])))
+    words = "; ".join(filter(None, (found, row.found_words)))
     ratio, tolerance = "–", ""
-    if row["ratio"] is not None:
-        ratio = number_text(row["ratio"], 3)
-        tolerance = f"±{percent_text(row['tolerance'], 2)}"
+    if row.ratio is not None:
+        ratio = number_text(row.ratio, 3)
+        tolerance = f"±{percent_text(row.tolerance, 2)}"
     return {"found_text": words or "–", "ratio_text": ratio, "tolerance_text": tolerance}

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imubench_pipeline.typing import Row
-
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from imubench_pipeline.model.published import PublishedRow
 
 _KEYS = ("maia", "silva", "engers")
 _LEGEND = (
@@ -36,26 +36,27 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the lines; return the exit status."""
     # Only what computes or draws loads this: the other commands answer at once.
     from imubench_pipeline.experiments.papers.about import PAPERS
+    from imubench_pipeline.model.published import PublishedRow
     from imubench_pipeline.report.show import show
 
     if arguments.results is None:
         from imubench_pipeline.experiments.papers.registry import rows_without_a_run
 
-        rows = list(rows_without_a_run())
+        rows = [PublishedRow(**row) for row in rows_without_a_run()]
         expected = "without the results of a run: what needs no log"
     else:
         from imubench_pipeline.tables import read, tables_of_run
 
         try:
             path = tables_of_run(arguments.results, ["published"])["published"]
-            rows = read("published", [path]).to_pylist()
+            rows = PublishedRow.rows_of(read("published", [path]))
         except (OSError, ValueError) as error:
             print(error, file=sys.stderr)
             return 2
         expected = f"{path}: the run simulates the logs of no paper"
     wanted = [paper for paper in PAPERS if arguments.paper in (None, paper.key)]
     names = {paper.name for paper in wanted}
-    places = list(dict.fromkeys(row["place"] for row in rows if row["paper"] in names))
+    places = list(dict.fromkeys(row.place for row in rows if row.paper in names))
     if arguments.place is not None and arguments.place not in places:
         shown = ", ".join(places) or expected
         print(f"no place {arguments.place!r}; there are: {shown}", file=sys.stderr)
@@ -66,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
             own = [
                 row
                 for row in rows
-                if row["paper"] == paper.name and arguments.place in (None, row["place"])
+                if row.paper == paper.name and arguments.place in (None, row.place)
             ]
             if own:
                 yield from _parts(f"{paper.name}: {paper.title}", own, width)
@@ -77,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _parts(title: str, rows: Sequence[Row], width: int) -> Iterator[RenderableType]:
+def _parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[RenderableType]:
     """Yield the table of a paper, and why lines differ."""
     from rich.text import Text
 
@@ -85,19 +86,19 @@ def _parts(title: str, rows: Sequence[Row], width: int) -> Iterator[RenderableTy
     from imubench_pipeline.report.papers import cells
     from imubench_pipeline.report.terminal_table import fitting
 
-    reasons = list(dict.fromkeys(row["reason"] for row in rows if row["reason"]))
+    reasons = list(dict.fromkeys(row.reason for row in rows if row.reason))
     lines: list[list[str | Text]] = []
     for row in rows:
         shown = cells(row)
-        note = f" [{reasons.index(row['reason']) + 1}]" if row["reason"] else ""
+        note = f" [{reasons.index(row.reason) + 1}]" if row.reason else ""
         lines.append(
             [
-                row["place"],
-                row["quantity"],
-                row["printed_as"],
+                row.place,
+                row.quantity,
+                row.printed_as,
                 shown["found_text"],
                 f"{shown['ratio_text']} {shown['tolerance_text']}".strip(),
-                row["verdict"] + note,
+                row.verdict + note,
             ]
         )
     heads = ["Place", "Quantity", "Printed", "Found", "Ratio", "Verdict"]
@@ -106,6 +107,7 @@ def _parts(title: str, rows: Sequence[Row], width: int) -> Iterator[RenderableTy
     yield Text(_LEGEND)
     for number, reason in enumerate(reasons, start=1):
         yield Text(f"  [{number}] {reason}")
-    for verdict in dict.fromkeys(row["verdict"] for row in rows):
-        yield Text(f"  {verdict}: {VERDICTS[verdict]}")
+    meanings = {str(verdict): meaning for verdict, meaning in VERDICTS.items()}
+    for verdict in dict.fromkeys(row.verdict for row in rows):
+        yield Text(f"  {verdict}: {meanings[verdict]}")
     yield Text()
