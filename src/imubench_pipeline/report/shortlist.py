@@ -8,7 +8,6 @@ from typing import Any
 from imubench_pipeline.model.comparisons import ShortlistRow
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
-from imubench_pipeline.typing import Row
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -19,9 +18,9 @@ def _context(site: Site) -> dict[str, Any]:
             {
                 "title": asked[name]["title"],
                 "note": asked[name].get("note"),
-                "rows": [_line(site, row) for row in rows if row["requirement"] == name],
+                "rows": [_line(site, row) for row in rows if row.requirement == name],
             }
-            for name in dict.fromkeys(row["requirement"] for row in rows)
+            for name in dict.fromkeys(row.requirement for row in rows)
         ]
     }
 
@@ -32,12 +31,12 @@ SHORTLIST = Entry(
 """The page of all sensors of the catalogue, for every requirement."""
 
 
-def _line(site: Site, row: Row) -> dict[str, Any]:
+def _line(site: Site, row: ShortlistRow) -> dict[str, Any]:
     sensor, verdict, best, worst, measured, _ = cells(row)
     return {
         **row,
-        "name": site.names.get(row["sensor"], sensor),
-        "logged": row["sensor"] in site.sensors,
+        "name": site.names.get(row.sensor, sensor),
+        "logged": row.sensor in site.sensors,
         "verdict": verdict,
         "best": best,
         "worst": worst,
@@ -45,27 +44,27 @@ def _line(site: Site, row: Row) -> dict[str, Any]:
     }
 
 
-def cells(row: Row) -> list[str]:
+def cells(row: ShortlistRow) -> list[str]:
     """Return sensor, verdict, margins at best, at worst and measured, and the limit, as texts."""
-    measured = _margin(row["measured_margin"])
-    if row["measured_margin_of"] == "simulated logs":
+    measured = _margin(row.measured_margin)
+    if row.measured_margin_of == "simulated logs":
         measured += " (simulated)"
     return [
-        row["sensor"],
-        row["verdict"],
-        _margin(row["best_margin"]),
-        _margin(row["worst_margin"]) if row["best_margin"] is not None else "–",
+        row.sensor,
+        row.verdict,
+        _margin(row.best_margin),
+        _margin(row.worst_margin) if row.best_margin is not None else "–",
         measured,
-        row["decides"] or row["reason"] or "",
+        row.decides or row.reason or "",
     ]
 
 
-def notes(rows: Sequence[Row]) -> Iterator[str]:
+def notes(rows: Sequence[ShortlistRow]) -> Iterator[str]:
     """Yield what is assumed of each sensor, or why it is not judged, in a line each."""
     for row in rows:
-        remarks = [row["reason"], row["assumed"]]
+        remarks = [row.reason, row.assumed]
         if any(remarks):
-            yield f"{row['sensor']}: {'; '.join(filter(None, remarks))}"
+            yield f"{row.sensor}: {'; '.join(filter(None, remarks))}"
 
 
 def _margin(value: float | None) -> str:
