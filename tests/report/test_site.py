@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -5,6 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.model.comparisons import DriftRow
 from imubench_pipeline.report.sensor import change_words
 from imubench_pipeline.report.site import Page, Site, sensor_names
 from imubench_pipeline.report.start import START, summary
@@ -145,11 +147,21 @@ def test_a_device_that_has_changed_is_named_with_what_has_changed() -> None:
 
 
 def test_a_change_is_told_in_words() -> None:
-    row = {"recording": "r", "channel": "gyro_x", "parameter": "N"}
-    assert change_words(row | {"change": -0.256, "p_value": 0.00012}, simulated=False) == (
+    row = DriftRow(
+        sensor="imu",
+        device="unit 7",
+        channel="gyro_x",
+        parameter="N",
+        recording="r",
+        position=2,
+        unit="SI",
+        change=-0.256,
+        p_value=0.00012,
+    )
+    assert change_words(row, simulated=False) == (
         "r, gyro x: N changed by −26 % (chance if it had not: 0.0001)."
     )
-    bias = row | {"parameter": "bias", "change": None, "p_value": 0.002}
+    bias = replace(row, parameter="bias", change=None, p_value=0.002)
     assert change_words(bias, simulated=True) == (
         "r (simulated), gyro x: fixed bias changed (chance if it had not: 0.002)."
     )

@@ -21,7 +21,6 @@ from imubench_pipeline.report.practical import limit_digits, symbol_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
-from imubench_pipeline.typing import Row
 
 _MANY = 12
 """Recordings of a sensor beyond which its page leaves budgets and deltas to those of recordings."""
@@ -33,10 +32,10 @@ def sensor_page(site: Site, sensor: str) -> Page:
     key = site.key_of(
         *(view.key for view in own),
         *(view.device_page for view in own),
-        [row for row in site.rows(PooledRow) if row["sensor"] == sensor],
-        [row for row in site.rows(RepeatabilityRow) if row["sensor"] == sensor],
-        [row for row in site.rows(RankingRow) if row["decides"] or row["sensor"] == sensor],
-        [row for row in site.rows(CoverageRow) if row["sensor"] == sensor],
+        [row for row in site.rows(PooledRow) if row.sensor == sensor],
+        [row for row in site.rows(RepeatabilityRow) if row.sensor == sensor],
+        [row for row in site.rows(RankingRow) if row.decides or row.sensor == sensor],
+        [row for row in site.rows(CoverageRow) if row.sensor == sensor],
         site.looks[sensor],
     )
     return Page(
@@ -46,7 +45,7 @@ def sensor_page(site: Site, sensor: str) -> Page:
 
 def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, Any]:
     together = Comparison(site.compared(own), site.names)
-    pooled = [_pooled(row) for row in site.rows(PooledRow) if row["sensor"] == sensor]
+    pooled = [_pooled(row) for row in site.rows(PooledRow) if row.sensor == sensor]
     shown = own if len(own) <= _MANY else []
     simulated = {view.full_name: view.simulated for view in own}
     budget = [row for view in shown for row in view.budget]
@@ -96,20 +95,20 @@ def _about(site: Site, sensor: str) -> str:
 
 
 def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
-    for device in dict.fromkeys((view.row["device"], view.device_page) for view in own):
-        views = [view for view in own if (view.row["device"], view.device_page) == device]
+    for device in dict.fromkeys((view.row.device, view.device_page) for view in own):
+        views = [view for view in own if (view.row.device, view.device_page) == device]
         count = counted(len(views), "recording")
         yield {"name": device[0], "page": device[1], "views": views, "count": count}
 
 
-def _pooled(row: Row) -> Row:
-    quantity = row["channel"].split("_", maxsplit=1)[0]
-    symbol = "signal" if row["parameter"] == "bias" else row["parameter"]
-    return row | {  # type: ignore[operator]  # a row of a table is a dict
-        "axis": row["channel"].replace("_", " "),
-        "digits": limit_digits(row["lower"], row["upper"], 4),
+def _pooled(row: PooledRow) -> dict[str, Any]:
+    quantity = row.channel.split("_", maxsplit=1)[0]
+    symbol = "signal" if row.parameter == "bias" else row.parameter
+    return row | {
+        "axis": row.channel.replace("_", " "),
+        "digits": limit_digits(row.lower, row.upper, 4),
         "ref": f"{quantity}.{symbol}",
-        "name": symbol_text(row["parameter"]),
+        "name": symbol_text(row.parameter),
     }
 
 
@@ -121,12 +120,12 @@ def device_page(site: Site, page: str) -> Page:
     return Page(page, "device.html.jinja", key, lambda: _device(site, own, rows))
 
 
-def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> dict[str, Any]:
-    sensor, device = own[0].sensor, own[0].row["device"]
+def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[DriftRow]) -> dict[str, Any]:
+    sensor, device = own[0].sensor, own[0].row.device
     named = {view.full_name for view in own}
-    rows = [row for row in rows if (row["sensor"], row["recording"]) in named]
+    rows = [row for row in rows if (row.sensor, row.recording) in named]
     # As `navigation.drift.order_of` has it: stamps that are all the same tell no order.
-    stamps = {row["started"] for row in rows}
+    stamps = {row.started for row in rows}
     dated = None not in stamps and len(stamps) > 1
     trends, payload = _trends(rows, dated=dated, simulated=own[0].simulated)
     return {
@@ -138,7 +137,7 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
         "changes": [
             change_words(row, simulated=own[0].simulated)
             for row in rows
-            if row["verdict"] == "changed"
+            if row.verdict == "changed"
         ],
         "order": "The recordings stand at the time when they were started."
         if dated
@@ -150,27 +149,27 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
 
 
 def _trends(
-    rows: Sequence[Row], *, dated: bool, simulated: bool
+    rows: Sequence[DriftRow], *, dated: bool, simulated: bool
 ) -> tuple[dict[str, list[dict[str, Any]]], list[dict[str, Any]]]:
     """Return the trends of a device by channel, and what their figures are drawn from."""
     trends: dict[str, list[dict[str, Any]]] = {}
     payload: list[dict[str, Any]] = []
     mark = " (simulated)" * simulated
-    for channel, parameter in dict.fromkeys((row["channel"], row["parameter"]) for row in rows):
+    for channel, parameter in dict.fromkeys((row.channel, row.parameter) for row in rows):
         series = sorted(
-            (row for row in rows if (row["channel"], row["parameter"]) == (channel, parameter)),
-            key=lambda row: row["position"],
+            (row for row in rows if (row.channel, row.parameter) == (channel, parameter)),
+            key=lambda row: row.position,
         )
-        if all(row["value"] is None for row in series):
+        if all(row.value is None for row in series):
             continue
         quantity, axis = channel.split("_")
         title = f"{QUANTITY_NAMES[quantity]} {axis}"
         name = symbol_text(parameter)
-        changes = [row["recording"] + mark for row in series if row["verdict"] == "changed"]
+        changes = [row.recording + mark for row in series if row.verdict == "changed"]
         outside = [
-            row["recording"] + mark
+            row.recording + mark
             for row in series
-            if row["verdict"] == "as before" and row["p_value"] < LEVEL
+            if row.verdict == "as before" and row.p_value is not None and row.p_value < LEVEL
         ]
         trends.setdefault(channel, []).append(
             {
@@ -180,15 +179,19 @@ def _trends(
                 "caption": f"{name}: {_trend_words(changes, outside)}",
             }
         )
-        columns = ("value", "lower", "upper", "expected_lower", "expected_upper", "verdict")
         payload.append(
             {
                 "channel": channel,
                 "parameter": parameter,
                 "dated": dated,
-                "started": [row["started"] for row in series],
-                "recordings": [row["recording"] for row in series],
-                **{name: [row[name] for row in series] for name in columns},
+                "started": [row.started for row in series],
+                "recordings": [row.recording for row in series],
+                "value": [row.value for row in series],
+                "lower": [row.lower for row in series],
+                "upper": [row.upper for row in series],
+                "expected_lower": [row.expected_lower for row in series],
+                "expected_upper": [row.expected_upper for row in series],
+                "verdict": [row.verdict for row in series],
             }
         )
     return trends, payload
@@ -204,13 +207,13 @@ def _trend_words(changes: Sequence[str], outside: Sequence[str]) -> str:
     return words
 
 
-def change_words(row: Row, *, simulated: bool) -> str:
+def change_words(row: DriftRow, *, simulated: bool) -> str:
     """Return a change of a device in words."""
-    name = symbol_text(row["parameter"])
+    name = symbol_text(row.parameter)
     by = ""
-    if row["change"] is not None:
-        by = f" by {100 * row['change']:+.0f} %".replace("-", "−")
-    chance = f"{row['p_value']:.1g}" if row["p_value"] is not None else "–"
-    where = row["channel"].replace("_", " ")
-    recording = row["recording"] + (" (simulated)" if simulated else "")
+    if row.change is not None:
+        by = f" by {100 * row.change:+.0f} %".replace("-", "−")
+    chance = f"{row.p_value:.1g}" if row.p_value is not None else "–"
+    where = row.channel.replace("_", " ")
+    recording = row.recording + (" (simulated)" if simulated else "")
     return f"{recording}, {where}: {name} changed{by} (chance if it had not: {chance})."

@@ -25,7 +25,6 @@ from imubench_pipeline.report.practical import System, first_choices, units_of_p
 from imubench_pipeline.report.shell import made_again
 from imubench_pipeline.report.view import Name, RecordingView, recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
-from imubench_pipeline.typing import Row
 
 _CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 _FIRST_ROWS = 100
@@ -125,12 +124,12 @@ class Site:
         views = recording_views(self.tables)
         together: dict[tuple[str, str, bool], int] = {}
         for view in views:
-            device = (view.sensor, view.row["device"], view.simulated)
+            device = (view.sensor, view.row.device, view.simulated)
             together[device] = together.get(device, 0) + 1
         for view in views:
             view.page = f"recordings/{view.sensor}/{view.name}.html"
-            device = (view.sensor, view.row["device"], view.simulated)
-            if together[device] > 1 or view.row["device"] != view.name:
+            device = (view.sensor, view.row.device, view.simulated)
+            if together[device] > 1 or view.row.device != view.name:
                 view.device_page = _device_page(*device)
         return views
 
@@ -144,7 +143,7 @@ class Site:
     @cached_property
     def turned(self) -> list[RecordingView]:
         """The recordings of gyros that were turned between north and south."""
-        return [view for view in self.views if view.row["kind"] == "two_position"]
+        return [view for view in self.views if view.row.kind == "two_position"]
 
     @cached_property
     def navigated(self) -> bool:
@@ -158,7 +157,7 @@ class Site:
         return [
             view
             for view in self.views
-            if view.row["kind"] in ("rate_table", "positions") or view.full_name in named
+            if view.row.kind in ("rate_table", "positions") or view.full_name in named
         ]
 
     @cached_property
@@ -170,9 +169,9 @@ class Site:
     def _named_in(self, of: type[OfRecordingRow]) -> set[Name]:
         return {(row.sensor, row.recording) for row in self.rows(of)}
 
-    def device_page_of(self, row: Row) -> str | None:
+    def device_page_of(self, row: DriftRow) -> str | None:
         """Return the page of the device of a row that names a recording."""
-        return self._device_pages.get((row["sensor"], row["recording"]))
+        return self._device_pages.get((row.sensor, row.recording))
 
     @cached_property
     def _device_pages(self) -> dict[tuple[str, str], str | None]:
@@ -223,21 +222,26 @@ class Site:
     def coverage(self) -> dict[tuple[str, str, str], str]:
         """Whether sensor, quantity and figure are published."""
         rows = self.rows(CoverageRow)
-        return {(row["sensor"], row["quantity"], row["figure"]): row["published"] for row in rows}
+        return {(row.sensor, row.quantity, row.figure): row.published for row in rows}
 
     def changed_devices(self) -> list[dict[str, Any]]:
         """Return the recordings that show a change of their device, with what has changed."""
         devices: dict[tuple[str, str], dict[str, Any]] = {}
         for row in self.rows(DriftRow):
-            if row["verdict"] != "changed":
+            if row.verdict != "changed":
                 continue
             device = devices.setdefault(
-                (row["sensor"], row["recording"]),
-                {key: row[key] for key in ("sensor", "device", "recording")}
-                | {"page": self.device_page_of(row), "what": []},
+                (row.sensor, row.recording),
+                {
+                    "sensor": row.sensor,
+                    "device": row.device,
+                    "recording": row.recording,
+                    "page": self.device_page_of(row),
+                    "what": [],
+                },
             )
-            name = "fixed bias" if row["parameter"] == "bias" else row["parameter"]
-            device["what"].append(f"{name} of {row['channel'].replace('_', ' ')}")
+            name = "fixed bias" if row.parameter == "bias" else row.parameter
+            device["what"].append(f"{name} of {row.channel.replace('_', ' ')}")
         simulated = {view.full_name: view.simulated for view in self.views}
         return [
             device | {"channels": ", ".join(device["what"]), "simulated": simulated[key]}
