@@ -103,22 +103,22 @@ def _kept(site: Site, view: RecordingView, table: str) -> Mapping[str, Any]:
 def _recording(view: RecordingView) -> dict[str, Any]:
     row = view.row
     temperature = None
-    if row["temperature_min"] is not None:
-        low, high = (number_text(row[f"temperature_{end}"], 3) for end in ("min", "max"))
+    if row.temperature_min is not None:
+        low, high = (number_text(end, 3) for end in (row.temperature_min, row.temperature_max))
         temperature = f"{low} to {high} °C"
-    findings = dict.fromkeys(finding["finding"] for finding in view.warnings)
+    findings = dict.fromkeys(finding.finding for finding in view.warnings)
     return {
         "sensor": view.sensor,
         "recording": view.name,
         "page": view.page,
-        "device": row["device"],
+        "device": row.device,
         "simulated": view.simulated,
-        "seconds": row["duration"],
-        "duration": duration_text(row["duration"]),
-        "rate": number_text(row["rate"]),
-        "started": row["started"],
+        "seconds": row.duration,
+        "duration": duration_text(row.duration),
+        "rate": number_text(row.rate),
+        "started": row.started,
         "temperature": temperature,
-        "decides": row["decides"] is not False,
+        "decides": row.decides is not False,
         "doubts": [term(name).name for name in findings],
     }
 

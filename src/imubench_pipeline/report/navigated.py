@@ -108,7 +108,7 @@ def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
             "matters": _matters(worse, sure, no_worse, open_ones),
             "smallest": None
             if smallest is None
-            else f"{TUNINGS[smallest['tuning']]}, {smallest['states']} states",
+            else f"{TUNINGS[smallest.tuning]}, {smallest.states} states",
             "dishonest": _dishonest(own),
         }
 

@@ -16,7 +16,7 @@ from imubench_pipeline.report.words import noise_words
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     """Return what the template needs; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
-    number = rows[0]["rates"] if rows else None
+    number = rows[0].rates if rows else None
     return {
         **about_of(site, view, [], folder),
         "summary": summary_words(view, [] if number is None else [f"{number} positions"]),

@@ -22,7 +22,6 @@ from imubench_pipeline.report.recording import about_of, summary_words
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import noise_words
-from imubench_pipeline.typing import Row
 
 
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
@@ -45,19 +44,24 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     }
 
 
-def _payload(points: Sequence[Row]) -> dict[str, Any]:
+def _payload(points: Sequence[CalibrationPointRow]) -> dict[str, Any]:
     arrays = Arrays()
-    names = ("table_rate", "mean", "line", "residual", "sigma")
-    table = {name: arrays.exact([row[name] for row in points]) for name in names}
     return {
-        "table": table | {"number": [row["number"] for row in points]},
+        "table": {
+            "table_rate": arrays.exact([row.table_rate for row in points]),
+            "mean": arrays.exact([row.mean for row in points]),
+            "line": arrays.exact([row.line for row in points]),
+            "residual": arrays.exact([row.residual for row in points]),
+            "sigma": arrays.exact([row.sigma for row in points]),
+            "number": [row.number for row in points],
+        },
         "arrays": arrays.texts,
     }
 
 
-def _summary(view: RecordingView, points: Sequence[Row]) -> str:
+def _summary(view: RecordingView, points: Sequence[CalibrationPointRow]) -> str:
     if not points:
         return summary_words(view, [])
-    most = math.degrees(max(abs(point["table_rate"]) for point in points))
+    most = math.degrees(max(abs(point.table_rate) for point in points))
     rates = f"{counted(len(points), 'steady rate')} up to {number_text(most)} °/s"
     return summary_words(view, [rates])
