@@ -1,5 +1,6 @@
 """The rooms of the package, and the arrows between them: docs/architecture.md."""
 
+import ast
 import os
 import re
 import shutil
@@ -80,3 +81,27 @@ def test_every_room_is_named_where_one_looks_for_it(page: str) -> None:
     named = {room: rf"\b{room}/" for room in ROOMS} | {leaf: rf"\b{leaf}\b" for leaf in LEAVES}
     missing = [name for name, pattern in named.items() if not re.search(pattern, text)]
     assert not missing, f"{page} does not name {missing}"
+
+
+def uses() -> dict[str, set[str]]:
+    """The rooms that each room imports."""
+    found: dict[str, set[str]] = {room: set() for room in ROOMS}
+    for room in ROOMS:
+        for path in (PACKAGE / room).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ImportFrom) and node.module:
+                    package, _, inside = node.module.partition(".")
+                    if package == PACKAGE.name:
+                        found[room].add(inside.partition(".")[0])
+    return {room: names & ROOMS - {room} for room, names in found.items()}
+
+
+def test_the_table_of_rooms_has_their_imports() -> None:
+    text = (PROJECT / "docs/architecture.md").read_text()
+    rows = dict(re.findall(r"^\| `(\w+)/` \|.*\| ([^|]*) \|$", text, re.MULTILINE))
+    layers = re.findall(r"^\| `(\w+)/` \|", text, re.MULTILINE)
+    due = {
+        room: ", ".join(sorted(names, key=layers.index)) or "–" for room, names in uses().items()
+    }
+    wrong = {room: due[room] for room in rows if rows[room] != due[room]}
+    assert not wrong, f"docs/architecture.md: expected in the column 'uses': {wrong}"
