@@ -1,13 +1,18 @@
 """Whether recordings decide: what findings, statuses and verdicts on models make of them."""
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, FusionRow, PooledRow
+from imubench_pipeline.model.estimates import ModelRow, ParameterRow
+from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.navigation.pooled import pooled_rows
 from imubench_pipeline.recordings.fitness import (
     UNFIT,
+    Doubt,
     doubts,
     fitness,
     judged,
@@ -20,30 +25,40 @@ from imubench_pipeline.recordings.fitness import (
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 from tests.ranking import ranking_rows
+from tests.rows import typed
 from tests.test_selection import errors_of
 
 ABOUT = {"sensor": "s", "recording": "a", "status": "ok"}
+OTHER = ABOUT | {"sensor": "other"}
 KEY = {"sensor": "s", "recording": "a", "channel": "gyro_x"}
 
 
 def test_what_is_not_sold_decides_nothing() -> None:
-    (doubt,) = not_sold([ABOUT, ABOUT | {"sensor": "other"}], {"s"})
-    (row,) = judged([ABOUT], [doubt], ())
-    assert (row["fitness"], row["decides"], row["doubts"]) == ("unfit", False, "not sold")
+    (doubt,) = not_sold(typed(RecordingRow, [ABOUT, OTHER]), {"s"})
+    row = verdict([doubt])
+    assert (row.fitness, row.decides, row.doubts) == ("unfit", False, "not sold")
     assert left_out([row]) == {("s", "a"): "a does not decide: not sold"}
 
 
-def finding(name: str, severity: str = "warning", **changes: Any) -> dict[str, Any]:
-    about = {"finding": name, "severity": severity, "detail": f"about {name}", "value": 1.0}
-    return KEY | about | {"start": None, "end": None} | changes
+def verdict(found: Iterable[Doubt], include: Sequence[str] = (), **changes: Any) -> RecordingRow:
+    (row,) = judged(typed(RecordingRow, [ABOUT | changes]), found, include)
+    return row
 
 
-def model(verdict: str, chosen: bool = True) -> dict[str, Any]:
-    return KEY | {"chosen": chosen, "verdict": verdict}
+def finding(name: str, severity: str = "warning", value: float = 1.0) -> FindingRow:
+    detail = f"about {name}"
+    return FindingRow(**KEY, finding=name, severity=severity, detail=detail, value=value)
 
 
-def parameter(status: str) -> dict[str, Any]:
-    return KEY | {"parameter": "K", "status": status, "reason": "drift"}
+def model(verdict: str, chosen: bool = True) -> ModelRow:
+    (row,) = typed(ModelRow, [KEY | {"chosen": chosen, "verdict": verdict}])
+    return row
+
+
+def parameter(status: str) -> ParameterRow:
+    about = {"parameter": "K", "status": status, "reason": "drift"}
+    (row,) = typed(ParameterRow, [KEY | about])
+    return row
 
 
 def test_a_log_of_which_nothing_is_found_is_fit() -> None:
@@ -52,35 +67,35 @@ def test_a_log_of_which_nothing_is_found_is_fit() -> None:
     )
     assert found == []
     assert fitness(found) == "fit"
-    (row,) = judged([ABOUT], found, ())
-    assert (row["fitness"], row["decides"], row["doubts"]) == ("fit", True, "")
+    row = verdict(found)
+    assert (row.fitness, row.decides, row.doubts) == ("fit", True, "")
 
 
 @pytest.mark.parametrize("name", sorted(UNFIT))
 def test_what_need_not_be_a_sensor_at_rest_in_its_unit_does_not_decide(name: str) -> None:
     severity = "fatal" if name == "stuck" else "warning"
     found = list(doubts([finding("noise_grows"), finding(name, severity)], [], []))
-    (row,) = judged([ABOUT], found, ())
-    assert (row["fitness"], row["decides"]) == ("unfit", False)
-    assert row["doubts"].startswith(f"{name.replace('_', ' ')} (gyro_x); noise grows")
-    assert left_out([row]) == {("s", "a"): f"a does not decide: {row['doubts']}"}
-    (asked_for,) = judged([ABOUT], found, ["s/a"])
-    assert (asked_for["fitness"], asked_for["decides"]) == ("unfit", True)
+    row = verdict(found)
+    assert (row.fitness, row.decides) == ("unfit", False)
+    assert row.doubts and row.doubts.startswith(f"{name.replace('_', ' ')} (gyro_x); noise grows")
+    assert left_out([row]) == {("s", "a"): f"a does not decide: {row.doubts}"}
+    asked_for = verdict(found, ["s/a"])
+    assert (asked_for.fitness, asked_for.decides) == ("unfit", True)
     assert left_out([asked_for]) == {}
 
 
 def test_other_doubts_leave_the_figures_and_are_said() -> None:
     found = list(doubts([finding("bias_step")], [], [model("not explained"), model("x", False)]))
-    (row,) = judged([ABOUT], found, ())
-    assert (row["fitness"], row["decides"]) == ("fit with doubts", True)
-    assert row["doubts"] == "bias step (gyro_x); not explained (gyro_x)"
-    assert found[0].row()["parameters"] == "B, B_curve, K, R, T_B, bias, sigma_min, tau_min"
-    assert found[1].row()["parameters"] is None
+    row = verdict(found)
+    assert (row.fitness, row.decides) == ("fit with doubts", True)
+    assert row.doubts == "bias step (gyro_x); not explained (gyro_x)"
+    assert found[0].row().parameters == "B, B_curve, K, R, T_B, bias, sigma_min, tau_min"
+    assert found[1].row().parameters is None
 
 
 def test_a_doubtful_parameter_is_no_doubt_of_the_log() -> None:
     (one,) = doubts([], [parameter("doubtful")], [])
-    assert one.row()["parameters"] == "K"
+    assert one.row().parameters == "K"
     assert one.reason == "drift"
     assert fitness([one]) == "fit"
 
@@ -100,17 +115,14 @@ def test_a_unit_of_time_mixed_up_has_a_factor_for_each_parameter() -> None:
         ("R",): pytest.approx(1e6),
     }
     assert fitness(found) == "unfit"
-    (row,) = judged([ABOUT], found, ())
-    assert row["doubts"] == "rate implausible (gyro_x)"
+    assert verdict(found).doubts == "rate implausible (gyro_x)"
 
 
 def test_a_recording_that_was_not_analysed_does_not_decide() -> None:
     for status in ("rejected", "failed"):
-        rows = judged(
-            [ABOUT | {"status": status}], doubts([finding("rejected", "fatal")], [], []), ()
-        )
-        assert (rows[0]["fitness"], rows[0]["decides"], rows[0]["doubts"]) == (None, False, "")
-        assert left_out(rows) == {}  # that is told as rejected
+        row = verdict(doubts([finding("rejected", "fatal")], [], []), status=status)
+        assert (row.fitness, row.decides, row.doubts) == (None, False, "")
+        assert left_out([row]) == {}  # that is told as rejected
 
 
 def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
@@ -119,7 +131,7 @@ def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
         limits = {"value": value, "lower": 0.99 * value, "upper": 1.01 * value}
         return about | limits | {"parameter": "N", "status": "ok", "unit": "x"}
 
-    rows = [row("a", 1.0), row("b", 1.01), row("c", 57.3)]
+    rows = typed(ParameterRow, [row("a", 1.0), row("b", 1.01), row("c", 57.3)])
     apart = {("s", "c"): "c does not decide"}
     (pooled,) = pooled_rows(undecided(rows, apart), [], {})
     (without,) = pooled_rows(rows[:2], [], {})
@@ -129,18 +141,22 @@ def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
 
 
 def test_rows_carry_the_doubts_of_what_they_stand_on() -> None:
-    about = [
-        ABOUT | {"device": "one", "decides": True, "doubts": "lines (gyro_x)"},
-        ABOUT | {"recording": "b", "device": "two", "decides": True, "doubts": ""},
-        ABOUT | {"recording": "c", "device": "two", "decides": False, "doubts": "motion (gyro_x)"},
-    ]
-    rows = [{"sensor": "s", "recording": name} for name in "ab"]
-    assert [row["doubts"] for row in with_doubts(rows, about)] == ["lines (gyro_x)", ""]
+    moved = {"device": "two", "decides": False, "doubts": "motion (gyro_x)"}
+    about = typed(
+        RecordingRow,
+        [
+            ABOUT | {"device": "one", "decides": True, "doubts": "lines (gyro_x)"},
+            ABOUT | {"recording": "b", "device": "two", "decides": True, "doubts": ""},
+            ABOUT | {"recording": "c"} | moved,
+        ],
+    )
+    rows = typed(ErrorBudgetRow, [{"sensor": "s", "recording": name} for name in "ab"])
+    assert [row.doubts for row in with_doubts(rows, about)] == ["lines (gyro_x)", ""]
     pair = {"sensor": "s", "recording": "b", "other": "s", "other_recording": "a"}
-    names = ("sensor", "recording"), ("other", "other_recording")
-    assert [row["doubts"] for row in with_doubts([pair], about, names)] == ["lines (gyro_x)"]
-    pools = [{"sensor": "s", "device": device} for device in (None, "one", "two")]
-    said = [row["doubts"] for row in with_doubts_of_all(pools, about)]
+    pairs = typed(FusionRow, [pair])
+    assert [row.doubts for row in with_doubts(pairs, about)] == ["lines (gyro_x)"]
+    pools = typed(PooledRow, [{"sensor": "s", "device": device} for device in (None, "one", "two")])
+    said = [row.doubts for row in with_doubts_of_all(pools, about)]
     assert said == ["a: lines (gyro_x)", "a: lines (gyro_x)", ""]
 
 

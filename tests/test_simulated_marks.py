@@ -3,7 +3,7 @@
 import gzip
 import shutil
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,8 @@ import pytest
 import yaml
 
 import imubench_pipeline as imu
+from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.readers import read
 from imubench_pipeline.readers.text.header import SIMULATED
 from imubench_pipeline.recordings.fitness import judged, simulated_beside_measured
@@ -125,23 +127,29 @@ def test_notes_do_not_overrule_the_mark(tmp_path: Path, stated: bool, found: lis
     assert imu.read_log(path, SENSOR).simulated is stated
 
 
-def row(sensor: str, recording: str, *, simulated: bool, status: str = "ok") -> dict[str, Any]:
-    about = {"sensor": sensor, "recording": recording, "device": recording, "kind": "static"}
-    return about | {"simulated": simulated, "status": status}
+def row(sensor: str, recording: str, *, simulated: bool, status: str = "ok") -> RecordingRow:
+    return RecordingRow(
+        sensor=sensor,
+        recording=recording,
+        device=recording,
+        kind="static",
+        simulated=simulated,
+        status=status,
+    )
 
 
-def joined(folder: Path, *rows: dict[str, Any]) -> dict[str, dict[str, Any]]:
+def joined(folder: Path, *rows: RecordingRow) -> dict[str, dict[str, Any]]:
     """Return the recordings of all sensors by name, each sensor judged by itself before."""
     parts: dict[str, list[Path]] = {"recordings": [], "doubts": [], "findings": []}
-    for sensor in sorted({row["sensor"] for row in rows}):
-        own = [row for row in rows if row["sensor"] == sensor]
+    for sensor in sorted({row.sensor for row in rows}):
+        own = [row for row in rows if row.sensor == sensor]
         doubts = list(simulated_beside_measured(own))
-        tables = {
+        own_tables: dict[str, Sequence[TableRow]] = {
             "recordings": judged(own, doubts, ["one/sim", "two/sim"]),
             "doubts": [doubt.row() for doubt in doubts],
             "findings": [],
         }
-        for name, of_sensor in tables.items():
+        for name, of_sensor in own_tables.items():
             path = folder / f"{sensor}.{name}.parquet"
             write_arrow(build(name, of_sensor), path)
             parts[name].append(path)

@@ -11,9 +11,11 @@ from imubench_pipeline.datasheets.suspicion import (
     unusual_rows,
     usual_figures,
 )
+from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.settings.sensor import Sensor, read_sensors
 from imubench_pipeline.settings.validation import parse
 from tests.conftest import PROJECT
+from tests.rows import typed
 from tests.test_configuration import SENSOR
 
 CATALOGUE = read_sensors(PROJECT / "config/sensors")
@@ -103,8 +105,8 @@ def test_an_estimate_is_told_by_the_name_and_digits_that_its_table_prints() -> N
     value, lower, upper = (x / 3600 * DEG for x in (397.8, 343.0, 408.5))
     row = {"sensor": "odd", "recording": "r", "channel": "gyro_x", "value": value,
            "lower": lower, "upper": upper}  # fmt: skip
-    rows = [row | {"parameter": name} for name in ("B", "sigma_min")]
+    rows = typed(ParameterRow, [row | {"parameter": name} for name in ("B", "sigma_min")])
     found = unusual_rows(rows, sensors, usual_figures(sensors))
-    (said,) = (finding["detail"] for finding in found)
+    (said,) = (finding.detail for finding in found)
     # The papers' B is another figure, and 1.5 times as large.
     assert said.startswith("gyro σ_min = 400 °/h is 66.3 times the median of 5 sensors, 6 °/h")

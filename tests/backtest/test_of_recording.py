@@ -9,6 +9,7 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import fit
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.backtest.comparison import findings, words
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
@@ -102,10 +103,16 @@ def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
     assert "periodic drift" in finding["detail"] and "600 s" in finding["detail"]
     (doubt,) = doubts([finding], [], [])
     assert not doubt.unfit and {"K", "B_curve"} <= set(doubt.parameters)
-    about = [
-        NAMES | {"status": "ok", "simulated": True, "duration": SAMPLES / RATE, "device": None}
-    ]
-    assert judged(about, [doubt], ())[0]["doubts"] == "backtest contradicts (gyro_x)"
+    about = RecordingRow(
+        **NAMES,
+        device="r",
+        kind="static",
+        status="ok",
+        simulated=True,
+        duration=SAMPLES / RATE,
+    )
+    (told,) = judged([about], [doubt], ())
+    assert told.doubts == "backtest contradicts (gyro_x)"
     questions = of_requirement("robot", ROBOT)
     errors = error_rows(NAMES, estimates, questions, draws=20, seed=1)
     ranking = build(
@@ -114,7 +121,7 @@ def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
             build("error_budget", errors).to_pylist(),
             {"robot": ROBOT},
             {"s": {"price_class": None}},
-            judged(about, [doubt], ()),
+            [told],
             backtests=rows,
         ),
     ).to_pylist()

@@ -19,6 +19,7 @@ import numpy as np
 from imubench_pipeline.datasheets.comparable import bias_comparables
 from imubench_pipeline.datasheets.suspicion import NEAR_PRINTED, printed_figures
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.rotation import GravityTurn
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
@@ -262,13 +263,13 @@ def implausible(
     return findings
 
 
-def implausible_of(quality: Quality, sensor: Sensor | None) -> list[dict[str, Any]]:
+def implausible_of(quality: Quality, sensor: Sensor | None) -> list[FindingRow]:
     """Return the rows of findings on what can be of no sensor at rest in its unit."""
     about = quality.recording
     turn = GravityTurn(**quality.gravity) if quality.gravity else None
     static = about.get("kind", "static") == "static"
     findings = implausible(quality.channels, turn, sensor, static=static)
-    return [dict(finding.row(about["sensor"], about["recording"])) for finding in findings]
+    return [finding.row(about["sensor"], about["recording"]) for finding in findings]
 
 
 def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:

@@ -7,11 +7,12 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
-from typing import Any
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.digits import digits_by
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import from_si
@@ -177,26 +178,27 @@ _NAMES = {"N": "N", "B": "σ_min"}
 
 
 def unusual_rows(
-    parameters: Iterable[Mapping[str, Any]], sensors: Mapping[str, Sensor], usual: UsualFigures
-) -> Iterator[Mapping[str, Any]]:
+    parameters: Iterable[ParameterRow], sensors: Mapping[str, Sensor], usual: UsualFigures
+) -> Iterator[FindingRow]:
     """Yield the rows of the table ``findings`` about estimates far from what vendors print.
 
     Of rows of the table ``parameters``, of ``sensors`` by name; ``usual`` is what a catalogue has.
     """
     for row in parameters:
         # What vendors print of B is the minimum of the curve.
-        figure = {"N": "N", "sigma_min": "B"}.get(row["parameter"])
-        value = row["value"]
+        figure = {"N": "N", "sigma_min": "B"}.get(row.parameter)
+        value = row.value
         if figure is None or value is None:
             continue
-        quantity, sensor = quantity_of(row["channel"]), sensors.get(row["sensor"])
+        quantity, sensor = quantity_of(row.channel), sensors.get(row.sensor)
         printed = printed_figures(sensor, quantity) if sensor else None
         unit, dimension = _SHOWN[quantity, figure]
-        known = row["lower"] is not None and row["upper"] is not None
-        names = ("value", "lower", "upper") if known else ("value",)
-        size, *limits = (from_si(row[name], unit, dimension) for name in names)
+        figures = [value]
+        if row.lower is not None and row.upper is not None:
+            figures += [row.lower, row.upper]
+        size, *limits = (from_si(number, unit, dimension) for number in figures)
         digits = digits_by(size, *(limits or (None, None)))
         text = f"{_NAMES[figure]} = {_text(quantity, figure, value, digits)}"
         for sentence in suspicious(quantity, {figure: value}, usual, printed, {figure: text}):
-            finding = Finding("unusual_figure", "warning", sentence, value, row["channel"])
-            yield finding.row(row["sensor"], row["recording"])
+            finding = Finding("unusual_figure", "warning", sentence, value, row.channel)
+            yield finding.row(row.sensor, row.recording)

@@ -9,10 +9,20 @@ said beside them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal, TypeVar
 
+from imubench_pipeline.model.comparisons import (
+    DatasheetRow,
+    ErrorBudgetRow,
+    FusionRow,
+    PooledRow,
+)
+from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
+from imubench_pipeline.model.recordings import DoubtRow, FindingRow, RecordingRow
+from imubench_pipeline.model.table import ChannelRow, OfRecordingRow
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.typing import Row
 
@@ -52,7 +62,10 @@ each parameter: N² = σ²(τ) τ, so that N goes with the root of time."""
 BESIDE_MEASURED = "simulated_beside_measured"
 """Code of the doubt that leaves out simulated recordings, though they be included."""
 
-WITH_DOUBTS = {"error_budget", "datasheet"}
+WITH_DOUBTS: Mapping[str, type[ErrorBudgetRow] | type[DatasheetRow]] = {
+    "error_budget": ErrorBudgetRow,
+    "datasheet": DatasheetRow,
+}
 """Tables of one recording whose rows repeat the doubts about it."""
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
@@ -107,64 +120,73 @@ class Doubt:
         """Whether it is one of the log, and not only of a parameter that it tells badly."""
         return self.code != "doubtful"
 
-    def row(self) -> dict[str, Any]:
+    def row(self) -> DoubtRow:
         """Return the row of the table ``doubts``."""
-        return {
-            **{name: getattr(self, name) for name in ("sensor", "recording", "channel", "code")},
-            "fitness": "unfit" if self.unfit else "fit with doubts",
-            "parameters": ", ".join(self.parameters) or None,
-            **{name: getattr(self, name) for name in ("factor", "start", "end", "reason")},
-        }
+        return DoubtRow(
+            sensor=self.sensor,
+            recording=self.recording,
+            channel=self.channel,
+            code=self.code,
+            fitness="unfit" if self.unfit else "fit with doubts",
+            parameters=", ".join(self.parameters) or None,
+            factor=self.factor,
+            start=self.start,
+            end=self.end,
+            reason=self.reason,
+        )
+
+
+Estimated = TypeVar("Estimated", ParameterRow, FixedBiasRow)
+Doubted = TypeVar("Doubted", bound=ErrorBudgetRow | DatasheetRow | FusionRow)
 
 
 def doubts(
-    findings: Iterable[Row], parameters: Iterable[Row], models: Iterable[Row]
+    findings: Iterable[FindingRow],
+    parameters: Iterable[ParameterRow],
+    models: Iterable[ModelRow],
 ) -> Iterator[Doubt]:
     """Yield what is doubted of recordings, the unfit first of each.
 
     Parameters
     ----------
-    findings : iterable of mapping
-        Rows of the table ``findings``.
-    parameters : iterable of mapping
-        Rows of the table ``parameters``, of the recommended methods.
-    models : iterable of mapping
-        Rows of the table ``models``.
+    findings : iterable of FindingRow
+    parameters : iterable of ParameterRow
+        Of the recommended methods.
+    models : iterable of ModelRow
     """
     every = [doubt for row in findings if _casts_doubt(row) for doubt in _of_finding(row)]
     every += [
-        Doubt(*_place(row), "not_explained", f"no model explains the spectrum of {row['channel']}")
+        Doubt(*_place(row), "not_explained", f"no model explains the spectrum of {row.channel}")
         for row in models
-        if row["chosen"] and row["verdict"] == "not explained"
+        if row.chosen and row.verdict == "not explained"
     ]
     every += [
         Doubt(
             *_place(row),
             "doubtful",
-            row["reason"] or "its status is doubtful",
-            parameters=(row["parameter"],),
+            row.reason or "its status is doubtful",
+            parameters=(row.parameter,),
         )
         for row in parameters
-        if row["status"] == "doubtful"
+        if row.status == "doubtful"
     ]
     yield from sorted(every, key=lambda doubt: not doubt.unfit)
 
 
-def not_sold(recordings: Iterable[Row], sensors: Collection[str]) -> Iterator[Doubt]:
+def not_sold(recordings: Iterable[RecordingRow], sensors: Collection[str]) -> Iterator[Doubt]:
     """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing.
 
     Parameters
     ----------
-    recordings : iterable of mapping
-        Rows of the table ``recordings``.
+    recordings : iterable of RecordingRow
     sensors : collection of str
         Those that are not sold.
     """
     for row in recordings:
-        if row["sensor"] in sensors:
+        if row.sensor in sensors:
             yield Doubt(
-                row["sensor"],
-                row["recording"],
+                row.sensor,
+                row.recording,
                 None,
                 "not_sold",
                 "no such sensor is sold",
@@ -172,20 +194,20 @@ def not_sold(recordings: Iterable[Row], sensors: Collection[str]) -> Iterator[Do
             )
 
 
-def simulated_beside_measured(recordings: Sequence[Row]) -> Iterator[Doubt]:
+def simulated_beside_measured(recordings: Sequence[RecordingRow]) -> Iterator[Doubt]:
     """Yield a doubt for each simulated recording, where any measured one was analysed.
 
     Parameters
     ----------
-    recordings : sequence of mapping
-        Rows of the table ``recordings``, of one sensor or of all.
+    recordings : sequence of RecordingRow
+        Of one sensor or of all.
     """
-    if any(row["status"] == "ok" and not row["simulated"] for row in recordings):
+    if any(row.status == "ok" and not row.simulated for row in recordings):
         for row in recordings:
-            if row["simulated"]:
+            if row.simulated:
                 yield Doubt(
-                    row["sensor"],
-                    row["recording"],
+                    row.sensor,
+                    row.recording,
                     None,
                     BESIDE_MEASURED,
                     "it is simulated, and other recordings are measured",
@@ -194,8 +216,8 @@ def simulated_beside_measured(recordings: Sequence[Row]) -> Iterator[Doubt]:
 
 
 def without_simulated(
-    recordings: Sequence[Row],
-) -> tuple[list[dict[str, Any]], list[Doubt]]:
+    recordings: Sequence[RecordingRow],
+) -> tuple[list[RecordingRow], list[Doubt]]:
     """Return the recordings of all sensors, judged anew, and the doubts that are new.
 
     Sensors are judged each by itself: a simulated recording of one decides until a measured one of
@@ -203,10 +225,10 @@ def without_simulated(
 
     Parameters
     ----------
-    recordings : sequence of mapping
-        Rows of the table ``recordings``, with whether they decide.
+    recordings : sequence of RecordingRow
+        With whether they decide.
     """
-    known = {_key(row) for row in recordings if _names(row["doubts"], BESIDE_MEASURED)}
+    known = {_key(row) for row in recordings if _names(row.doubts, BESIDE_MEASURED)}
     new = [
         doubt
         for doubt in simulated_beside_measured(recordings)
@@ -214,14 +236,14 @@ def without_simulated(
     ]
     apart = {(doubt.sensor, doubt.recording): words([doubt]) for doubt in new}
     judged_anew = [
-        {
-            **row,
-            "fitness": row["fitness"] and "unfit",
-            "decides": False,
-            "doubts": "; ".join(filter(None, [apart[_key(row)], row["doubts"]])),
-        }
+        replace(
+            row,
+            fitness=row.fitness and "unfit",
+            decides=False,
+            doubts="; ".join(filter(None, [apart[_key(row)], row.doubts])),
+        )
         if _key(row) in apart
-        else dict(row)
+        else row
         for row in recordings
     ]
     return judged_anew, new
@@ -242,14 +264,13 @@ def fitness(of_recording: Iterable[Doubt]) -> Fitness:
 
 
 def judged(
-    recordings: Sequence[Row], doubts: Iterable[Doubt], included: Collection[str]
-) -> list[dict[str, Any]]:
+    recordings: Sequence[RecordingRow], doubts: Iterable[Doubt], included: Collection[str]
+) -> list[RecordingRow]:
     """Return the rows of recordings with whether they decide, and their doubts.
 
     Parameters
     ----------
-    recordings : sequence of mapping
-        Rows of the table ``recordings``.
+    recordings : sequence of RecordingRow
     doubts : iterable of Doubt
         Of all of them.
     included : collection of str
@@ -286,69 +307,62 @@ def left_out(recordings: Iterable[Row]) -> dict[Key, str]:
         Rows of the table ``recordings``.
     """
     return {
-        _key(row): f"{row['recording']} does not decide: {row['doubts']}"
+        (row["sensor"], row["recording"]): f"{row['recording']} does not decide: {row['doubts']}"
         for row in recordings
         if row["status"] == "ok" and row["decides"] is False
     }
 
 
-def undecided(rows: Iterable[Row], not_deciding: Collection[Key]) -> Iterator[dict[str, Any]]:
+def undecided(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Iterator[Estimated]:
     """Yield rows of estimates, without the values of recordings that do not decide.
+
+    A mean that is left out is NaN, as a row of it has a value.
 
     Parameters
     ----------
-    rows : iterable of mapping
-        With ``sensor``, ``recording``, ``value``, ``lower`` and ``upper``.
+    rows : iterable of ParameterRow or of FixedBiasRow
     not_deciding : collection of (str, str)
         Sensor and recording.
     """
-    nothing = {"value": None, "lower": None, "upper": None}
     for row in rows:
         if _key(row) not in not_deciding:
-            yield dict(row)
-            continue
-        status = {"status": "does_not_decide"} if "status" in row else {}
-        yield {**row, **nothing, **status}
+            yield row
+        elif isinstance(row, FixedBiasRow):
+            yield replace(row, value=math.nan)
+        else:
+            yield replace(row, value=None, lower=None, upper=None, status="does_not_decide")
 
 
-def with_doubts(
-    rows: Iterable[Row],
-    recordings: Iterable[Row],
-    names: Sequence[tuple[str, str]] = (("sensor", "recording"),),
-) -> Iterator[dict[str, Any]]:
-    """Yield rows with the doubts of the recordings that they stand on.
-
-    Parameters
-    ----------
-    recordings : iterable of mapping
-        Rows of the table ``recordings``.
-    names : sequence of (str, str)
-        The columns that name sensor and recording; several pairs, of several recordings.
-    """
-    by_recording: dict[tuple[Any, Any], str] = {
-        _key(row): row["doubts"] or "" for row in recordings
+def with_doubts(rows: Iterable[Doubted], recordings: Iterable[RecordingRow]) -> Iterator[Doubted]:
+    """Yield rows with the doubts of the recordings that they stand on."""
+    by_recording: dict[tuple[str, str | None], str] = {
+        _key(row): row.doubts or "" for row in recordings
     }
     for row in rows:
-        texts = [by_recording.get((row.get(of), row.get(name)), "") for of, name in names]
-        yield {**row, "doubts": "; ".join(filter(None, dict.fromkeys(texts)))}
+        texts = [by_recording.get(key, "") for key in _stands_on(row)]
+        yield replace(row, doubts="; ".join(filter(None, dict.fromkeys(texts))))
 
 
-def with_doubts_of_all(pools: Iterable[Row], recordings: Iterable[Row]) -> Iterator[dict[str, Any]]:
-    """Yield rows of the table ``pooled`` with the doubts of the recordings of sensor or device.
+def _stands_on(
+    row: ErrorBudgetRow | DatasheetRow | FusionRow,
+) -> Sequence[tuple[str, str | None]]:
+    """Return sensor and recording of what a row stands on; of a comparison of two, both."""
+    own = row.sensor, row.recording
+    return (own, (row.other, row.other_recording)) if isinstance(row, FusionRow) else (own,)
 
-    Parameters
-    ----------
-    pools, recordings : iterable of mapping
-        Rows of the tables.
-    """
-    listed = [row for row in recordings if row["decides"] and row["doubts"]]
+
+def with_doubts_of_all(
+    pools: Iterable[PooledRow], recordings: Iterable[RecordingRow]
+) -> Iterator[PooledRow]:
+    """Yield pools with the doubts of the recordings of sensor or device."""
+    listed = [row for row in recordings if row.decides and row.doubts]
     for row in pools:
         texts = [
-            f"{recording['recording']}: {recording['doubts']}"
+            f"{recording.recording}: {recording.doubts}"
             for recording in listed
-            if recording["sensor"] == row["sensor"] and row["device"] in (None, recording["device"])
+            if recording.sensor == row.sensor and row.device in (None, recording.device)
         ]
-        yield {**row, "doubts": _shortened(texts)}
+        yield replace(row, doubts=_shortened(texts))
 
 
 def _shortened(texts: Sequence[str]) -> str:
@@ -356,50 +370,51 @@ def _shortened(texts: Sequence[str]) -> str:
     return "; ".join(texts[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
 
 
-def _judged(row: Row, doubts: Sequence[Doubt], included: Collection[str]) -> dict[str, Any]:
-    verdict = fitness(doubts) if row["status"] == "ok" else None
-    named = f"{row['sensor']}/{row['recording']}" in included
+def _judged(row: RecordingRow, doubts: Sequence[Doubt], included: Collection[str]) -> RecordingRow:
+    verdict = fitness(doubts) if row.status == "ok" else None
+    named = f"{row.sensor}/{row.recording}" in included
     named &= all(doubt.code != BESIDE_MEASURED for doubt in doubts)
-    return {
-        **row,
-        "fitness": verdict,
-        "decides": verdict is not None and (verdict != "unfit" or named),
-        "doubts": words(doubts),
-    }
+    return replace(
+        row,
+        fitness=verdict,
+        decides=verdict is not None and (verdict != "unfit" or named),
+        doubts=words(doubts),
+    )
 
 
 def _names(words_of_doubts: str | None, code: str) -> bool:
     return (words_of_doubts or "").startswith(code.replace("_", " "))
 
 
-def _casts_doubt(row: Row) -> bool:
-    if row["finding"] in LEFT_OUT:
+def _casts_doubt(row: FindingRow) -> bool:
+    if row.finding in LEFT_OUT:
         return False
-    return row["severity"] == "warning" or row["finding"] in UNFIT
+    return row.severity == "warning" or row.finding in UNFIT
 
 
-def _of_finding(row: Row) -> Iterator[Doubt]:
+def _of_finding(row: FindingRow) -> Iterator[Doubt]:
     """Yield the doubt of a finding, or one for each factor by which parameters may change."""
-    code = row["finding"]
+    code = row.finding
     by_factor: dict[float | None, list[str]] = {}
-    for name, power in SCALES.get(code, {}).items():
-        by_factor.setdefault(row["value"] ** power, []).append(name)
+    if row.value is not None:
+        for name, power in SCALES.get(code, {}).items():
+            by_factor.setdefault(row.value**power, []).append(name)
     for factor, names in (by_factor or {None: [*BEARS_ON.get(code, ())]}).items():
         yield Doubt(
             *_place(row),
             code,
-            row["detail"],
+            row.detail,
             parameters=tuple(sorted(names)),
             unfit=code in UNFIT,
             factor=factor,
-            start=row["start"],
-            end=row["end"],
+            start=row.start,
+            end=row.end,
         )
 
 
-def _place(row: Row) -> tuple[str, str, str | None]:
-    return row["sensor"], row["recording"], row["channel"]
+def _place(row: FindingRow | ChannelRow) -> tuple[str, str, str | None]:
+    return row.sensor, row.recording, row.channel
 
 
-def _key(row: Row) -> Key:
-    return row["sensor"], row["recording"]
+def _key(row: RecordingRow | OfRecordingRow) -> Key:
+    return row.sensor, row.recording

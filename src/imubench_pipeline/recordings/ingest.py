@@ -64,7 +64,7 @@ class Ingested:
         sensor, recording = names["sensor"], names["recording"]
         return Quality(
             names | {"status": status} | self.summary,
-            [dict(finding.row(sensor, recording)) for finding in self.findings],
+            [finding.row(sensor, recording) for finding in self.findings],
             self.channels,
             self.kept,
             gravity=asdict(self.gravity) if self.gravity else None,
@@ -462,7 +462,7 @@ def write_failed(settings: str, failure: Failure, path: Path) -> None:
         "started": notes.get("started"),
         "reason": failure.reason,
     }
-    finding = dict(failure.finding().row(failure.sensor, str(failure.recording)))
+    finding = failure.finding().row(failure.sensor, str(failure.recording))
     remove_kept(path.parent)
     Quality(recording, [finding], {}, {}, asdict(failure)).write(path)
 

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.recordings.recording import (
     MEND,
     ChannelLog,
@@ -30,7 +31,7 @@ class Quality:
     """
 
     recording: dict[str, Any]
-    findings: list[dict[str, Any]]
+    findings: list[FindingRow]
     channels: dict[str, dict[str, Any]]
     kept: dict[str, dict[str, Any]] | None = None
     """The files of samples, as `identified` gives them; None: it was not kept what they are."""
@@ -38,6 +39,11 @@ class Quality:
     """Why the ingest failed (`imubench_pipeline.tables.failures.Failure`)."""
     gravity: dict[str, Any] | None = None
     """How gravity turns against the sensor (`recordings.quality.rotation.GravityTurn`)."""
+
+    @property
+    def row(self) -> RecordingRow:
+        """The row of the table ``recordings``."""
+        return RecordingRow(**self.recording)
 
     @property
     def grids(self) -> dict[str, int]:
@@ -54,7 +60,9 @@ class Quality:
             If it is damaged.
         """
         try:
-            return cls(**read_sealed_json(path))
+            content = read_sealed_json(path)
+            content["findings"] = [FindingRow(**row) for row in content.get("findings", ())]
+            return cls(**content)
         except (ValueError, TypeError) as error:  # other letters, or other keys
             raise RecordingError(f"{path}: is not as the ingest wrote it: {MEND}") from error
 
@@ -103,7 +111,7 @@ def outcome(results: Path, sensor: str, recording: str) -> str:
     if about["status"] != "ok":
         return f"{name}: {about['status']}: {about.get('reason')}"
     kinds = dict.fromkeys(
-        row["finding"].replace("_", " ") for row in quality.findings if row["severity"] != "note"
+        row.finding.replace("_", " ") for row in quality.findings if row.severity != "note"
     )
     hours = about["duration"] / 3600.0
     told = f"{name}: {hours:.3g} h at {about['rate']:.6g} Hz, {len(quality.channels)} channels"

@@ -33,7 +33,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         except Exception as error:  # the others are checked all the same
             reason = one_line(f"{recording.path.name}: {describe_error(error)}")
             failure = Failure(sensor, name, "check", "error", reason)
-            quality = Quality({"status": "failed"}, [dict(failure.finding().row(sensor, name))], {})
+            quality = Quality({"status": "failed"}, [failure.finding().row(sensor, name)], {})
         yield sensor, name, quality
 
 
@@ -48,7 +48,7 @@ def _checked(plan: Plan, sensor: str, name: str, recording: Recording) -> Qualit
         how = AllanSettings.model_validate_json(plan.settings("allan"))
         for channel, log in static_logs(Path(folder)).items():
             for finding in findings_of_channel(channel, log, plan.bandwidth(sensor, name), how):
-                quality.findings.append(dict(finding.row(sensor, name)))
+                quality.findings.append(finding.row(sensor, name))
     return quality
 
 

@@ -265,14 +265,14 @@ def _check(options: argparse.Namespace) -> int:
         print(reason, file=sys.stderr)
     worst = int(bool(plan.unusable))
     for sensor, recording, quality in check(plan):
-        serious = [f for f in quality.findings if f["severity"] != "note"]
+        serious = [f for f in quality.findings if f.severity != "note"]
         worst = max(worst, int(bool(serious)))
         status = quality.recording["status"]
         status = status if status != "ok" or not serious else "warnings"
         made = ", simulated" * bool(quality.recording.get("simulated"))
         print(f"{sensor}/{recording}: {status}{made}")
         for finding in quality.findings:
-            line = f"  {finding['severity']:8} {finding['finding']}: {printable(finding['detail'])}"
+            line = f"  {finding.severity:8} {finding.finding}: {printable(finding.detail)}"
             if sys.stdout.isatty():  # elsewhere one line each, for programs such as grep
                 width = max(shutil.get_terminal_size().columns - 1, 40)
                 line = textwrap.fill(line, width, subsequent_indent=" " * 11)

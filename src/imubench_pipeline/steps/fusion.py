@@ -12,6 +12,8 @@ import pyarrow.compute as pc
 
 from imubench_pipeline.estimators.estimate import JointDraws
 from imubench_pipeline.estimators.rows import draws, estimate_of
+from imubench_pipeline.model.comparisons import FusionRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
 from imubench_pipeline.navigation.fusion.equivalence import (
     FusionChannel,
@@ -52,7 +54,7 @@ def candidates(
     warm = _temperature_parts(tables)
     compensated = parameters.filter(pc.equal(parameters["method"], "compensated")).to_pylist()
     recommended = parameters.filter(parameters["recommended"]).to_pylist()
-    about = {(row["sensor"], row["recording"]): row for row in recordings.to_pylist()}
+    about = {(row.sensor, row.recording): row for row in RecordingRow.rows_of(recordings)}
     apart = left_out(about.values())
     groups: dict[tuple[str, str, str, str], list[Row]] = {}
     used = [row for row in compensated if _channel(row) in warm]
@@ -74,8 +76,8 @@ def candidates(
             sensor,
             recording,
             channel,
-            of["simulated"],
-            of["duration"] or 0.0,
+            of.simulated,
+            of.duration or 0.0,
             estimate_of(method, rows),
             warm.get((sensor, recording, channel)),
             partial(drawn, path, channel, method) if path else None,
@@ -118,8 +120,8 @@ def fusion_rows(
         draws=how.draws,
         seed=how.seed,
     )
-    pairs = ("sensor", "recording"), ("other", "other_recording")
-    return with_doubts(rows, tables["recordings"].to_pylist(), pairs)
+    about = RecordingRow.rows_of(tables["recordings"])
+    return with_doubts((FusionRow(**row) for row in rows), about)
 
 
 TACTICAL = "tactical"

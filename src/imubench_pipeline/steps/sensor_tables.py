@@ -10,6 +10,9 @@ import pyarrow as pa
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.datasheets.suspicion import UsualFigures, unusual_rows, usual_of_text
+from imubench_pipeline.model.comparisons import PooledRow
+from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
+from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.pooled import pooled_rows
@@ -57,10 +60,12 @@ def joined_tables(
             failed_steps += failed
     failures = list(dict.fromkeys(failed_steps))
     joined = without(joined, {(failure.sensor, failure.recording) for failure in failures})
-    about = [quality.recording for quality in qualities]
-    devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
+    about = [quality.row for quality in qualities]
+    devices = {(row.sensor, row.recording): row.device for row in about}
     recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
-    estimated, biases = recommended.to_pylist(), joined["fixed_bias"].to_pylist()
+    estimated = ParameterRow.rows_of(recommended)
+    biases = FixedBiasRow.rows_of(joined["fixed_bias"])
+    models = ModelRow.rows_of(joined["models"])
     joined["drift"] = build("drift", drift_rows(estimated, biases, about))
     sensors = sensors_of(sensor)
     findings = findings_of(
@@ -71,23 +76,25 @@ def joined_tables(
         sensors,
         usual_of_text(usual),
     )
-    findings += recorded_twice(joined["models"].to_pylist(), biases)
+    findings += recorded_twice(models, biases)
     if "backtest" in joined:
         findings += comparison.findings(joined["backtest"].to_pylist())
     joined["findings"] = build("findings", findings)
     doubted = [
         *simulated_beside_measured(about),
         *not_sold(about, {name for name, sensor in sensors.items() if not sensor.sold}),
-        *doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()),
+        *doubts(FindingRow.rows_of(joined["findings"]), estimated, models),
     ]
     about = judged(about, doubted, json.loads(decide).get("include", ()))
     joined["recordings"] = build("recordings", about)
     joined["doubts"] = build("doubts", (doubt.row() for doubt in doubted))
     apart = left_out(about)
     pools = pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
-    joined["pooled"] = build("pooled", with_doubts_of_all(pools, about))
-    for name in WITH_DOUBTS & joined.keys():
-        joined[name] = build(name, with_doubts(joined[name].to_pylist(), about))
+    joined["pooled"] = build(
+        "pooled", with_doubts_of_all((PooledRow(**row) for row in pools), about)
+    )
+    for name in WITH_DOUBTS.keys() & joined.keys():
+        joined[name] = build(name, with_doubts(WITH_DOUBTS[name].rows_of(joined[name]), about))
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published_figures"] = build("published_figures", published_rows(truths, truth, joined))
@@ -105,7 +112,7 @@ def findings_of(
     qualities: Sequence[Quality],
     deterministic: Sequence[Row],
     of_estimates: Iterable[Row],
-    estimated: Sequence[Row],
+    estimated: Sequence[ParameterRow],
     sensors: Mapping[str, Sensor],
     usual: UsualFigures,
 ) -> list[Row]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.recordings.fitness import WITH_DOUBTS, with_doubts, without_simulated
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures
@@ -23,15 +24,15 @@ def tables_of_all(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
 
 def _without_simulated(tables: dict[str, pa.Table]) -> dict[str, pa.Table]:
     """Return tables in which no simulated recording decides beside measured ones of any sensor."""
-    recordings, new = without_simulated(tables["recordings"].to_pylist())
+    recordings, new = without_simulated(RecordingRow.rows_of(tables["recordings"]))
     if not new:
         return tables
-    doubts = [*(doubt.row() for doubt in new), *tables["doubts"].to_pylist()]
+    doubts = [*(doubt.row() for doubt in new), *DoubtRow.rows_of(tables["doubts"])]
     return tables | {
         "recordings": build("recordings", recordings),
         "doubts": build("doubts", doubts),
         **{
-            name: build(name, with_doubts(tables[name].to_pylist(), recordings))
-            for name in WITH_DOUBTS & tables.keys()
+            name: build(name, with_doubts(WITH_DOUBTS[name].rows_of(tables[name]), recordings))
+            for name in WITH_DOUBTS.keys() & tables.keys()
         },
     }

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from typing import Any, Literal
+from dataclasses import dataclass, fields
+from typing import Literal
+
+from imubench_pipeline.model.recordings import FindingRow
 
 LEFT_OUT = ("rejected", "failed")
 """Findings that a recording is left out, with the reason: they are listed by themselves."""
@@ -35,12 +36,22 @@ class Finding:
     end: float | None = None
     """The part of the recording that it concerns, s from the first sample; None: all of it."""
 
-    def row(self, sensor: str, recording: str) -> Mapping[str, Any]:
+    def row(self, sensor: str, recording: str) -> FindingRow:
         """Return the row of the table ``findings``."""
-        return {"sensor": sensor, "recording": recording, **asdict(self)}
+        return FindingRow(
+            sensor=sensor,
+            recording=recording,
+            channel=self.channel,
+            finding=self.finding,
+            severity=self.severity,
+            detail=self.detail,
+            value=self.value,
+            start=self.start,
+            end=self.end,
+        )
 
 
-def finding_of(row: Mapping[str, Any]) -> Finding:
+def finding_of(row: FindingRow) -> Finding:
     """Return the finding that a row of the table ``findings`` stands for."""
     return Finding(**{field.name: row[field.name] for field in fields(Finding)})
 

@@ -18,11 +18,14 @@ from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow
+from imubench_pipeline.model.recordings import FindingRow
+from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.recordings.quality import levels
 from imubench_pipeline.recordings.quality.repeats import WINDOW, Stretch
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, Excerpt, together
 from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 
 _FEWEST = 64
 """Increments of a piece that must not be 0."""
@@ -178,20 +181,22 @@ def _repeated(channel: str | None, stretches: list[Stretch], present: int, rate:
     return Finding("repeated_stretch", "warning", detail, total, channel, begin, end)
 
 
-def recorded_twice(models: Iterable[Row], biases: Iterable[Row]) -> Iterator[Row]:
+def recorded_twice(
+    models: Iterable[ModelRow], biases: Iterable[FixedBiasRow]
+) -> Iterator[FindingRow]:
     """Yield the rows of the table ``findings`` about recordings that another one holds, too.
 
     ``models`` and ``biases``: rows of the tables ``models`` and ``fixed_bias``, in the order of the
     recordings. The first of several copies is taken for the log.
     """
-    means = {_place(row): row["value"] for row in biases}
+    means = {_place(row): row.value for row in biases}
     first: dict[tuple[Any, ...], str] = {}
     copies: dict[tuple[str, str], dict[str, list[str]]] = {}
     for row in models:
         mean = means.get(_place(row))
-        if not row["chosen"] or row["log_likelihood"] is None or mean is None:
+        if not row.chosen or mean is None:
             continue
-        samples = format(row["log_likelihood"], _DIGITS), format(mean, _DIGITS)
+        samples = format(row.log_likelihood, _DIGITS), format(mean, _DIGITS)
         sensor, recording, channel = _place(row)
         of = first.setdefault((sensor, channel, *samples), recording)
         if of != recording:
@@ -206,8 +211,8 @@ def recorded_twice(models: Iterable[Row], biases: Iterable[Row]) -> Iterator[Row
             yield finding.row(sensor, recording)
 
 
-def _place(row: Row) -> tuple[str, str, str]:
-    return row["sensor"], row["recording"], row["channel"]
+def _place(row: ChannelRow) -> tuple[str, str, str]:
+    return row.sensor, row.recording, row.channel
 
 
 # ---------------------------------------------------------------------------------- noise in common
