@@ -12,13 +12,15 @@ import json
 import os
 import traceback
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
+from imubench_pipeline.model.table import R
 from imubench_pipeline.tables.files import build, joined, read_json, read_part, schema, write_arrow
 from imubench_pipeline.tables.findings import Finding, UnavailableError, without_addresses
 
@@ -27,8 +29,6 @@ QUALITY = "quality.json"
 _METADATA = b"imubench.failure"
 _BESIDE = ("earth_rotation", "calibration")
 """Steps that need more than a static log: the rest of what it tells stands without them."""
-
-_NOT_JUDGED = {"fitness": None, "decides": False}
 
 _NAMED = ("recordings", "findings", "estimate_findings", "failures")
 """Tables that say why a recording is left out of the others."""
@@ -50,6 +50,16 @@ class Failure:
     def name(self) -> str:
         """What is left out."""
         return f"{self.sensor}/{self.recording}" if self.recording else self.sensor
+
+    def row(self) -> FailureRow:
+        """Return the row of the table ``failures``."""
+        return FailureRow(
+            sensor=self.sensor,
+            recording=self.recording,
+            step=self.step,
+            cause=self.cause,
+            reason=self.reason,
+        )
 
     def finding(self) -> Finding:
         """Return the finding about the recording."""
@@ -131,9 +141,8 @@ def with_failures(
     """
     if not failures:
         return {"failures": schema("failures").empty_table()} | dict(tables)
-    kinds = {
-        (row["sensor"], row["recording"]): row["kind"] for row in tables["recordings"].to_pylist()
-    }
+    recordings = RecordingRow.rows_of(tables["recordings"])
+    kinds = {(row.sensor, row.recording): row.kind for row in recordings}
     reasons = {
         (failure.sensor, failure.recording): failure.reason
         for failure in reversed(failures)
@@ -144,23 +153,28 @@ def with_failures(
     marked["recordings"] = build(
         "recordings",
         (
-            row | {"status": "failed", "reason": reasons[key]} | _NOT_JUDGED
+            replace(row, status="failed", reason=reasons[key], fitness=None, decides=False)
             if key in reasons
             else row
-            for row in tables["recordings"].to_pylist()
-            for key in [(row["sensor"], row["recording"])]
+            for row in recordings
+            for key in [(row.sensor, row.recording)]
         ),
     )
     of_recordings = [failure for failure in failures if failure.recording]
-    listed = tables["findings"].to_pylist()
-    rows = [
+    listed = FindingRow.rows_of(tables["findings"])
+    found = [
         failure.finding().row(failure.sensor, str(failure.recording)) for failure in of_recordings
     ]
-    marked["findings"] = build("findings", [*listed, *(row for row in rows if row not in listed)])
-    before = tables["failures"].to_pylist() if "failures" in tables else []
-    new = [row for row in map(asdict, failures) if row not in before]
-    marked["failures"] = build("failures", [*before, *new])
+    marked["findings"] = build("findings", with_new(listed, found))
+    before = FailureRow.rows_of(tables["failures"]) if "failures" in tables else []
+    marked["failures"] = build("failures", with_new(before, [one.row() for one in failures]))
     return marked
+
+
+def with_new(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
+    """Return rows of a table, and after them those of others that are not among them."""
+    known = {tuple(row.values()) for row in listed}
+    return [*listed, *(row for row in rows if tuple(row.values()) not in known)]
 
 
 def without(
