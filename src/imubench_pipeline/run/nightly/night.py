@@ -176,8 +176,10 @@ class Night:
         finished = datetime.now(UTC)
         fields: dict[str, Any] = {"outcome": "failed"}
         after, analysed = None, before.recordings if before else {}
+        tables = None
         try:
-            tables = {} if failure else load_tables(self.results)
+            if not failure:
+                tables = load_tables(self.results)
         except (OSError, ValueError) as error:
             failure = [f"the tables cannot be read: {error}"]
         held_back = {skip.recording for skip in skips if skip.held_back}
@@ -185,7 +187,7 @@ class Night:
         skips = [*skips, *(Skip(name, _WRITTEN_TO, held_back=False) for name in late)]
         was_skipped = before.skipped if before else {}
         since = {skip.recording: was_skipped.get(skip.recording, self._began) for skip in skips}
-        if not failure:
+        if tables is not None:
             logs = {name: log.files for name, log in seen.items() if name not in held_back}
             after = state_of(tables, finished, logs, since)
             fields = compared(before, after, tables, late)

@@ -5,22 +5,22 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
 from datetime import datetime
+from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
-from imubench_pipeline.model.recordings import FindingRow
+from imubench_pipeline.model.comparisons import DriftRow, RankingRow
+from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
+from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
+from imubench_pipeline.model.table import OfRecordingRow, R
 from imubench_pipeline.report.run_summary import serious
 from imubench_pipeline.run.nightly.settling import Signature
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
-
-Rows = list[dict[str, Any]]
-
-_OF_A_RECORDING = ("recordings", "parameters", "fixed_bias")
-"""The tables whose rows tell whether a recording was analysed again with another outcome."""
 
 
 class StateError(ValueError):
@@ -129,7 +129,21 @@ def read_state(path: Path) -> State | None:
         ) from error
 
 
-def load_tables(results: Path) -> dict[str, Rows]:
+@dataclass(frozen=True)
+class RunRows:
+    """The rows of the tables of a run that a state is made of."""
+
+    recordings: list[RecordingRow]
+    parameters: list[ParameterRow]
+    """Of the recommended methods."""
+    fixed_bias: list[FixedBiasRow]
+    failures: list[FailureRow]
+    findings: list[FindingRow]
+    drift: list[DriftRow]
+    ranking: list[RankingRow]
+
+
+def load_tables(results: Path) -> RunRows:
     """Return the rows of the tables that a state is made of.
 
     Raises
@@ -137,80 +151,87 @@ def load_tables(results: Path) -> dict[str, Rows]:
     OSError, ValueError
         If one is not there, or is of another form.
     """
-    tables: dict[str, Rows] = {}
-    for name in (*_OF_A_RECORDING, "failures", "findings", "drift", "ranking"):
-        table = read(name, [results / f"tables/{name}.parquet"])
-        if name == "parameters":
-            table = table.filter(table["recommended"])
-        tables[name] = table.to_pylist()
-    return tables
+
+    def rows(of: type[R]) -> list[R]:
+        return of.rows_of(read(of.table, [results / f"tables/{of.table}.parquet"]))
+
+    return RunRows(
+        recordings=rows(RecordingRow),
+        parameters=[row for row in rows(ParameterRow) if row.recommended],
+        fixed_bias=rows(FixedBiasRow),
+        failures=rows(FailureRow),
+        findings=rows(FindingRow),
+        drift=rows(DriftRow),
+        ranking=rows(RankingRow),
+    )
 
 
 def state_of(
-    tables: Mapping[str, Rows],
+    tables: RunRows,
     finished: datetime,
     logs: Mapping[str, Signature],
     skipped: Mapping[str, datetime],
 ) -> State:
     """Return the state after a run, of tables as of `load_tables` and the logs that were read."""
     rejected = {
-        name_in(row): row["reason"] or "no reason is kept"
-        for row in tables["recordings"]
-        if row["status"] == "rejected"
+        name_in(row): row.reason or "no reason is kept"
+        for row in tables.recordings
+        if row.status == "rejected"
     }
-    findings = [FindingRow(**row) for row in tables["findings"]]
     return State(
         finished=finished,
         logs=dict(logs),
         recordings={
             name: Known(digest, rejected.get(name)) for name, digest in _digests(tables).items()
         },
-        warned=sorted({warned(row) for row in serious(findings)}, key=str),
-        drifted=sorted({drifted(row) for row in changes(tables["drift"])}),
-        leaders=leading(tables["ranking"]),
+        warned=sorted({warned(row) for row in serious(tables.findings)}, key=str),
+        drifted=sorted({drifted(row) for row in changes(tables.drift)}),
+        leaders=leading(tables.ranking),
         skipped=dict(skipped),
     )
 
 
-def name_in(row: Mapping[str, Any]) -> str:
+def name_in(row: OfRecordingRow | RecordingRow | FailureRow | DriftRow) -> str:
     """Return sensor and name of the recording of a row."""
-    return f"{row['sensor']}/{row['recording']}"
+    return f"{row.sensor}/{row.recording}"
 
 
-def warned(row: Mapping[str, Any]) -> Warned:
-    """Return what names a row of the table ``findings``."""
-    return Warned(name_in(row), row["channel"], row["finding"])
+def warned(row: FindingRow) -> Warned:
+    """Return what names a finding."""
+    return Warned(name_in(row), row.channel, row.finding)
 
 
-def changes(drift: Iterable[dict[str, Any]]) -> Rows:
-    """Return the rows of the table ``drift`` that say that a device has changed."""
-    return [row for row in drift if row["verdict"] == "changed"]
+def changes(drift: Iterable[DriftRow]) -> list[DriftRow]:
+    """Return the rows that say that a device has changed."""
+    return [row for row in drift if row.verdict == "changed"]
 
 
-def drifted(row: Mapping[str, Any]) -> Drifted:
+def drifted(row: DriftRow) -> Drifted:
     """Return what names a row of the table ``drift``."""
-    return Drifted(*(row[column] for column in Drifted._fields))
+    return Drifted(row.sensor, row.device, row.channel, row.parameter, row.recording)
 
 
-def leading(ranking: Iterable[Mapping[str, Any]]) -> dict[str, Leader | None]:
+def leading(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
     """Return the sensor that comes first for each requirement; None where none can be ranked."""
     first: dict[str, Leader | None] = {}
     margins: dict[str, float] = {}
     for row in ranking:
-        if row["decides"]:
-            name = row["requirement"]
+        if row.decides:
+            name = row.requirement
             first.setdefault(name, None)
-            margin = row["margin"] or 0.0
-            if row["rank"] == 1 and (name not in margins or margin > margins[name]):
-                first[name] = Leader(row["sensor"], not row["verdict"].endswith("fails"))
+            margin = row.margin or 0.0
+            if row.rank == 1 and (name not in margins or margin > margins[name]):
+                first[name] = Leader(row.sensor, not row.verdict.endswith("fails"))
                 margins[name] = margin
     return first
 
 
-def _digests(tables: Mapping[str, Rows]) -> dict[str, str]:
-    """Return a digest of what the tables say of each recording."""
-    digests = {name_in(row): hashlib.sha256() for row in tables["recordings"]}
-    for table in _OF_A_RECORDING:
-        for row in tables[table]:
-            digests[name_in(row)].update(json.dumps(row, sort_keys=True).encode())
+def _digests(tables: RunRows) -> dict[str, str]:
+    """Return a digest of what the tables say of each recording: another one of another outcome."""
+    digests = {name_in(row): hashlib.sha256() for row in tables.recordings}
+    rows = chain[RecordingRow | ParameterRow | FixedBiasRow](
+        tables.recordings, tables.parameters, tables.fixed_bias
+    )
+    for row in rows:
+        digests[name_in(row)].update(json.dumps(dict(row), sort_keys=True).encode())
     return {name: digest.hexdigest()[:16] for name, digest in digests.items()}

@@ -8,13 +8,11 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
-from imubench_pipeline.model.comparisons import RankingRow
-from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.report.run_summary import leaders, left_out, one_line, serious
 from imubench_pipeline.run.nightly.state import (
     Known,
     Leader,
-    Rows,
+    RunRows,
     State,
     changes,
     drifted,
@@ -139,7 +137,7 @@ class Summary(BaseModel):
 
 
 def compared(
-    before: State | None, after: State, tables: Mapping[str, Rows], without: Iterable[str]
+    before: State | None, after: State, tables: RunRows, without: Iterable[str]
 ) -> dict[str, Any]:
     """Return what is new in a state since the last successful run, as fields of the summary.
 
@@ -163,8 +161,8 @@ def compared(
         "removed": [name for name in was.recordings if name not in after.recordings],
         "failed": [
             Failed(**row)
-            for row in tables["failures"]
-            if row["recording"] is None or name_in(row) not in written_to
+            for row in tables.failures
+            if row.recording is None or name_in(row) not in written_to
         ],
         "rejected": [
             Rejected(
@@ -177,12 +175,12 @@ def compared(
         ],
         "warnings": [
             NewWarning.model_validate({**row, "recording": name_in(row)})
-            for row in serious(FindingRow(**row) for row in tables["findings"])
+            for row in serious(tables.findings)
             if name_in(row) not in written_to and warned(row) not in known_warnings
         ],
         "drift": [
-            Drift.model_validate(row)
-            for row in changes(tables["drift"])
+            Drift.model_validate(dict(row))
+            for row in changes(tables.drift)
             if name_in(row) not in written_to and drifted(row) not in known_drift
         ],
         "first": list(_first(was, after, tables)),
@@ -199,17 +197,16 @@ def _because(name: str, was: State, now: State) -> str:
     return "settings, or the code of the analysis, changed"
 
 
-def _first(was: State, now: State, tables: Mapping[str, Rows]) -> Iterator[First]:
+def _first(was: State, now: State, tables: RunRows) -> Iterator[First]:
     for name, leader in now.leaders.items():
         if name in was.leaders and leader == was.leaders[name]:
             continue
-        of_it = [RankingRow(**row) for row in tables["ranking"] if row["requirement"] == name]
-        recordings = [RecordingRow(**row) for row in tables["recordings"]]
+        of_it = [row for row in tables.ranking if row.requirement == name]
         yield First(
             requirement=name,
             sensor=leader and leader.sensor,
             before=_shown(was.leaders.get(name)),
-            said=next(leaders(of_it, recordings)),
+            said=next(leaders(of_it, tables.recordings)),
         )
 
 
