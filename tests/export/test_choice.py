@@ -1,6 +1,3 @@
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -8,6 +5,7 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.export.choice import choose, parameter_notes
 from imubench_pipeline.export.imu import ExportError
+from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.tables.keys import Key
 
@@ -22,9 +20,9 @@ def estimate(method: str = "likelihood", **values: float | Parameter | None) -> 
 
 def rows(
     channel: str, found: Estimate, recording: str = "a", *, recommended: bool = True
-) -> Sequence[dict[str, Any]]:
+) -> list[ParameterRow]:
     key = Key("mti_7", recording, channel)
-    return [dict(row) for row in parameter_rows(key, found, recommended=recommended)]
+    return list(parameter_rows(key, found, recommended=recommended))
 
 
 # At 60 s x is the best, y the worst; at 1 s y is the best and x the worst.

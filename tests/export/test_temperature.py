@@ -10,8 +10,11 @@ import pytest
 from imubench_pipeline.export import matlab, px4
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.export.temperature import TemperatureEffect, temperature_effect
+from imubench_pipeline.model.estimates import TemperatureRow
+from imubench_pipeline.model.recordings import RecordingRow
 from tests.export.sensors import imu
 from tests.export.test_filters import ekf2
+from tests.rows import typed
 
 RECORDING = {
     "recording": "warm", "device": "serial 7", "temperature_min": 18.0, "temperature_max": 41.0,
@@ -26,19 +29,24 @@ FIGURES = {
 Figures = dict[str, tuple[float | None, float | None, float | None, str]]
 
 
-def rows(channel: str, compensated: bool = True, **changes: Any) -> list[dict[str, Any]]:
+def rows(channel: str, compensated: bool = True, **changes: Any) -> list[TemperatureRow]:
     """Rows of the table ``temperature``; ``changes`` by parameter."""
     names = ("value", "lower", "upper", "status")
-    return [
-        {"channel": channel, "parameter": name, "compensated": compensated, "reason": "why"}
-        | dict(zip(names, changes.get(name, figure), strict=True))
-        for name, figure in FIGURES.items()
-    ]
+    about = {"channel": channel, "compensated": compensated, "reason": "why"}
+    figures = {name: changes.get(name, figure) for name, figure in FIGURES.items()}
+    return typed(
+        TemperatureRow,
+        [
+            about | {"parameter": name} | dict(zip(names, figure, strict=True))
+            for name, figure in figures.items()
+        ],
+    )
 
 
-def effect(*given: list[dict[str, Any]], horizon: float = 60.0, **about: Any) -> TemperatureEffect:
+def effect(*given: list[TemperatureRow], horizon: float = 60.0, **about: Any) -> TemperatureEffect:
     listed = [row for one in given for row in one]
-    return temperature_effect(listed, RECORDING | about, "gyro", horizon)
+    (recording,) = typed(RecordingRow, [RECORDING | about])
+    return temperature_effect(listed, recording, "gyro", horizon)
 
 
 def px4_offset(found: dict[str, float], axis: int, temperature: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,24 +20,22 @@ from imubench_pipeline.estimators.estimate import (
     JointDraws,
     Parameter,
 )
+from imubench_pipeline.model.estimates import AllanRow, DrawRow, ParameterRow
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.keys import Key, divided
-from imubench_pipeline.typing import Row
 
 
-def allan_rows(key: Key, curve: AllanCurve) -> Iterator[Row]:
+def allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
     """Yield the rows of the table ``allan``."""
     for i, limits in enumerate(limit_rows(curve)):
-        yield (
-            asdict(key)
-            | limits
-            | {
-                "cluster_size": int(curve.cluster_size[i]),
-                "averaged": float(curve.averaged[i]),
-                "exponent": int(curve.exponent[i]),
-                "share": float(curve.share[i]),
-            }
+        yield AllanRow(
+            **asdict(key),
+            **limits,
+            cluster_size=int(curve.cluster_size[i]),
+            averaged=float(curve.averaged[i]),
+            exponent=int(curve.exponent[i]),
+            share=float(curve.share[i]),
         )
 
 
@@ -55,34 +54,41 @@ def limit_rows(curve: AllanCurve) -> Iterator[dict[str, Any]]:
         }
 
 
-def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterator[Row]:
+def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterator[ParameterRow]:
     """Yield the rows of the table ``parameters``."""
     units = SI_UNITS[quantity_of(key.channel)]
     for component, name, parameter in estimate.components():
-        yield asdict(key) | {
-            "method": estimate.method,
-            "recommended": recommended,
-            "model": estimate.model.name,
-            "component": component,
-            "parameter": name,
-            "unit": units[name],
-            **asdict(parameter),
-        }
+        yield ParameterRow(
+            **asdict(key),
+            method=estimate.method,
+            recommended=recommended,
+            model=estimate.model.name,
+            component=component,
+            parameter=name,
+            value=parameter.value,
+            lower=parameter.lower,
+            upper=parameter.upper,
+            unit=units[name],
+            status=parameter.status,
+            reason=parameter.reason,
+            duration_needed=parameter.duration_needed,
+            fitted=parameter.fitted,
+        )
 
 
-def draw_rows(key: Key, estimate: Estimate) -> Iterator[Row]:
+def draw_rows(key: Key, estimate: Estimate) -> Iterator[DrawRow]:
     """Yield the rows of the table ``draws``; none of an estimate that has no joint draws."""
     if estimate.draws is None:
         return
     for number, (first, further) in enumerate(
         zip(estimate.draws.first.tolist(), estimate.draws.further.tolist(), strict=True)
     ):
-        key_columns = asdict(key) | {"method": estimate.method, "draw": number}
+        draw = partial(DrawRow, **asdict(key), method=estimate.method, draw=number)
         nonzero = {name: value for name, value in zip(FAMILY, first, strict=True) if value}
-        yield key_columns | {"component": 1} | nonzero
+        yield draw(component=1, **nonzero)
         for component, (B, T_B) in enumerate(further, start=2):
             if B:
-                yield key_columns | {"component": component, "B": B, "T_B": T_B}
+                yield draw(component=component, B=B, T_B=T_B)
 
 
 def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
@@ -124,21 +130,21 @@ def _estimates(table: pa.Table, joint: Path | None) -> dict[str, list[Estimate]]
     drawn = draws(joint) if joint is not None else {}
     estimates_of_channels: dict[str, list[Estimate]] = {}
     for (channel, method), rows in divided(table, "channel", "method").items():
-        estimate = estimate_of(method, rows.to_pylist())
+        estimate = estimate_of(method, ParameterRow.rows_of(rows))
         estimate = replace(estimate, draws=drawn.get((channel, method)))
         estimates_of_channels.setdefault(channel, []).append(estimate)
     return estimates_of_channels
 
 
-def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
+def estimate_of(method: str, rows: Iterable[ParameterRow]) -> Estimate:
     """Return the estimate that rows of the table ``parameters`` stand for."""
     components: dict[int, dict[str, Parameter]] = {}
     lines: dict[int, dict[str, Parameter]] = {}
     of_curve: dict[str, Parameter] = {}
     for row in rows:
-        name = row["parameter"]
+        name = row.parameter
         group = lines if name in ("amplitude", "frequency") else components
-        place = of_curve if name in CURVE else group.setdefault(row["component"], {})
+        place = of_curve if name in CURVE else group.setdefault(row.component, {})
         place[name] = Parameter(**{field.name: row[field.name] for field in fields(Parameter)})
     first = components.pop(1, {})
     return Estimate(method, first, list(components.values()), list(lines.values()), of_curve)

@@ -12,7 +12,7 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError
 from imubench_pipeline.export.temperature import AXES
-from imubench_pipeline.typing import Row
+from imubench_pipeline.model.estimates import ParameterRow
 
 Key = tuple[str, str]  # recording, channel
 _Estimated = tuple[str, str, str]  # and method
@@ -36,7 +36,7 @@ class Choice:
 
 
 def choose(
-    rows: Iterable[Row],
+    rows: Iterable[ParameterRow],
     quantity: str,
     *,
     axis: str = WORST,
@@ -52,8 +52,8 @@ def choose(
 
     Parameters
     ----------
-    rows : iterable of mapping
-        Of the table ``parameters``, of one sensor.
+    rows : iterable of ParameterRow
+        Of one sensor.
     quantity : {"gyro", "accel"}
     axis : str
         ``worst``, ``median`` (of an even number the larger of the two in the middle), or a device
@@ -70,11 +70,11 @@ def choose(
     ExportError
         If there is no estimate of the quantity, or of the device.
     """
-    everywhere: dict[_Estimated, list[Row]] = {}
+    everywhere: dict[_Estimated, list[ParameterRow]] = {}
     for row in rows:
-        wanted = row["recommended"] if method is None else row["method"] == method
-        if wanted and row["channel"].startswith(f"{quantity}_"):
-            key = (row["recording"], row["channel"], row["method"])
+        wanted = row.recommended if method is None else row.method == method
+        if wanted and row.channel.startswith(f"{quantity}_"):
+            key = (row.recording, row.channel, row.method)
             everywhere.setdefault(key, []).append(row)
     estimated = everywhere
     if axis not in (WORST, MEDIAN):
@@ -115,7 +115,7 @@ def choose(
 
 
 def _ranked(
-    estimated: Mapping[_Estimated, Sequence[Row]], horizon: float
+    estimated: Mapping[_Estimated, Sequence[ParameterRow]], horizon: float
 ) -> list[tuple[float, _Estimated, Estimate]]:
     """Return the axes with white noise, in the order of their Allan deviation at the horizon."""
     ranked = []

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -21,6 +20,9 @@ from imubench_pipeline.export.overbound import MOST_EXCESS, overbound
 from imubench_pipeline.export.smallest_model import FAMILIES, Family
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.export.temperature import TemperatureEffect, temperature_effect
+from imubench_pipeline.model.estimates import AllanRow, ParameterRow, TemperatureRow
+from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.model.table import R
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
@@ -115,42 +117,42 @@ def made(tables: Tables, request: Request, recordings: Path | None = None) -> st
 
 def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
     """Return the sensor's noise as a request asks for it (see `made`)."""
-    recordings = _rows(tables["recordings"], sensor=request.sensor)
+    recordings = _rows(RecordingRow, tables, sensor=request.sensor)
     if not recordings:
         sensors = sorted(set(tables["recordings"]["sensor"].to_pylist()))
         raise ExportError(f"no sensor {request.sensor!r}; there are: {', '.join(sensors)}")
-    by_name = {row["recording"]: row for row in recordings}
+    by_name = {row.recording: row for row in recordings}
     rows, cautions = _deciding(tables, request, recordings)
     axes: dict[str, AxisNoise] = {}
     rates: list[float] = []
     effects: dict[str, TemperatureEffect] = {}
     simulated = False
     for quantity in ("gyro", "accel"):
-        if not any(row["channel"].startswith(f"{quantity}_") for row in rows):
+        if not any(row.channel.startswith(f"{quantity}_") for row in rows):
             continue
         choice = choose(
             rows,
             quantity,
             axis=request.axis,
             horizon=request.horizon,
-            devices={row["recording"]: row["device"] for row in recordings},
+            devices={row.recording: row.device for row in recordings},
             method=request.method,
         )
         about = by_name[choice.recording]
-        if about["doubts"]:
-            cautions.append(f"{choice.recording} is in doubt: {about['doubts']}")
-        simulated = simulated or bool(about["simulated"])
-        if about["rate"] is None:
+        if about.doubts:
+            cautions.append(f"{choice.recording} is in doubt: {about.doubts}")
+        simulated = simulated or about.simulated
+        if about.rate is None:
             raise ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
-        rates.append(float(f"{about['rate']:.9g}"))  # stamps are not sure of more
+        rates.append(float(f"{about.rate:.9g}"))  # stamps are not sure of more
         axes[quantity] = choice.axis
-        warmed = _rows(tables["temperature"], sensor=request.sensor, recording=choice.recording)
+        place = {"sensor": request.sensor, "recording": choice.recording}
+        warmed = _rows(TemperatureRow, tables, **place)
         effects[quantity] = temperature_effect(warmed, about, quantity, request.horizon)
         if request.overbound:
-            rate = float(about["rate"])
-            axes[quantity] = _bounded(tables["allan"], choice, request, rate, folder)
+            axes[quantity] = _bounded(tables, choice, request, about.rate, folder)
     if not axes:
-        reasons = "; ".join(row["reason"] for row in recordings if row["reason"])
+        reasons = "; ".join(row.reason for row in recordings if row.reason)
         raise ExportError(f"{request.sensor}: no estimate; its recordings are left out: {reasons}")
     gravity = STANDARD_GRAVITY if request.latitude is None else normal_gravity(request.latitude)
     return Imu(
@@ -169,22 +171,22 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
 
 
 def _deciding(
-    tables: Tables, request: Request, recordings: Sequence[Mapping[str, Any]]
-) -> tuple[list[dict[str, Any]], list[str]]:
+    tables: Tables, request: Request, recordings: Sequence[RecordingRow]
+) -> tuple[list[ParameterRow], list[str]]:
     """Return the estimates that an export may stand on, and what is to be said of the others."""
-    rows = _rows(tables["parameters"], sensor=request.sensor)
+    rows = _rows(ParameterRow, tables, sensor=request.sensor)
     apart = left_out(recordings)
     without = [
-        f"left out: {row['recording']} is {row['status']}: {row['reason']}"
+        f"left out: {row.recording} is {row.status}: {row.reason}"
         for row in recordings
-        if row["status"] != "ok"
+        if row.status != "ok"
     ]
     if not apart:
         return rows, without
     reasons = "; ".join(apart.values())
     if (request.because or "").strip():
         return rows, [f"{reasons}; used all the same, because: {request.because}", *without]
-    deciding = [row for row in rows if (row["sensor"], row["recording"]) not in apart]
+    deciding = [row for row in rows if (row.sensor, row.recording) not in apart]
     if rows and not deciding:
         raise ExportError(
             f"{request.sensor}: {reasons}; look at the findings, or say why it may be used all the "
@@ -201,14 +203,13 @@ def _drawn(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseMo
 
 
 def _bounded(
-    allan: pa.Table, choice: Choice, request: Request, rate: float, folder: Path | None
+    tables: Tables, choice: Choice, request: Request, rate: float, folder: Path | None
 ) -> AxisNoise:
     """Return the smallest model above the measured curve of the axis that was chosen."""
     family = TARGETS[request.target].family
     drawn = _drawn(folder, request.sensor, choice)
-    curve = curve_of(
-        _rows(allan, sensor=request.sensor, recording=choice.recording, channel=choice.channel)
-    )
+    place = {"sensor": request.sensor, "recording": choice.recording, "channel": choice.channel}
+    curve = curve_of(_rows(AllanRow, tables, **place))
     try:
         bound = overbound(
             curve,
@@ -242,20 +243,21 @@ def _holding(family: Family) -> str:
     return "".join(f"; {other} is held by {names}" for other, names in kinds.items() if names)
 
 
-def curve_of(rows: list[dict[str, Any]]) -> AllanCurve:
+def curve_of(rows: Sequence[AllanRow]) -> AllanCurve:
     """Return the curve of rows of the table ``allan`` of one channel; ExportError without any."""
     if not rows:
         raise ExportError("the channel has no Allan variance")
     return AllanCurve(
-        tau=np.array([row["tau"] for row in rows]),
-        cluster_size=np.array([row["cluster_size"] for row in rows], dtype=np.int64),
-        variance=np.array([row["adev"] for row in rows]) ** 2,
-        edf=np.array([row["edf"] for row in rows]),
-        edf_upper=np.array([row["edf_upper"] for row in rows]),
+        tau=np.array([row.tau for row in rows]),
+        cluster_size=np.array([row.cluster_size for row in rows], dtype=np.int64),
+        variance=np.array([row.adev for row in rows]) ** 2,
+        edf=np.array([row.edf for row in rows]),
+        edf_upper=np.array([row.edf_upper for row in rows]),
     )
 
 
-def _rows(table: pa.Table, **wanted: str) -> list[dict[str, Any]]:
+def _rows(of: type[R], tables: Tables, **wanted: str) -> list[R]:
+    table = tables[of.table]
     for name, value in wanted.items():
         table = table.filter(pc.equal(table[name], value))
-    return list(table.to_pylist())
+    return of.rows_of(table)

@@ -12,7 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from imubench_pipeline.typing import Row
+from imubench_pipeline.model.estimates import TemperatureRow
+from imubench_pipeline.model.recordings import RecordingRow
 
 AXES = "xyz"
 
@@ -50,30 +51,29 @@ class TemperatureEffect:
 
 
 def temperature_effect(
-    rows: Iterable[Row], recording: Row, quantity: str, horizon: float
+    rows: Iterable[TemperatureRow], recording: RecordingRow, quantity: str, horizon: float
 ) -> TemperatureEffect:
     """Return what temperature adds to the axes of a quantity in one recording.
 
-    `rows` are those of the table ``temperature`` of the recording, `recording` its row of
-    ``recordings``. A sensor that may follow the temperature later than the `horizon`, how long the
-    program goes without a measurement, s, is left out.
+    `rows` are those of the recording. A sensor that may follow the temperature later than the
+    `horizon`, how long the program goes without a measurement, s, is left out.
     """
-    low, high = recording["temperature_min"], recording["temperature_max"]
-    by_axis: dict[str, dict[str, Row]] = {}
+    low, high = recording.temperature_min, recording.temperature_max
+    by_axis: dict[str, dict[str, TemperatureRow]] = {}
     for row in rows:
-        of, axis = row["channel"].split("_")
+        of, axis = row.channel.split("_")
         if of == quantity:
-            by_axis.setdefault(axis, {})[row["parameter"]] = row
+            by_axis.setdefault(axis, {})[row.parameter] = row
     if not by_axis or low is None or high is None:
-        why = f"{recording['recording']} has no readings of the temperature"
+        why = f"{recording.recording} has no readings of the temperature"
         return TemperatureEffect(notes=[f"left out: {why}"])
-    reference = float(min(by_axis.items())[1]["T_0"]["value"])
+    reference = _value(min(by_axis.items())[1]["T_0"])
     unit = {"gyro": "rad/s", "accel": "m/s^2"}[quantity]
     slope: dict[str, float] = {}
     square: dict[str, float] = {}
     notes = [
-        f"T_0 = {reference:.2f} degC, of recording {recording['recording']}, device "
-        f"{recording['device']}: it holds for that device, from {low:.2f} to {high:.2f} degC"
+        f"T_0 = {reference:.2f} degC, of recording {recording.recording}, device "
+        f"{recording.device}: it holds for that device, from {low:.2f} to {high:.2f} degC"
     ]
     for axis in AXES:
         if axis not in by_axis:
@@ -84,28 +84,34 @@ def temperature_effect(
         if reason is not None:
             notes.append(f"axis {axis} left out: {reason}")
             continue
-        q = fit["quadratic"]["value"] or 0.0
+        s, q = fit["sensitivity"], fit["quadratic"].value or 0.0
         # The axes of one quantity may come from files whose mean temperatures differ.
-        slope[axis] = fit["sensitivity"]["value"] + 2.0 * q * (reference - fit["T_0"]["value"])
+        slope[axis] = _value(s) + 2.0 * q * (reference - _value(fit["T_0"]))
         if q:
             square[axis] = q
-        s = fit["sensitivity"]
         bends = f", square {q:.3e} {unit}/K^2" if q else ""
         notes.append(
-            f"axis {axis}: {s['value']:.4e} {unit}/K, 95 % limits {s['lower']:.3e} to "
-            f"{s['upper']:.3e}{bends}; {_lag_words(fit['lag'])}"
+            f"axis {axis}: {s.value:.4e} {unit}/K, 95 % limits {s.lower:.3e} to "
+            f"{s.upper:.3e}{bends}; {_lag_words(fit['lag'])}"
         )
     return TemperatureEffect(reference, float(low), float(high), slope, square, notes)
 
 
-def _reason_against(fit: Mapping[str, Row], span: float, horizon: float) -> str | None:
+def _value(row: TemperatureRow) -> float:
+    """Return the value of T_0, or of a sensitivity that is safe to correct with."""
+    if row.value is None:
+        raise ValueError(f"{row.channel}: {row.parameter} has no value: {row.reason}")
+    return row.value
+
+
+def _reason_against(fit: Mapping[str, TemperatureRow], span: float, horizon: float) -> str | None:
     """Return why a fit is not safe to correct with; None where it is."""
     s, lag = fit["sensitivity"], fit["lag"]
-    if s["value"] is None or s["lower"] is None or s["upper"] is None:
-        return f"the sensitivity is {s['status'].replace('_', ' ')}: {s['reason']}"
-    if not s["compensated"]:
-        return f"the log does not show it: {s['reason']}"
-    error = 0.5 * (s["upper"] - s["lower"]) / abs(s["value"])
+    if s.value is None or s.lower is None or s.upper is None:
+        return f"the sensitivity is {s.status.replace('_', ' ')}: {s.reason}"
+    if not s.compensated:
+        return f"the log does not show it: {s.reason}"
+    error = 0.5 * (s.upper - s.lower) / abs(s.value)
     if error > _LEAST_KNOWN:
         return (
             f"it is known to {100 * error:.0f} % only, by the noise and by what the register of "
@@ -113,10 +119,10 @@ def _reason_against(fit: Mapping[str, Row], span: float, horizon: float) -> str 
         )
     if span < _LEAST_RANGE:
         return f"the temperature varies by {span:.2g} K only; {_LEAST_RANGE:g} K is needed"
-    if lag["status"] != "absent":
-        longest = lag["upper"]
+    if lag.status != "absent":
+        longest = lag.upper
         if longest is None:
-            return f"its lag is {lag['status'].replace('_', ' ')}: {lag['reason']}"
+            return f"its lag is {lag.status.replace('_', ' ')}: {lag.reason}"
         if longest > horizon:
             return (
                 f"it may lag the temperature by {longest:.3g} s, longer than the horizon of "
@@ -125,7 +131,7 @@ def _reason_against(fit: Mapping[str, Row], span: float, horizon: float) -> str 
     return None
 
 
-def _lag_words(lag: Row) -> str:
-    if lag["upper"] is None:
+def _lag_words(lag: TemperatureRow) -> str:
+    if lag.upper is None:
         return "no lag"
-    return f"a lag of up to {lag['upper']:.3g} s is not corrected"
+    return f"a lag of up to {lag.upper:.3g} s is not corrected"

@@ -364,8 +364,8 @@ def _table(estimates: Any, units: System) -> pd.DataFrame:
         key = Key(sensor, recording, estimate.channel)
         for row in parameter_rows(key, estimate, recommended=True):
             kept = {name: value for name, value in row.items() if name != "recommended"}
-            if units == "practical" and row["parameter"] in SHOWN:
-                unit = page_unit(estimate.quantity, row["parameter"], "practical")
+            if units == "practical" and row.parameter in SHOWN:
+                unit = page_unit(estimate.quantity, row.parameter, "practical")
                 for name in ("value", "lower", "upper", "fitted"):
                     kept[name] = None if row[name] is None else row[name] * unit.per_si
                 kept["unit"] = unit.sign

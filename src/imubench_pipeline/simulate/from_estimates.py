@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.estimators.rows import estimate_of
+from imubench_pipeline.model.estimates import (
+    FixedBiasRow,
+    LowPassRow,
+    ParameterRow,
+    TemperatureRow,
+)
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.settings.sensor import CHANNELS, quantity_of
 from imubench_pipeline.settings.validation import ConfigError
@@ -19,7 +25,6 @@ from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, befo
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
 
-Rows = list[dict[str, Any]]
 _NEEDED = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
 
 
@@ -45,7 +50,7 @@ def with_estimates(
     except (OSError, ValueError) as error:
         raise ConfigError(str(error)) from error
     recorded = _recording(tables["recordings"], folder, name, recording)
-    chosen = recorded["recording"]
+    chosen = recorded.recording
     of_log = {
         table: tables[table].filter(
             (pc.field("sensor") == name) & (pc.field("recording") == chosen)
@@ -56,13 +61,12 @@ def with_estimates(
     figures: dict[str, list[Remark]] = {}
     topics: list[set[Topic]] = []
     for channel in CHANNELS:
-        of_channel = {
-            table: rows.filter(pc.field("channel") == channel).to_pylist()
-            for table, rows in of_log.items()
-        }
-        if of_channel["parameters"]:
+        of_channel = _Estimated.of(
+            {table: rows.filter(pc.field("channel") == channel) for table, rows in of_log.items()}
+        )
+        if of_channel.parameters:
             axis = _Axis(printed, channel, of_channel, f"{name}/{chosen}")
-            axes[channel] = axis.model(float(recorded["rate"]))
+            axes[channel] = axis.model(_rate(recorded))
             topics.append({remark.topic for remark in axis.remarks})
             of_datasheet = printed.figures.get(channel, [])
             figures[channel] = [
@@ -79,7 +83,7 @@ def with_estimates(
         [remark for remark in printed.assumed if remark.topic not in estimated],
         name,
     )
-    if recorded["simulated"]:
+    if recorded.simulated:
         origin.assume("log", f"{name}/{chosen} is itself simulated")
     if any(quantity_of(channel) == "accel" for channel in axes):
         text = "accel: the mean of a recording is mostly gravity, so it is no bias here"
@@ -87,12 +91,10 @@ def with_estimates(
     return origin
 
 
-def _recording(
-    recordings: pa.Table, folder: Path, name: str, asked: str | None
-) -> Mapping[str, Any]:
+def _recording(recordings: pa.Table, folder: Path, name: str, asked: str | None) -> RecordingRow:
     """Return the row of the recording to take: that asked for, or the longest."""
-    of_sensor = recordings.filter(pc.field("sensor") == name).to_pylist()
-    usable = {row["recording"]: row for row in of_sensor if row["status"] == "ok"}
+    of_sensor = RecordingRow.rows_of(recordings.filter(pc.field("sensor") == name))
+    usable = {row.recording: row for row in of_sensor if row.status == "ok"}
     if not usable:
         sensors = ", ".join(sorted(set(recordings["sensor"].to_pylist()))) or "none"
         raise ConfigError(f"{folder}: no estimate of sensor {name!r}; there are: {sensors}")
@@ -100,19 +102,47 @@ def _recording(
         raise ConfigError(
             f"{folder}: no recording {asked!r} of {name}; there are: {', '.join(usable)}"
         )
-    longest = max(usable, key=lambda key: (usable[key]["duration"], key))
+    longest = max(usable, key=lambda key: (usable[key].duration or 0.0, key))
     return usable[asked or longest]
+
+
+def _rate(recording: RecordingRow) -> float:
+    if recording.rate is None:
+        raise ConfigError(f"{recording.sensor}/{recording.recording}: its rate is not known")
+    return recording.rate
+
+
+@dataclass(frozen=True)
+class _Estimated:
+    """What the tables of a run have of one channel."""
+
+    parameters: Sequence[ParameterRow]
+    fixed_bias: Sequence[FixedBiasRow]
+    temperature: Mapping[str, TemperatureRow]
+    """By parameter."""
+    low_pass: Mapping[str, LowPassRow]
+    """By parameter."""
+
+    @classmethod
+    def of(cls, tables: Mapping[str, pa.Table]) -> _Estimated:
+        temperature = TemperatureRow.rows_of(tables["temperature"])
+        low_pass = LowPassRow.rows_of(tables["low_pass"])
+        return cls(
+            ParameterRow.rows_of(tables["parameters"]),
+            FixedBiasRow.rows_of(tables["fixed_bias"]),
+            {row.parameter: row for row in temperature},
+            {row.parameter: row for row in low_pass},
+        )
 
 
 class _Axis:
     """What a run has found of one channel."""
 
-    def __init__(self, printed: Origin, channel: str, tables: Mapping[str, Rows], log: str) -> None:
+    def __init__(self, printed: Origin, channel: str, found: _Estimated, log: str) -> None:
         self._printed = printed.imu.axes.get(channel) or SensorModel()
         self._gravity = quantity_of(channel) == "accel"
-        self._tables, self._log = tables, log
-        self._temperature = {row["parameter"]: row for row in tables["temperature"]}
-        self._low_pass = {row["parameter"]: row for row in tables["low_pass"]}
+        self._found, self._log = found, log
+        self._temperature, self._low_pass = found.temperature, found.low_pass
         self.remarks: list[Remark] = []
 
     def model(self, rate: float) -> SensorModel:
@@ -121,10 +151,10 @@ class _Axis:
         method = "compensated" if self._compensated else None
         rows = [
             row
-            for row in self._tables["parameters"]
-            if (row["method"] == method if method else row["recommended"])
+            for row in self._found.parameters
+            if (row.method == method if method else row.recommended)
         ]
-        estimate = estimate_of(rows[0]["method"], rows)
+        estimate = estimate_of(rows[0].method, rows)
         self._note(
             "noise",
             f"noise {estimate.model.name}: estimated by {estimate.method} from {self._log}, N "
@@ -135,32 +165,33 @@ class _Axis:
 
     @property
     def _compensated(self) -> bool:
-        return any(row["compensated"] for row in self._temperature.values())
+        return any(row.compensated for row in self._temperature.values())
 
     def _note(self, topic: Topic, text: str) -> None:
         self.remarks.append(Remark(topic, text))
 
     def _filter(self) -> LowPass | None:
         cutoff = self._low_pass.get("cutoff")
-        if cutoff is None or cutoff["value"] is None:
+        if cutoff is None or cutoff.value is None or cutoff.order is None:
             return self._printed.low_pass
-        self._note("low-pass", f"cut-off {cutoff['value']:.4g} Hz: estimated from {self._log}")
-        return LowPass(cutoff["value"], cutoff["order"])
+        self._note("low-pass", f"cut-off {cutoff.value:.4g} Hz: estimated from {self._log}")
+        return LowPass(cutoff.value, cutoff.order)
 
     def _drift(self) -> TemperatureDrift | None:
-        if not self._compensated:
+        reference = self._temperature["T_0"].value if self._compensated else None
+        if reference is None:
             return self._printed.drift
         values = {
-            name: row["value"] if row["value"] is not None else row["fitted"]
+            name: row.value if row.value is not None else row.fitted
             for name, row in self._temperature.items()
         }
-        slope, unit = values["sensitivity"] or 0.0, self._temperature["sensitivity"]["unit"]
+        slope, unit = values["sensitivity"] or 0.0, self._temperature["sensitivity"].unit
         self._note(
             "drift", f"temperature sensitivity {slope:.4g} {unit}: estimated from {self._log}"
         )
         return TemperatureDrift(
             sensitivity=slope,
-            reference=values["T_0"],
+            reference=reference,
             quadratic=values["quadratic"] or 0.0,
             lag=values["lag"] or 0.0,
         )
@@ -168,11 +199,11 @@ class _Axis:
     def _bias(self) -> float:
         if self._gravity:
             return self._printed.bias
-        if self._compensated and self._temperature["bias"]["value"] is not None:
-            bias = float(self._temperature["bias"]["value"])
+        bias = self._temperature["bias"].value if self._compensated else None
+        if bias is not None:
             self._note("bias", f"bias {bias:g} rad/s at T_0: estimated from {self._log}")
             return bias
-        for row in self._tables["fixed_bias"]:
-            self._note("bias", f"bias {row['value']:g} rad/s: mean of {self._log}")
-            return float(row["value"])
+        for row in self._found.fixed_bias:
+            self._note("bias", f"bias {row.value:g} rad/s: mean of {self._log}")
+            return row.value
         return self._printed.bias

@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 from imubench_pipeline.estimators.estimate import JointDraws
 from imubench_pipeline.estimators.rows import draws, estimate_of
 from imubench_pipeline.model.comparisons import FusionRow
+from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
 from imubench_pipeline.navigation.fusion.equivalence import (
@@ -52,15 +53,17 @@ def candidates(
     """
     recordings, parameters = tables["recordings"], tables["parameters"]
     warm = _temperature_parts(tables)
-    compensated = parameters.filter(pc.equal(parameters["method"], "compensated")).to_pylist()
-    recommended = parameters.filter(parameters["recommended"]).to_pylist()
+    compensated = ParameterRow.rows_of(
+        parameters.filter(pc.equal(parameters["method"], "compensated"))
+    )
+    recommended = ParameterRow.rows_of(parameters.filter(parameters["recommended"]))
     about = {(row.sensor, row.recording): row for row in RecordingRow.rows_of(recordings)}
     apart = left_out(about.values())
-    groups: dict[tuple[str, str, str, str], list[Row]] = {}
+    groups: dict[tuple[str, str, str, str], list[ParameterRow]] = {}
     used = [row for row in compensated if _channel(row) in warm]
     used += [row for row in recommended if _channel(row) not in warm]
     for row in used:
-        key = (row["sensor"], row["recording"], row["channel"], row["method"])
+        key = (row.sensor, row.recording, row.channel, row.method)
         groups.setdefault(key, []).append(row)
     read = cache(draws)
 

@@ -14,6 +14,7 @@ from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import estimates
 from imubench_pipeline.export.overbound import overbound
 from imubench_pipeline.export.request import curve_of
+from imubench_pipeline.model.estimates import AllanRow
 from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError
@@ -137,7 +138,7 @@ def _bounded(folder: Path, best: Mapping[str, Estimate], horizon: float) -> Mode
     table = read("allan", [folder / "allan.parquet"])
     models = {}
     for channel, estimate in best.items():
-        curve = curve_of(table.filter(pc.field("channel") == channel).to_pylist())
+        curve = curve_of(AllanRow.rows_of(table.filter(pc.field("channel") == channel)))
         rate = float(curve.cluster_size[0] / curve.tau[0])
         drawn = estimate.draws
         many = [drawn.model(number) for number in range(len(drawn))] if drawn is not None else []

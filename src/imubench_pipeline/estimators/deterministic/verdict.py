@@ -21,8 +21,8 @@ from imubench_pipeline.estimators.estimate import (
     Parameter,
     Status,
 )
+from imubench_pipeline.model.estimates import DeterministicRow
 from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.typing import Row
 
 _HEAVY = 0.3
 """Excess kurtosis from which N is known less well than of normal samples."""
@@ -169,24 +169,28 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
     return Verdict(tuple(findings), caveats, widening, growth, scatter)
 
 
-def deterministic_rows(key: Mapping[str, str], unit: str, courses: Courses) -> Iterator[Row]:
+def deterministic_rows(
+    key: Mapping[str, str], unit: str, courses: Courses
+) -> Iterator[DeterministicRow]:
     """Yield the rows of the table ``deterministic``; the key is sensor, recording and channel."""
     for course in courses.courses:
-        yield {
-            **key,
-            "kind": course.kind,
-            "start": course.start,
-            "end": course.end,
-            "size": course.size,
-            "size_lower": course.size_lower,
-            "size_upper": course.size_upper,
-            "unit": unit,
-            "time": course.time,
-            "time_lower": course.time_lower,
-            "time_upper": course.time_upper,
-            "place_error": course.place_error,
-            "gain": course.gain,
-        }
+        yield DeterministicRow(
+            sensor=key["sensor"],
+            recording=key["recording"],
+            channel=key["channel"],
+            kind=course.kind,
+            start=course.start,
+            end=course.end,
+            size=course.size,
+            size_lower=course.size_lower,
+            size_upper=course.size_upper,
+            unit=unit,
+            time=course.time,
+            time_lower=course.time_lower,
+            time_upper=course.time_upper,
+            place_error=course.place_error,
+            gain=course.gain,
+        )
 
 
 def _finding(channel: str, unit: str, course: Course) -> Finding:
