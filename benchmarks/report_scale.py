@@ -25,6 +25,8 @@ import numpy as np
 import pyarrow as pa
 import yaml
 
+from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.report.compare import KEPT as COMPARED
 from imubench_pipeline.report.publish import publish, site_of
@@ -102,9 +104,11 @@ def multiplied(results: Path, number: int) -> dict[str, pa.Table]:
                 for k, (name, f) in enumerate(zip(names, factors, strict=True))
             ]
         )
-    recommended = tables["parameters"].filter(tables["parameters"]["recommended"]).to_pylist()
+    recommended = tables["parameters"].filter(tables["parameters"]["recommended"])
     rows = drift_rows(
-        recommended, tables["fixed_bias"].to_pylist(), tables["recordings"].to_pylist()
+        ParameterRow.rows_of(recommended),
+        FixedBiasRow.rows_of(tables["fixed_bias"]),
+        RecordingRow.rows_of(tables["recordings"]),
     )
     tables["drift"] = build("drift", rows)
     kept = results / "recordings/one/sim_one"

@@ -3,11 +3,15 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
+from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
+from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judgements
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.typing import Row
+from tests.rows import typed
 
 
 def ranking_rows(
@@ -18,6 +22,12 @@ def ranking_rows(
     doubts: Iterable[Row] = (),
     parameters: Iterable[Row] = (),
     backtests: Iterable[Row] = (),
-) -> Iterator[Row]:
-    basis = Basis.of(recordings, doubts, parameters, backtests)
-    return ranked(list(judgements(errors, requirements, sensors, basis)), basis)
+) -> Iterator[RankingRow]:
+    basis = Basis.of(
+        typed(RecordingRow, recordings),
+        typed(DoubtRow, doubts),
+        typed(ParameterRow, parameters),
+        typed(BacktestRow, backtests),
+    )
+    judged = judgements(typed(ErrorBudgetRow, errors), requirements, sensors, basis)
+    return ranked(list(judged), basis)

@@ -1,5 +1,6 @@
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,7 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from imubench_pipeline.navigation.drift import COLUMNS, LEVEL, drift_rows, order_of, series_of
+from imubench_pipeline.model.comparisons import DriftRow
+from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
+from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.navigation.drift import LEVEL, drift_rows, order_of, series_of
 from tests.conftest import few
 
 Z = 1.959963984540054
@@ -16,23 +20,26 @@ TERMS = ("N", "B", "K", "T_B")
 
 
 def recording(name, started=None, device="d", simulated=False, status="ok"):
-    return {"sensor": "S", "device": device, "recording": name, "started": started,
-            "simulated": simulated, "status": status}  # fmt: skip
+    return RecordingRow(
+        sensor="S", device=device, recording=name, kind="static", started=started,
+        simulated=simulated, status=status,
+    )  # fmt: skip
 
 
 def parameter(name, value, error=0.01, term="N", channel="gyro_x", **more):
     known = value is not None
-    return {
+    about = {
         "sensor": "S", "recording": name, "channel": channel, "method": "likelihood",
         "recommended": True, "model": "N+GM+K", "component": 1, "parameter": term, "value": value,
         "lower": value * math.exp(-Z * error) if known else None,
         "upper": value * math.exp(Z * error) if known else None,
         "unit": "rad/s/sqrt(Hz)", "status": "ok", "reason": None, "duration_needed": None,
-    } | more  # fmt: skip
+    }  # fmt: skip
+    return ParameterRow(**(about | more))
 
 
 def bias(name, value, channel="gyro_x"):
-    return {"sensor": "S", "recording": name, "channel": channel, "value": value, "unit": "rad/s"}
+    return FixedBiasRow(sensor="S", recording=name, channel=channel, value=value, unit="rad/s")
 
 
 def names(count):
@@ -315,7 +322,7 @@ def test_series() -> None:
     rows = [recording(f"m{i}", f"2026-01-0{9 - i}") for i in range(3)]
     rows += [recording(f"s{i}", simulated=True) for i in range(2)]
     rows += [recording("lone", device="e"), recording("bad", device="e", status="rejected")]
-    rows.append({**recording("x"), "sensor": "T"})
+    rows.append(replace(recording("x"), sensor="T"))
     measured, simulated = series_of(rows)
     assert (measured.simulated, measured.order) == (False, "started")
     assert [row["recording"] for row in measured.recordings] == ["m2", "m1", "m0"]
@@ -339,7 +346,7 @@ def test_rows_fit_the_table() -> None:
     rows += [parameter(name, None, term="Q", status="absent") for name in names(2)]
     biases = [bias(name, 9.8, "accel_x") for name in names(2)]
     found = list(drift_rows(rows, biases, [recording(name) for name in names(2)]))
-    assert all(tuple(row) == COLUMNS for row in found)
+    assert all(isinstance(row, DriftRow) for row in found)
     keys = [(row["channel"], row["parameter"], row["position"]) for row in found]
     assert keys == [
         ("gyro_x", "N", 1), ("gyro_x", "N", 2), ("gyro_x", "K", 1), ("gyro_x", "K", 2),

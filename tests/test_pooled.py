@@ -6,7 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import f_oneway
 
-from imubench_pipeline.navigation.pooled import COLUMNS, Pool, pool, pooled_rows, turn_on_bias
+from imubench_pipeline.model.comparisons import PooledRow
+from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
+from imubench_pipeline.navigation.pooled import Pool, pool, pooled_rows, turn_on_bias
 from tests.conftest import few
 
 Z = 1.959963984540054
@@ -227,29 +229,24 @@ def test_one_mean_has_no_deviation() -> None:
 
 def parameter(recording, name="N", value=1.0, status="ok", half=0.01, **more):
     known = value is not None
-    return {
+    about = {
         "sensor": "S", "recording": recording, "channel": "gyro_x", "method": "likelihood",
         "recommended": True, "model": "N+F+K", "component": 1, "parameter": name, "value": value,
         "lower": value * np.exp(-half) if known else None,
         "upper": value * np.exp(half) if known else None,
         "unit": "rad/s/sqrt(Hz)", "status": status, "reason": None, "duration_needed": None,
-    } | more  # fmt: skip
+    }  # fmt: skip
+    return ParameterRow(**(about | more))
 
 
 def bias(recording, value, channel="gyro_x"):
     unit = "rad/s" if channel.startswith("gyro") else "m/s^2"
-    return {
-        "sensor": "S",
-        "recording": recording,
-        "channel": channel,
-        "value": value,
-        "unit": unit,
-    }
+    return FixedBiasRow(sensor="S", recording=recording, channel=channel, value=value, unit=unit)
 
 
 def by_key(rows):
     rows = list(rows)
-    assert all(tuple(row) == COLUMNS for row in rows)
+    assert all(isinstance(row, PooledRow) for row in rows)
     return {(row["device"], row["channel"], row["parameter"]): row for row in rows}
 
 
@@ -346,7 +343,7 @@ def test_none_identified_gives_a_row_without_a_value() -> None:
 
 
 def test_biases() -> None:
-    given_biases = [bias("a", -1e-3), bias("b", 1e-3), bias("c", None)]
+    given_biases = [bias("a", -1e-3), bias("b", 1e-3), bias("c", np.nan)]
     given_biases += [bias(r, 9.8, "accel_z") for r in "ab"]
     found = by_key(pooled_rows([], given_biases, {("S", r): "d" for r in "abc"}))
     row = found[None, "gyro_x", "bias"]

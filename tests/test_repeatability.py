@@ -6,10 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from imubench_pipeline.model.estimates import FixedBiasRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.repeatability import repeatability_rows
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.tables import build
+from tests.rows import typed
 from tests.test_configuration import SENSOR
 
 HOUR = math.pi / 180 / 3600
@@ -38,7 +41,8 @@ def rows(
         {"sensor": "s", "recording": name, "channel": channel, "value": bias, "unit": "rad/s"}
         for name, bias in zip(names, biases, strict=True)
     ]
-    found = list(repeatability_rows(fixed, recordings, SENSORS, 0.1))
+    fixed_biases, turn_ons = typed(FixedBiasRow, fixed), typed(RecordingRow, recordings)
+    found = list(repeatability_rows(fixed_biases, turn_ons, SENSORS, 0.1))
     made: list[dict[str, Any]] = build("repeatability", found).to_pylist()
     return made
 

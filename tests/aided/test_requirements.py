@@ -8,6 +8,8 @@ import pytest
 from pydantic import ValidationError
 
 from imubench_pipeline.experiments.aided.trajectories import NAMES
+from imubench_pipeline.model.comparisons import NavigationRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.in_outages import outage_rows
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
@@ -30,9 +32,10 @@ def verdict(size: float, half: float = 1.05, **changes: Any) -> dict[str, Any]:
         position_upper=size * half,
         **changes,
     )
-    about = recording_rows("imu")["recordings"]
-    rows = outage_rows(build("navigation", [run]).to_pylist(), about, {"robot": OUTAGE})
-    basis = Basis.of(build("recordings", about).to_pylist(), [], [], [])
+    about = RecordingRow.rows_of(build("recordings", recording_rows("imu")["recordings"]))
+    runs = NavigationRow.rows_of(build("navigation", [run]))
+    rows = outage_rows(runs, about, {"robot": OUTAGE})
+    basis = Basis.of(about)
     judged = list(judgements(rows, {"robot": OUTAGE}, {"imu": {"price_class": None}}, basis))
     (row,) = build("ranking", ranked(judged, basis)).to_pylist()
     return row

@@ -13,6 +13,9 @@ import pyarrow as pa
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.experiments.papers.registry import rows_without_a_run
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.model.estimates import BacktestRow, FixedBiasRow, ParameterRow
+from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.navigation.pooled import pooled_rows
@@ -279,15 +282,16 @@ def joined(
 ) -> Tables:
     """The tables of a run: the rows of its recordings, and what it makes of them together."""
     made = tables_of(*several)
-    recommended = [row for row in made["parameters"].to_pylist() if row["recommended"]]
-    biases = made["fixed_bias"].to_pylist()
-    about = made["recordings"].to_pylist()
-    devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
+    recommended = [row for row in ParameterRow.rows_of(made["parameters"]) if row.recommended]
+    biases = FixedBiasRow.rows_of(made["fixed_bias"])
+    about = RecordingRow.rows_of(made["recordings"])
+    devices = {(row.sensor, row.recording): row.device for row in about}
     asked = {n: Requirement.model_validate(one) for n, one in (requirements or {}).items()}
-    sensors = {row["sensor"]: {"price_class": None} for row in about}
-    shown = made["backtest"].to_pylist()
-    basis = Basis.of(about, made["doubts"].to_pylist(), recommended, shown)
-    judged = list(judgements(made["error_budget"].to_pylist(), asked, sensors, basis))
+    sensors = {row.sensor: {"price_class": None} for row in about}
+    shown = BacktestRow.rows_of(made["backtest"])
+    basis = Basis.of(about, DoubtRow.rows_of(made["doubts"]), recommended, shown)
+    errors = ErrorBudgetRow.rows_of(made["error_budget"])
+    judged = list(judgements(errors, asked, sensors, basis))
     return made | {
         "pooled": build("pooled", pooled_rows(recommended, biases, devices)),
         "drift": build("drift", drift_rows(recommended, biases, about)),

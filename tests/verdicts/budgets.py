@@ -3,6 +3,9 @@
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
@@ -10,6 +13,7 @@ from imubench_pipeline.navigation.verdicts.judgement import judgements
 from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
+from tests.rows import typed
 from tests.test_selection import white
 
 Rows = list[dict[str, Any]]
@@ -61,12 +65,12 @@ def judge(
 ) -> tuple[Rows, Rows]:
     """Return the tables ``ranking``, of the limits that decide, and ``next_steps``."""
     questions = [q for name, one in asked.items() for q in of_requirement(name, one)]
-    errors: Rows = []
+    errors: list[ErrorBudgetRow] = []
     for sensor, logs in sensors.items():
         for recording, estimates in logs.items():
             names = {"sensor": sensor, "recording": recording}
             rows = error_rows(names, estimates, questions, draws=400, seed=1)
-            errors += build("error_budget", rows).to_pylist()
+            errors += ErrorBudgetRow.rows_of(build("error_budget", rows))
     if recordings is None:
         recordings = [about(sensor, name) for sensor, logs in sensors.items() for name in logs]
     if parameters is None:
@@ -76,7 +80,11 @@ def judge(
             for name in logs
             for row in three_axes(sensor, name)
         ]
-    basis = Basis.of(recordings, doubts or [], parameters)
+    basis = Basis.of(
+        typed(RecordingRow, recordings),
+        typed(DoubtRow, doubts or []),
+        typed(ParameterRow, parameters),
+    )
     files = {sensor: {"price_class": None, "abilities": abilities or {}} for sensor in sensors}
     judged = list(judgements(errors, asked, files, basis))
     ranking = build("ranking", ranked(judged, basis)).to_pylist()

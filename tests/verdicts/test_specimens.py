@@ -1,27 +1,29 @@
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.verdicts.specimens import Spread, expected, usual_spread
 from tests.conftest import few
+from tests.rows import typed
 from tests.verdicts.budgets import HEADING, about, gyro, judge
 
 
-def totals(logs: np.ndarray, error: float, limit: float = 1.0) -> list[dict[str, Any]]:
+def totals(logs: np.ndarray, error: float, limit: float = 1.0) -> list[ErrorBudgetRow]:
     """Errors of which the logarithms are these, known to within a standard deviation."""
     factor = math.exp(1.959964 * error)
-    return [
+    rows = [
         {"recording": str(i), "sigma": math.exp(y), "lower": math.exp(y) / factor,
          "upper": math.exp(y) * factor, "within": 0.3, "limit": limit}
         for i, y in enumerate(logs)
     ]  # fmt: skip
+    return typed(ErrorBudgetRow, rows)
 
 
-def each(rows: list[dict[str, Any]]) -> dict[str, str]:
-    return {row["recording"]: row["recording"] for row in rows}
+def each(rows: list[ErrorBudgetRow]) -> dict[str, str]:
+    return {row.recording: row.recording for row in rows}
 
 
 @pytest.mark.parametrize("count", [2, 3, 5])

@@ -38,51 +38,48 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
+from imubench_pipeline.model.comparisons import DriftRow
+from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.pooled import POOLED, bounded_exp, points_about_median, usable
 from imubench_pipeline.noise import PARAMETERS, TERMS
-from imubench_pipeline.typing import Row
 
 Order = Literal["started", "name"]
 
 LEVEL = 0.01
 """Probability that a recording of an unchanged device is flagged in anything, at most."""
 
-COLUMNS = (
-    *("sensor", "device", "channel", "parameter", "recording", "position", "started"),
-    *("value", "lower", "upper", "unit", "expected", "expected_lower", "expected_upper"),
-    *("change", "p_value", "verdict", "reason"),
-)
-"""The columns of the table ``drift``."""
+Estimated = ParameterRow | FixedBiasRow
+"""What is compared: a parameter, or the mean of a channel."""
 
 _FEWEST = 3  # recordings that tell the spread between them
 _LINE_FROM = 8  # recordings; a line takes one degree of freedom more
 _EACH, _GROWTH = 32, 1.05  # tau is found anew with each of 32 recordings, then with each 5 % more
 _NAMES = (*POOLED, "bias")
 _OF_BIAS = {kind.symbol for kind in TERMS if PARAMETERS["B"] in kind.parameters}
-_ABSENT: Row = {"status": "absent", "value": None}
 _NOTHING = (math.nan, math.nan, math.nan, math.nan, 0.0, -1.0, -1.0)
 
 
 class Series(NamedTuple):
-    """The analysed recordings of one device, rows of ``recordings``, the first one first."""
+    """The analysed recordings of one device, the first one first."""
 
     sensor: str
     device: str
     simulated: bool
-    recordings: list[Row]
+    recordings: list[RecordingRow]
     order: Order
 
 
-def order_of(recordings: Iterable[Row]) -> tuple[list[Row], Order]:
-    """Order rows of the table ``recordings`` of one device in time, and say by what.
+def order_of(recordings: Iterable[RecordingRow]) -> tuple[list[RecordingRow], Order]:
+    """Order the recordings of one device in time, and say by what.
 
     By ``started`` where each has one that is ISO 8601 and not all are the same (a clock that was
     never set); equal ones by name. Else by the name, its numbers as numbers: run_2 before run_10.
     A stamp without a zone is UTC, as the readers write it.
     """
-    by_name = sorted(recordings, key=lambda row: _natural(row["recording"]))
+    by_name = sorted(recordings, key=lambda row: _natural(row.recording))
     try:
-        stamps = [_stamp(row["started"] or "") for row in by_name]
+        stamps = [_stamp(row.started or "") for row in by_name]
     except ValueError:
         return by_name, "name"
     if len(set(stamps)) < 2:
@@ -101,21 +98,23 @@ def _natural(name: str) -> tuple[list[tuple[str, int]], str]:
     return [(text.casefold(), int(digits or -1)) for text, digits in parts], name
 
 
-def series_of(recordings: Iterable[Row]) -> Iterator[Series]:
+def series_of(recordings: Iterable[RecordingRow]) -> Iterator[Series]:
     """Yield each device's recordings of status ``ok``, if two or more; simulated ones apart."""
-    groups: dict[tuple[str, str, bool], list[Row]] = {}
+    groups: dict[tuple[str, str, bool], list[RecordingRow]] = {}
     for row in recordings:
-        if row["status"] == "ok":
-            groups.setdefault((row["sensor"], row["device"], row["simulated"]), []).append(row)
+        if row.status == "ok":
+            groups.setdefault((row.sensor, row.device, row.simulated), []).append(row)
     for key in sorted(groups):
         if len(groups[key]) > 1:
             yield Series(*key, *order_of(groups[key]))
 
 
 def drift_rows(
-    parameters: Iterable[Row], fixed_bias: Iterable[Row], recordings: Iterable[Row]
-) -> Iterator[Row]:
-    """Yield the rows of the table ``drift``, with the `COLUMNS`.
+    parameters: Iterable[ParameterRow],
+    fixed_bias: Iterable[FixedBiasRow],
+    recordings: Iterable[RecordingRow],
+) -> Iterator[DriftRow]:
+    """Yield the rows of the table ``drift``.
 
     One for each recording of a series, and channel and parameter that any recording of it has;
     those of the gyro come first, those of a parameter follow one another in time. The limits of
@@ -124,31 +123,32 @@ def drift_rows(
 
     Parameters
     ----------
-    parameters : iterable of mapping
-        Rows of the table ``parameters``, of the recommended method. Used are component 1 and the
+    parameters : iterable of ParameterRow
+        Of the recommended method. Used are component 1 and the
         parameters of `navigation.pooled.POOLED`; only a value with status ``ok`` is an estimate. B
         and T_B are compared with those of the same terms: B of flicker noise and of a Gauss-Markov
         process are different quantities; that of the curve is the same of all models.
-    fixed_bias, recordings : iterable of mapping
-        Rows of these tables.
+    fixed_bias : iterable of FixedBiasRow
+    recordings : iterable of RecordingRow
     """
-    cells: dict[tuple[str, str], dict[tuple[str, str], Row]] = {}
-    for row in (*parameters, *fixed_bias):
-        name = row.get("parameter", "bias")
-        if name in _NAMES and row.get("component", 1) == 1:
-            cells.setdefault((row["sensor"], row["recording"]), {})[row["channel"], name] = row
+    cells: dict[tuple[str, str], dict[tuple[str, str], Estimated]] = {}
+    for row in parameters:
+        if row.parameter in _NAMES and row.component == 1:
+            cells.setdefault((row.sensor, row.recording), {})[row.channel, row.parameter] = row
+    for bias in fixed_bias:
+        cells.setdefault((bias.sensor, bias.recording), {})[bias.channel, "bias"] = bias
     for series in series_of(recordings):
-        keys = [(series.sensor, row["recording"]) for row in series.recordings]
+        keys = [(series.sensor, row.recording) for row in series.recordings]
         yield from _rows(series, [cells.get(key, {}) for key in keys])
 
 
-def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Row]]) -> Iterator[Row]:
+def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Estimated]]) -> Iterator[DriftRow]:
     points: dict[tuple[str, ...], dict[int, tuple[float, ...]]] = {}
     units: dict[tuple[str, str], str] = {}
     for place, cell in enumerate(cells):
         for key, row in cell.items():
-            if row.get("status") != "absent":
-                units[key] = row["unit"]
+            if _status(row) != "absent":
+                units[key] = row.unit
                 points.setdefault((*key, _kind(row)), {})[place] = _point(row)
     columns = {column: index for index, column in enumerate(sorted(points))}
     data = np.full((3, len(cells), len(columns)), np.nan)
@@ -159,30 +159,57 @@ def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Row]]) -> Iterat
     for key in sorted(units, key=lambda key: (key[0][0] != "g", key[0], _NAMES.index(key[1]))):
         noise = key[1] != "bias"
         for place, recording in enumerate(series.recordings):
-            row = cells[place].get(key, _ABSENT)
-            index = columns.get((*key, _kind(row)), -1)
+            own = cells[place].get(key)
+            index = columns.get((*key, _kind(own)), -1)
             *y, p, changed, count, alone = _NOTHING if index < 0 else levels[place][index]
             expected = [None if math.isnan(x) else bounded_exp(x) if noise else x for x in y]
-            value = row["value"] if row.get("status", "ok") == "ok" else None
+            value = own.value if own is not None and _status(own) == "ok" else None
             change = value / expected[0] - 1.0 if noise and value and expected[0] else None
-            reasons = [_unjudged(row, count)] if math.isnan(p) else []
+            reasons = [_unjudged(own, count)] if math.isnan(p) else []
             if alone >= 0.0:
-                reasons.append(f"{series.recordings[int(alone)]['recording']} stood alone")
+                reasons.append(f"{series.recordings[int(alone)].recording} stood alone")
             if changed:
                 side = "above" if changed > 0.0 else "below"
                 reasons.append(f"{side} what the {count:.0f} before it lead one to expect")
                 if not noise and key[0].startswith("accel"):
                     reasons.append("gravity is in it: the sensor may lie differently")
-            judged = (None, None) if math.isnan(p) else (p, "changed" if changed else "as before")
-            about = (series.sensor, series.device, *key, recording["recording"], place + 1)
-            measured = (recording["started"], value, row.get("lower"), row.get("upper"), units[key])
-            outcome = (*expected, change, *judged, "; ".join(reasons) or None)
-            yield dict(zip(COLUMNS, about + measured + outcome, strict=True))
+            p_value, verdict = (
+                (None, None) if math.isnan(p) else (p, "changed" if changed else "as before")
+            )
+            yield DriftRow(
+                sensor=series.sensor,
+                device=series.device,
+                channel=key[0],
+                parameter=key[1],
+                recording=recording.recording,
+                position=place + 1,
+                started=recording.started,
+                value=value,
+                lower=own.lower if isinstance(own, ParameterRow) else None,
+                upper=own.upper if isinstance(own, ParameterRow) else None,
+                unit=units[key],
+                expected=expected[0],
+                expected_lower=expected[1],
+                expected_upper=expected[2],
+                change=change,
+                p_value=p_value,
+                verdict=verdict,
+                reason="; ".join(reasons) or None,
+            )
 
 
-def _kind(row: Row) -> str:
+def _status(row: Estimated | None) -> str:
+    """Return whether there is a value; a mean always is one."""
+    if row is None:
+        return "absent"
+    return row.status if isinstance(row, ParameterRow) else "ok"
+
+
+def _kind(row: Estimated | None) -> str:
     """Return what B and T_B are parameters of, such as ``F`` or ``GM``; of others nothing."""
-    terms = row["model"].split("+") if row.get("parameter") in ("B", "T_B") else []
+    if not isinstance(row, ParameterRow) or row.parameter not in ("B", "T_B"):
+        return ""
+    terms = row.model.split("+")
     return "+".join(term for term in terms if term in _OF_BIAS)
 
 
@@ -192,28 +219,33 @@ def _tested_as(column: tuple[str, ...]) -> tuple[str, ...]:
     return (channel, "B_curve", "") if parameter == "B" and kind in _OF_BIAS else column
 
 
-def _point(row: Row) -> tuple[float, ...]:
+def _point(row: Estimated) -> tuple[float, ...]:
     """Return y and the variances of its error, where the truth lies below and above; or NaN."""
-    if "status" not in row:
-        return math.nan if row["value"] is None else row["value"], 0.0, 0.0
-    triple = (row["value"] if row["status"] == "ok" else None, row["lower"], row["upper"])
+    if isinstance(row, FixedBiasRow):
+        return row.value, 0.0, 0.0
+    triple = (row.value if row.status == "ok" else None, row.lower, row.upper)
     if not usable(triple):
         return math.nan, math.nan, math.nan
     y, points = points_about_median([triple])
     return y, *points[0][1:]
 
 
-def _unjudged(row: Row, count: float) -> str:
-    status = row.get("status", "ok").replace("_", " ")
+def _unjudged(row: Estimated | None, count: float) -> str:
+    status = _status(row).replace("_", " ")
+    reason = row.reason if isinstance(row, ParameterRow) else None
     if status != "ok":
-        return f"{status}: {row['reason']}" if row.get("reason") else status
+        return f"{status}: {reason}" if reason else status
     if count < 0.0:
         return "no value with limits"
     if count == 0.0:
         return "the first value" + f" with {_kind(row)}" * bool(_kind(row))
     if count < _FEWEST:
         return f"{count:.0f} before it at this level: the spread between recordings is not known"
-    return "limits far narrower than before" if "status" in row else "all before it are the same"
+    return (
+        "limits far narrower than before"
+        if isinstance(row, ParameterRow)
+        else "all before it are the same"
+    )
 
 
 class _Levels:

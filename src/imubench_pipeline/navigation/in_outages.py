@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from dataclasses import replace
+from typing import Annotated, Any
 
 from scipy.special import ndtr
 
+from imubench_pipeline.model import table
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, NavigationRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.pooled import NORMAL
 from imubench_pipeline.settings.requirements import DIMENSIONS, Limit, Requirement
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import SI_UNITS
 
 _AXES = {"position": math.sqrt(2.0), "velocity": math.sqrt(2.0), "heading": 1.0}
@@ -22,23 +25,35 @@ _AXES = {"position": math.sqrt(2.0), "velocity": math.sqrt(2.0), "heading": 1.0}
 _MEANT = "simulated drives; the limits are those of the runs, not of the estimate"
 
 
+@table.row
+class OutageErrorRow(ErrorBudgetRow):
+    """An error at the end of outages on a trajectory."""
+
+    trajectory: Annotated[str | None, table.Column("of the outages")]
+
+
+def trajectory_of(total: ErrorBudgetRow) -> str | None:
+    """Return the trajectory whose outages an error is of; None: an error of dead reckoning."""
+    return total.trajectory if isinstance(total, OutageErrorRow) else None
+
+
 def outage_rows(
-    navigation: Iterable[Row],
-    recordings: Iterable[Row],
+    navigation: Iterable[NavigationRow],
+    recordings: Iterable[RecordingRow],
     requirements: Mapping[str, Requirement],
-) -> Iterator[Row]:
+) -> Iterator[OutageErrorRow]:
     """Yield the rows of the limits that are about outages, of every sensor with static recordings.
 
     Of the tables ``navigation`` and ``recordings``. A sensor without such a run has no figure.
     """
-    runs: dict[tuple[Any, ...], Row] = {}
-    for row in navigation:
-        if row["recommended"] and row["signals"] != "log" and row["position"] is not None:
-            runs[row["sensor"], row["trajectory"], row["outage"]] = row
-    of_sensors: dict[str, Row] = {}
-    for row in recordings:
-        if row["status"] == "ok" and row["kind"] == "static":
-            of_sensors.setdefault(row["sensor"], row)
+    runs: dict[tuple[Any, ...], NavigationRow] = {}
+    for run in navigation:
+        if run.recommended and run.signals != "log" and run.position is not None:
+            runs[run.sensor, run.trajectory, run.outage] = run
+    of_sensors: dict[str, RecordingRow] = {}
+    for recording in recordings:
+        if recording.status == "ok" and recording.kind == "static":
+            of_sensors.setdefault(recording.sensor, recording)
     for name, requirement in requirements.items():
         for limit in requirement.in_outages:
             for sensor, about in of_sensors.items():
@@ -47,46 +62,57 @@ def outage_rows(
 
 
 def _row(
-    name: str, requirement: Requirement, limit: Limit, about: Row, run: Row | None
-) -> dict[str, Any]:
+    name: str,
+    requirement: Requirement,
+    limit: Limit,
+    about: NavigationRow | RecordingRow,
+    run: NavigationRow | None,
+) -> OutageErrorRow:
     allowed = limit.size / requirement.sigmas
-    row: dict[str, Any] = {
-        "sensor": about["sensor"],
-        "recording": about["recording"],
-        "requirement": name,
-        "axis": requirement.axis,
-        "gyro": None,
-        "accel": None,
-        "error": limit.error,
-        "time": limit.seconds,
-        "trajectory": limit.trajectory,
-        "source": "total",
-        "limit": allowed,
-        "unit": SI_UNITS[DIMENSIONS[limit.error]],
-        "sigma": None,
-        "lower": None,
-        "upper": None,
-        "within": None,
-        "reached_after": None,
-        "reason": "no filter was run for this sensor (setting navigate: of)",
-    }
+    unknown = OutageErrorRow(
+        sensor=about.sensor,
+        recording=about.recording,
+        requirement=name,
+        axis=requirement.axis,
+        error=limit.error,
+        time=limit.seconds,
+        trajectory=limit.trajectory,
+        source="total",
+        limit=allowed,
+        unit=SI_UNITS[DIMENSIONS[limit.error]],
+        reason="no filter was run for this sensor (setting navigate: of)",
+    )
     if run is None:
-        return row
-    if run["consistent"] is False:
-        inside = 100.0 * run["nees_inside"]
+        return unknown
+    if run.consistent is False:
+        inside = 100.0 * (run.nees_inside or 0.0)
         reason = (
             f"the filter of this sensor goes astray: NEES is inside in {inside:.0f} % instead of 95"
         )
-        return row | {"reason": reason}
-    sigma, lower, upper = (
-        run[f"{limit.error}{end}"] / _AXES[limit.error] for end in ("", "_lower", "_upper")
-    )
+        return replace(unknown, reason=reason)
+    found = _error(run, limit.error)
+    if found is None:
+        return replace(unknown, reason=f"the runs do not tell the error of the {limit.error}")
+    sigma, lower, upper = (size / _AXES[limit.error] for size in found)
     spread = math.log(upper / lower) / (2.0 * NORMAL)
-    assumed = f"; assumed: {run['assumed']}" if run["assumed"] else ""
-    return row | {
-        "sigma": sigma,
-        "lower": lower,
-        "upper": upper,
-        "within": float(ndtr(math.log(allowed / sigma) / spread)),
-        "reason": _MEANT + assumed,
-    }
+    assumed = f"; assumed: {run.assumed}" if run.assumed else ""
+    return replace(
+        unknown,
+        sigma=sigma,
+        lower=lower,
+        upper=upper,
+        within=float(ndtr(math.log(allowed / sigma) / spread)),
+        reason=_MEANT + assumed,
+    )
+
+
+def _error(run: NavigationRow, error: str) -> tuple[float, float, float] | None:
+    """Return the root mean square of an error with its limits."""
+    value, lower, upper = {
+        "position": (run.position, run.position_lower, run.position_upper),
+        "velocity": (run.velocity, run.velocity_lower, run.velocity_upper),
+        "heading": (run.heading, run.heading_lower, run.heading_upper),
+    }[error]
+    if value is None or lower is None or upper is None:
+        return None
+    return value, lower, upper

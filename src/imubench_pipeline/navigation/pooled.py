@@ -32,11 +32,12 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal, TypeGuard
+from typing import Literal, TypeGuard, TypeVar
 
 from scipy.special import chdtrc, chdtri, fdtrc, stdtrit
 
-from imubench_pipeline.typing import Row
+from imubench_pipeline.model.comparisons import PooledRow
+from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 
 Verdict = Literal["agree", "differ"]
 
@@ -46,18 +47,15 @@ LEVEL = 0.01
 POOLED = ("N", "B_curve", "sigma_min", "K", "B", "T_B", "Q", "R")
 """The parameters that are pooled, in their order in the table."""
 
-_KEYS = ("sensor", "device", "channel", "parameter", "recordings", "left_out")
-_NUMBERS = ("value", "lower", "upper", "unit", "spread", "spread_lower", "spread_upper")
-COLUMNS = (*_KEYS, *_NUMBERS, "p_value", "verdict", "reason")
-"""The columns of the table ``pooled``."""
-
 NORMAL = 1.959963984540054
 """97.5 % of the standard normal."""
 
 _NARROWEST_HALF = 0.25
 
+E = TypeVar("E", ParameterRow, FixedBiasRow)
+
 _Point = tuple[float, float, float]  # y, and its variance where the truth lies below and above
-_Present = tuple[str, Row]  # a device, and the row of one of its recordings
+_Group = tuple[str, str | None, str, str]  # sensor, device, channel and parameter
 
 
 @dataclass(frozen=True)
@@ -283,9 +281,11 @@ def _same_devices(pairs: Sequence[tuple[float, str]]) -> float | None:
 
 
 def pooled_rows(
-    parameters: Iterable[Row], biases: Iterable[Row], devices: Mapping[tuple[str, str], str]
-) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the table ``pooled``, with the `COLUMNS`.
+    parameters: Iterable[ParameterRow],
+    biases: Iterable[FixedBiasRow],
+    devices: Mapping[tuple[str, str], str],
+) -> Iterator[PooledRow]:
+    """Yield the rows of the table ``pooled``.
 
     One (device None) for each sensor with two recordings or more and, where it has more than one
     device, one for each device with two or more. None where no recording has the parameter, of
@@ -296,89 +296,143 @@ def pooled_rows(
 
     Parameters
     ----------
-    parameters : iterable of mapping
-        Rows of the table ``parameters``; used are those with ``recommended``, component 1 and a
-        parameter of `POOLED`. Only a value with status ``ok`` is an estimate.
-    biases : iterable of mapping
-        ``sensor, recording, channel, value, unit``: the mean of the channel, SI.
+    parameters : iterable of ParameterRow
+        Used are those that are recommended, of component 1 and a parameter of `POOLED`. Only a
+        value with status ``ok`` is an estimate.
+    biases : iterable of FixedBiasRow
+        The mean of each channel; one that is not finite is left out.
     devices : mapping of (sensor, recording) to str
         The device; a recording that is not there is a device of its own.
     """
     # By channel, parameter and recording; under "" every recording, as one that lacks the term.
-    tables: dict[tuple[str, str], dict[str, dict[str, Row | None]]] = {}
+    estimates: dict[tuple[str, str], dict[str, dict[str, ParameterRow | None]]] = {}
+    means: dict[tuple[str, str], dict[str, FixedBiasRow | None]] = {}
     for row in parameters:
-        if row["recommended"] and row.get("component", 1) == 1:
-            table = tables.setdefault((row["sensor"], row["channel"]), {})
-            table.setdefault("", {})[row["recording"]] = None
-            if row["parameter"] in POOLED and row["status"] != "absent":
-                table.setdefault(row["parameter"], {})[row["recording"]] = row
-    for row in biases:
-        table = tables.setdefault((row["sensor"], row["channel"]), {})
-        table.setdefault("bias", {})[row["recording"]] = row
+        if row.recommended and row.component == 1:
+            table = estimates.setdefault((row.sensor, row.channel), {})
+            table.setdefault("", {})[row.recording] = None
+            if row.parameter in POOLED and row.status != "absent":
+                table.setdefault(row.parameter, {})[row.recording] = row
+    for bias in biases:
+        means.setdefault((bias.sensor, bias.channel), {})[bias.recording] = bias
+    keys = dict.fromkeys((*estimates, *means))
     of_sensor: dict[str, set[str]] = {}
-    for (sensor, _), table in tables.items():
-        names = {devices.get((sensor, key), key) for rows in table.values() for key in rows}
-        of_sensor.setdefault(sensor, set()).update(names)
-    for (sensor, channel), table in tables.items():
+    for sensor, channel in keys:
+        names = {name for rows in estimates.get((sensor, channel), {}).values() for name in rows}
+        names.update(means.get((sensor, channel), {}))
+        own = {devices.get((sensor, name), name) for name in names}
+        of_sensor.setdefault(sensor, set()).update(own)
+    for sensor, channel in keys:
+        table = estimates.get((sensor, channel), {})
         several = len(of_sensor[sensor]) > 1
-        for name in (*POOLED, "bias"):
+        for name in POOLED:
             rows = table.get(name, {})
-            if rows and name not in ("T_B", "bias"):
+            if rows and name != "T_B":
                 rows = table[""] | rows
-            groups: dict[str | None, list[tuple[str, Row | None]]] = {}
-            for recording, entry in rows.items():
-                device = devices.get((sensor, recording), recording)
-                for group in (None, device) if several else (None,):
-                    groups.setdefault(group, []).append((device, entry))
-            for group, cells in groups.items():
-                present = [(device, entry) for device, entry in cells if entry is not None]
-                if len(cells) > 1 and present:
-                    make = _bias_row if name == "bias" else _parameter_row
-                    values = make(present, len(cells) - len(present), several and group is None)
-                    keys = (sensor, group, channel, name)
-                    yield dict(zip(COLUMNS, keys + values, strict=True))
+            for device, present, count in _groups(sensor, rows, devices, several=several):
+                group = (sensor, device, channel, name)
+                yield _parameter_row(group, present, count - len(present), several)
+        of_channel = means.get((sensor, channel), {})
+        for device, biased, _ in _groups(sensor, of_channel, devices, several=several):
+            yield _bias_row((sensor, device, channel, "bias"), biased, several)
 
 
-def _parameter_row(present: list[_Present], absent: int, several: bool) -> tuple[Any, ...]:
+def _groups(
+    sensor: str,
+    rows: Mapping[str, E | None],
+    devices: Mapping[tuple[str, str], str],
+    *,
+    several: bool,
+) -> Iterator[tuple[str | None, list[tuple[str, E]], int]]:
+    """Yield sensor (None) and devices with rows of several recordings, and how many they are.
+
+    The rows that are there come with the device of each.
+    """
+    groups: dict[str | None, list[tuple[str, E | None]]] = {}
+    for recording, entry in rows.items():
+        device = devices.get((sensor, recording), recording)
+        for group in (None, device) if several else (None,):
+            groups.setdefault(group, []).append((device, entry))
+    for group, cells in groups.items():
+        present = [(device, entry) for device, entry in cells if entry is not None]
+        if len(cells) > 1 and present:
+            yield group, present, len(cells)
+
+
+def _parameter_row(
+    group: _Group, present: Sequence[tuple[str, ParameterRow]], absent: int, several: bool
+) -> PooledRow:
+    sensor, device, channel, parameter = group
+    of_devices = several and device is None
     triples = [
-        (row["value"] if row["status"] == "ok" else None, row["lower"], row["upper"])
-        for _, row in present
+        (row.value if row.status == "ok" else None, row.lower, row.upper) for _, row in present
     ]
     pooled = pool(*zip(*triples, strict=True))
     logs, left_out = [], Counter[str]()
-    for (device, row), triple in zip(present, triples, strict=True):
+    for (of, row), triple in zip(present, triples, strict=True):
         if usable(triple):
-            logs.append((math.log(triple[0]), device))
+            logs.append((math.log(triple[0]), of))
         else:
-            left_out[row["status"].replace("ok", "no limits").replace("_", " ")] += 1
+            left_out[row.status.replace("ok", "no limits").replace("_", " ")] += 1
     reasons = [f"{number} left out: {status}" for status, number in left_out.items()]
     if pooled.contradicting:
         reasons.append(f"limits of {pooled.contradicting} left out lie outside what is predicted")
     if absent:
         reasons.append(f"absent in {absent} of {absent + len(present)}: that is no agreement")
     if pooled.verdict == "differ":
-        reasons.append("differ: " + "the devices, or " * several + "the sensor is not stationary")
+        reasons.append(
+            "differ: " + "the devices, or " * of_devices + "the sensor is not stationary"
+        )
     elif pooled.spread_upper == 0.0:
         reasons.append("the values agree better than their limits allow")
-    verdict = None if absent and pooled.verdict == "agree" else pooled.verdict
     spread = (pooled.spread, pooled.spread_lower, pooled.spread_upper)
     in_unit = [None if part is None else part * (pooled.value or 0.0) for part in spread]
-    limits = (pooled.lower, pooled.upper, present[0][1]["unit"])
-    reason = "; ".join(reasons + _device_reasons(logs, several)) or None
-    counts = (pooled.recordings, pooled.left_out + absent)
-    return *counts, pooled.value, *limits, *in_unit, pooled.p_value, verdict, reason
+    return PooledRow(
+        sensor=sensor,
+        device=device,
+        channel=channel,
+        parameter=parameter,
+        recordings=pooled.recordings,
+        left_out=pooled.left_out + absent,
+        value=pooled.value,
+        lower=pooled.lower,
+        upper=pooled.upper,
+        unit=present[0][1].unit,
+        spread=in_unit[0],
+        spread_lower=in_unit[1],
+        spread_upper=in_unit[2],
+        p_value=pooled.p_value,
+        verdict=None if absent and pooled.verdict == "agree" else pooled.verdict,
+        reason="; ".join(reasons + _device_reasons(logs, of_devices)) or None,
+    )
 
 
-def _bias_row(present: list[_Present], _: int, several: bool) -> tuple[Any, ...]:
-    pairs = [(row["value"], device) for device, row in present]
+def _bias_row(
+    group: _Group, present: Sequence[tuple[str, FixedBiasRow]], several: bool
+) -> PooledRow:
+    sensor, device, channel, parameter = group
+    pairs = [(row.value, of) for of, row in present]
     bias = turn_on_bias(value for value, _ in pairs)
     reasons = [f"{bias.left_out} left out: no mean"] * (bias.left_out > 0)
-    if present[0][1]["channel"].startswith("accel"):
+    if channel.startswith("accel"):
         reasons.append("gravity is in it: the spread also shows how differently the sensor lay")
-    spread = (bias.deviation, bias.deviation_lower, bias.deviation_upper)
-    reason = "; ".join(reasons + _device_reasons(pairs, several)) or None
-    limits = (bias.lower, bias.upper, present[0][1]["unit"])
-    return bias.recordings, bias.left_out, bias.mean, *limits, *spread, None, None, reason
+    reasons += _device_reasons(pairs, several and device is None)
+    return PooledRow(
+        sensor=sensor,
+        device=device,
+        channel=channel,
+        parameter=parameter,
+        recordings=bias.recordings,
+        left_out=bias.left_out,
+        value=bias.mean,
+        lower=bias.lower,
+        upper=bias.upper,
+        unit=present[0][1].unit,
+        spread=bias.deviation,
+        spread_lower=bias.deviation_lower,
+        spread_upper=bias.deviation_upper,
+        reason="; ".join(reasons) or None,
+    )
 
 
 def _device_reasons(pairs: Iterable[tuple[float | None, str]], several: bool) -> list[str]:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.model.estimates import BacktestRow
+from imubench_pipeline.navigation.in_outages import trajectory_of
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.navigation.verdicts.unless import unless_words
-from imubench_pipeline.typing import Row
 
 _SHOWN = 3
 """Recordings whose doubts are named; of more the number."""
 
 
-def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
+def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
     """Yield the rows of the table ``ranking``, of judgements and the recordings that they stand on.
 
     A sensor stands where its limit with the least margin stands. Its rank is one more than the
@@ -28,94 +30,91 @@ def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
         for judgement in own:
             sensor = judgement.sensor
             rank, tied = _rank(sensor, compared) if sensor in compared else (None, [])
-            place = {"rank": rank, "tied_with": ", ".join(tied) or None}
-            apart = [reason for (of, _), reason in basis.apart.items() if of == sensor]
-            of_sensor = {
-                "requirement": name,
-                "sensor": sensor,
-                **place,
-                "verdict": judgement.verdict,
-                "conditions": judgement.conditions,
-                "confidence": judgement.requirement.confidence,
-                "left_out": "; ".join(apart) or None,
-                **_unless_row(judgement),
-            }
             for standing, weak in zip(judgement.standings, judgement.weak, strict=True):
-                yield {
-                    **of_sensor,
-                    "at_most": standing.total["limit"] * judgement.requirement.sigmas,
-                    "decides": standing is judgement.decides,
-                    **_limit_row(standing),
-                    "longest_log": basis.longest(standing.totals),
-                    "evidence": ("weak" if weak else "strong") if standing.known else None,
-                    "evidence_reasons": ", ".join(weak) or None,
-                    **_backtest_row(name, standing, basis),
-                    "doubts": _doubts(sensor, standing, basis),
-                }
+                yield _row(judgement, standing, weak, rank, tied, basis)
+
+
+def _row(
+    judgement: Judgement,
+    standing: Standing,
+    weak: Sequence[str],
+    rank: int | None,
+    tied: Sequence[str],
+    basis: Basis,
+) -> RankingRow:
+    sensor, requirement, known = judgement.sensor, judgement.requirement, standing.known
+    total, expected = standing.total, standing.expected
+    apart = [reason for (of, _), reason in basis.apart.items() if of == sensor]
+    unless = None if judgement.outside else judgement.unless
+    logged, mended = (unless.logged, unless.mended) if unless else (None, None)
+    tested = _backtest(judgement.name, standing, basis)
+    return RankingRow(
+        requirement=judgement.name,
+        sensor=sensor,
+        rank=rank,
+        tied_with=", ".join(tied) or None,
+        verdict=judgement.verdict,
+        decides=standing is judgement.decides,
+        recording=total.recording,
+        error=total.error,
+        time=total.time,
+        trajectory=trajectory_of(total),
+        at_most=None if total.limit is None else total.limit * requirement.sigmas,
+        confidence=requirement.confidence,
+        limit=total.limit,
+        sigma=expected.sigma,
+        lower=expected.lower,
+        upper=expected.upper,
+        unit=total.unit,
+        margin=_margin(standing),
+        chance=standing.chance if known else None,
+        limit_verdict=standing.verdict,
+        source=standing.source,
+        share=standing.share,
+        reached_after=total.reached_after,
+        conditions=judgement.conditions,
+        parts=standing.parts,
+        reason=total.reason,
+        doubts=_doubts(sensor, standing, basis),
+        left_out="; ".join(apart) or None,
+        specimens=expected.specimens,
+        recordings=expected.recordings,
+        longest_log=basis.longest(standing.totals),
+        spread=expected.spread.variance**0.5 if expected.spread else None,
+        spread_of=expected.spread_of,
+        evidence=("weak" if weak else "strong") if known else None,
+        evidence_reasons=", ".join(weak) or None,
+        unless=unless_words(unless) if unless else None,
+        unless_verdict=mended.verdict if mended else None,
+        unless_margin=_margin(mended),
+        logged_verdict=logged.verdict if logged else None,
+        logged_margin=_margin(logged),
+        backtest_channel=tested.channel if tested else None,
+        backtest_ratio=tested.ratio if tested else None,
+        backtest_ratio_lower=tested.ratio_lower if tested else None,
+        backtest_ratio_upper=tested.ratio_upper if tested else None,
+        backtest_windows=tested.windows if tested else None,
+    )
 
 
 def _doubts(sensor: str, standing: Standing, basis: Basis) -> str:
     """Return what is doubted of the recordings that a standing rests on."""
-    recordings = [row["recording"] for row in standing.totals]
+    recordings = [row.recording for row in standing.totals]
     if len(recordings) < 2:
-        return basis.doubted((sensor, standing.total["recording"]))
+        return basis.doubted((sensor, standing.total.recording))
     doubts = [f"{name}: {words}" for name in recordings if (words := basis.doubted((sensor, name)))]
     more = len(doubts) - _SHOWN
     return "; ".join(doubts[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
 
 
-def _limit_row(standing: Standing) -> Row:
-    total, expected = standing.total, standing.expected
-    known = standing.known
-    return {
-        **{key: total[key] for key in ("recording", "error", "time", "limit", "unit")},
-        "trajectory": total.get("trajectory"),
-        "sigma": expected.sigma,
-        "lower": expected.lower,
-        "upper": expected.upper,
-        "margin": _margin(standing),
-        "chance": standing.chance if known else None,
-        "limit_verdict": standing.verdict,
-        "source": standing.source,
-        "share": standing.share,
-        "parts": standing.parts,
-        "reached_after": total["reached_after"],
-        "reason": total["reason"],
-        "specimens": expected.specimens,
-        "recordings": expected.recordings,
-        "spread": expected.spread.variance**0.5 if expected.spread else None,
-        "spread_of": expected.spread_of,
-    }
-
-
-def _backtest_row(requirement: str, standing: Standing, basis: Basis) -> Row:
+def _backtest(requirement: str, standing: Standing, basis: Basis) -> BacktestRow | None:
     """Return what the log of the channel that an error mostly comes of shows of its part."""
     total = standing.total
     words = (standing.source or "").split()
-    quantity = next((word for word in words if word in ("gyro", "accel")), None)
-    where = {"requirement": requirement, "channel": total[quantity] if quantity else None}
-    backtest = basis.backtest({**total, **where})
-    return {
-        "backtest_channel": where["channel"] if backtest.get("ratio") is not None else None,
-        **{
-            f"backtest_{name}": backtest.get(name)
-            for name in ("ratio", "ratio_lower", "ratio_upper", "windows")
-            if backtest.get("ratio") is not None
-        },
-    }
-
-
-def _unless_row(judgement: Judgement) -> Row:
-    unless = judgement.unless
-    if unless is None or judgement.outside:
-        return {}
-    return {
-        "unless": unless_words(unless),
-        "unless_verdict": unless.mended and unless.mended.verdict,
-        "unless_margin": _margin(unless.mended),
-        "logged_verdict": unless.logged and unless.logged.verdict,
-        "logged_margin": _margin(unless.logged),
-    }
+    channels = {"gyro": total.gyro, "accel": total.accel}
+    channel = next((channels[word] for word in words if word in channels), None)
+    tested = basis.backtest(total, requirement, channel)
+    return tested if tested is not None and tested.ratio is not None else None
 
 
 def _margin(standing: Standing | None) -> float | None:

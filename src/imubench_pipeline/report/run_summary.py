@@ -185,7 +185,7 @@ def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -
             shown = f"no sensor fulfils it; nearest is {shown}"
         tied = f", tied with {best.tied_with}" if best.tied_with else ""
         weak = ", on weak evidence" * (best.evidence == "weak")
-        yield one_line(f"{name}: {shown}: {in_words(best)}{weak}{tied}")
+        yield one_line(f"{name}: {shown}: {in_words(best.verdict, best.conditions)}{weak}{tied}")
 
 
 def one_line(text: str, longest: int = _MOST_LETTERS) -> str:

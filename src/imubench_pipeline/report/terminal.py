@@ -243,7 +243,8 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
     sensor = one_line(group["sensor"] + " (simulated)" * group["simulated"])
     if group["tied_with"]:
         sensor += "\n" + one_line(f"tied with {group['tied_with']}")
-    verdict = Text(one_line(in_words(group)), style=_STYLES.get(group["verdict"], "dim"))
+    words = in_words(group["verdict"], group["conditions"])
+    verdict = Text(one_line(words), style=_STYLES.get(group["verdict"], "dim"))
     if group["weak"]:
         verdict.stylize("dim")
     weak = f"on weak evidence: {group['weak']}" if group["weak"] else ""

@@ -144,7 +144,7 @@ def requirement_verdict(
     best = ranked[0]
     decides = next(limit for limit in best["limits"] if limit["decides"])
     best_name = names[best["sensor"]] + (" (simulated)" if best["simulated"] else "")
-    verdict, conditions = in_words(best), []
+    verdict, conditions = in_words(best["verdict"], best["conditions"]), []
     if (best["conditions"] or "").count("; ") and best["verdict"].endswith(" if"):
         conditions = best["conditions"].split("; ")
         verdict = f"{best['verdict'].removesuffix(' if')} on {len(conditions)} conditions"

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pyarrow.compute as pc
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, NavigationRow
+from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
+from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.navigation.in_outages import outage_rows
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
@@ -21,19 +24,19 @@ def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -
     sections = json.loads(settings)
     requirements = requirements_of(sections["requirements"])
     joined = {name: read(name, [path]) for name, path in tables.items()}
-    asked = joined.pop("error_budget").filter(pc.field("requirement").is_valid())
-    navigation = joined.pop("navigation")
-    columns = ["sensor", "recording", "channel", "recommended", "value"]
-    recommended = joined["parameters"].select(columns).filter(pc.field("recommended"))
+    asked = joined["error_budget"].filter(pc.field("requirement").is_valid())
+    recommended = joined["parameters"].filter(pc.field("recommended"))
+    recordings = RecordingRow.rows_of(joined["recordings"])
     basis = Basis.of(
-        joined["recordings"].to_pylist(),
-        joined["doubts"].to_pylist(),
-        recommended.to_pylist(),
-        joined["backtest"].to_pylist(),
+        recordings,
+        DoubtRow.rows_of(joined["doubts"]),
+        ParameterRow.rows_of(recommended),
+        BacktestRow.rows_of(joined["backtest"]),
     )
     sensors = sections["sensors"]
-    outages = outage_rows(navigation.to_pylist(), joined["recordings"].to_pylist(), requirements)
-    of_sensors = [row for row in (*asked.to_pylist(), *outages) if row["sensor"] in sensors]
+    outages = outage_rows(NavigationRow.rows_of(joined["navigation"]), recordings, requirements)
+    errors: list[ErrorBudgetRow] = [*ErrorBudgetRow.rows_of(asked), *outages]
+    of_sensors = [row for row in errors if row.sensor in sensors]
     judged = list(judgements(of_sensors, requirements, sensors, basis))
     built = {
         "ranking": build("ranking", ranked(judged, basis)),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from imubench_pipeline.model.estimates import FixedBiasRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.repeatability import repeatability_rows
 from imubench_pipeline.settings.config import DatasheetSettings
 from imubench_pipeline.settings.sensor import sensors_of
@@ -15,8 +17,8 @@ def write_repeatability(
 ) -> None:
     """Write the table ``repeatability``, as Parquet and CSV."""
     how = DatasheetSettings.model_validate_json(settings)
-    fixed = read("fixed_bias", [biases]).to_pylist()
-    about = read("recordings", [recordings]).to_pylist()
+    fixed = FixedBiasRow.rows_of(read("fixed_bias", [biases]))
+    about = RecordingRow.rows_of(read("recordings", [recordings]))
     rows = repeatability_rows(fixed, about, sensors_of(catalogue), how.tolerance)
     table = build("repeatability", rows)
     for output in outputs:

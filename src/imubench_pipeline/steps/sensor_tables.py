@@ -10,7 +10,6 @@ import pyarrow as pa
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.datasheets.suspicion import UsualFigures, unusual_rows, usual_of_text
-from imubench_pipeline.model.comparisons import PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.navigation.backtest import comparison
@@ -90,9 +89,7 @@ def joined_tables(
     joined["doubts"] = build("doubts", (doubt.row() for doubt in doubted))
     apart = left_out(about)
     pools = pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
-    joined["pooled"] = build(
-        "pooled", with_doubts_of_all((PooledRow(**row) for row in pools), about)
-    )
+    joined["pooled"] = build("pooled", with_doubts_of_all(pools, about))
     for name in WITH_DOUBTS.keys() & joined.keys():
         joined[name] = build(name, with_doubts(WITH_DOUBTS[name].rows_of(joined[name]), about))
     truth = list(truth_rows(truths))

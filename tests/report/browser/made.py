@@ -23,6 +23,8 @@ from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
 from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.error_growth import growth_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
@@ -46,6 +48,7 @@ from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.ranking import ranking_rows
 from tests.report.tables import SCORES
+from tests.rows import typed
 
 Rows = dict[str, list[Mapping[str, Any]]]
 
@@ -298,8 +301,9 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
         rows["findings"].append(Finding("rejected", "fatal", REASON, 1.0).row(sensor, recording))
     best = [row for row in rows["parameters"] if row["recommended"]]
     devices = {(row["sensor"], row["recording"]): row["device"] for row in rows["recordings"]}
-    rows["drift"] = [*drift_rows(best, rows["fixed_bias"], rows["recordings"])]
-    rows["pooled"] = [*pooled_rows(best, rows["fixed_bias"], devices)]
+    estimated, biases = typed(ParameterRow, best), typed(FixedBiasRow, rows["fixed_bias"])
+    rows["drift"] = [*drift_rows(estimated, biases, typed(RecordingRow, rows["recordings"]))]
+    rows["pooled"] = [*pooled_rows(estimated, biases, devices)]
     prices = {name: {"price_class": one.price_class} for name, one in SENSORS.items()}
     errors = build("error_budget", rows["error_budget"]).to_pylist()
     rows["ranking"] = [*ranking_rows(errors, REQUIREMENTS, prices, parameters=best)]

@@ -14,10 +14,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.suitability.abilities import Abilities, judge
 from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.settings.requirements import Must
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import from_si
 
 EXCLUDED = "excluded"
@@ -73,7 +73,7 @@ class Rests:
     figures: Mapping[tuple[str, str], float]
 
     @classmethod
-    def of(cls, must: Must, has: Abilities, conditions: Iterable[Row]) -> Rests:
+    def of(cls, must: Must, has: Abilities, conditions: Iterable[ErrorBudgetRow]) -> Rests:
         """Return what the verdict on a sensor rests on.
 
         Of what it must have and has, and the rows of the table ``error_budget`` that a limit rests
@@ -82,8 +82,10 @@ class Rests:
         lacking, unknown = judge(must, has)
         figures: dict[tuple[str, str], float] = {}
         for row in conditions:
-            key = _measured(row), row["cause"]
-            largest = row["largest"] or 0.0
+            if row.cause is None:
+                continue  # a condition has one
+            key = _measured(row), row.cause
+            largest = row.largest or 0.0
             figures[key] = min(figures.get(key, largest), largest)
         return cls(tuple(lacking), tuple(unknown), figures)
 
@@ -121,54 +123,65 @@ def _down(value: float) -> float:
     return float(Decimal(value).quantize(step, rounding=ROUND_DOWN))
 
 
-def in_words(row: Row) -> str:
-    """Return the verdict of a row of ``ranking`` with what it rests on.
+def in_words(verdict: str, conditions: str | None) -> str:
+    """Return a verdict of the table ``ranking`` with the conditions that it rests on.
 
     Such as ``passes if its gyros are calibrated to ...``.
     """
-    if not row["conditions"]:
-        return str(row["verdict"])
-    return f"{row['verdict']}{':' * (row['verdict'] == EXCLUDED)} {row['conditions']}"
+    if not conditions:
+        return verdict
+    return f"{verdict}{':' * (verdict == EXCLUDED)} {conditions}"
 
 
-def _measured(row: Row) -> str:
+def _measured(row: ErrorBudgetRow) -> str:
     """Return whose figure a source is of."""
-    return next(word for word in row["source"].split() if word in SENSORS)
+    return next(word for word in row.source.split() if word in SENSORS)
 
 
-def is_condition(row: Row) -> bool:
-    """Tell whether a limit rests on the figure of a source, a row of the table ``error_budget``."""
-    return row["largest_unit"] is not None and row["cause"] in _FIGURES
+def is_condition(row: ErrorBudgetRow) -> bool:
+    """Tell whether a limit rests on the figure of a source."""
+    return row.largest_unit is not None and row.cause in _FIGURES
 
 
-def once_calibrated(words: str, total: Row, conditions: Iterable[Row]) -> str:
+def once_calibrated(
+    words: str,
+    limit: float | None,
+    sigma: float | None,
+    upper: float | None,
+    conditions: Iterable[ErrorBudgetRow],
+) -> str:
     """Return the verdict on an error when the biases that break its limit are calibrated.
 
     A bias is in every draw of the total by its square, and so in the limits of the total. ``words``
-    is the verdict as it is; total and conditions, the sources that the limit rests on, are rows of
-    the table ``error_budget``.
+    is the verdict as it is; limit, sigma and upper are those of the error; conditions are the
+    sources that the limit rests on.
     """
-    squares = [row["sigma"] ** 2 for row in conditions if row["sigma"] is not None]
-    if not squares or words in CONDITIONAL:
+    squares = [size**2 for _, size in with_sigma(conditions)]
+    if not squares or words in CONDITIONAL or limit is None:
         return words
-    for size, better in (("upper", "passes"), ("sigma", "probably passes")):
-        if total[size] ** 2 - math.fsum(squares) < total["limit"] ** 2:
+    for size, better in ((upper, "passes"), (sigma, "probably passes")):
+        if size is not None and size**2 - math.fsum(squares) < limit**2:
             return better
     return words
 
 
-def parts_of(total: float, sources: Iterable[Row], least: float = 0.01) -> str | None:
+def with_sigma(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, float]]:
+    """Return the rows with a figure, each with its standard deviation."""
+    return [(row, row.sigma) for row in rows if row.sigma is not None]
+
+
+def parts_of(total: float, sources: Iterable[ErrorBudgetRow], least: float = 0.01) -> str | None:
     """Return the sources of an error with their parts of the variance, the largest first.
 
-    Of a total, 1 sigma, and rows of the table ``error_budget``; parts below ``least`` are left out.
+    Of a total, 1 sigma, and its sources; parts below ``least`` are left out.
     """
     if total <= 0.0:
         return None
-    shares = ((row, (row["sigma"] / total) ** 2) for row in sources if row["sigma"] is not None)
+    shares = ((row, (sigma / total) ** 2) for row, sigma in with_sigma(sources))
     shown = sorted((pair for pair in shares if pair[1] >= least), key=lambda pair: -pair[1])
     return "; ".join(f"{named(row)} {100 * share:.0f} %" for row, share in shown) or None
 
 
-def named(row: Row) -> str:
-    """Return the name of a source of the table ``error_budget``, marked where it is printed."""
-    return row["source"] + f" (datasheet, {row['kind']})" * (row["origin"] == "datasheet")
+def named(row: ErrorBudgetRow) -> str:
+    """Return the name of a source, marked where it is printed."""
+    return row.source + f" (datasheet, {row.kind})" * (row.origin == "datasheet")

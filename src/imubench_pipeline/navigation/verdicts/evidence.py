@@ -14,12 +14,12 @@ from collections.abc import Iterator
 from typing import Literal, get_args
 
 from imubench_pipeline.estimators.estimate import CURVE
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.noise import TERMS, Term
 from imubench_pipeline.noise.terms.traits import Role
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
 
@@ -91,29 +91,27 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
 
 
 def _of_log(
-    total: Row, standing: Standing, requirement: Requirement, basis: Basis
+    total: ErrorBudgetRow, standing: Standing, requirement: Requirement, basis: Basis
 ) -> Iterator[str]:
-    key = total["sensor"], total["recording"]
-    for quantity in ("gyro", "accel"):
-        axes = basis.axes(key, quantity) if total[quantity] else None
+    key = total.sensor, total.recording
+    answering = {"gyro": total.gyro, "accel": total.accel}
+    for quantity, channel in answering.items():
+        axes = basis.axes(key, quantity) if channel else None
         if requirement.axis == "worst" and axes is not None and axes < _AXES:
             yield "few_axes"
     if standing.source is None:
         return
     behind = parameters_behind(standing.source)
-    channel = total[quantity_behind(standing.source) or "gyro"]
+    channel = answering[quantity_behind(standing.source) or "gyro"]
     for doubt in basis.doubts.get(key, ()):
-        named = set((doubt["parameters"] or "").split(", ")) - {""}
-        if doubt["channel"] in (None, channel) and behind and (not named or named & behind):
-            yield doubt["code"]
+        named = set((doubt.parameters or "").split(", ")) - {""}
+        if doubt.channel in (None, channel) and behind and (not named or named & behind):
+            yield doubt.code
 
 
-def longest_asked(total: Row, requirement: Requirement) -> float:
-    """Return the longest time that a limit is about, s: its own, or the window at rest before.
-
-    ``total`` is a row of the table ``error_budget``.
-    """
+def longest_asked(total: ErrorBudgetRow, requirement: Requirement) -> float:
+    """Return the longest time that a limit is about, s: its own, or the window at rest before."""
     window = requirement.static_window
     # The heading found at rest has no window before it.
-    before = quantity_to_si(window, "time") if window and total["error"] != "north" else 0.0
-    return float(max(total["time"], before))
+    before = quantity_to_si(window, "time") if window and total.error != "north" else 0.0
+    return max(total.time, before)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.suitability.abilities import Abilities
 from imubench_pipeline.navigation.suitability.conditions import Rests, once_calibrated
 from imubench_pipeline.navigation.verdicts.basis import Basis
@@ -14,10 +15,6 @@ from imubench_pipeline.navigation.verdicts.specimens import Spread, usual_spread
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
 from imubench_pipeline.navigation.verdicts.unless import Unless, unless
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.typing import Row
-
-_NOTHING = {"sigma": None, "lower": None, "upper": None, "within": None, "reached_after": None}
-"""What is known from a recording that does not decide."""
 
 _WORST_FIRST = (
     "surely fails",
@@ -74,20 +71,20 @@ class Judgement:
 
 
 def judgements(
-    errors: Iterable[Row],
+    errors: Iterable[ErrorBudgetRow],
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Mapping[str, Any]],
     basis: Basis,
 ) -> Iterator[Judgement]:
     """Yield how each sensor stands to each requirement.
 
-    Of rows of the table ``error_budget``, ``price_class`` and, where known, ``abilities`` of each
+    Of the errors of all recordings, ``price_class`` and, where known, ``abilities`` of each
     sensor, and the recordings, of which those that do not decide are left out.
     """
-    by_requirement: dict[str, dict[str, list[Row]]] = {}
+    by_requirement: dict[str | None, dict[str, list[ErrorBudgetRow]]] = {}
     for row in errors:
-        of_sensors = by_requirement.setdefault(row["requirement"], {})
-        of_sensors.setdefault(row["sensor"], []).append(row)
+        of_sensors = by_requirement.setdefault(row.requirement, {})
+        of_sensors.setdefault(row.sensor, []).append(row)
     for name, requirement in requirements.items():
         of_sensors = by_requirement.get(name, {})
         usual = {made: _usual(of_sensors, basis, simulated=made) for made in (False, True)}
@@ -112,24 +109,32 @@ def judgements(
             )
 
 
-def _specimens(sensor: str, rows: Iterable[Row], basis: Basis) -> tuple[dict[str, str], bool]:
+def _specimens(
+    sensor: str, rows: Iterable[ErrorBudgetRow], basis: Basis
+) -> tuple[dict[str, str], bool]:
     """Return the specimen of each recording of rows, and whether all of these are simulated."""
-    keys = [(sensor, row["recording"]) for row in rows]
+    keys = [(sensor, row.recording) for row in rows]
     devices = {recording: basis.device((sensor, recording)) for _, recording in keys}
     return devices, all(basis.simulated(key) for key in keys)
 
 
-def _deciding_rows(rows: Sequence[Row], basis: Basis) -> list[Row]:
+def _deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[ErrorBudgetRow]:
     """Return rows without the figures of recordings that do not decide."""
-    apart = [basis.apart.get((row["sensor"], row["recording"])) for row in rows]
+    apart = [basis.apart.get((row.sensor, row.recording)) for row in rows]
     return [
-        row if reason is None else {**row, **_NOTHING, "reason": reason}
+        row if reason is None else _without_figure(row, reason)
         for row, reason in zip(rows, apart, strict=True)
     ]
 
 
+def _without_figure(row: ErrorBudgetRow, reason: str) -> ErrorBudgetRow:
+    return replace(
+        row, sigma=None, lower=None, upper=None, within=None, reached_after=None, reason=reason
+    )
+
+
 def _usual(
-    of_sensors: Mapping[str, Sequence[Row]], basis: Basis, *, simulated: bool
+    of_sensors: Mapping[str, Sequence[ErrorBudgetRow]], basis: Basis, *, simulated: bool
 ) -> dict[tuple[Any, ...], Spread]:
     """Return the spread between specimens of all sensors that have several, by limit."""
     by_limit: dict[tuple[Any, ...], list[Spread]] = {}
@@ -145,12 +150,10 @@ def _usual(
 
 
 def _once_calibrated(standing: Standing) -> str:
-    error = {
-        "limit": standing.total["limit"],
-        "sigma": standing.expected.sigma,
-        "upper": standing.expected.upper,
-    }
-    return once_calibrated(standing.verdict, error, standing.conditions)
+    error = standing.expected
+    return once_calibrated(
+        standing.verdict, standing.total.limit, error.sigma, error.upper, standing.conditions
+    )
 
 
 def _outside(requirement: Requirement, price_class: str | None) -> str | None:

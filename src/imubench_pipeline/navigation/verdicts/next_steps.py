@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 
 from scipy.special import stdtrit
 
+from imubench_pipeline.model.comparisons import NextStepRow
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
 from imubench_pipeline.navigation.verdicts.evidence import LONGEST_PART, REASONS, longest_asked
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
@@ -46,7 +47,7 @@ class _Step:
     what: str = ""
 
 
-def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[dict[str, Any]]:
+def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
     """Return the rows of the table ``next_steps``, what turns most verdicts first."""
     groups: dict[tuple[Any, ...], list[_Step]] = {}
     for judgement in judged:
@@ -57,11 +58,11 @@ def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[dict[str, 
     return sorted(
         rows,
         key=lambda row: (
-            -row["verdicts_turned"],
-            -row["verdicts_strengthened"],
-            _ORDER.index(row["action"]),
-            row["sensor"],
-            row["recording"] or "",
+            -row.verdicts_turned,
+            -row.verdicts_strengthened,
+            _ORDER.index(row.action),
+            row.sensor,
+            row.recording or "",
         ),
     )
 
@@ -91,10 +92,10 @@ def _steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
 def _to_know(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     """Yield what a recording lacks of which nothing is known, or how long it is to be."""
     total = judgement.decides.total
-    key = judgement.sensor, total["recording"]
+    key = judgement.sensor, total.recording
     if key in basis.apart:
         return
-    needs = ("gyro",) if total["error"] in ("heading", "north") else ("gyro", "accel")
+    needs = ("gyro",) if total.error in ("heading", "north") else ("gyro", "accel")
     missing = [name for name in needs if basis.lacks(key, name)]
     if missing:
         yield _Step("add_channels", key, judgement.name, turns=True, what=_quantities(missing))
@@ -152,9 +153,9 @@ def _to_strengthen(judgement: Judgement, reason: str, basis: Basis) -> Iterator[
         yield _Step("add_channels", key, name, False, what="all three axes")
     elif reason not in REASONS:
         for total in decides.totals:
-            own = sensor, total["recording"]
-            doubts = [row for row in basis.doubts.get(own, ()) if row["code"] == reason]
-            if any(row["factor"] is not None for row in doubts):
+            own = sensor, total.recording
+            doubts = [row for row in basis.doubts.get(own, ()) if row.code == reason]
+            if any(row.factor is not None for row in doubts):
                 what = _quantities(basis.factors(own))
                 yield _Step("check_unit", own, name, False, what=what)
             elif doubts:
@@ -168,7 +169,7 @@ def _quantities(names: Iterable[str]) -> str:
 
 def _longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:
     """Return the recording of a standing that is longest, and its duration."""
-    keys = [(sensor, row["recording"]) for row in standing.totals]
+    keys = [(sensor, row.recording) for row in standing.totals]
     key = max(keys, key=lambda candidate: basis.duration(candidate) or 0.0)
     return key, basis.duration(key)
 
@@ -178,7 +179,7 @@ def _duration_needed(judgement: Judgement) -> float:
     return longest_asked(judgement.decides.total, judgement.requirement) / LONGEST_PART
 
 
-def _row(steps: Sequence[_Step], basis: Basis) -> dict[str, Any]:
+def _row(steps: Sequence[_Step], basis: Basis) -> NextStepRow:
     first = steps[0]
     turned = {step.requirement for step in steps if step.turns}
     strengthened = {step.requirement for step in steps} - turned
@@ -191,17 +192,17 @@ def _row(steps: Sequence[_Step], basis: Basis) -> dict[str, Any]:
     effect = _effect(first.action, len(turned), len(strengthened))
     logged = basis.duration((sensor, recording)) if recording else None
     what = _what_to_do(first.action, recording, whats, duration, logged, specimens)
-    return {
-        "sensor": sensor,
-        "recording": recording,
-        "requirements": ", ".join(dict.fromkeys(step.requirement for step in steps)),
-        "action": first.action,
-        "verdicts_turned": len(turned),
-        "verdicts_strengthened": len(strengthened),
-        "duration": duration,
-        "specimens": specimens,
-        "text": f"{what}: {effect}",
-    }
+    return NextStepRow(
+        sensor=sensor,
+        recording=recording,
+        requirements=", ".join(dict.fromkeys(step.requirement for step in steps)),
+        action=first.action,
+        verdicts_turned=len(turned),
+        verdicts_strengthened=len(strengthened),
+        duration=duration,
+        specimens=specimens,
+        text=f"{what}: {effect}",
+    )
 
 
 def _what_to_do(

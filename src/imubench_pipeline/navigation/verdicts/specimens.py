@@ -30,8 +30,8 @@ from statistics import variance
 
 from scipy.special import stdtr, stdtrit
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.pooled import NORMAL, Pool, bounded_exp, pool
-from imubench_pipeline.typing import Row
 
 Limits = tuple[float, float, float]  # value, lower, upper
 
@@ -72,7 +72,7 @@ class Expected:
 
 
 def expected(
-    totals: Sequence[Row], devices: Mapping[str, str], usual: Spread | None = None
+    totals: Sequence[ErrorBudgetRow], devices: Mapping[str, str], usual: Spread | None = None
 ) -> Expected:
     """Return the error that the next specimen of a sensor will have.
 
@@ -80,17 +80,17 @@ def expected(
     without a figure do not count; the specimen of each recording; and the spread of other sensors,
     for one specimen.
     """
-    with_figure = [row for row in totals if row["sigma"] is not None]
-    if not with_figure:
+    figures = [(row, figure) for row in totals if (figure := _figure(row)) is not None]
+    if not figures:
         return Expected(None, None, None, None, 0, 0)
     groups: dict[str, list[Limits]] = {}
-    for row in with_figure:
-        groups.setdefault(devices[row["recording"]], []).append(_limits(row))
-    counts = (len(groups), len(with_figure))
-    if any(row["sigma"] <= 0.0 for row in with_figure) or (len(with_figure) == 1 and usual is None):
-        worst = max(with_figure, key=lambda row: row["sigma"])
-        return Expected(worst["sigma"], worst["lower"], worst["upper"], worst["within"], *counts)
-    limit = with_figure[0]["limit"]
+    for row, figure in figures:
+        groups.setdefault(devices[row.recording], []).append(_limits(*figure))
+    counts = (len(groups), len(figures))
+    if any(sigma <= 0.0 for _, (sigma, _, _) in figures) or (len(figures) == 1 and usual is None):
+        worst, figure = max(figures, key=lambda pair: pair[1][0])
+        return Expected(*figure, worst.within, *counts)
+    limit = figures[0][0].limit
     if len(groups) == 1 and usual is not None:
         value, lower, upper = _of_device(*groups.values())
         error = math.log(upper / lower) / (2.0 * NORMAL)
@@ -125,14 +125,18 @@ def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
     )
 
 
-def _limits(row: Row) -> Limits:
+def _figure(row: ErrorBudgetRow) -> Limits | None:
+    if row.sigma is None or row.lower is None or row.upper is None:
+        return None
+    return row.sigma, row.lower, row.upper
+
+
+def _limits(value: float, lower: float, upper: float) -> Limits:
     """Return value and limits as `pool` takes them: positive, and on either side of the value."""
-    value = row["sigma"]
-    lower = max(row["lower"], _FURTHEST * value)
     return (
         value,
-        min(lower, value * (1.0 - _NARROWEST)),
-        max(row["upper"], value * (1.0 + _NARROWEST)),
+        min(max(lower, _FURTHEST * value), value * (1.0 - _NARROWEST)),
+        max(upper, value * (1.0 + _NARROWEST)),
     )
 
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from imubench_pipeline.navigation.suitability.conditions import is_condition, named, parts_of
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.navigation.in_outages import trajectory_of
+from imubench_pipeline.navigation.suitability.conditions import (
+    is_condition,
+    named,
+    parts_of,
+    with_sigma,
+)
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, expected
-from imubench_pipeline.typing import Row
 
 _SURE = 0.975
 """Chance from which a verdict is sure."""
@@ -22,16 +28,16 @@ VAGUE = 4.0
 class Standing:
     """What a sensor makes of one limit of a requirement."""
 
-    # row ``total`` of the table ``error_budget`` of the recording that answers: of several, the one
-    # whose error is nearest to what is expected
-    total: Row
-    totals: Sequence[Row]  # those of all recordings with a figure
+    # row ``total`` of the recording that answers: of several, the one whose error is nearest to
+    # what is expected
+    total: ErrorBudgetRow
+    totals: Sequence[ErrorBudgetRow]  # those of all recordings with a figure
     expected: Expected  # the error, of the next specimen where there are several
     source: str | None = None  # the largest contribution
     share: float | None = None  # its part of the variance
     parts: str | None = None  # all sources that count
     # rows of sources whose figure is not known, or breaks the limit until it is calibrated
-    conditions: tuple[Row, ...] = ()
+    conditions: tuple[ErrorBudgetRow, ...] = ()
 
     @property
     def known(self) -> bool:
@@ -41,12 +47,12 @@ class Standing:
     @property
     def margin(self) -> float:
         """How many times the error fits into the limit."""
-        return _over(self.total["limit"], self.expected.sigma)
+        return _over(self.total.limit, self.expected.sigma)
 
     @property
     def margins(self) -> tuple[float, float]:
         """95 % limits of the margin."""
-        limit = self.total["limit"]
+        limit = self.total.limit
         return _over(limit, self.expected.upper), _over(limit, self.expected.lower)
 
     @property
@@ -64,8 +70,8 @@ class Standing:
     @property
     def _vague(self) -> bool:
         """Whether the log that answers says too little: two specimens do not know their spread."""
-        lower, upper = self.total["lower"], self.total["upper"]
-        return bool(lower <= 0.0 or upper / lower > VAGUE)
+        lower, upper = self.total.lower, self.total.upper
+        return lower is None or upper is None or lower <= 0.0 or upper / lower > VAGUE
 
     @property
     def verdict(self) -> str:
@@ -81,7 +87,7 @@ class Standing:
 
 
 def standings(
-    rows: Iterable[Row],
+    rows: Iterable[ErrorBudgetRow],
     devices: Mapping[str, str],
     usual: Mapping[tuple[Any, ...], Spread] | None = None,
 ) -> list[Standing]:
@@ -90,50 +96,55 @@ def standings(
     Of rows of the table ``error_budget``, the specimen of each recording, and the spread of other
     sensors by `limit_of`.
     """
-    by_limit: dict[tuple[Any, ...], list[Row]] = {}
+    by_limit: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
     for row in map(_judgeable, rows):
         by_limit.setdefault(limit_of(row), []).append(row)
     return [
         _standing(parts, devices, (usual or {}).get(key))
         for key, parts in by_limit.items()
-        if any(row["source"] == "total" for row in parts)
+        if any(row.source == "total" for row in parts)
     ]
 
 
-_JUDGED_BY = ("sigma", "lower", "upper", "within", "limit")
-
-
-def _judgeable(row: Row) -> Row:
+def _judgeable(row: ErrorBudgetRow) -> ErrorBudgetRow:
     """Return a row; a total without the numbers for its verdict has no figure."""
-    missing = [name for name in _JUDGED_BY if row[name] is None]
-    if row["source"] != "total" or not missing:
+    judged_by = {
+        "sigma": row.sigma,
+        "lower": row.lower,
+        "upper": row.upper,
+        "within": row.within,
+        "limit": row.limit,
+    }
+    missing = [name for name, number in judged_by.items() if number is None]
+    if row.source != "total" or not missing:
         return row
-    reason = row["reason"] or f"it has no {' and no '.join(missing)}"
-    return {**row, "sigma": None, "reason": reason}
+    reason = row.reason or f"it has no {' and no '.join(missing)}"
+    return replace(row, sigma=None, reason=reason)
 
 
-def limit_of(row: Row) -> tuple[Any, ...]:
+def limit_of(row: ErrorBudgetRow) -> tuple[Any, ...]:
     """Return what names the limit of a row."""
-    return row["error"], row["time"], row["limit"], row.get("trajectory")
+    return row.error, row.time, row.limit, trajectory_of(row)
 
 
-def _standing(parts: Sequence[Row], devices: Mapping[str, str], usual: Spread | None) -> Standing:
-    totals = [row for row in parts if row["source"] == "total"]
-    with_figure = [row for row in totals if row["sigma"] is not None]
+def _standing(
+    parts: Sequence[ErrorBudgetRow], devices: Mapping[str, str], usual: Spread | None
+) -> Standing:
+    totals = [row for row in parts if row.source == "total"]
+    figures = with_sigma(totals)
+    with_figure = [row for row, _ in figures]
     prediction = expected(with_figure, devices, usual)
     if prediction.sigma is None:
         return Standing(totals[0], with_figure, prediction)
-    answer = min(with_figure, key=lambda row: _apart(row["sigma"], prediction.sigma))
-    own = [
-        row for row in parts if row["source"] != "total" and row["recording"] == answer["recording"]
-    ]
+    answer, sigma = min(figures, key=lambda figure: _apart(figure[1], prediction.sigma))
+    own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
     conditions = tuple(row for row in own if is_condition(row))
-    sources = [row for row in own if row["sigma"] is not None]
-    largest = max(sources, key=lambda row: row["sigma"], default=None)
-    if largest is None or answer["sigma"] == 0.0:
+    sources = with_sigma(own)
+    if not sources or sigma == 0.0:
         return Standing(answer, with_figure, prediction, conditions=conditions)
-    share = (largest["sigma"] / answer["sigma"]) ** 2
-    parts_in_words = parts_of(answer["sigma"], sources)
+    largest, size = max(sources, key=lambda source: source[1])
+    share = (size / sigma) ** 2
+    parts_in_words = parts_of(sigma, own)
     return Standing(
         answer, with_figure, prediction, named(largest), share, parts_in_words, conditions
     )
@@ -154,5 +165,5 @@ def _apart(sigma: float, other: float | None) -> float:
     return abs(math.log(sigma / other))
 
 
-def _over(limit: float, error: float | None) -> float:
-    return limit / error if error else math.inf
+def _over(limit: float | None, error: float | None) -> float:
+    return limit / error if limit is not None and error else math.inf

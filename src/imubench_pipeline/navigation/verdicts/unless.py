@@ -10,17 +10,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from scipy.special import ndtr
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.pooled import NORMAL
+from imubench_pipeline.navigation.suitability.conditions import with_sigma
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.evidence import quantity_behind
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
-from imubench_pipeline.typing import Row
 
 Factors = Mapping[str, float]  # by quantity
 
@@ -50,20 +51,20 @@ class Unless:
     doubts: Mapping[tuple[str, str], str]  # what is doubted of each recording that is concerned
 
 
-def unless(sensor: str, rows: Sequence[Row], basis: Basis) -> Unless | None:
+def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless | None:
     """Return what the verdict on a sensor would be if what is doubted were mended.
 
-    The rows are those of the table ``error_budget``, of one requirement, with the figures of all
-    recordings. None where there is nothing to say. Where all recordings of a sensor were left out,
-    it says what they would give as they were logged; else what another unit would turn.
+    The rows are those of one requirement, with the figures of all recordings. None where there is
+    nothing to say. Where all recordings of a sensor were left out, it says what they would give as
+    they were logged; else what another unit would turn.
     """
-    keys = list(dict.fromkeys((sensor, row["recording"]) for row in rows))
+    keys = list(dict.fromkeys((sensor, row.recording) for row in rows))
     apart = [key for key in keys if key in basis.apart]
     unjudged = len(apart) == len(keys) and bool(keys)
     doubted = [key for key in keys if basis.factors(key) and (unjudged or key not in apart)]
     if not unjudged and not doubted:
         return None
-    own = [row for row in rows if unjudged or (sensor, row["recording"]) not in apart]
+    own = [row for row in rows if unjudged or (sensor, row.recording) not in apart]
     devices = {name: basis.device((of, name)) for of, name in keys}
     logged = deciding(standings(own, devices))
     factors = {key: basis.factors(key) for key in doubted}
@@ -77,44 +78,50 @@ def unless(sensor: str, rows: Sequence[Row], basis: Basis) -> Unless | None:
     return Unless(logged if unjudged else None, mended, together, doubts)
 
 
-def _mended(rows: Iterable[Row], factors: Mapping[tuple[str, str], Factors]) -> Iterator[Row]:
+def _mended(
+    rows: Iterable[ErrorBudgetRow], factors: Mapping[tuple[str, str], Factors]
+) -> Iterator[ErrorBudgetRow]:
     """Yield rows with the figures that recordings would have in the other unit."""
-    by_total: dict[tuple[Any, ...], list[Row]] = {}
+    by_total: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
     for row in rows:
-        by_total.setdefault((row["sensor"], row["recording"], *limit_of(row)), []).append(row)
+        by_total.setdefault((row.sensor, row.recording, *limit_of(row)), []).append(row)
     for (sensor, recording, *_), parts in by_total.items():
         yield from scaled(parts, factors.get((sensor, recording), {}))
 
 
-def scaled(parts: Sequence[Row], factors: Factors) -> list[Row]:
+def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudgetRow]:
     """Return the rows of one error of one recording with the quantities of factors multiplied.
 
-    They are of the table ``error_budget``: ``total``, and its sources.
+    They are ``total``, and its sources.
     """
+    own = [row for row in parts if row.source != "total"]
     sources = [
-        {**row, "sigma": factors.get(quantity_behind(row["source"]) or "", 1.0) * row["sigma"]}
-        for row in parts
-        if row["source"] != "total" and row["sigma"] is not None
+        (row, factors.get(quantity_behind(row.source) or "", 1.0) * sigma)
+        for row, sigma in with_sigma(own)
     ]
-    missing = [row for row in parts if row["source"] != "total" and row["sigma"] is None]
-    (total,) = (row for row in parts if row["source"] == "total")
-    if not total["sigma"] or not sources:
+    missing = [row for row in own if row.sigma is None]
+    (total,) = (row for row in parts if row.source == "total")
+    if not total.sigma or not sources or total.lower is None or total.upper is None:
         return list(parts)
-    sigma = math.hypot(*(row["sigma"] for row in sources))
-    by = sigma / total["sigma"]
-    limits = {name: by * total[name] for name in ("lower", "upper")}
-    changed = {**total, "sigma": sigma, **limits}
-    return [{**changed, "within": _within(changed), "reached_after": None}, *sources, *missing]
+    sigma = math.hypot(*(size for _, size in sources))
+    by = sigma / total.sigma
+    lower, upper = by * total.lower, by * total.upper
+    within = _within(total.limit, sigma, lower, upper)
+    return [
+        replace(total, sigma=sigma, lower=lower, upper=upper, within=within, reached_after=None),
+        *(replace(row, sigma=size) for row, size in sources),
+        *missing,
+    ]
 
 
-def _within(total: Row) -> float | None:
+def _within(limit: float | None, sigma: float, lower: float, upper: float) -> float | None:
     """Return the chance that an error is within its limit, log-normal on either side."""
-    if total["limit"] is None:
+    if limit is None:
         return None
-    away = math.log(total["limit"] / total["sigma"])
-    if away <= 0.0 and total["lower"] <= 0.0:
+    away = math.log(limit / sigma)
+    if away <= 0.0 and lower <= 0.0:
         return 0.5  # the limits leave it open
-    side = total["upper"] / total["sigma"] if away > 0.0 else total["sigma"] / total["lower"]
+    side = upper / sigma if away > 0.0 else sigma / lower
     half = math.log(side)
     if half <= 0.0:
         return 1.0 if away >= 0.0 else 0.0
@@ -139,7 +146,7 @@ def unless_words(alternative: Unless) -> str:
 
 def _outcome(standing: Standing) -> str:
     if standing.verdict == "not enough data":
-        reason = "" if standing.known else f" ({standing.total['reason']})"
+        reason = "" if standing.known else f" ({standing.total.reason})"
         return f"cannot be judged{reason}"
     return f"{standing.verdict} (margin {standing.margin:.3g})"
 
