@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.navigation.error_budget import (
     Contribution,
     Figure,
@@ -32,6 +33,7 @@ from imubench_pipeline.navigation.error_budget.printed_errors import PRINTED, in
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.settings.printed import IN_USE, Datasheet
+from tests.rows import typed
 
 G = 9.80665
 DEGREE = math.pi / 180
@@ -263,7 +265,7 @@ def test_what_a_log_tells_of_temperature_stands_before_the_datasheet() -> None:
             ("sensitivity", "ok", -2e-4), ("quadratic", "absent", None), ("lag", "ok", 9.0),
         )
     ]  # fmt: skip
-    found = in_use(printed, ["gyro_x", "gyro_y"], rows)
+    found = in_use(printed, ["gyro_x", "gyro_y"], typed(TemperatureRow, rows))
     measured = found["gyro_x"]["temperature"]
     assert (measured.sigma, measured.origin) == (2e-4, "measured")
     assert measured.spread == pytest.approx(1e-4 / 1.96)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
+from imubench_pipeline.model.estimates import ErrorGrowthRow
 from imubench_pipeline.navigation.error_growth import growth_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, standard
 from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
@@ -39,7 +40,7 @@ HOW = {"draws": DRAWS, "seed": 7}
 
 
 @cache
-def grown() -> list[dict[str, object]]:
+def grown() -> list[ErrorGrowthRow]:
     return list(growth_rows(NAMES, ESTIMATES, times=[10.0, 45.0], window=90.0, **HOW))
 
 
@@ -61,7 +62,7 @@ def test_errors_that_grow_are_those_of_the_budget() -> None:
         of_budget = asked[row["error"], row["time"], row["source"]]
         for name in ("gyro", "accel", "unit"):
             assert row[name] == of_budget[name]
-        for name in {"sigma", "lower", "upper"} & row.keys():
+        for name in ("sigma", "lower", "upper"):
             assert row[name] == pytest.approx(of_budget[name], rel=1e-12)
 
 
@@ -100,13 +101,14 @@ def test_a_ratio_follows_from_what_is_kept_of_each_channel() -> None:
     np.testing.assert_allclose(np.log10(taus), np.arange(-2.0, 2.6, 0.5), atol=1e-12)
     for tau in taus:
         own, other = (
-            np.array([r["adev"] for r in rows if r["tau"] == tau and "draw" in r]) for rows in kept
+            np.array([r["adev"] for r in rows if r["tau"] == tau and r.draw is not None])
+            for rows in kept
         )
         assert len(own) == DRAWS and (np.diff(own) >= 0).all()
         ratio = ratio_of_deviations(a, b, tau, **how)
         limits = np.quantile(own[:, None] / other, [0.025, 0.975], method="inverted_cdf")
         np.testing.assert_allclose([ratio.lower, ratio.upper], limits, rtol=1e-12)
-        values = [r["adev"] for rows in kept for r in rows if r["tau"] == tau and "draw" not in r]
+        values = [r["adev"] for rows in kept for r in rows if r["tau"] == tau and r.draw is None]
         assert ratio.value == pytest.approx(values[0] / values[1], rel=1e-12)
 
 

@@ -1,7 +1,6 @@
 """From a kept log and its estimates to rows, findings, doubts and the ranking."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -9,6 +8,7 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import fit
+from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.backtest.comparison import findings, words
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
@@ -18,6 +18,7 @@ from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channe
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 from tests.ranking import ranking_rows
+from tests.rows import typed
 
 RATE, SAMPLES, N = 5.0, 40_000, 1e-4
 NAMES = {"sensor": "s", "recording": "r"}
@@ -49,12 +50,12 @@ def rows_of(
     estimates: dict[str, Estimate],
     requirement: Requirement = ROBOT,
     **taken_out: str,
-) -> list[dict[str, Any]]:
-    apart = [{"channel": channel, "kind": kind} for channel, kind in taken_out.items()]
+) -> list[BacktestRow]:
+    kinds = [{"channel": channel, "kind": kind} for channel, kind in taken_out.items()]
+    apart = typed(DeterministicRow, kinds)
     asked = {"robot": requirement}
     found = backtest_rows(NAMES, logs, estimates, asked, apart, draws=50, seed=1)
-    made: list[dict[str, Any]] = build("backtest", found).to_pylist()
-    return made
+    return BacktestRow.rows_of(build("backtest", found))
 
 
 @pytest.fixture(scope="module")

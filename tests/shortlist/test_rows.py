@@ -1,10 +1,15 @@
 """Margins from datasheets alone, held against closed forms of the error's growth."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges, measured_ranges
 from imubench_pipeline.navigation.shortlist.figures import printed_ranges
 from imubench_pipeline.navigation.shortlist.rows import VERDICTS, shortlist_rows
@@ -15,6 +20,7 @@ from imubench_pipeline.settings.sensor import Sensor, read_sensors
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.tables import build
 from tests.conftest import PROJECT
+from tests.rows import typed
 from tests.test_configuration import SENSOR
 
 DEG = math.pi / 180
@@ -43,10 +49,11 @@ def judged(
     sensors: Sensor | dict[str, Sensor],
     ranges: MeasuredRanges = NOTHING,
     asked: Requirement | None = None,
-    **tables: Any,
+    ranking: Sequence[RankingRow] = (),
+    recordings: Sequence[RecordingRow] = (),
 ) -> list[dict[str, Any]]:
     named = {"s": sensors} if isinstance(sensors, Sensor) else sensors
-    rows = shortlist_rows({"r": asked or requirement()}, named, ranges, **tables)
+    rows = shortlist_rows({"r": asked or requirement()}, named, ranges, ranking, recordings)
     found: list[dict[str, Any]] = build("shortlist", rows).to_pylist()
     return found
 
@@ -151,16 +158,22 @@ def test_what_is_measured_stands_beside_it() -> None:
     standing = {"requirement": "r", "sensor": "s", "recording": "a", "decides": True,
                 "margin": 1.5, "verdict": "passes"}  # fmt: skip
     for simulated, words in ((True, "simulated logs"), (False, "logs")):
-        recordings = [{"sensor": "s", "recording": "a", "simulated": simulated}]
-        (row,) = judged(sensor(noise_density=DENSITY), ranking=[standing], recordings=recordings)
+        (row,) = judged(
+            sensor(noise_density=DENSITY),
+            ranking=typed(RankingRow, [standing]),
+            recordings=typed(
+                RecordingRow, [{"sensor": "s", "recording": "a", "simulated": simulated}]
+            ),
+        )
         assert (row["measured_margin"], row["measured_margin_of"]) == (1.5, words)
         assert row["measured_verdict"] == "passes"
 
 
-def parameter(name: str, status: str, value: float | None, **limits: Any) -> dict[str, Any]:
-    return {"sensor": "m", "recording": "a", "channel": "gyro_x", "recommended": True,
+def parameter(name: str, status: str, value: float | None, **limits: Any) -> ParameterRow:
+    row = {"sensor": "m", "recording": "a", "channel": "gyro_x", "recommended": True,
             "component": 1, "parameter": name, "status": status, "value": value,
             "lower": None, "upper": None} | limits  # fmt: skip
+    return typed(ParameterRow, [row])[0]
 
 
 def test_ranges_are_those_of_real_logs_that_decide() -> None:
@@ -169,18 +182,19 @@ def test_ranges_are_those_of_real_logs_that_decide() -> None:
         parameter("K", "absent", None, upper=5.0),
         parameter("T_B", "not_identified", None, lower=1.0, upper=1e4),
     ]
-    about = {"sensor": "m", "recording": "a", "simulated": False, "status": "ok",
-             "decides": True, "doubts": ""}  # fmt: skip
+    row = {"sensor": "m", "recording": "a", "simulated": False, "status": "ok",
+           "decides": True, "doubts": ""}  # fmt: skip
+    (about,) = typed(RecordingRow, [row])
     found = measured_ranges(rows, [about], {"m": "consumer"})
     assert found.of_sensor == {("m", "gyro", "B"): (1.0, 3.0), ("m", "gyro", "K"): (0.0, 5.0)}
     other = found.span("tactical", "gyro", "B")
     assert other is not None and "of any class" in other.words
     assert found.span("consumer", "gyro", "T_B") is None
-    shown = [*rows, parameter("K", "ok", 2.0, lower=1.5, upper=2.5) | {"recording": "b"}]
-    both = measured_ranges(shown, [about, about | {"recording": "b"}], {"m": "consumer"})
+    shown = [*rows, replace(parameter("K", "ok", 2.0, lower=1.5, upper=2.5), recording="b")]
+    both = measured_ranges(shown, [about, replace(about, recording="b")], {"m": "consumer"})
     assert both.of_sensor["m", "gyro", "K"] == (0.0, 2.5)
     for change in ({"simulated": True}, {"decides": False}):
-        assert measured_ranges(rows, [about | change], {}).of_sensor == {}
+        assert measured_ranges(rows, [replace(about, **change)], {}).of_sensor == {}
 
 
 def test_the_whole_catalogue_is_judged() -> None:

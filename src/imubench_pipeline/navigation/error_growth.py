@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.model.estimates import ErrorGrowthRow
 from imubench_pipeline.navigation.error_budget import Budget, Figures, Uncalibrated, draw_models
 from imubench_pipeline.navigation.error_budget.budget import ACCEL_ORDER, GYRO_ORDER
 from imubench_pipeline.navigation.expected_errors import (
@@ -30,7 +31,7 @@ from imubench_pipeline.noise.growth import Calibrated
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.noise.stacked import summed
 from imubench_pipeline.settings.requirements import DIMENSIONS
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS
 
 _TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
@@ -48,7 +49,7 @@ def growth_rows(
     draws: int,
     seed: int,
     figures: Mapping[str, Figures] = NO_FIGURES_OF_CHANNELS,
-) -> Iterator[Row]:
+) -> Iterator[ErrorGrowthRow]:
     """Yield the rows of the table ``error_growth`` of a recording.
 
     They are of its worst axes, and where it has several, of each alone: of the gyro and the
@@ -102,18 +103,22 @@ def growth_rows(
             gyro, accel = chosen["gyro"], chosen["accel"]
             assert gyro is not None  # every error needs one
             drawn = noise(question.error, question.time, Calibrated(at_rest), gyro, accel)
-            asked = {
-                **names,
-                **chosen,
-                "axis": axis,
-                "window": at_rest,
-                "error": question.error,
-                "time": question.time,
-                "unit": SI_UNITS[DIMENSIONS[question.error]],
-            }
-            yield asked | {"source": "total", **_limits(budget, drawn)}
+            row = partial(
+                ErrorGrowthRow,
+                sensor=names["sensor"],
+                recording=names["recording"],
+                axis=axis,
+                gyro=gyro,
+                accel=accel,
+                window=at_rest,
+                error=question.error,
+                time=question.time,
+                unit=SI_UNITS[DIMENSIONS[question.error]],
+            )
+            lower, upper = _limits(budget, drawn)
+            yield row(source="total", sigma=budget.total, lower=lower, upper=upper)
             for part in sorted(budget.contributions, key=lambda one: -one.sigma):
-                yield asked | {"source": part.source, "sigma": part.sigma}
+                yield row(source=part.source, sigma=part.sigma)
 
 
 def _answerers(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, AxisErrors]]:
@@ -127,13 +132,9 @@ def _answerers(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, AxisErrors
     return {"worst": dict(axes), **alone}
 
 
-def _limits(budget: Budget, drawn: Array) -> dict[str, float]:
-    """Return the total of a budget with its limits, by the variances that noise has drawn."""
+def _limits(budget: Budget, drawn: Array) -> tuple[float, float]:
+    """Return the limits of the total of a budget, by the variances that noise has drawn."""
     sure = math.fsum(part.sigma**2 for part in budget.contributions if part.cause != "noise")
     lower, upper = np.quantile(np.sqrt(drawn + sure), [_TAIL, 1.0 - _TAIL])
     # The draws of what is absent lie above it: the value itself is inside.
-    return {
-        "sigma": budget.total,
-        "lower": min(float(lower), budget.total),
-        "upper": max(float(upper), budget.total),
-    }
+    return min(float(lower), budget.total), max(float(upper), budget.total)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.error_budget import (
     NO_FIGURES,
     NO_USE,
@@ -29,7 +30,7 @@ from imubench_pipeline.navigation.error_budget import (
     interval,
     time_until,
 )
-from imubench_pipeline.navigation.error_budget.parts import Largest, source_row
+from imubench_pipeline.navigation.error_budget.parts import Largest
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.printed import SENSORS
@@ -41,7 +42,6 @@ from imubench_pipeline.settings.requirements import (
     Requirement,
 )
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
 
 NO_FIGURES_OF_CHANNELS: Mapping[str, Figures] = MappingProxyType({})
@@ -177,7 +177,7 @@ def error_rows(
     draws: int,
     seed: int,
     figures: Mapping[str, Figures] = NO_FIGURES_OF_CHANNELS,
-) -> Iterator[Row]:
+) -> Iterator[ErrorBudgetRow]:
     """Yield the rows of the table ``error_budget`` of a recording.
 
     Parameters
@@ -204,15 +204,17 @@ def error_rows(
 
     drawn = {channel: drawn_of(channel) for channel in axes}
     for question in questions:
-        asked: dict[str, Any] = {
-            **names,
-            "requirement": question.requirement,
-            "axis": question.axis,
-            "error": question.error,
-            "time": question.time,
-            "limit": question.limit,
-            "unit": SI_UNITS[DIMENSIONS[question.error]],
-        }
+        asked = ErrorBudgetRow(
+            sensor=names["sensor"],
+            recording=names["recording"],
+            requirement=question.requirement,
+            axis=question.axis,
+            error=question.error,
+            time=question.time,
+            source="total",
+            limit=question.limit,
+            unit=SI_UNITS[DIMENSIONS[question.error]],
+        )
         chosen = answering(question, axes)
         if chosen is None:
             missing = [
@@ -220,19 +222,38 @@ def error_rows(
                 for quantity in question.needs
                 if not _of(quantity, axes)
             ]
-            yield asked | {"source": "total", "reason": "; ".join(missing)}
+            yield replace(asked, reason="; ".join(missing))
             continue
         pair = [axes[c] if c else _NOTHING for c in chosen.values()]
         many = [drawn[c] if c else [_NOTHING] * draws for c in chosen.values()]
         nominal = question.answer(*pair)
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
-        total = _total(question, nominal, budgets, chosen, estimates)
-        yield asked | chosen | total | {"reached_after": question.reached(*pair)}
-        largest = Largest.of(nominal, question.limit, total["upper"])
+        asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
+        lower, upper = interval(budgets)
+        # The draws of what is absent lie above it: the value itself is inside.
+        lower, upper = min(lower, nominal.total), max(upper, nominal.total)
+        apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
+        reasons = (
+            *nominal.assumptions,
+            *_doubts(chosen, estimates),
+            *_apart(apart, estimates),
+            *_unknown(question, estimates),
+        )
+        yield replace(
+            asked,
+            sigma=nominal.total,
+            lower=lower,
+            upper=upper,
+            drawn="one by one" if apart else "jointly",
+            within=question.limit and chance_within(question.limit, budgets),
+            reason="; ".join(reasons) or None,
+            reached_after=question.reached(*pair),
+        )
+        largest = Largest.of(nominal, question.limit, upper)
         for contribution in sorted(nominal.contributions, key=lambda part: -part.sigma):
-            yield asked | chosen | source_row(contribution) | largest.of_bias(contribution)
+            yield largest.of_bias(asked, contribution)
         for missed in nominal.missing if question.limit is not None else ():
-            yield asked | chosen | largest.of_missing(missed)
+            yield largest.of_missing(asked, missed)
 
 
 def axes_of(
@@ -261,34 +282,6 @@ def answering(question: Question, axes: Mapping[str, AxisErrors]) -> dict[str, s
 
 def _of(quantity: str, axes: Mapping[str, AxisErrors]) -> list[str]:
     return [channel for channel in axes if quantity_of(channel) == quantity]
-
-
-def _total(
-    question: Question,
-    nominal: Budget,
-    budgets: Sequence[Budget],
-    chosen: Mapping[str, str | None],
-    estimates: Mapping[str, Estimate],
-) -> dict[str, Any]:
-    """Return what the row of a total says of it, by its budget and those of drawn models."""
-    lower, upper = interval(budgets)
-    apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
-    reasons = (
-        *nominal.assumptions,
-        *_doubts(chosen, estimates),
-        *_apart(apart, estimates),
-        *_unknown(question, estimates),
-    )
-    return {
-        "source": "total",
-        "sigma": nominal.total,
-        # The draws of what is absent lie above it: the value itself is inside.
-        "lower": min(lower, nominal.total),
-        "upper": max(upper, nominal.total),
-        "drawn": "one by one" if apart else "jointly",
-        "within": question.limit and chance_within(question.limit, budgets),
-        "reason": "; ".join(reasons) or None,
-    }
 
 
 def _drawn(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:

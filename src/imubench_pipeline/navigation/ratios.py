@@ -16,16 +16,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.model.estimates import DrawnDeviationRow
 from imubench_pipeline.navigation.fusion.equivalence import FusionChannel, number_needed
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.noise.stacked import summed
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 
 Verdict = Literal["lower", "higher", "not told apart", "not known"]
 
@@ -160,7 +162,7 @@ def _variances(models: Sequence[NoiseModel], tau: Sequence[float]) -> Array:
 
 def deviation_rows(
     channel: FusionChannel, rate: float, *, longest: float, draws: int, seed: int
-) -> Iterator[Row]:
+) -> Iterator[DrawnDeviationRow]:
     """Yield the rows of the table ``drawn_deviations`` of a channel.
 
     What `ratio_of_deviations` needs to know of it, at tau of two a decade from the sampling
@@ -185,10 +187,14 @@ def deviation_rows(
         for step in range(math.ceil(first - 1e-9), math.floor(last + 1e-9) + 1)
     ]
     drawn = np.sqrt(_variances(_drawn(channel, draws, seed), taus))
-    names = {name: getattr(channel, name) for name in ("sensor", "recording", "channel")}
+    row = partial(
+        DrawnDeviationRow,
+        sensor=channel.sensor,
+        recording=channel.recording,
+        channel=channel.channel,
+    )
     for tau, deviations in zip(taus, drawn, strict=True):
-        at = {**names, "tau": tau}
         unknown = "; ".join(dict.fromkeys(channel.unknown(tau))) or None
-        yield at | {"adev": math.sqrt(channel.variance(tau)), "unknown": unknown}
+        yield row(tau=tau, adev=math.sqrt(channel.variance(tau)), unknown=unknown)
         for number, deviation in enumerate(np.sort(deviations).tolist()):
-            yield at | {"draw": number, "adev": deviation}
+            yield row(tau=tau, draw=number, adev=deviation)

@@ -9,6 +9,8 @@ from typing import Any
 
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.model.estimates import DeterministicRow, DrawnDeviationRow, TemperatureRow
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
 from imubench_pipeline.navigation.error_budget.printed_errors import in_use
 from imubench_pipeline.navigation.error_growth import growth_rows
@@ -20,13 +22,12 @@ from imubench_pipeline.settings.config import ErrorBudgetSettings, FusionSetting
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import requirements_of
 from imubench_pipeline.tables import read
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
 
 def error_tables(
     inputs: dict[str, Path], names: dict[str, str], settings: str
-) -> dict[str, Iterator[Row]]:
+) -> dict[str, Iterator[TableRow]]:
     """Return the rows of the tables that the rule leaves; none of a rejected log."""
     sections = json.loads(settings)
     how = ErrorBudgetSettings.model_validate(sections["error_budget"])
@@ -42,8 +43,8 @@ def error_tables(
         return {name: iter(()) for name in _TABLES}
     drawn = {"draws": how.draws, "seed": how.seed}
     logs = kept_static_logs(inputs["quality"].parent)
-    apart = read("deterministic", [inputs["deterministic"]]).to_pylist()
-    temperature = read("temperature", [inputs["temperature"]]).to_pylist()
+    apart = DeterministicRow.rows_of(read("deterministic", [inputs["deterministic"]]))
+    temperature = TemperatureRow.rows_of(read("temperature", [inputs["temperature"]]))
     figures = in_use(Datasheet.model_validate(sections["datasheet"]), estimates, temperature)
     tables = (
         error_rows(names, estimates, questions, figures=figures, **drawn),
@@ -62,7 +63,7 @@ def _deviations(
     quality: Quality,
     estimates: Mapping[str, Estimate],
     sections: Mapping[str, Any],
-) -> Iterator[Row]:
+) -> Iterator[DrawnDeviationRow]:
     """Yield the rows of the table ``drawn_deviations``."""
     how = FusionSettings.model_validate(sections["fusion"])
     for name, estimate in estimates.items():

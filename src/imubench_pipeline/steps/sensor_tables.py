@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.datasheets.suspicion import UsualFigures, unusual_rows, usual_of_text
-from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
+from imubench_pipeline.model.estimates import BacktestRow, FixedBiasRow, ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
@@ -77,7 +77,7 @@ def joined_tables(
     )
     findings += recorded_twice(models, biases)
     if "backtest" in joined:
-        findings += comparison.findings(joined["backtest"].to_pylist())
+        findings += comparison.findings(BacktestRow.rows_of(joined["backtest"]))
     joined["findings"] = build("findings", findings)
     doubted = [
         *simulated_beside_measured(about),

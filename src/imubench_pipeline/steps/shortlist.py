@@ -7,13 +7,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.model.table import R
 from imubench_pipeline.navigation.shortlist.classes import measured_ranges
 from imubench_pipeline.navigation.shortlist.figures import printed_ranges
 from imubench_pipeline.navigation.shortlist.rows import shortlist_rows
 from imubench_pipeline.settings.requirements import Requirement, requirements_of
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import build, read, write_arrow
-from imubench_pipeline.typing import Row
 
 NEEDED = ("recordings", "parameters", "ranking")
 """The tables of a run that it reads."""
@@ -23,7 +26,7 @@ def rows_of_run(
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Sensor],
     tables: Mapping[str, Path],
-) -> Iterator[Row]:
+) -> Iterator[ShortlistRow]:
     """Yield the rows of the table ``shortlist``.
 
     Parameters
@@ -40,12 +43,15 @@ def rows_of_run(
         If a table cannot be read, or is of another form.
     """
     sensors = {name: sensor for name, sensor in sensors.items() if sensor.sold}
-    rows = {name: read(name, [path]).to_pylist() for name, path in tables.items()}
-    recordings = rows.get("recordings", [])
+
+    def rows_of(of: type[R]) -> list[R]:
+        return of.rows_of(read(of.table, [tables[of.table]])) if of.table in tables else []
+
+    recordings = rows_of(RecordingRow)
     classes = {name: sensor.price_class for name, sensor in sensors.items()}
-    measured = measured_ranges(rows.get("parameters", []), recordings, classes)
+    measured = measured_ranges(rows_of(ParameterRow), recordings, classes)
     ranges = replace(measured, printed=printed_ranges(sensors))
-    yield from shortlist_rows(requirements, sensors, ranges, rows.get("ranking", []), recordings)
+    yield from shortlist_rows(requirements, sensors, ranges, rows_of(RankingRow), recordings)
 
 
 def write_shortlist(

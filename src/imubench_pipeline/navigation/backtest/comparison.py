@@ -28,13 +28,15 @@ from typing import Literal
 import numpy as np
 from scipy.special import gammaincc, gammaincinv
 
+from imubench_pipeline.model.estimates import BacktestRow
+from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.navigation.backtest.covariance import Spread, WindowCovariance
 from imubench_pipeline.navigation.backtest.windows import Window, errors
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
 from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 
 _LEAST_SCATTER = 0.3
 """Part of the scatter of the log that is left at least: where a model is known hardly better than
@@ -201,38 +203,39 @@ def _too_few(asked: DeadReckoning, cut: Window, means: Sequence[Array], count: i
     return f"gaps leave {count} overlapping windows: {wanted} without a gap"
 
 
-def words(row: Row) -> str:
+def words(row: BacktestRow) -> str:
     """Return a row of the table ``backtest`` in words."""
-    if row["ratio"] is None:
-        return str(row["reason"])
+    if row.ratio is None:
+        return str(row.reason)
     return (
-        f"this log drifted {row['ratio']:.2f} times the prediction at {row['time']:g} s "
-        f"({row['ratio_lower']:.2f} to {row['ratio_upper']:.2f} are to be expected), "
-        f"{row['windows']} windows, as good as {row['independent']:.3g} independent ones"
+        f"this log drifted {row.ratio:.2f} times the prediction at {row.time:g} s "
+        f"({row.ratio_lower:.2f} to {row.ratio_upper:.2f} are to be expected), "
+        f"{row.windows} windows, as good as {row.independent:.3g} independent ones"
     )
 
 
-def findings(rows: Iterable[Row]) -> Iterator[Row]:
+def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
     """Yield the rows of the table ``findings`` of logs that contradict their own budgets.
 
-    One a channel, of the error whose ratio is least likely; from rows of the table ``backtest``.
+    One a channel, of the error whose ratio is least likely.
     """
-    worst: dict[tuple[str, str, str], Row] = {}
+    by_channel: dict[tuple[str, str, str], list[tuple[float, float, BacktestRow]]] = {}
     for row in rows:
-        place = row["sensor"], row["recording"], row["channel"]
-        if row["contradicted"] and row["chance"] < worst.get(place, {"chance": 2.0})["chance"]:
-            worst[place] = row
-    for (sensor, recording, channel), row in worst.items():
-        taken_out = row["taken_out"]
+        if row.contradicted and row.chance is not None and row.ratio is not None:
+            place = row.sensor, row.recording, row.channel
+            by_channel.setdefault(place, []).append((row.chance, row.ratio, row))
+    for (sensor, recording, channel), contradicted in by_channel.items():
+        _, ratio, row = min(contradicted, key=lambda one: one[0])
+        taken_out = row.taken_out
         why = (
             f"what is taken out of the noise ({taken_out.replace('_', ' ')}) is in the log"
             if taken_out
             else "its slow terms miss something, such as drift with temperature"
         )
         detail = (
-            f"{channel}: {row['error']} after {row['time']:g} s with the bias from "
-            f"{row['window']:g} s at rest: {words(row)}. Budgets of this channel are too small: "
+            f"{channel}: {row.error} after {row.time:g} s with the bias from "
+            f"{row.window:g} s at rest: {words(row)}. Budgets of this channel are too small: "
             f"{why}"
         )
-        finding = Finding("backtest_contradicts", "warning", detail, row["ratio"], channel)
+        finding = Finding("backtest_contradicts", "warning", detail, ratio, channel)
         yield finding.row(sensor, recording)

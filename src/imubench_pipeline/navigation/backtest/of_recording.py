@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from dataclasses import replace
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.navigation.backtest.comparison import Comparison, DeadReckoning, compare
 from imubench_pipeline.navigation.backtest.windows import block_means, window
 from imubench_pipeline.navigation.error_budget import draw_models, drawn_jointly
@@ -14,7 +15,6 @@ from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.requirements import DIMENSIONS, Error, Limit, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import SI_UNITS, quantity_to_si
 
 SURE = 0.01
@@ -41,11 +41,11 @@ def backtest_rows(
     logs: Mapping[str, ChannelLog],
     estimates: Mapping[str, Estimate],
     requirements: Mapping[str, Requirement],
-    deterministic: Iterable[Row],
+    deterministic: Iterable[DeterministicRow],
     *,
     draws: int,
     seed: int,
-) -> Iterator[Row]:
+) -> Iterator[BacktestRow]:
     """Yield the rows of the table ``backtest`` of a recording.
 
     The logs are taken as they are, with lines, drift with temperature and what is taken out of the
@@ -60,8 +60,8 @@ def backtest_rows(
     estimates : mapping of str to Estimate
         The recommended one of each channel.
     requirements : mapping of str to Requirement
-    deterministic : iterable of mapping
-        Rows of the table ``deterministic``: what is taken out of the noise, and not in the models.
+    deterministic : iterable of DeterministicRow
+        What is taken out of the noise, and not in the models.
     draws : int
         Noise models drawn from what each log leaves open.
     seed : int
@@ -69,18 +69,20 @@ def backtest_rows(
     """
     apart: dict[str, dict[str, None]] = {}
     for component in deterministic:
-        apart.setdefault(component["channel"], {})[component["kind"]] = None
+        apart.setdefault(component.channel, {})[component.kind] = None
     rows = [
-        dict(names) | row | {"taken_out": ", ".join(apart.get(channel, ())) or None}
+        replace(row, taken_out=", ".join(apart.get(channel, ())) or None)
         for channel, log in logs.items()
         if channel in estimates
         for row in _of_channel(names, channel, log, estimates[channel], requirements, draws, seed)
     ]
-    compared = sum(row.get("chance") is not None for row in rows)
+    compared = sum(row.chance is not None for row in rows)
     for row in rows:
-        if row.get("chance") is not None:
-            row["contradicted"] = row["chance"] * compared < SURE and row["ratio"] >= MATERIAL
-        yield row
+        if row.chance is None or row.ratio is None:
+            yield row
+        else:
+            contradicted = row.chance * compared < SURE and row.ratio >= MATERIAL
+            yield replace(row, contradicted=contradicted)
 
 
 def _of_channel(
@@ -91,10 +93,9 @@ def _of_channel(
     requirements: Mapping[str, Requirement],
     draws: int,
     seed: int,
-) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a channel, without the names of its recording."""
+) -> Iterator[BacktestRow]:
     listed = [
-        (_about(channel, name, limit), _asked(channel, requirement, limit, estimate))
+        (_about(names, channel, name, limit), _asked(channel, requirement, limit, estimate))
         for name, requirement in requirements.items()
         for limit in requirement.by_dead_reckoning
         if (quantity_of(channel), limit.error) in (*_ORDERS, ("gyro", "north"))
@@ -112,26 +113,27 @@ def _of_channel(
     jointly = drawn_jointly(estimate)
     for about, asked in listed:
         if not isinstance(asked, DeadReckoning):
-            yield about | {"reason": asked}
+            yield replace(about, reason=asked)
         elif (cut := cuts[asked]) is None:
-            yield about | {
-                "reason": f"two samples are further apart than the times: {log.rate:g} Hz"
-            }
+            reason = f"two samples are further apart than the times: {log.rate:g} Hz"
+            yield replace(about, reason=reason)
         else:
             comparison = compare(
                 asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly
             )
-            yield about | _columns(asked, comparison)
+            yield _with_figures(about, asked, comparison)
 
 
-def _about(channel: str, requirement: str, limit: Limit) -> dict[str, Any]:
-    return {
-        "channel": channel,
-        "requirement": requirement,
-        "error": limit.error,
-        "time": limit.seconds,
-        "unit": SI_UNITS[DIMENSIONS[limit.error]],
-    }
+def _about(names: Mapping[str, str], channel: str, requirement: str, limit: Limit) -> BacktestRow:
+    return BacktestRow(
+        sensor=names["sensor"],
+        recording=names["recording"],
+        channel=channel,
+        requirement=requirement,
+        error=limit.error,
+        time=limit.seconds,
+        unit=SI_UNITS[DIMENSIONS[limit.error]],
+    )
 
 
 def _asked(
@@ -149,21 +151,22 @@ def _asked(
     return DeadReckoning(order, rest, limit.seconds, factor)
 
 
-def _columns(asked: DeadReckoning, comparison: Comparison) -> dict[str, Any]:
+def _with_figures(row: BacktestRow, asked: DeadReckoning, comparison: Comparison) -> BacktestRow:
     predicted = comparison.predicted
-    return {
-        "window": asked.rest,
-        "windows": comparison.windows,
-        "independent": comparison.independent,
-        "measured": comparison.measured,
-        "predicted": predicted,
-        "predicted_lower": comparison.lower,
-        "predicted_upper": comparison.upper,
-        "ratio": comparison.ratio,
-        "ratio_lower": None if comparison.least is None else comparison.least / predicted,
-        "ratio_upper": None if comparison.most is None else comparison.most / predicted,
-        "chance": comparison.chance,
-        "verdict": comparison.verdict,
-        "duration_needed": asked.duration_needed,
-        "reason": comparison.reason,
-    }
+    return replace(
+        row,
+        window=asked.rest,
+        windows=comparison.windows,
+        independent=comparison.independent,
+        measured=comparison.measured,
+        predicted=predicted,
+        predicted_lower=comparison.lower,
+        predicted_upper=comparison.upper,
+        ratio=comparison.ratio,
+        ratio_lower=None if comparison.least is None else comparison.least / predicted,
+        ratio_upper=None if comparison.most is None else comparison.most / predicted,
+        chance=comparison.chance,
+        verdict=comparison.verdict,
+        duration_needed=asked.duration_needed,
+        reason=comparison.reason,
+    )

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.error_budget.in_use import (
     Cause,
     Figure,
@@ -115,17 +116,18 @@ def of_figure(
     return None
 
 
-def source_row(contribution: Contribution) -> dict[str, Any]:
-    """Return what the table ``error_budget`` says of a source."""
+def source_row(of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow:
+    """Return the row of a source, from one that says what it is a source of."""
     figure = contribution.figure
-    return {
-        "source": contribution.source,
-        "sigma": contribution.sigma,
-        "cause": contribution.cause,
-        "origin": figure.origin if figure else "measured",
-        "kind": figure.kind if figure else None,
-        "convention": figure.convention if figure else None,
-    }
+    return replace(
+        of,
+        source=contribution.source,
+        sigma=contribution.sigma,
+        cause=contribution.cause,
+        origin=figure.origin if figure else "measured",
+        kind=figure.kind if figure else None,
+        convention=figure.convention if figure else None,
+    )
 
 
 @dataclass(frozen=True)
@@ -165,26 +167,34 @@ class Largest:
         parts = len(biases) + len(budget.missing)
         return cls(math.sqrt(max(room, 0.0) / parts) if parts else 0.0, biases)
 
-    def of_bias(self, contribution: Contribution) -> dict[str, Any]:
-        """Return the largest figure of a printed bias; nothing of what the limit can bear."""
-        figure = contribution.figure
+    def of_bias(self, of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow:
+        """Return the row of a source, of a printed bias with the largest figure.
+
+        Nothing is said of what the limit can bear. `of` says what it is a source of.
+        """
+        row, figure = source_row(of, contribution), contribution.figure
         if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
-            return {}
+            return row
         quantity = "accel" if "accel" in contribution.source.split() else "gyro"
-        return self._figure(quantity, contribution.cause, contribution.sigma / figure.sigma)
+        return self._figure(row, quantity, contribution.cause, contribution.sigma / figure.sigma)
 
-    def of_missing(self, missing: Missing) -> dict[str, Any]:
-        """Return the row of a source whose figure is not known."""
-        return {
-            "source": missing.source,
-            "cause": missing.cause,
-            "origin": "not known",
-            "reason": missing.reason,
-        } | self._figure(missing.quantity, missing.cause, missing.lever)
+    def of_missing(self, of: ErrorBudgetRow, missing: Missing) -> ErrorBudgetRow:
+        """Return the row of a source whose figure is not known, from one that says of what."""
+        row = replace(
+            of,
+            source=missing.source,
+            cause=missing.cause,
+            origin="not known",
+            reason=missing.reason,
+        )
+        return self._figure(row, missing.quantity, missing.cause, missing.lever)
 
-    def _figure(self, quantity: str, cause: str, lever: float) -> dict[str, Any]:
+    def _figure(
+        self, row: ErrorBudgetRow, quantity: str, cause: str, lever: float
+    ) -> ErrorBudgetRow:
         dimension = FIGURE_DIMENSIONS[quantity][PRINTED[cause]][0]  # type: ignore[index]  # a cause
-        return {
-            "largest": self.room / lever if self.room else None,
-            "largest_unit": SI_UNITS[dimension],
-        }
+        return replace(
+            row,
+            largest=self.room / lever if self.room else None,
+            largest_unit=SI_UNITS[dimension],
+        )

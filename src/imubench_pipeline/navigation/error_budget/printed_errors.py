@@ -20,9 +20,9 @@ import math
 from collections.abc import Iterable, Mapping
 
 from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis
+from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.navigation.error_budget.in_use import Cause, Figure
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet
-from imubench_pipeline.typing import Row
 
 PRINTED: Mapping[Cause, str] = {
     "turn_on_bias": "offset",
@@ -74,26 +74,30 @@ def _figure(axis: PrintedAxis, name: str) -> Figure:
     return Figure(reason=obstacle or axis.unpublished(like, name).reason)
 
 
-def of_log(rows: Iterable[Row]) -> dict[Cause, Figure]:
+def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
     """Return what the log of a channel tells of the errors that come in use, SI.
 
     From its rows of the table ``temperature``; ``temperature`` and ``temperature_squared`` where it
     tells them.
     """
-    return {
-        _MEASURED[row["parameter"]]: Figure(
-            sigma=abs(row["value"]),
+    figures: dict[Cause, Figure] = {}
+    for row in rows:
+        if row.parameter not in _MEASURED or row.status != "ok" or row.value is None:
+            continue
+        spread = 0.0
+        if row.lower is not None and row.upper is not None:
+            spread = (row.upper - row.lower) / (2.0 * SIGMAS)
+        figures[_MEASURED[row.parameter]] = Figure(
+            sigma=abs(row.value),
             origin="measured",
             convention="of this specimen, at the mean temperature of the log",
-            spread=(row["upper"] - row["lower"]) / (2.0 * SIGMAS),
+            spread=spread,
         )
-        for row in rows
-        if row["parameter"] in _MEASURED and row["status"] == "ok"
-    }
+    return figures
 
 
 def in_use(
-    datasheet: Datasheet, channels: Iterable[str], temperature: Iterable[Row]
+    datasheet: Datasheet, channels: Iterable[str], temperature: Iterable[TemperatureRow]
 ) -> dict[str, dict[Cause, Figure]]:
     """Return by channel what is known of the errors that come in use, as `error_rows` takes it.
 
@@ -102,6 +106,6 @@ def in_use(
     rows = list(temperature)
     return {
         channel: of_datasheet(datasheet, channel)
-        | of_log(row for row in rows if row["channel"] == channel)
+        | of_log(row for row in rows if row.channel == channel)
         for channel in channels
     }

@@ -7,17 +7,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
+from imubench_pipeline.model.comparisons import FusionRow
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.navigation.fusion.board import divided
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 
 _MATTERS = 0.1
 """Part of the Allan variance from which a parameter that is not known leaves no plain number."""
@@ -206,7 +206,7 @@ def equivalence_rows(
     longest: float,
     draws: int,
     seed: int,
-) -> Iterator[Row]:
+) -> Iterator[FusionRow]:
     """Yield the rows of the table ``fusion``: every ordered pair of sensors at every tau, s.
 
     The candidates are the channels of all sensors; the other parameters are those of `answer`.
@@ -225,32 +225,37 @@ def equivalence_rows(
                 for sensor, own in by_sensor.items()
             }
             for a, b in permutations(answers, 2):
-                names = {"quantity": quantity, "tau": tau, "sensor": a, "other": b}
-                yield names | _pair(answers[a], answers[b], tau)
+                row = FusionRow(quantity=quantity, tau=tau, sensor=a, other=b)
+                yield _pair(row, answers[a], answers[b])
 
 
-def _pair(a: Answer | str, b: Answer | str, tau: float) -> dict[str, Any]:
-    row: dict[str, Any] = {}
-    reasons: list[str] = []
-    for prefix, sensor_answer in (("", a), ("other_", b)):
-        if isinstance(sensor_answer, str):
-            reasons.append(sensor_answer)
-            continue
-        if sensor_answer.unknown:
-            reasons.append(sensor_answer.unknown)
-        row |= {
-            f"{prefix}recording": sensor_answer.candidate.recording,
-            f"{prefix}channel": sensor_answer.candidate.channel,
-            f"{prefix}simulated": sensor_answer.candidate.simulated,
-            f"{prefix}adev": math.sqrt(sensor_answer.own + sensor_answer.common),
-        }
+def _pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow:
+    """Return the row of two sensors at a tau with what is found of them."""
+    answers = [each if isinstance(each, str) else each.unknown for each in (a, b)]
+    reasons = [reason for reason in answers if reason]
     plain = not reasons
     if not isinstance(a, str):
         whole = a.own + a.common
-        row |= {"floor": math.sqrt(a.common), "common_share": a.common / whole}
-        row["temperature_share"] = a.candidate.of_temperature(tau) / whole
+        row = replace(
+            row,
+            recording=a.candidate.recording,
+            channel=a.candidate.channel,
+            simulated=a.candidate.simulated,
+            adev=math.sqrt(whole),
+            floor=math.sqrt(a.common),
+            common_share=a.common / whole,
+            temperature_share=a.candidate.of_temperature(row.tau) / whole,
+        )
+    if not isinstance(b, str):
+        row = replace(
+            row,
+            other_recording=b.candidate.recording,
+            other_channel=b.candidate.channel,
+            other_simulated=b.candidate.simulated,
+            other_adev=math.sqrt(b.own + b.common),
+        )
     if isinstance(a, str) or isinstance(b, str):
-        return row | {"reason": "; ".join(reasons)}
+        return replace(row, reason="; ".join(reasons))
     number = float(number_needed(a.own, a.common, b.own + b.common))
     drawn = number_needed(a.drawn_own, a.drawn_common, b.drawn_own + b.drawn_common)
     # Between infinite ones there is nothing to interpolate.
@@ -258,13 +263,14 @@ def _pair(a: Answer | str, b: Answer | str, tau: float) -> dict[str, Any]:
     # The draws of what is absent lie above it: the value itself is inside.
     low, high = min(float(low), number), max(float(high), number)
     if math.isinf(number):
-        reasons.append(f"no number of them reaches it at {tau:g} s: the common part is a floor")
+        reasons.append(f"no number of them reaches it at {row.tau:g} s: the common part is a floor")
     elif math.isinf(high):
         reasons.append("within the limits of the parameters, no number may reach it")
-    return row | {
-        "n": number if plain and math.isfinite(number) else None,
-        "lower": low if math.isfinite(low) else None,
-        "upper": high if math.isfinite(high) else None,
-        "reachable": math.isfinite(number),
-        "reason": "; ".join(reasons) or None,
-    }
+    return replace(
+        row,
+        n=number if plain and math.isfinite(number) else None,
+        lower=low if math.isfinite(low) else None,
+        upper=high if math.isfinite(high) else None,
+        reachable=math.isfinite(number),
+        reason="; ".join(reasons) or None,
+    )

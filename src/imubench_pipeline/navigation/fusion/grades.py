@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.model.comparisons import GradeRow
 from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.settings.printed import Datasheet
 
@@ -45,9 +45,7 @@ class Grade:
                     yield option, one
 
 
-def grade_rows(
-    candidates: Iterable[FusionChannel], grades: Sequence[Grade]
-) -> Iterator[dict[str, Any]]:
+def grade_rows(candidates: Iterable[FusionChannel], grades: Sequence[Grade]) -> Iterator[GradeRow]:
     """Yield the rows of the table ``grades``: each sensor against each printed figure.
 
     The axis that is the middle one by N answers for a sensor, a measured one before a simulated.
@@ -62,18 +60,23 @@ def grade_rows(
             if grade.sensor == sensor:
                 continue
             for option, printed in grade.printed(chosen.channel):
-                names: dict[str, Any] = {
-                    "quantity": quantity,
-                    "sensor": sensor,
-                    "recording": chosen.recording,
-                    "channel": chosen.channel,
-                    "simulated": chosen.simulated,
-                    "grade": grade.sensor,
-                    "grade_name": grade.name,
-                    "option": option,
-                    "statistic": STATISTICS[printed.statistic],
-                }
-                yield names | _compared(_own(chosen, printed.statistic), printed)
+                own = _own(chosen, printed.statistic)
+                row = GradeRow(
+                    quantity=quantity,
+                    sensor=sensor,
+                    recording=chosen.recording,
+                    channel=chosen.channel,
+                    simulated=chosen.simulated,
+                    grade=grade.sensor,
+                    grade_name=grade.name,
+                    option=option,
+                    statistic=STATISTICS[printed.statistic],
+                    value=own.value,
+                    lower=own.lower,
+                    upper=own.upper,
+                    printed=printed.value,
+                )
+                yield _compared(row, own, printed)
 
 
 def _middle(channels: Sequence[FusionChannel]) -> FusionChannel:
@@ -89,28 +92,19 @@ def _own(channel: FusionChannel, statistic: str) -> Parameter:
     return of.get(STATISTICS[statistic], Parameter(None, "not_shown", "not estimated"))
 
 
-def _compared(own: Parameter, printed: Comparable) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        "value": own.value,
-        "lower": own.lower,
-        "upper": own.upper,
-        "printed": printed.value,
-        "n": None,
-        "n_lower": None,
-        "n_upper": None,
-        "reason": None,
-    }
+def _compared(row: GradeRow, own: Parameter, printed: Comparable) -> GradeRow:
     if printed.value is None:
-        return row | {"reason": printed.obstacle or printed.reason}
+        return replace(row, reason=printed.obstacle or printed.reason)
 
     def needed(value: float | None) -> float | None:
         return (
             None if value is None else (value / printed.value) ** 2 if printed.value else math.inf
         )
 
-    return row | {
-        "reason": None if own.value is not None else own.reason or own.status,
-        "n": needed(own.value),
-        "n_lower": needed(own.lower),
-        "n_upper": needed(own.upper),
-    }
+    return replace(
+        row,
+        n=needed(own.value),
+        n_lower=needed(own.lower),
+        n_upper=needed(own.upper),
+        reason=None if own.value is not None else own.reason or own.status,
+    )

@@ -7,9 +7,10 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.typing import Row
 
 _TAKEN = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
 """Parameters of the estimates, and what stands for them here: B is that of the curve."""
@@ -68,38 +69,36 @@ def class_of(price_class: str | None) -> str:
 
 
 def measured_ranges(
-    parameters: Iterable[Row],
-    recordings: Iterable[Row],
+    parameters: Iterable[ParameterRow],
+    recordings: Iterable[RecordingRow],
     price_classes: Mapping[str, str | None],
 ) -> MeasuredRanges:
     """Return what the logs of a run say, of real sensors and recordings that decide.
 
-    From rows of the tables ``parameters`` and ``recordings``: the 95 % limits of what has a value.
-    A random walk that a log does not show may be 0; its upper limit counts only where no log of the
-    sensor shows one.
+    They are the 95 % limits of what has a value. A random walk that a log does not show may be 0;
+    its upper limit counts only where no log of the sensor shows one.
     """
     about = list(recordings)
     apart = left_out(about)
     real = {
         place
         for row in about
-        if not row["simulated"] and (place := (row["sensor"], row["recording"])) not in apart
+        if not row.simulated and (place := (row.sensor, row.recording)) not in apart
     }
     shown: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
     absent: dict[tuple[str, str, str], list[float]] = {}
-    for row in parameters:
-        figure = _TAKEN.get(row["parameter"])
-        if figure is None or not row["recommended"] or row["component"] != 1:
+    for one in parameters:
+        figure = _TAKEN.get(one.parameter)
+        if figure is None or not one.recommended or one.component != 1:
             continue
-        if (row["sensor"], row["recording"]) not in real:
+        if (one.sensor, one.recording) not in real:
             continue
-        key = (row["sensor"], quantity_of(row["channel"]), figure)
-        if row["status"] == "ok" and row["value"] is not None:
-            ends = (row["lower"], row["upper"])
-            low, high = (row["value"] if end is None else end for end in ends)
+        key = (one.sensor, quantity_of(one.channel), figure)
+        if one.status == "ok" and one.value is not None:
+            low, high = (one.value if end is None else end for end in (one.lower, one.upper))
             shown.setdefault(key, []).append((low, high))
-        elif row["status"] == "absent" and figure == "K":
-            absent.setdefault(key, []).append(row["upper"] or 0.0)
+        elif one.status == "absent" and figure == "K":
+            absent.setdefault(key, []).append(one.upper or 0.0)
     ranges = {}
     for key in {*shown, *absent}:
         several = shown.get(key, [(0.0, max(absent.get(key, [0.0])))])

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import replace
 
-from imubench_pipeline.model.comparisons import ShortlistRow
-from imubench_pipeline.model.table import names_of
+from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.error_budget.in_use import BIASES, Figure
 from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
 from imubench_pipeline.navigation.error_budget.parts import Budget
@@ -23,7 +23,6 @@ from imubench_pipeline.navigation.shortlist.figures import End, Figures, figures
 from imubench_pipeline.navigation.suitability.abilities import Abilities, abilities, judge
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
-from imubench_pipeline.typing import Row
 
 VERDICTS: Mapping[str, str] = {
     "cannot pass": "lacks what it must have, or fails even with the best that its datasheet allows",
@@ -43,17 +42,17 @@ def shortlist_rows(
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Sensor],
     ranges: MeasuredRanges,
-    ranking: Iterable[Row] = (),
-    recordings: Iterable[Row] = (),
-) -> Iterator[Row]:
+    ranking: Iterable[RankingRow] = (),
+    recordings: Iterable[RecordingRow] = (),
+) -> Iterator[ShortlistRow]:
     """Judge all sensors of a catalogue by their datasheets alone, beside what is measured.
 
     Yields a row a requirement and sensor, the best margin first; what is not judged is last. The
-    ranges are for what is not published; rows of the tables ``ranking`` and ``recordings`` of a run
-    have what its logs say.
+    ranges are for what is not published; the ranking and the recordings of a run have what its logs
+    say.
     """
-    simulated = {(row["sensor"], row["recording"]): row["simulated"] for row in recordings}
-    measured = {(row["requirement"], row["sensor"]): row for row in ranking if row["decides"]}
+    simulated = {(row.sensor, row.recording): row.simulated for row in recordings}
+    measured = {(row.requirement, row.sensor): row for row in ranking if row.decides}
     by_sensor = {
         name: {quantity: figures_of(sensor, quantity, ranges) for quantity in ("gyro", "accel")}
         for name, sensor in sensors.items()
@@ -64,35 +63,40 @@ def shortlist_rows(
             continue  # no datasheet tells how a filter navigates
         rows = []
         for sensor, figures in by_sensor.items():
-            row = _judged(requirement, questions, sensors[sensor], figures)
+            row = _judged((name, sensor), requirement, questions, sensors[sensor], figures)
             standing = measured.get((name, sensor))
-            if standing is not None and standing["margin"] is not None:
-                of_model = simulated.get((sensor, standing["recording"]), False)
-                row |= {
-                    "measured_margin_of": "simulated logs" if of_model else "logs",
-                    "measured_margin": standing["margin"],
-                    "measured_verdict": standing["verdict"],
-                }
-            rows.append(row | {"requirement": name, "sensor": sensor})
-        yield from sorted(rows, key=lambda row: (-(row["best_margin"] or 0.0), row["sensor"]))
+            if standing is not None and standing.margin is not None:
+                of_model = standing.recording and simulated.get((sensor, standing.recording), False)
+                row = replace(
+                    row,
+                    measured_margin_of="simulated logs" if of_model else "logs",
+                    measured_margin=standing.margin,
+                    measured_verdict=standing.verdict,
+                )
+            rows.append(row)
+        yield from sorted(rows, key=lambda row: (-(row.best_margin or 0.0), row.sensor))
 
 
 def _judged(
+    names: tuple[str, str],
     requirement: Requirement,
     questions: Sequence[Question],
     sensor: Sensor,
     figures: Mapping[str, Figures | str],
-) -> dict[str, Any]:
-    row: dict[str, Any] = dict.fromkeys(names_of(ShortlistRow))
-    row["price_class"] = price_class = sensor.price_class
+) -> ShortlistRow:
+    """Return the row of a requirement and a sensor, by these names."""
+    price_class = sensor.price_class
+    row = ShortlistRow(
+        requirement=names[0], sensor=names[1], price_class=price_class, verdict="not judged"
+    )
     lacking, unknown = judge(requirement.must, _before_buying(sensor))
     if lacking:
-        return row | {"verdict": "cannot pass", "reason": "; ".join(lacking)}
+        return replace(row, verdict="cannot pass", reason="; ".join(lacking))
     needed = dict.fromkeys(quantity for question in questions for quantity in question.needs)
     published = {q: entry for q in needed if isinstance(entry := figures[q], Figures)}
     if len(published) < len(needed):
         why = "; ".join(entry for q in needed if isinstance(entry := figures[q], str))
-        return row | {"verdict": "not judged", "reason": why}
+        return replace(row, reason=why)
     in_use = {quantity: of_datasheet(sensor.datasheet, f"{quantity}_x") for quantity in published}
     best, missing = _margins(questions, published, in_use, "best")
     least = min(range(len(best)), key=best.__getitem__)
@@ -101,16 +105,17 @@ def _judged(
         margins, missing = _margins(questions, published, in_use, "worst")
         worst = min(margins) if not missing else None
     assumed = [words for allowed in published.values() for words in allowed.assumed] + missing
-    row |= {
-        "best_margin": best[least],
-        "worst_margin": worst,
-        "decides": requirement.by_dead_reckoning[least].text,
-        "assumed": "; ".join([*assumed, *(f"{name}: not known" for name in unknown)]) or None,
-    }
+    row = replace(
+        row,
+        best_margin=best[least],
+        worst_margin=worst,
+        decides=requirement.by_dead_reckoning[least].text,
+        assumed="; ".join([*assumed, *(f"{name}: not known" for name in unknown)]) or None,
+    )
     if not requirement.admits(price_class):
         why = "outside the price class" if price_class else "price class not stated"
-        return row | {"verdict": "not judged", "reason": why}
-    return row | {"verdict": _verdict(row["best_margin"], row["worst_margin"])}
+        return replace(row, reason=why)
+    return replace(row, verdict=_verdict(best[least], worst))
 
 
 def _before_buying(sensor: Sensor) -> Abilities:
