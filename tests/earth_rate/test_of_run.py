@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from imubench_pipeline.tables.of_experiments import EARTH_RATE_TABLES
 
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import Quality, identified
 from imubench_pipeline.recordings.recording import log_paths
 from imubench_pipeline.steps.noise_source import from_static
 from imubench_pipeline.tables import build
+from imubench_pipeline.tables.schemas import TURNED
 from tests.earth_rate.recordings import (
     EVERY_30,
     PRINTED,
@@ -25,8 +26,9 @@ from tests.earth_rate.recordings import (
     turned_log,
 )
 from tests.earth_rate.runs import EARTH, PAPER, RATE, turned
+from tests.rows import typed
 
-OWN: dict[str, Any] = {"device": "7", "simulated": False}
+(OWN,) = typed(RecordingRow, [{"device": "7", "simulated": False}])
 
 # What a run predicts takes longer than what it finds: of one run alone all of it is asked for.
 briefly = partial(run, asked={"goals": (1.0,), "run_time": "2 min", "draws": 20})
@@ -50,7 +52,7 @@ def found(tmp_path_factory: pytest.TempPathFactory, rest: Path) -> Found:
 
 
 def test_the_rate_is_found_within_what_is_said_of_it(found: Found) -> None:
-    for table in EARTH_RATE_TABLES:
+    for table in TURNED:
         build(table, found[table])  # the columns and their types are those of the table
     rows = by_method(found["earth_rate"])
     for method in ("pairs", "triples", "filter", "smoother"):
@@ -235,7 +237,8 @@ def test_a_gyro_that_cannot_be_used_is_said_beside_what_can(
 
 def test_a_rejected_recording_leaves_nothing(tmp_path: Path, rest: Path) -> None:
     (tmp_path / "a").mkdir()
-    Quality({"status": "rejected"}, [], {}, {}).write(tmp_path / "a/quality.json")
+    (rejected,) = typed(RecordingRow, [{"status": "rejected"}])
+    Quality(dict(rejected), [], {}, {}).write(tmp_path / "a/quality.json")
     assert set(map(len, briefly(tmp_path / "a", [rest]).values())) == {0}
 
 

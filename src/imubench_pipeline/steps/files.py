@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from imubench_pipeline.model.recordings import FailureRow, FileRow, RecordingRow
 from imubench_pipeline.tables import build, read, write_arrow
-from imubench_pipeline.typing import Row
 
 NEEDED = ("recordings", "failures")
 
@@ -15,33 +17,38 @@ _STATUS = {"ok": "analysed"}
 
 
 def file_rows(
-    files: Iterable[Mapping[str, str | None]], recordings: Iterable[Row], failures: Iterable[Row]
-) -> Iterator[Row]:
+    files: Iterable[Mapping[str, Any]],
+    recordings: Iterable[RecordingRow],
+    failures: Iterable[FailureRow],
+) -> Iterator[FileRow]:
     """Yield the rows of the table ``files``.
 
     Parameters
     ----------
     files : iterable of mapping
         Every file in the drop zone (`imubench_pipeline.recordings.drop_zone.FoundFile`).
-    recordings, failures : iterable of mapping
-        Rows of these tables. The files of a recording that has no row have failed with its sensor.
+    recordings : iterable of RecordingRow
+        The files of a recording that has no row have failed with its sensor.
+    failures : iterable of FailureRow
     """
-    outcome = {(row["sensor"], row["recording"]): row for row in recordings}
-    of_sensor = {row["sensor"]: row["reason"] for row in failures if row["recording"] is None}
-    for file in files:
-        if file["recording"] is None:
-            yield {**file, "status": "skipped"}
-        elif row := outcome.get((file["sensor"], file["recording"])):
-            status = _STATUS.get(row["status"], row["status"])
-            yield {**file, "status": status, "reason": row["reason"]}
+    outcome = {(row.sensor, row.recording): row for row in recordings}
+    of_sensor = {row.sensor: row.reason for row in failures if row.recording is None}
+    for found in files:
+        file = FileRow(**found, status="skipped")
+        if file.sensor is None or file.recording is None:
+            yield file
+        elif row := outcome.get((file.sensor, file.recording)):
+            status = _STATUS.get(row.status, row.status)
+            yield replace(file, status=status, reason=row.reason)
         else:
-            reason = of_sensor.get(file["sensor"], "it is in no table of its sensor")
-            yield {**file, "status": "failed", "reason": reason}
+            reason = of_sensor.get(file.sensor, "it is in no table of its sensor")
+            yield replace(file, status="failed", reason=reason)
 
 
 def write_files(tables: Mapping[str, Path], files: str, outputs: Iterable[Path]) -> None:
     """Write the table ``files``, as Parquet and CSV; `files` is what the plan found, as JSON."""
-    rows = {name: read(name, [tables[name]]).to_pylist() for name in NEEDED}
-    table = build("files", file_rows(json.loads(files), **rows))
+    recordings = RecordingRow.rows_of(read("recordings", [tables["recordings"]]))
+    failures = FailureRow.rows_of(read("failures", [tables["failures"]]))
+    table = build("files", file_rows(json.loads(files), recordings, failures))
     for output in outputs:
         write_arrow(table, output)

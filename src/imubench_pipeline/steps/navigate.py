@@ -39,6 +39,9 @@ from imubench_pipeline.experiments.aided.runs import (
 )
 from imubench_pipeline.experiments.aided.signals import Signals, Spreads, signals
 from imubench_pipeline.experiments.aided.trajectories import trajectory
+from imubench_pipeline.model.comparisons import NavigationRow
+from imubench_pipeline.model.estimates import LowPassRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.recordings.kept import kept_static_logs
@@ -51,7 +54,7 @@ from imubench_pipeline.simulate.models import imu_model
 from imubench_pipeline.steps.noise_source import static_recordings
 from imubench_pipeline.steps.tunings import TRUE, Models, all_axes, scaled, tunings
 from imubench_pipeline.tables import read
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
 _FEWEST_PIECES = 4
@@ -80,7 +83,7 @@ class _Source:
     true: Models | None
 
 
-def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Row]:
+def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[NavigationRow]:
     """Yield the rows of the table ``navigation`` of a sensor.
 
     Of the longest of its static recordings that can be used, in ``folders``; `settings`: of
@@ -94,35 +97,38 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Ro
         for entry in map(SimulatedRecording.model_validate, sections["truths"])
     }
     # A measured recording before a simulated one, the longest of several.
-    for about, folder in static_recordings(folders, lambda row: (row["simulated"],)):
+    for about, folder in static_recordings(folders, lambda row: (row.simulated,)):
         best = recommended_estimates(folder / "parameters.parquet")
         fitted = {name: scaled(each.model, 1.0) for name, each in best.items()}
         if not fitted:
             continue
-        names = {"sensor": sensor, "recording": about["recording"]}
-        if about["rate"] < _SLOWEST:
-            slow = f"samples of {about['rate']:.3g} Hz; expected {_SLOWEST:g} Hz or more"
+        names = {"sensor": sensor, "recording": about.recording}
+        untold = NavigationRow(sensor=sensor, recording=about.recording, tuning=TRUE)
+        rate = about.rate or 0.0
+        if rate < _SLOWEST:
+            slow = f"samples of {rate:.3g} Hz; expected {_SLOWEST:g} Hz or more"
             for course in how.trajectories:
-                yield names | {"trajectory": course, "tuning": TRUE, "reason": slow}
+                yield replace(untold, trajectory=course, reason=slow)
             return
         stand_in = _stand_in(fitted, how)
         fitted |= stand_in
         if all_axes(fitted) is None:
             lacking = "the recording tells no white noise of a gyro"
             for course in how.trajectories:
-                yield names | {"trajectory": course, "tuning": TRUE, "reason": lacking}
+                yield replace(untold, trajectory=course, reason=lacking)
             return
         longest = max(quantity_to_si(length, "time") for length in how.outages)
         tuned, lacking_of = tunings(folder, sensor, declared, longest, stand_in)
-        truth = truths.get(about["recording"])
+        truth = truths.get(about.recording)
         methods = [each.method for each in best.values()]
         chosen = max(sorted(set(methods)), key=methods.count)
-        for source in _sources(folder, about, fitted, stand_in, truth, how):
+        for source in _sources(folder, about, rate, fitted, stand_in, truth, how):
             for row in _rows(names, how, source, tuned, lacking_of):
-                yield row | {
-                    "recommended": row["tuning"] == chosen,
-                    "assumed": f"accelerometers: {how.accel_noise}" if stand_in else None,
-                }
+                yield replace(
+                    row,
+                    recommended=row.tuning == chosen,
+                    assumed=f"accelerometers: {how.accel_noise}" if stand_in else None,
+                )
         return
 
 
@@ -152,14 +158,14 @@ def _stand_in(fitted: Models, how: NavigateSettings) -> Models:
 
 def _sources(
     folder: Path,
-    about: Mapping[str, Any],
+    about: RecordingRow,
+    logged: float,
     fitted: Models,
     stand_in: Models,
     truth: SimulatedRecording | None,
     how: NavigateSettings,
 ) -> Iterator[_Source]:
     """Yield where signals may come from: the simulator, and a log that is no simulation."""
-    logged = float(about["rate"])
     block = _block(logged, how)
     spreads = _spreads(how)
     known = truth is not None and truth.specimens is None
@@ -188,7 +194,7 @@ def _sources(
             spreads,
             drive.every,
             how.seed,
-            (about["sensor"], about["recording"], course, str(number)),
+            (about.sensor, about.recording, course, str(number)),
             block=block,
             temperature=(
                 (lambda start, stop: reference + change * np.arange(start, stop) / samples)
@@ -199,7 +205,7 @@ def _sources(
 
     sampling = logged / block
     yield _Source("truth" if known else "estimate", sampling, how.runs, simulated, true)
-    if not about["simulated"]:
+    if not about.simulated:
         pieces = _pieces(folder, block, round(quantity_to_si(how.duration, "time") * sampling))
         if len(pieces) >= _FEWEST_PIECES:
 
@@ -210,7 +216,7 @@ def _sources(
                     spreads,
                     drive.every,
                     how.seed,
-                    (about["sensor"], about["recording"], course, f"log {number}"),
+                    (about.sensor, about.recording, course, f"log {number}"),
                     added=pieces[number],
                 )
 
@@ -243,14 +249,14 @@ def _reference(axes: Mapping[str, SensorModel]) -> float:
 
 def _in_front(folder: Path, channel: str, noise: NoiseModel, rate: float) -> SensorModel:
     """Return the model of an axis that was found of a log at a rate in Hz, with its low-pass."""
-    rows = {
-        row["parameter"]: row
-        for row in read("low_pass", [folder / "low_pass.parquet"]).to_pylist()
-        if row["channel"] == channel
-    }
-    cutoff = rows.get("cutoff") or {"value": None, "order": None}
-    told = cutoff["value"] is not None
-    plain = SensorModel(low_pass=LowPass(cutoff["value"], cutoff["order"]) if told else None)
+    rows = LowPassRow.rows_of(read("low_pass", [folder / "low_pass.parquet"]))
+    filters = [
+        LowPass(row.value, row.order)
+        for row in rows
+        if row.channel == channel and row.parameter == "cutoff"
+        if row.value is not None and row.order is not None
+    ]
+    plain = SensorModel(low_pass=filters[-1] if filters else None)
     return replace(plain, noise=before_the_filter(plain, noise, rate))
 
 
@@ -284,7 +290,7 @@ def _rows(
     source: _Source,
     tuned: Mapping[str, Models],
     lacking: Mapping[str, str],
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[NavigationRow]:
     lengths = [quantity_to_si(length, "time") for length in how.outages]
     duration = quantity_to_si(how.duration, "time")
     spreads = _spreads(how)
@@ -299,20 +305,24 @@ def _rows(
             partial(source.of_run, drive, course),
             source.runs,
         )
-        about = dict(names) | {"trajectory": course, "signals": source.words, "runs": source.runs}
+        about: dict[str, Any] = dict(names) | {
+            "trajectory": course,
+            "signals": source.words,
+            "runs": source.runs,
+        }
         told = [
-            about
-            | _of_tuning(drive, outcomes, name, length)
-            | _banks(models[name])
-            | {"model": _named(models[name])}
+            NavigationRow(
+                **(about | _of_tuning(drive, outcomes, name, length) | _banks(models[name])),
+                model=_named(models[name]),
+            )
             for name in models
             for length in (None, *lengths)
         ]
         smallest = _smallest(told)
         for row in told:
-            yield row | {"smallest": row["tuning"] == smallest}
+            yield replace(row, smallest=row.tuning == smallest)
         for name, reason in lacking.items():
-            yield about | {"tuning": name, "reason": reason}
+            yield NavigationRow(**about, tuning=name, reason=reason)
 
 
 def _states(models: Models, sampling: float, spreads: Spreads, duration: float) -> list[AxisStates]:
@@ -391,17 +401,17 @@ def _consistent(share: Share) -> bool | None:
     return True if off + 2.0 * share.error <= _WIDEST + 1e-9 else None
 
 
-def _smallest(rows: Sequence[Mapping[str, Any]]) -> str | None:
+def _smallest(rows: Sequence[NavigationRow]) -> str | None:
     """Return the tuning of the fewest states of those that are consistent in all their rows.
 
     Of several that one whose position is best after the longest outage. The true model is none.
     """
-    by_tuning: dict[str, list[Mapping[str, Any]]] = {}
+    by_tuning: dict[str, list[NavigationRow]] = {}
     for row in rows:
-        by_tuning.setdefault(row["tuning"], []).append(row)
+        by_tuning.setdefault(row.tuning, []).append(row)
     consistent = {
-        name: (own[0]["states"], own[-1]["position"])
+        name: (own[0].states or 0, own[-1].position or 0.0)
         for name, own in by_tuning.items()
-        if name != TRUE and all(row.get("consistent") for row in own)
+        if name != TRUE and all(row.consistent for row in own)
     }
     return min(consistent, key=lambda name: consistent[name], default=None)

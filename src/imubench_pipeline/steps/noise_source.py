@@ -7,12 +7,13 @@ several; without any, that of the typical figures of its datasheet.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.estimators.rows import estimates, recommended_estimates
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
@@ -22,7 +23,6 @@ from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.typing import Row
 
 NO_MODEL = (
     "the noise of this sensor is not known: no static recording of it could be used, and its "
@@ -30,8 +30,8 @@ NO_MODEL = (
 )
 """Why nothing is found without a `NoiseSource`."""
 
-Kept = tuple[Row, Path]
-"""Row of the table ``recordings``, and the folder."""
+Kept = tuple[RecordingRow, Path]
+"""A recording, and its folder."""
 
 _SEED = 20260101
 """Of the drawn models: each recording and channel has a stream of its own."""
@@ -60,7 +60,7 @@ class NoiseSource:
 
 
 def from_static(
-    folders: Sequence[Path], own: Mapping[str, Any], channel: str, draws: int = 0
+    folders: Sequence[Path], own: RecordingRow, channel: str, draws: int = 0
 ) -> NoiseSource | None:
     """Return the noise of a gyro from the static recordings of its sensor.
 
@@ -70,16 +70,16 @@ def from_static(
     ----------
     folders : sequence of Path
         Of those recordings.
-    own : mapping
-        Row of the table ``recordings`` of the recording that was turned.
+    own : RecordingRow
+        Of the recording that was turned.
     channel : str
         The gyro that was turned; another gyro of the sensor answers where it has no estimate.
     draws : int
         Models that are drawn from what the log leaves open of the estimate.
     """
 
-    def far(row: Row) -> tuple[bool, bool]:
-        return row["simulated"] != own["simulated"], row["device"] != own["device"]
+    def far(row: RecordingRow) -> tuple[bool, bool]:
+        return row.simulated != own.simulated, row.device != own.device
 
     for row, folder in static_recordings(folders, far):
         parameters = folder / "parameters.parquet"
@@ -98,7 +98,7 @@ def from_static(
 
 
 def static_recordings(
-    folders: Sequence[Path], far: Callable[[Row], tuple[bool, ...]]
+    folders: Sequence[Path], far: Callable[[RecordingRow], tuple[bool, ...]]
 ) -> list[Kept]:
     """Return the static recordings that can be used: the nearest first, of these the longest.
 
@@ -107,11 +107,11 @@ def static_recordings(
 
     def order(recording: Kept) -> tuple[Any, ...]:
         row = recording[0]
-        return *far(row), -(row["duration"] or 0.0), row["recording"]
+        return *far(row), -(row.duration or 0.0), row.recording
 
-    every = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
-    static = [(row, folder) for row, folder in every if row["kind"] == "static"]
-    return sorted((each for each in static if each[0]["status"] == "ok"), key=order)
+    every = [(Quality.read(folder / "quality.json").row, folder) for folder in folders]
+    static = [(row, folder) for row, folder in every if row.kind == "static"]
+    return sorted((each for each in static if each[0].status == "ok"), key=order)
 
 
 def noise_source(
@@ -122,7 +122,7 @@ def noise_source(
     `folder` is that of the recording that was turned, `static` those of the static recordings of
     its sensor; `draws`: models that are drawn from what a static log leaves open.
     """
-    own = Quality.read(folder / "quality.json").recording
+    own = Quality.read(folder / "quality.json").row
     return from_static(static, own, key.channel, draws) or from_printed(
         key.sensor, sensor, key.channel
     )
@@ -153,11 +153,11 @@ def segments_reason(log: ChannelLog) -> str:
     )
 
 
-def _words(row: Mapping[str, Any], own: Mapping[str, Any], name: str, channel: str) -> str:
-    words = [f"static recording {row['recording']}"]
-    if row["device"] != own["device"]:
-        words.append(f"of another device, {row['device']}")
-    if row["simulated"]:
+def _words(row: RecordingRow, own: RecordingRow, name: str, channel: str) -> str:
+    words = [f"static recording {row.recording}"]
+    if row.device != own.device:
+        words.append(f"of another device, {row.device}")
+    if row.simulated:
         words.append("simulated")
     if name != channel:
         words.append(f"of its {name}, as {channel} has no estimate there")

@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -20,13 +21,14 @@ from imubench_pipeline.experiments.alignment.accuracy import accuracies
 from imubench_pipeline.experiments.alignment.fine import OPEN
 from imubench_pipeline.experiments.alignment.triad import Site, Triad
 from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
+from imubench_pipeline.model.experiments import AlignmentRow, EarthRatePredictionRow
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.steps.noise_source import static_recordings
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
 TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)
@@ -82,22 +84,24 @@ class Noise:
 
 def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
     """Return the noise of a sensor from its static recordings; None where none tells it."""
-    for row, folder in static_recordings(folders, lambda row: (row["simulated"],)):
+    for row, folder in static_recordings(folders, lambda row: (row.simulated,)):
         best = recommended_estimates(folder / "parameters.parquet")
         models = {name: estimate.model for name, estimate in best.items() if estimate.model.N}
-        if any(name.startswith("gyro_") for name in models):
-            return Noise(row["recording"], row["rate"], models)
+        if row.rate is not None and any(name.startswith("gyro_") for name in models):
+            return Noise(row.recording, row.rate, models)
     return None
 
 
-def outlook_tables(folders: Sequence[Path], sensor: str, settings: str) -> dict[str, list[Row]]:
+def outlook_tables(
+    folders: Sequence[Path], sensor: str, settings: str
+) -> dict[str, Sequence[TableRow]]:
     """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
 
     `folders` are those of its static recordings; `settings`: of
     `imubench_pipeline.run.plan.Plan.outlook_settings`. There are no rows where no recording tells
     the noise of a gyro, and none of ``alignment`` without an accelerometer.
     """
-    rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}
+    rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}
     sections = json.loads(settings)
     how = EarthRateSettings.model_validate(sections["earth_rate"])
     noise = noise_at_rest(folders)
@@ -110,20 +114,22 @@ def outlook_tables(folders: Sequence[Path], sensor: str, settings: str) -> dict[
     return rows
 
 
-def _predicted(sensor: str, noise: Noise, how: EarthRateSettings) -> Iterator[Row]:
+def _predicted(
+    sensor: str, noise: Noise, how: EarthRateSettings
+) -> Iterator[EarthRatePredictionRow]:
     gyro = noise.middle_gyro
     assert gyro is not None  # noise_at_rest has seen to it
     latitude = quantity_to_si(how.latitude, "angle")
     outlook = Outlook(noise.models[gyro], latitude, TURNING, noise.rate)
     run_time = max(quantity_to_si(how.run_time, "time"), 3.0 * DWELL)
-    names = {"sensor": sensor, "recording": noise.recording, "channel": gyro}
-    for row in prediction_rows(outlook, DWELL, how.goals, run_time):
-        yield names | row
+    row = partial(EarthRatePredictionRow, sensor=sensor, recording=noise.recording, channel=gyro)
+    for predicted in prediction_rows(outlook, DWELL, how.goals, run_time):
+        yield row(**predicted)
 
 
 def _aligned(
     sensor: str, noise: Noise, printed: Datasheet, how: EarthRateSettings
-) -> Iterator[Row]:
+) -> Iterator[AlignmentRow]:
     gyros, accelerometers = noise.three("gyro"), noise.three("accel")
     gyro_bias, gyro_words = _bias(printed, "gyro", how)
     accelerometer_bias, accelerometer_words = _bias(printed, "accel", how)
@@ -134,36 +140,35 @@ def _aligned(
         accelerometer_bias=accelerometer_bias,
     )
     site = Site(latitude=quantity_to_si(how.latitude, "angle"))
-    about = {
-        "sensor": sensor,
-        "recording": noise.recording,
-        "latitude": site.latitude,
-        "gyro_bias": gyro_bias,
-        "gyro_bias_from": gyro_words,
-        "accelerometer_bias": accelerometer_bias,
-        "accelerometer_bias_from": accelerometer_words,
-        "gyros": ", ".join(gyros),
-        "accelerometers": ", ".join(accelerometers),
-    }
     rng = channel_rng(_SEED, repr(triad), "alignment")
     for accuracy in accuracies(triad, site, noise.rate, TIMES, runs=_RUNS, rng=rng):
         roll, pitch, heading = (float(value) for value in accuracy.sigma)
-        row = about | {
-            "positions": accuracy.positions,
-            "method": accuracy.method,
-            "time": accuracy.time,
-            "roll": roll,
-            "pitch": pitch,
-            "heading": heading if heading < OPEN else None,
-            "reason": accuracy.reason,
-        }
-        if accuracy.errors is not None:
-            row["simulated"] = accuracy.simulated
-            for name, ratio in zip(
-                ("roll", "pitch", "heading"), accuracy.errors.tolist(), strict=True
-            ):
-                row[f"error_{name}"] = None if math.isnan(ratio) else ratio
-        yield row
+        errors = [None] * 3 if accuracy.errors is None else accuracy.errors.tolist()
+        of_roll, of_pitch, of_heading = (
+            None if error is None or math.isnan(error) else error for error in errors
+        )
+        yield AlignmentRow(
+            sensor=sensor,
+            recording=noise.recording,
+            positions=accuracy.positions,
+            method=accuracy.method,
+            time=accuracy.time,
+            roll=roll,
+            pitch=pitch,
+            heading=heading if heading < OPEN else None,
+            reason=accuracy.reason,
+            error_roll=of_roll,
+            error_pitch=of_pitch,
+            error_heading=of_heading,
+            simulated=None if accuracy.errors is None else accuracy.simulated,
+            latitude=site.latitude,
+            gyro_bias=gyro_bias,
+            gyro_bias_from=gyro_words,
+            accelerometer_bias=accelerometer_bias,
+            accelerometer_bias_from=accelerometer_words,
+            gyros=", ".join(gyros),
+            accelerometers=", ".join(accelerometers),
+        )
 
 
 def _bias(printed: Datasheet, quantity: str, how: EarthRateSettings) -> tuple[float, str]:
