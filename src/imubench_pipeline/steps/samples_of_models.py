@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.model.estimates import LowPassRow, ModelSampleRow, TemperatureRow
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.kept import kept_static_logs
@@ -32,7 +33,7 @@ from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, befo
 from imubench_pipeline.simulate.simulation import Signal, simulate_blocks
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 
 STRETCH = 1.0
 """Length of the stretch of which every sample is shown, s."""
@@ -46,7 +47,9 @@ _SMOOTHED = 100.0
 """Time over which readings of the temperature are averaged, s."""
 
 
-def samples_of_models(folder: Path, sensor: str, recording: str, seed: int) -> Iterator[Row]:
+def samples_of_models(
+    folder: Path, sensor: str, recording: str, seed: int
+) -> Iterator[ModelSampleRow]:
     """Yield the rows of the table ``samples_of_models``; none of a rejected recording.
 
     Parameters
@@ -60,22 +63,21 @@ def samples_of_models(folder: Path, sensor: str, recording: str, seed: int) -> I
     logs = kept_static_logs(folder)
     if not logs:
         return
-    tables = {
-        name: _by_channel(read(name, [folder / f"{name}.parquet"]).to_pylist())
-        for name in ("low_pass", "temperature", "fixed_bias")
-    }
+    filters = LowPassRow.rows_of(read("low_pass", [folder / "low_pass.parquet"]))
+    thermal = TemperatureRow.rows_of(read("temperature", [folder / "temperature.parquet"]))
     by_method = {
         channel: {estimate.method: estimate.model for estimate in own}
         for channel, own in estimates(folder / "parameters.parquet").items()
     }
     for channel, log in logs.items():
         key = Key(sensor, recording, channel)
-        known = {name: rows.get(channel, {}) for name, rows in tables.items()}
+        low_pass = _low_pass(row for row in filters if row.channel == channel)
+        followed = {row.parameter: row for row in thermal if row.channel == channel}
         samples = min(log.grid, MOST)
         yield from _rows(key, "log", log.rate, samples, log.blocks())
-        plain = SensorModel(low_pass=_low_pass(known["low_pass"]), bias=log.mean())
+        plain = SensorModel(low_pass=low_pass, bias=log.mean())
         models = by_method.get(channel, {})
-        warm = known["temperature"] and known["temperature"]["sensitivity"]["compensated"]
+        warm = bool(followed) and followed["sensitivity"].compensated
         after = models.get("compensated" if warm else "likelihood")
         for of, noise in (("before", models.get("curve")), ("after", after)):
             if noise is None:
@@ -84,40 +86,33 @@ def samples_of_models(folder: Path, sensor: str, recording: str, seed: int) -> I
             model = SensorModel(noise=noise, low_pass=plain.low_pass, bias=plain.bias)
             temperature = None
             if of == "after" and warm:
-                model, temperature = _warmed(model, known["temperature"], log)
+                model, temperature = _warmed(model, followed, log)
             rng = channel_rng(seed, repr(noise), channel, f"samples {of}")
             blocks = simulate_blocks(model, log.rate, samples, rng, temperature=temperature)
             yield from _rows(key, of, log.rate, samples, blocks)
 
 
-def _by_channel(rows: Iterable[Row]) -> dict[str, dict[str, Row]]:
-    found: dict[str, dict[str, Row]] = {}
+def _low_pass(rows: Iterable[LowPassRow]) -> LowPass | None:
     for row in rows:
-        found.setdefault(row["channel"], {})[row.get("parameter", "bias")] = row
-    return found
-
-
-def _low_pass(rows: Mapping[str, Row]) -> LowPass | None:
-    cutoff = rows.get("cutoff")
-    if cutoff is None or cutoff["value"] is None:
-        return None
-    return LowPass(cutoff["value"], cutoff["order"])
+        if row.parameter == "cutoff" and row.value is not None and row.order is not None:
+            return LowPass(row.value, row.order)
+    return None
 
 
 def _warmed(
-    model: SensorModel, rows: Mapping[str, Row], log: ChannelLog
+    model: SensorModel, rows: Mapping[str, TemperatureRow], log: ChannelLog
 ) -> tuple[SensorModel, Signal]:
     """Return a model with its drift with temperature, and the temperature of the log."""
-    value = {
-        name: row["fitted"] if row["value"] is None else row["value"] for name, row in rows.items()
-    }
+    value = {name: row.fitted if row.value is None else row.value for name, row in rows.items()}
+    reference, bias = value["T_0"], value.get("bias")
+    assert reference is not None  # the mean temperature is never unknown
     drift = TemperatureDrift(
         sensitivity=value["sensitivity"] or 0.0,
-        reference=value["T_0"],
+        reference=reference,
         quadratic=value["quadratic"] or 0.0,
         lag=value["lag"] or 0.0,
     )
-    bias = model.bias if value.get("bias") is None else value["bias"]
+    bias = model.bias if bias is None else bias
     warmed = SensorModel(noise=model.noise, low_pass=model.low_pass, bias=bias, drift=drift)
     readings = np.concatenate([*log.temperatures()])
     size = max(round(_SMOOTHED * log.rate), 1)
@@ -131,9 +126,17 @@ def _warmed(
     return warmed, lambda start, stop: np.interp(np.arange(start, stop), at, means)
 
 
-def _rows(key: Key, of: str, rate: float, samples: int, blocks: Iterable[Array]) -> Iterator[Row]:
+def _rows(
+    key: Key, of: str, rate: float, samples: int, blocks: Iterable[Array]
+) -> Iterator[ModelSampleRow]:
     """Yield the deviation of the samples, those of a stretch, and the envelope."""
-    names = asdict(key) | {"of": of}
+    row = partial(
+        ModelSampleRow,
+        sensor=key.sensor,
+        recording=key.recording,
+        channel=key.channel,
+        of=of,
+    )
     edges = bucket_edges(samples, BUCKETS)
     figures = no_figures(edges)
     stretch = round(STRETCH * rate)
@@ -153,9 +156,9 @@ def _rows(key: Key, of: str, rate: float, samples: int, blocks: Iterable[Array])
             break
     number, total = figures[:, PRESENT].sum(), figures[:, TOTAL].sum()
     deviation = math.sqrt(max(squares / number - (total / number - first) ** 2, 0.0))
-    yield names | {"what": "deviation", "start": 0.0, "end": samples / rate, "mean": deviation}
+    yield row(what="deviation", start=0.0, end=samples / rate, mean=deviation)
     for k, value in enumerate(np.concatenate(parts).tolist()):
-        at = {"start": k / rate, "end": (k + 1) / rate}
-        yield names | at | {"what": "stretch", "mean": None if math.isnan(value) else value}
-    for row in envelope_rows(edges / rate, figures):
-        yield names | {"what": "envelope"} | {name: row[name] for name in _SPAN}
+        mean = None if math.isnan(value) else value
+        yield row(what="stretch", start=k / rate, end=(k + 1) / rate, mean=mean)
+    for seen in envelope_rows(edges / rate, figures):
+        yield row(what="envelope", **{name: seen[name] for name in _SPAN})

@@ -10,7 +10,13 @@ import pyarrow as pa
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.datasheets.suspicion import UsualFigures, unusual_rows, usual_of_text
-from imubench_pipeline.model.estimates import BacktestRow, FixedBiasRow, ModelRow, ParameterRow
+from imubench_pipeline.model.estimates import (
+    BacktestRow,
+    DeterministicRow,
+    FixedBiasRow,
+    ModelRow,
+    ParameterRow,
+)
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
@@ -32,7 +38,6 @@ from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.steps.published_figures import published_rows, truth_rows
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures, without
-from imubench_pipeline.typing import Row
 
 
 def joined_tables(
@@ -69,8 +74,8 @@ def joined_tables(
     sensors = sensors_of(sensor)
     findings = findings_of(
         qualities,
-        joined["deterministic"].to_pylist(),
-        joined.pop("estimate_findings").to_pylist(),
+        DeterministicRow.rows_of(joined["deterministic"]),
+        FindingRow.rows_of(joined.pop("estimate_findings")),
         estimated,
         sensors,
         usual_of_text(usual),
@@ -107,12 +112,12 @@ _NEAR = 1 / 100
 
 def findings_of(
     qualities: Sequence[Quality],
-    deterministic: Sequence[Row],
-    of_estimates: Iterable[Row],
+    deterministic: Sequence[DeterministicRow],
+    of_estimates: Iterable[FindingRow],
     estimated: Sequence[ParameterRow],
     sensors: Mapping[str, Sensor],
     usual: UsualFigures,
-) -> list[Row]:
+) -> list[FindingRow]:
     """Return the rows of the table ``findings`` about recordings, each by itself.
 
     Parameters
@@ -127,11 +132,11 @@ def findings_of(
     usual : mapping
         What is usual of the figures of other sensors.
     """
-    about = [quality.recording for quality in qualities]
+    about = [quality.row for quality in qualities]
     of_logs = without_doubles(
         (row for quality in qualities for row in quality.findings),
         deterministic,
-        {(row["sensor"], row["recording"]): row.get("duration") or 0.0 for row in about},
+        {(row.sensor, row.recording): row.duration or 0.0 for row in about},
     )
     of_levels = (
         row
@@ -142,24 +147,24 @@ def findings_of(
 
 
 def without_doubles(
-    findings: Iterable[Row],
-    deterministic: Iterable[Row],
+    findings: Iterable[FindingRow],
+    deterministic: Iterable[DeterministicRow],
     durations: Mapping[tuple[str, str], float],
-) -> Iterator[Row]:
+) -> Iterator[FindingRow]:
     """Yield the findings of the ingest that the table ``deterministic`` does not tell better.
 
     `durations`: of each sensor and recording, s.
     """
-    by_place: dict[tuple[str, str, str], list[Row]] = {}
+    by_place: dict[tuple[str, str, str], list[DeterministicRow]] = {}
     for row in deterministic:
-        by_place.setdefault((row["sensor"], row["recording"], row["channel"]), []).append(row)
+        by_place.setdefault((row.sensor, row.recording, row.channel), []).append(row)
     for finding in findings:
-        kind = _OF_LOGS.get(finding["finding"])
-        if kind is None:
+        kind = _OF_LOGS.get(finding.finding)
+        if kind is None or finding.channel is None:
             yield finding
             continue
-        place = (finding["sensor"], finding["recording"], finding["channel"])
-        same = (row for row in by_place.get(place, ()) if row["kind"] == kind)
-        near = _NEAR * durations.get((finding["sensor"], finding["recording"]), 0.0)
-        if not any(abs(row["start"] - (finding["start"] or 0.0)) <= near for row in same):
+        place = (finding.sensor, finding.recording, finding.channel)
+        same = (row for row in by_place.get(place, ()) if row.kind == kind)
+        near = _NEAR * durations.get((finding.sensor, finding.recording), 0.0)
+        if not any(abs(row.start - (finding.start or 0.0)) <= near for row in same):
             yield finding
