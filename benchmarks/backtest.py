@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 import simulators
 from imubench_pipeline.allan import cluster_sizes, of_blocks
 from imubench_pipeline.estimators.rows import recommended_estimates
-from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
+from imubench_pipeline.model.estimates import BacktestRow
 from imubench_pipeline.navigation.backtest.comparison import words
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
 from imubench_pipeline.recordings.recording import LogWriter, channel_logs
@@ -157,9 +157,8 @@ def tested(log: Simulated, number: int, folder: Path) -> list[Row]:
     write("draws", rows.draws, folder / "draws.parquet")
     estimates = recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     how, names = ErrorBudgetSettings(), {"sensor": "own", "recording": f"{number}"}
-    apart = DeterministicRow.rows_of(build("deterministic", rows.deterministic))
     found = backtest_rows(
-        names, logs, estimates, REQUIREMENTS, apart, draws=how.draws, seed=how.seed
+        names, logs, estimates, REQUIREMENTS, rows.deterministic, draws=how.draws, seed=how.seed
     )
     made: list[Row] = build("backtest", found).to_pylist()
     return made

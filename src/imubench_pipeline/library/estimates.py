@@ -17,8 +17,6 @@ from imubench_pipeline.library.curves import Curve, Curves, measured
 from imubench_pipeline.library.given import Channels, Units, columns_of, rate_of
 from imubench_pipeline.library.logs import Log, log_of
 from imubench_pipeline.library.shown import Shown, Summary, cut
-from imubench_pipeline.model.estimates import ModelRow, ParameterRow
-from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import Doubt, doubts
 from imubench_pipeline.report.practical import System, interval_text, page_unit, symbol_text
@@ -292,8 +290,7 @@ def estimate(
         raise ValueError(
             f"{log.name}: no channel is estimated by {method}: {'; '.join(left_out.values())}"
         )
-    parameters = [ParameterRow(**row) for row in into.parameters]
-    recommended = [row for row in parameters if row.recommended]
+    recommended = [row for row in into.parameters if row.recommended]
     rows = findings_of(
         [log.quality],
         into.deterministic,
@@ -302,9 +299,8 @@ def estimate(
         {} if log.declared is None else {log.sensor: log.declared},
         usual_figures(shipped_sensors()),
     )
-    found_of = [FindingRow(**row) for row in rows]
-    doubted = list(doubts(found_of, recommended, [ModelRow(**row) for row in into.models]))
-    return Estimates(estimates, log, method, list(map(finding_of, found_of)), doubted, left_out)
+    doubted = list(doubts(rows, recommended, into.models))
+    return Estimates(estimates, log, method, list(map(finding_of, rows)), doubted, left_out)
 
 
 def _why_not(into: Estimation, channel: str) -> str:

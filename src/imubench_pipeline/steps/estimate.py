@@ -7,7 +7,6 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -35,6 +34,20 @@ from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperatu
 from imubench_pipeline.estimators.thermal.register import step_of
 from imubench_pipeline.estimators.thermal.result import ThermalFit, shift_by_effect
 from imubench_pipeline.estimators.white_level import find_white_stretch
+from imubench_pipeline.model.estimates import (
+    AllanRow,
+    CompensatedAllanRow,
+    DeterministicRow,
+    DrawRow,
+    FixedBiasRow,
+    LineRow,
+    LowPassRow,
+    ModelRow,
+    ParameterRow,
+    SpectrumRow,
+    TemperatureRow,
+)
+from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog, mean_of
@@ -44,7 +57,7 @@ from imubench_pipeline.steps.allan import too_sparse
 from imubench_pipeline.steps.kept_curves import curves
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 
 
@@ -52,19 +65,18 @@ from imubench_pipeline.units import quantity_to_si
 class Estimation:
     """Rows of the tables that the estimation of a recording leaves."""
 
-    allan: list[Row] = field(default_factory=list)
-    parameters: list[Row] = field(default_factory=list)
-    draws: list[Row] = field(default_factory=list)
-    models: list[Row] = field(default_factory=list)
-    lines: list[Row] = field(default_factory=list)
-    spectrum: list[Row] = field(default_factory=list)
-    fixed_bias: list[Row] = field(default_factory=list)
-    temperature: list[Row] = field(default_factory=list)
-    allan_compensated: list[Row] = field(default_factory=list)
-    low_pass: list[Row] = field(default_factory=list)
-    deterministic: list[Row] = field(default_factory=list)
-    estimate_findings: list[Row] = field(default_factory=list)
-    """Rows of the table ``findings``."""
+    allan: list[AllanRow] = field(default_factory=list)
+    parameters: list[ParameterRow] = field(default_factory=list)
+    draws: list[DrawRow] = field(default_factory=list)
+    models: list[ModelRow] = field(default_factory=list)
+    lines: list[LineRow] = field(default_factory=list)
+    spectrum: list[SpectrumRow] = field(default_factory=list)
+    fixed_bias: list[FixedBiasRow] = field(default_factory=list)
+    temperature: list[TemperatureRow] = field(default_factory=list)
+    allan_compensated: list[CompensatedAllanRow] = field(default_factory=list)
+    low_pass: list[LowPassRow] = field(default_factory=list)
+    deterministic: list[DeterministicRow] = field(default_factory=list)
+    estimate_findings: list[FindingRow] = field(default_factory=list)
     estimates: dict[str, dict[str, Estimate]] = field(default_factory=dict)
     """By channel and method: what the rows of the tables ``parameters`` and ``draws`` stand for."""
     paths: dict[Path, TemperaturePath] = field(default_factory=dict)
@@ -117,7 +129,8 @@ def estimate_channel(
         recommended = into.estimates[key.channel].get(best)
         N = recommended.parameters["N"].value if recommended else None
         into.add_findings(key, spectral_findings(key.channel, channel.fitted.frame, N))
-    into.fixed_bias.append(asdict(key) | {"value": channel.mean, "unit": channel.unit})
+    bias = FixedBiasRow(**asdict(key), value=channel.mean, unit=channel.unit)
+    into.fixed_bias.append(bias)
 
 
 class _Channel:
@@ -268,25 +281,26 @@ _BEST_FIRST = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
 """The method to use is the first of these that is asked for."""
 
 
-def _model_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
+def _model_rows(key: Key, fit: Likelihood) -> Iterator[ModelRow]:
     """Yield the rows of the table ``models``, the chosen model first."""
     for place, candidate in enumerate(fit.candidates):
-        yield asdict(key) | {
-            "model": candidate.terms.name,
-            "chosen": place == 0,
-            "free": candidate.terms.parameters,
-            "log_likelihood": -candidate.maximum.cost,
-            "bic": candidate.bic,
-            "aic": candidate.aic,
-            "weight": candidate.weight,
-            "deviance": candidate.goodness.deviance,
-            "chance": candidate.goodness.chance,
-            "verdict": candidate.goodness.verdict,
-            "note": _note(fit) if place == 0 else candidate.goodness.where,
-            "bins": int(fit.used.sum()),
-            "band": fit.band.highest if fit.band else None,
-            "band_source": fit.band.source if fit.band else None,
-        }
+        yield ModelRow(
+            **asdict(key),
+            model=candidate.terms.name,
+            chosen=place == 0,
+            free=candidate.terms.parameters,
+            log_likelihood=-candidate.maximum.cost,
+            bic=candidate.bic,
+            aic=candidate.aic,
+            weight=candidate.weight,
+            deviance=candidate.goodness.deviance,
+            chance=candidate.goodness.chance,
+            verdict=candidate.goodness.verdict,
+            note=_note(fit) if place == 0 else candidate.goodness.where,
+            bins=int(fit.used.sum()),
+            band=fit.band.highest if fit.band else None,
+            band_source=fit.band.source if fit.band else None,
+        )
 
 
 def _note(fit: Likelihood) -> str:
@@ -294,37 +308,39 @@ def _note(fit: Likelihood) -> str:
     return "; ".join(note for note in notes if note)
 
 
-def _line_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
+def _line_rows(key: Key, fit: Likelihood) -> Iterator[LineRow]:
     """Yield the rows of the table ``lines``."""
     for line in fit.lines:
         row = asdict(line)
         row.pop("resolution")
-        yield asdict(key) | row
+        yield LineRow(**asdict(key), **row)
 
 
-def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
+def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[SpectrumRow]:
     """Yield the rows of the table ``spectrum``."""
     spectrum, fitted = fit.spectrum, fit.fitted
-    names = ("frequency", "lower", "upper", "ordinates", "density")
-    columns = [getattr(spectrum, name) for name in names]
-    for i, values in enumerate(zip(*columns, strict=True)):
-        yield (
-            asdict(key)
-            | dict(zip(names, map(float, values), strict=True))
-            | {
-                "fitted": float(fitted[i]) if np.isfinite(fitted[i]) else None,
-                "used": bool(fit.used[i]),
-            }
+    for i, frequency in enumerate(spectrum.frequency):
+        yield SpectrumRow(
+            **asdict(key),
+            frequency=float(frequency),
+            lower=float(spectrum.lower[i]),
+            upper=float(spectrum.upper[i]),
+            ordinates=float(spectrum.ordinates[i]),
+            density=float(spectrum.density[i]),
+            fitted=float(fitted[i]) if np.isfinite(fitted[i]) else None,
+            used=bool(fit.used[i]),
         )
 
 
-def _compensated_rows(key: Key, left: AllanCurve, added: AllanCurve) -> Iterator[Row]:
+def _compensated_rows(
+    key: Key, left: AllanCurve, added: AllanCurve
+) -> Iterator[CompensatedAllanRow]:
     """Yield the rows of the table ``allan_compensated``: of what temperature leaves, and adds."""
     for about, deviation in zip(limit_rows(left), added.deviation, strict=True):
-        yield asdict(key) | about | {"temperature": float(deviation)}
+        yield CompensatedAllanRow(**asdict(key), **about, temperature=float(deviation))
 
 
-def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[Row]:
+def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[TemperatureRow]:
     """Yield the rows of the table ``temperature``."""
     unit = SI_UNITS[quantity_of(key.channel)]["B"]
     figures = {
@@ -334,22 +350,44 @@ def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[Row]:
         "lag": (fit.lag, "s"),
         "bias": (fit.bias, unit),
     }
-    about = asdict(key) | {"compensated": fit.compensated}
     for name, (parameter, its_unit) in figures.items():
-        reason = parameter.reason or (fit.reason if name == "sensitivity" else None)
-        yield about | _figure(name, parameter, its_unit) | {"reason": reason}
+        yield TemperatureRow(
+            **asdict(key),
+            compensated=fit.compensated,
+            parameter=name,
+            value=parameter.value,
+            lower=parameter.lower,
+            upper=parameter.upper,
+            unit=its_unit,
+            status=parameter.status,
+            reason=parameter.reason or (fit.reason if name == "sensitivity" else None),
+            fitted=parameter.fitted,
+        )
 
 
-def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
+def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[LowPassRow]:
     """Yield the rows of the table ``low_pass``: none where a band was asked for."""
     low_pass = fit.low_pass
     if low_pass is None:
         return
     density = SI_UNITS[quantity_of(key.channel)]["N"]
-    about = asdict(key) | {"kind": low_pass.kind, "order": low_pass.order}
-    yield about | _figure("cutoff", low_pass.frequency, "Hz")
+    figures = {"cutoff": (low_pass.frequency, "Hz")}
     if low_pass.order is not None:
-        yield about | _figure("floor", Parameter(low_pass.floor), density)
+        figures["floor"] = (Parameter(low_pass.floor), density)
+    for name, (parameter, unit) in figures.items():
+        yield LowPassRow(
+            **asdict(key),
+            kind=low_pass.kind,
+            order=low_pass.order,
+            parameter=name,
+            value=parameter.value,
+            lower=parameter.lower,
+            upper=parameter.upper,
+            unit=unit,
+            status=parameter.status,
+            reason=parameter.reason,
+            fitted=parameter.fitted,
+        )
 
 
 def resolution_of(log: ChannelLog) -> float:
@@ -357,12 +395,6 @@ def resolution_of(log: ChannelLog) -> float:
     values = next((block for block in log.blocks() if np.isfinite(block).any()), np.empty(0))
     present = values[np.isfinite(values)][:_ENOUGH]
     return step_of(np.unique(present), len(present))
-
-
-def _figure(name: str, parameter: Parameter, unit: str) -> dict[str, Any]:
-    values = asdict(parameter)
-    values.pop("duration_needed")
-    return {"parameter": name, "unit": unit, **values}
 
 
 def estimation(
