@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks, of_phase
 from imubench_pipeline.allan.phase import NO_GAPS, gaps_of, integrate
 from imubench_pipeline.estimators.rows import allan_rows
+from imubench_pipeline.model.estimates import AllanRow
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.typing import Row
 
 
 def too_sparse(channel: str, log: ChannelLog) -> Finding:
@@ -28,7 +28,9 @@ def too_sparse(channel: str, log: ChannelLog) -> Finding:
     return Finding("too_short", "fatal", detail, log.grid, channel)
 
 
-def curves(folder: Path, sensor: str, recording: str, settings: AllanSettings) -> Iterator[Row]:
+def curves(
+    folder: Path, sensor: str, recording: str, settings: AllanSettings
+) -> Iterator[AllanRow]:
     """Yield the rows of the table ``allan``; none of a rejected recording."""
     for channel, log in kept_static_logs(folder).items():
         yield from allan_rows(Key(sensor, recording, channel), curve_of_channel(log, settings))

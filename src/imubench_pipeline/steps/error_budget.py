@@ -71,8 +71,8 @@ def _deviations(
             sensor=names["sensor"],
             recording=names["recording"],
             channel=name,
-            simulated=quality.recording["simulated"],
-            duration=quality.recording["duration"],
+            simulated=quality.row.simulated,
+            duration=quality.row.duration or 0.0,
             estimate=estimate,
         )
         rate = quality.channels[name]["rate"]

@@ -12,9 +12,10 @@ import pyarrow.compute as pc
 
 from imubench_pipeline.estimators.estimate import JointDraws
 from imubench_pipeline.estimators.rows import draws, estimate_of
-from imubench_pipeline.model.comparisons import FusionRow
-from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.comparisons import FusionRow, GradeRow
+from imubench_pipeline.model.estimates import CompensatedAllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.model.table import ChannelRow, TableRow
 from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
 from imubench_pipeline.navigation.fusion.equivalence import (
     FusionChannel,
@@ -26,7 +27,6 @@ from imubench_pipeline.recordings.fitness import left_out, with_doubts
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import build, read, write_arrow
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
 NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
@@ -92,28 +92,30 @@ def _temperature_parts(
 ) -> dict[tuple[str, str, str], TemperaturePart]:
     """Return what temperature adds to the channels of which it is taken out."""
     curves: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
-    for row in tables["allan_compensated"].to_pylist():
-        curves.setdefault(_channel(row), []).append((row["tau"], row["temperature"]))
+    for left in CompensatedAllanRow.rows_of(tables["allan_compensated"]):
+        curves.setdefault(_channel(left), []).append((left.tau, left.temperature))
     temperature = tables["temperature"]
     chosen = pc.and_(temperature["compensated"], pc.equal(temperature["parameter"], "sensitivity"))
     parts = {}
-    for row in temperature.filter(chosen).to_pylist():
+    for row in TemperatureRow.rows_of(temperature.filter(chosen)):
+        if row.value is None or row.lower is None or row.upper is None:
+            continue
         if _channel(row) in curves:
             tau, deviation = np.array(curves[_channel(row)]).T
-            error = (row["upper"] - row["lower"]) / (2.0 * SIGMAS * abs(row["value"]))
+            error = (row.upper - row.lower) / (2.0 * SIGMAS * abs(row.value))
             parts[_channel(row)] = TemperaturePart(tau, deviation, error)
     return parts
 
 
-def _channel(row: Row) -> tuple[str, str, str]:
-    return row["sensor"], row["recording"], row["channel"]
+def _channel(row: ChannelRow) -> tuple[str, str, str]:
+    return row.sensor, row.recording, row.channel
 
 
 def fusion_rows(
     tables: Mapping[str, pa.Table],
     how: FusionSettings,
     joint: Mapping[tuple[str, str], Path] | None = None,
-) -> Iterator[Row]:
+) -> Iterator[FusionRow]:
     """Return the rows of the table ``fusion``; `tables` and `joint` are as of `candidates`."""
     rows = equivalence_rows(
         candidates(tables, joint),
@@ -123,15 +125,16 @@ def fusion_rows(
         draws=how.draws,
         seed=how.seed,
     )
-    about = RecordingRow.rows_of(tables["recordings"])
-    return with_doubts((FusionRow(**row) for row in rows), about)
+    return with_doubts(rows, RecordingRow.rows_of(tables["recordings"]))
 
 
 TACTICAL = "tactical"
 """First word of the price class whose datasheets are to be reached."""
 
 
-def grades_of_run(tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]) -> Iterator[Row]:
+def grades_of_run(
+    tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]
+) -> Iterator[GradeRow]:
     """Return the rows of the table ``grades``; `tables` as of `candidates`.
 
     Of sensors that are not sold, too: a board of several is made to reach such a grade.
@@ -159,7 +162,7 @@ def write_fusion(
     how = FusionSettings.model_validate_json(settings)
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
     of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}
-    rows = {
+    rows: dict[str, Iterator[TableRow]] = {
         "fusion": fusion_rows(tables, how, of_recording),
         "grades": grades_of_run(tables, sensors_of(catalogue)),
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,13 @@ from imubench_pipeline.experiments.alignment.fine import align
 from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.experiments.calibration.least_squares import NotObservableError
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.positions import TRIAD, InPositions
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.steps.noise_source import NO_MODEL, from_printed, segments_reason
 from imubench_pipeline.steps.outlook import noise_at_rest
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
 ANGLES = ("roll", "pitch", "heading")
@@ -38,7 +39,7 @@ def attitude_rows(
     sensor: Sensor,
     declared: InPositions,
     truth: Mapping[str, float],
-) -> Iterator[Row]:
+) -> Iterator[CalibrationRow]:
     """Yield roll, pitch and heading of the first position, or why they are not found.
 
     Parameters
@@ -54,12 +55,19 @@ def attitude_rows(
     truth : mapping of str to float
         The angles of a simulation, rad.
     """
-    about: dict[str, Any] = {**names, "channel": "gyro_x", "run": "positions"}
-    about["latitude"] = declared.latitude_si
+    about = partial(
+        CalibrationRow,
+        sensor=names["sensor"],
+        recording=names["recording"],
+        channel="gyro_x",
+        run="positions",
+        unit="rad",
+        latitude=declared.latitude_si,
+    )
 
-    def without(status: str, reason: str) -> Iterator[Row]:
+    def without(status: str, reason: str) -> Iterator[CalibrationRow]:
         for name in ANGLES:
-            yield about | {"parameter": name, "unit": "rad", "status": status, "reason": reason}
+            yield about(parameter=name, status=status, reason=reason)
 
     missing = [name for name in TRIAD if name not in logs]
     if missing:
@@ -75,7 +83,7 @@ def attitude_rows(
         yield from without("no_model", NO_MODEL)
         return
     models, words = noise
-    about |= {"model": models[0].name, "model_from": words}
+    about = partial(about, model=models[0].name, model_from=words)
     try:
         positions, means = _means(axes, declared)
         triad = Triad(
@@ -91,25 +99,22 @@ def attitude_rows(
     except ValueError as error:
         yield from without("too_short", str(error))
         return
-    about |= {
-        "duration": positions.blocks.duration,
-        "samples": int(positions.blocks.count.sum()),
-        "rates": len(positions.turned),
-    }
     for name, value, sigma in zip(
         ANGLES, euler_angles(aligned.attitude[0]).tolist(), fine.sigma[-1].tolist(), strict=True
     ):
-        yield about | {
-            "parameter": name,
-            "value": value,
-            "lower": value - _LIMIT * sigma,
-            "upper": value + _LIMIT * sigma,
-            "unit": "rad",
-            "status": "ok",
-            "sigma": sigma,
-            "sigma_noise": sigma,
-            "truth": truth.get(name),
-        }
+        yield about(
+            parameter=name,
+            value=value,
+            lower=value - _LIMIT * sigma,
+            upper=value + _LIMIT * sigma,
+            status="ok",
+            sigma=sigma,
+            sigma_noise=sigma,
+            truth=truth.get(name),
+            duration=positions.blocks.duration,
+            samples=int(positions.blocks.count.sum()),
+            rates=len(positions.turned),
+        )
 
 
 def _noise(

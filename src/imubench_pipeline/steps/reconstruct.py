@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import estimates, recommended_estimates
 from imubench_pipeline.estimators.score import beats, rms, score
+from imubench_pipeline.model.estimates import ReconstructionRow, ScoreRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import (
     channel_rng,
@@ -34,8 +35,8 @@ from imubench_pipeline.tables.keys import Key
 class Reconstruction:
     """Rows of the tables ``reconstruction`` and ``scores`` of one channel and method."""
 
-    curve_rows: list[Mapping[str, Any]]
-    score_row: Mapping[str, Any]
+    curve_rows: list[ReconstructionRow]
+    score_row: ScoreRow
     differences: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     """RMS of each member with equal weights, as 000 Table 3 has it of one."""
 
@@ -57,9 +58,8 @@ def reconstruct(
     model = estimate.model
     if not model.terms:
         reasons = {p.reason for p in estimate.parameters.values() if p.reason}
-        return Reconstruction(
-            [], names | {"reason": "no term has a value: " + "; ".join(sorted(reasons))}
-        )
+        reason = "no term has a value: " + "; ".join(sorted(reasons))
+        return Reconstruction([], ScoreRow(**names, reason=reason))
     sizes, samples = measured.cluster_size, measured.samples
 
     def stream(use: str) -> np.random.Generator:
@@ -81,15 +81,17 @@ def reconstruct(
     scores = score(measured.deviation, error, of_model, deviations)
     rows = _rows(names, measured.tau, median, lower, upper, reconstructed)
     differences = rms(deviations, measured.deviation)
-    return Reconstruction(list(rows), names | asdict(scores), differences)
+    return Reconstruction(list(rows), ScoreRow(**names, **asdict(scores)), differences)
 
 
 def _rows(
     names: Mapping[str, Any], tau: NDArray[np.float64], *columns: NDArray[np.float64]
-) -> Iterator[Mapping[str, Any]]:
-    titles = ("tau", "adev", "lower", "upper", "reconstructed")
+) -> Iterator[ReconstructionRow]:
     for values in zip(tau, *columns, strict=True):
-        yield {**names, **dict(zip(titles, map(float, values), strict=True))}
+        at, adev, lower, upper, reconstructed = map(float, values)
+        yield ReconstructionRow(
+            **names, tau=at, adev=adev, lower=lower, upper=upper, reconstructed=reconstructed
+        )
 
 
 def _keep(
@@ -105,8 +107,8 @@ def _keep(
 class ReconstructionRows:
     """Rows of the tables ``reconstruction`` and ``scores``."""
 
-    reconstruction: list[Mapping[str, Any]] = field(default_factory=list)
-    scores: list[Mapping[str, Any]] = field(default_factory=list)
+    reconstruction: list[ReconstructionRow] = field(default_factory=list)
+    scores: list[ScoreRow] = field(default_factory=list)
 
 
 def reconstruction_rows(
@@ -122,7 +124,7 @@ def reconstruction_rows(
     for channel, by_method in estimates(parameters).items():
         if channels is not None and channel not in channels:
             continue
-        key = Key(about.recording["sensor"], about.recording["recording"], channel)
+        key = Key(about.row.sensor, about.row.recording, channel)
         rate = about.channels[channel]["rate"]
         results = {}
         for estimate in by_method:
@@ -134,7 +136,7 @@ def reconstruction_rows(
             # Of the log without what temperature adds the curve is another.
             same = method != "compensated" and result.differences.size and recommended.size
             chance = beats(result.differences, recommended) if same else None
-            rows.scores.append({**result.score_row, "beats": chance})
+            rows.scores.append(replace(result.score_row, beats=chance))
             rows.reconstruction.extend(result.curve_rows)
     return rows
 

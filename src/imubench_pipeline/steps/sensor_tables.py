@@ -141,7 +141,7 @@ def findings_of(
     of_levels = (
         row
         for quality in qualities
-        for row in implausible_of(quality, sensors.get(quality.recording["sensor"]))
+        for row in implausible_of(quality, sensors.get(quality.row.sensor))
     )
     return [*of_logs, *of_levels, *of_estimates, *unusual_rows(estimated, sensors, usual)]
 
