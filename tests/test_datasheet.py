@@ -14,10 +14,12 @@ from imubench_pipeline.datasheets.measured import fixed_bias, sensitivity
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.sensor import read_sensors
 from tests.conftest import PROJECT
+from tests.rows import typed
 
 DEG = math.pi / 180
 G = 9.80665
@@ -423,19 +425,20 @@ COEFFICIENT = sheet(temperature_coefficient={"value": 0.05, "unit": "deg/s/K"})
 
 def thermal(
     s: tuple[float | None, float | None, float | None], compensated: bool, q: float | None = None
-) -> list[dict[str, Any]]:
+) -> list[TemperatureRow]:
     """Rows of the table ``temperature``, of a sensitivity with its limits in °/s/K."""
     figures = [None if one is None else one * DEG for one in s]
     names = ("value", "lower", "upper")
     row = dict(zip(names, figures, strict=True)) | {"reason": "BIC favours it by 2.0 only"}
-    return [
+    rows: list[dict[str, Any]] = [
         {"parameter": "T_0", "value": 27.0, "compensated": compensated},
         {"parameter": "sensitivity", "compensated": compensated} | row,
         {"parameter": "quadratic", "value": q, "compensated": compensated},
     ]
+    return typed(TemperatureRow, rows)
 
 
-def coefficient(rows: list[dict[str, Any]]) -> Delta:
+def coefficient(rows: list[TemperatureRow]) -> Delta:
     found = sensitivity(rows, 21.0, 34.0)
     (row,) = (
         r

@@ -12,10 +12,12 @@ from imubench_pipeline.datasheets.deltas import bias_deltas, deltas
 from imubench_pipeline.datasheets.measured import sensitivity
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.steps.published_figures import published_rows, truth_rows
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.keys import Key
+from tests.rows import typed
 
 DEGREE = math.pi / 180
 KEY = Key("imu", "sim_board", "gyro_x")
@@ -103,7 +105,7 @@ def tables(
         for one in (curve, best)
         for delta in deltas(datasheet, "gyro_x", one, tau, 0.1)
     ]
-    warm = sensitivity(temperature, None, None)
+    warm = sensitivity(typed(TemperatureRow, temperature), None, None)
     compared += [
         NAMES | {"method": "mean"} | asdict(delta)
         for delta in bias_deltas(datasheet, "gyro_x", {"gyro_x": bias}, 0.1, warm)

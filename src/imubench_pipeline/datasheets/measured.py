@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from imubench_pipeline.datasheets.comparable import Comparable
 from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
 from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR
 
 _LOCAL_GRAVITY = 0.027
@@ -123,29 +123,29 @@ def _size(value: float, unknown: float, reason: str) -> Parameter:
 
 
 def sensitivity(
-    rows: Iterable[Mapping[str, Any]], lowest: float | None, highest: float | None
+    rows: Iterable[TemperatureRow], lowest: float | None, highest: float | None
 ) -> Parameter:
     """Return the size of the sensitivity of a channel to temperature, as its thermal fit tells it.
 
-    A vendor prints ± so much per kelvin: the sign is left out. It is in rad/s/K or m/s²/K, from
-    rows of the table ``temperature``; the reason says at what temperature and over which range, °C,
+    A vendor prints ± so much per kelvin: the sign is left out. It is in rad/s/K or m/s²/K; the
+    reason says at what temperature and over which range, °C,
     it holds. Where temperature is not taken out of the log, the upper limit alone; where it cannot
     be told from time, nothing.
     """
-    by_parameter = {row["parameter"]: row for row in rows}
+    by_parameter = {row.parameter: row for row in rows}
     row = by_parameter.get("sensitivity")
     if row is None:
         return NO_READINGS
-    at = f"slope at {by_parameter['T_0']['value']:.3g} °C"
+    at = f"slope at {by_parameter['T_0'].value:.3g} °C"
     if lowest is not None and highest is not None:
         at += f", of readings from {lowest:.3g} to {highest:.3g} °C; the vendor has another range"
-    if by_parameter["quadratic"]["value"] is not None:
+    if by_parameter["quadratic"].value is not None:
         at += "; the bias bends with temperature, the slope is another elsewhere"
-    lower, upper = row["lower"], row["upper"]
-    if row["value"] is None or lower is None or upper is None:
-        return Parameter(None, "not_identified", row["reason"] or "no interval")
+    lower, upper = row.lower, row.upper
+    if row.value is None or lower is None or upper is None:
+        return Parameter(None, "not_identified", row.reason or "no interval")
     largest = max(abs(lower), abs(upper))
-    if not row["compensated"]:
-        return Parameter(None, "not_identified", f"{row['reason']}; {at}", 0.0, largest)
+    if not row.compensated:
+        return Parameter(None, "not_identified", f"{row.reason}; {at}", 0.0, largest)
     least = 0.0 if lower <= 0.0 <= upper else min(abs(lower), abs(upper))
-    return Parameter(abs(row["value"]), "ok", at, least, largest)
+    return Parameter(abs(row.value), "ok", at, least, largest)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from imubench_pipeline.experiments.papers.about import About, Basis, Verdict
 from imubench_pipeline.experiments.papers.evidence import Evidence
-from imubench_pipeline.typing import Row
+from imubench_pipeline.model.published import PublishedRow
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,30 +83,30 @@ def verdict_of(claim: Claim, found: Found) -> Verdict:
     return "agrees" if inside or near else "differs"
 
 
-def rows_of(paper: Paper, evidence: Evidence) -> Iterator[Row]:
+def rows_of(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
     """Yield the rows of the table ``published`` of a paper."""
     for claim in paper.claims(evidence):
         found = claim.found(evidence)
         verdict = verdict_of(claim, found)
         ratio = found.value / claim.value if found.value is not None and claim.value else None
-        yield {
-            "paper": paper.about.name,
-            "place": claim.place,
-            "quantity": claim.quantity,
-            "printed_as": claim.printed,
-            "printed": claim.value,
-            "found": found.value,
-            "lower": found.lower,
-            "upper": found.upper,
-            "found_words": found.words or None,
-            "ratio": ratio,
-            "tolerance": claim.tolerance if ratio is not None else None,
-            "unit": claim.unit,
-            "printed_unit": claim.printed_unit or claim.unit,
-            "scale": claim.scale,
-            "basis": claim.basis,
-            "verdict": verdict,
-            "reason": (found.reason or claim.reason or None) if verdict != "agrees" else None,
-            "page": claim.page or None,
-            "check": claim.check,
-        }
+        yield PublishedRow(
+            paper=paper.about.name,
+            place=claim.place,
+            quantity=claim.quantity,
+            printed_as=claim.printed,
+            printed=claim.value,
+            found=found.value,
+            lower=found.lower,
+            upper=found.upper,
+            found_words=found.words or None,
+            ratio=ratio,
+            tolerance=claim.tolerance if ratio is not None else None,
+            unit=claim.unit,
+            printed_unit=claim.printed_unit or claim.unit,
+            scale=claim.scale,
+            basis=claim.basis,
+            verdict=verdict,
+            reason=(found.reason or claim.reason or None) if verdict != "agrees" else None,
+            page=claim.page or None,
+            check=claim.check,
+        )

@@ -35,6 +35,7 @@ from imubench_pipeline.experiments.papers.engers_axes import (
 )
 from imubench_pipeline.experiments.papers.engers_figures import figures
 from imubench_pipeline.experiments.papers.evidence import Evidence
+from imubench_pipeline.model.published import PublishedFigureRow
 from imubench_pipeline.noise import FLOOR
 
 _TEST = "tests/papers/test_engers.py"
@@ -57,14 +58,14 @@ def _published(axis: Axis, place: str, parameter: str, times: float) -> Callable
     """
 
     def found(run: Evidence) -> Found:
-        of_axis = run.of_log("published_figures", axis.log, place=place, parameter=parameter)
-        row = next((row for row in of_axis if row["of"] == "log"), None)
-        if row is None or row["value"] is None:
+        of_axis = run.of_log(PublishedFigureRow, axis.log, place=place, parameter=parameter)
+        row = next((row for row in of_axis if row.of == "log"), None)
+        if row is None or row.value is None:
             return nothing(NO_LOG)
         value, lower, upper = (
-            None if row[end] is None else times * row[end] for end in ("value", "lower", "upper")
+            None if end is None else times * end for end in (row.value, row.lower, row.upper)
         )
-        curve = None if parameter == "bias" else row["curve"]
+        curve = None if parameter == "bias" else row.curve
         words = ""
         if curve is not None:
             shown = np.format_float_positional(

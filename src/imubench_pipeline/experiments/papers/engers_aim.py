@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from imubench_pipeline.experiments.papers.claims import Claim, Found, nothing
 from imubench_pipeline.experiments.papers.engers_axes import DEGREE, NAMES
 from imubench_pipeline.experiments.papers.evidence import Evidence
-from imubench_pipeline.typing import Row
+from imubench_pipeline.model.comparisons import GradeRow
 
 _PLACE = "Section 1.0.1.1"
 _CHECK = "tests/test_specimens.py"
@@ -43,12 +43,12 @@ def _reached(grade: str, option: str | None) -> Callable[[Evidence], Found]:
     def found(run: Evidence) -> Found:
         words = []
         for sensor, name in ((_ONE, ""), (_FUSED, f"of {_NUMBER} fused ")):
-            rows = run.rows("grades", sensor=sensor, quantity="gyro", grade=grade, option=option)
-            by = {row["statistic"]: row for row in reversed(rows)}
+            rows = run.rows(GradeRow, sensor=sensor, quantity="gyro", grade=grade, option=option)
+            by = {row.statistic: row for row in reversed(rows)}
             if not by:
                 return nothing(_NO_LOGS)
-            if all(row["printed"] is None for row in rows):
-                return nothing(f"noise of {rows[0]['grade_name']}: {rows[0]['reason']}")
+            if all(row.printed is None for row in rows):
+                return nothing(f"noise of {rows[0].grade_name}: {rows[0].reason}")
             shown = [
                 f"{count} by its {what}"
                 for statistic, what in (("N", "white noise"), ("sigma_min", "lowest point"))
@@ -60,25 +60,25 @@ def _reached(grade: str, option: str | None) -> Callable[[Evidence], Found]:
     return found
 
 
-def _count(row: Row | None) -> str:
+def _count(row: GradeRow | None) -> str:
     """Return the least whole number that is enough; empty where none is known."""
-    if row is None or row["n_upper"] is None:
+    if row is None or row.n_upper is None:
         return ""
-    known = row["n"] is not None
-    return f"{'' if known else 'at most '}{max(math.ceil(row['n' if known else 'n_upper']), 1)}"
+    most = "at most " if row.n is None else ""
+    return f"{most}{max(math.ceil(row.n_upper if row.n is None else row.n), 1)}"
 
 
 def _fused(run: Evidence) -> Found:
     """Return N of the fused log, beside what that of one makes expect."""
     one, fused = (
-        next(iter(run.rows("grades", sensor=sensor, quantity="gyro", statistic="N")), None)
+        next(iter(run.rows(GradeRow, sensor=sensor, quantity="gyro", statistic="N")), None)
         for sensor in (_ONE, _FUSED)
     )
-    if one is None or fused is None or not one["value"]:
+    if one is None or fused is None or not one.value:
         return nothing(_NO_LOGS)
-    expected = one["value"] / math.sqrt(_NUMBER)
+    expected = one.value / math.sqrt(_NUMBER)
     return Found(
-        value=fused["value"], lower=fused["lower"], upper=fused["upper"],
+        value=fused.value, lower=fused.lower, upper=fused.upper,
         words=f"that of the one {NAMES[_ONE]} over √{_NUMBER} is "
         f"{expected / DEGREE * 60.0:.4f}; the fused ones are others of their kind",
         verdict="done here",

@@ -27,6 +27,12 @@ from imubench_pipeline.experiments.papers.engers_axes import (
     page_of,
 )
 from imubench_pipeline.experiments.papers.evidence import Evidence, Log
+from imubench_pipeline.model.estimates import (
+    AllanRow,
+    CompensatedAllanRow,
+    ModelSampleRow,
+    ReconstructionRow,
+)
 
 _TEST = "tests/papers/test_engers.py"
 _SAMPLES = "tests/test_samples_of_models.py"
@@ -268,15 +274,17 @@ def _inside(sensor: str, axis: str) -> Callable[[Evidence], Found]:
     def found(run: Evidence) -> Found:
         log = Log(sensor, RECORDING, f"gyro_{axis}")
         for method in ("compensated", "likelihood"):
-            bands = run.of_log("reconstruction", log, method=method)
+            bands = run.of_log(ReconstructionRow, log, method=method)
             if bands:
                 break
         else:
             return nothing(NO_LOG)
-        table = "allan_compensated" if method == "compensated" else "allan"
-        measured = {row["tau"]: row["adev"] for row in run.of_log(table, log)}
-        seen = [row for row in bands if row["tau"] >= _PASSED and row["tau"] in measured]
-        inside = sum(row["lower"] <= measured[row["tau"]] <= row["upper"] for row in seen)
+        curve: type[AllanRow] | type[CompensatedAllanRow] = (
+            CompensatedAllanRow if method == "compensated" else AllanRow
+        )
+        measured = {row.tau: row.adev for row in run.of_log(curve, log)}
+        seen = [row for row in bands if row.tau >= _PASSED and row.tau in measured]
+        inside = sum(row.lower <= measured[row.tau] <= row.upper for row in seen)
         share = 100.0 * inside / len(seen)
         return Found(
             words=f"of the simulated log {share:.0f} % above {_PASSED:g} s is in the 95 % band of "
@@ -290,8 +298,8 @@ def _inside(sensor: str, axis: str) -> Callable[[Evidence], Found]:
 
 def _spread(run: Evidence, sensor: str) -> dict[tuple[str, str], float]:
     """Return the deviation of samples by channel, of the log and of the models; maybe none."""
-    rows = run.rows("samples_of_models", sensor=sensor, recording=RECORDING, what="deviation")
-    return {(row["channel"], row["of"]): row["mean"] for row in rows}
+    rows = run.rows(ModelSampleRow, sensor=sensor, recording=RECORDING, what="deviation")
+    return {(row.channel, row.of): row.mean for row in rows if row.mean is not None}
 
 
 def _deviations(sensor: str, if_alike: str) -> Callable[[Evidence], Found]:
@@ -344,10 +352,13 @@ def _neighbours(sensor: str, of: str) -> Callable[[Evidence], Found]:
 
     def found(run: Evidence) -> Found:
         rows = run.rows(
-            "samples_of_models", sensor=sensor, recording=RECORDING, channel="gyro_x",
+            ModelSampleRow, sensor=sensor, recording=RECORDING, channel="gyro_x",
             what="stretch",
         )  # fmt: skip
-        stretches = {one: [row["mean"] for row in rows if row["of"] == one] for one in ("log", of)}
+        stretches = {
+            one: [row.mean for row in rows if row.of == one and row.mean is not None]
+            for one in ("log", of)
+        }
         if not all(stretches.values()):
             return nothing(NO_LOG)
         log, model = (_correlation(values) for values in stretches.values())

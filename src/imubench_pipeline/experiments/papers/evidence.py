@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
-from imubench_pipeline.typing import Row
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.model.table import R
 
 
 class Log(NamedTuple):
@@ -29,31 +32,30 @@ class Evidence:
 
     def __init__(self, tables: Mapping[str, pa.Table] | None = None) -> None:
         self._tables = dict(tables or {})
-        self._rows: dict[str, list[Row]] = {}
 
-    def rows(self, table: str, **where: object) -> list[Row]:
-        """Return the rows of a table in which columns have these values."""
-        if table not in self._rows:
-            self._rows[table] = self._tables[table].to_pylist() if table in self._tables else []
-        return [
-            row
-            for row in self._rows[table]
-            if all(row[name] == value for name, value in where.items())
-        ]
+    def rows(self, of: type[R], **where: object) -> list[R]:
+        """Return the rows of a table, by their class, in which columns have these values."""
+        table = self._tables.get(of.table)
+        if table is None:
+            return []
+        for name, value in where.items():
+            column = table[name]
+            table = table.filter(column.is_null() if value is None else pc.equal(column, value))
+        return of.rows_of(table)
 
     def has(self, sensor: str, recording: str) -> bool:
         """Tell whether the run has a recording that could be used."""
-        return bool(self.rows("recordings", sensor=sensor, recording=recording, status="ok"))
+        return bool(self.rows(RecordingRow, sensor=sensor, recording=recording, status="ok"))
 
-    def of_log(self, table: str, log: Log, **where: object) -> list[Row]:
-        """Return the rows of a table about a channel of a recording."""
-        return self.rows(table, **log._asdict(), **where)
+    def of_log(self, of: type[R], log: Log, **where: object) -> list[R]:
+        """Return the rows of a table, by their class, about a channel of a recording."""
+        return self.rows(of, **log._asdict(), **where)
 
-    def parameter(self, log: Log, name: str, method: str | None = None) -> Row | None:
-        """Return the row of ``parameters`` of one parameter's first component.
+    def parameter(self, log: Log, name: str, method: str | None = None) -> ParameterRow | None:
+        """Return the estimate of one parameter's first component.
 
         By a method; without one, by the recommended method.
         """
         by: dict[str, object] = {"recommended": True} if method is None else {"method": method}
-        rows = self.of_log("parameters", log, parameter=name, component=1, **by)
+        rows = self.of_log(ParameterRow, log, parameter=name, component=1, **by)
         return rows[0] if rows else None

@@ -39,10 +39,10 @@ from imubench_pipeline.experiments.papers.maia_printed import (
     lowest_point,
     readings,
 )
+from imubench_pipeline.model.estimates import ParameterRow, ScoreRow
 from imubench_pipeline.navigation.error_budget import Quantity, Start, budget
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.typing import Row
 from imubench_pipeline.units import to_si
 
 _TEST = "tests/papers/test_maia.py"
@@ -107,11 +107,10 @@ def _value(model: NoiseModel, symbol: str) -> float:
     return float(getattr(model, symbol))
 
 
-def _words_of(row: Row | None, what: str) -> str:
+def _words_of(row: ParameterRow | None, what: str) -> str:
     if row is None:
         return ""
-    value = row["value"]
-    told = str(row["status"]).replace("_", " ") if value is None else _power(float(value), 3)
+    told = row.status.replace("_", " ") if row.value is None else _power(row.value, 3)
     return f"{what}: {told}"
 
 
@@ -121,9 +120,9 @@ def _estimated(channel: Channel, symbol: str, run: Evidence) -> Found:
     if row is None:
         return nothing(_NO_LOG)
     words = _words_of(run.parameter(_log(channel), symbol), "likelihood")
-    if row["value"] is None:
-        return Found(words=words, verdict="differs", reason=row["reason"])
-    return Found(value=row["value"], lower=row["lower"], upper=row["upper"], words=words)
+    if row.value is None:
+        return Found(words=words, verdict="differs", reason=row.reason)
+    return Found(value=row.value, lower=row.lower, upper=row.upper, words=words)
 
 
 def _read(channel: Channel, symbol: str, run: Evidence) -> Found:
@@ -316,15 +315,15 @@ def _beaten(channel: Channel, _: Evidence) -> Found:
 
 
 def _scored(channel: Channel, method: str, run: Evidence) -> Found:
-    rows = run.of_log("scores", _log(channel), method=method)
-    if not rows or rows[0]["rms"] is None:
+    rows = run.of_log(ScoreRow, _log(channel), method=method)
+    if not rows or rows[0].rms is None:
         return nothing(_NO_LOG)
     row = rows[0]
-    low, high = row["drawn_log10_lower"], row["drawn_log10_upper"]
+    low, high = row.drawn_log10_lower, row.drawn_log10_upper
     return Found(
-        value=row["rms"],
+        value=row.rms,
         verdict="differs",
-        words=f"{row['rms_log10']:.3f} decades; of one reconstruction {row['drawn_log10']:.3f} "
+        words=f"{row.rms_log10:.3f} decades; of one reconstruction {row.drawn_log10:.3f} "
         f"({low:.3f} to {high:.3f})",
     )
 
@@ -446,13 +445,14 @@ def _slopes(_: Evidence) -> Found:
 
 
 def _nearer(channel: Channel, run: Evidence) -> Found:
-    scores = {row["method"]: row["rms_log10"] for row in run.of_log("scores", _log(channel))}
-    if scores.get("authors") is None or scores.get("paper") is None:
+    scores = {row.method: row.rms_log10 for row in run.of_log(ScoreRow, _log(channel))}
+    authors, optimised = scores.get("authors"), scores.get("paper")
+    if authors is None or optimised is None:
         return nothing(_NO_LOG)
     return Found(
-        words=f"from the simulated log {scores['authors']:.3f} decades by Table 1, "
-        f"{scores['paper']:.3f} optimised; it cannot be otherwise, as the log is of Table 2",
-        verdict="agrees" if scores["paper"] < scores["authors"] else "differs",
+        words=f"from the simulated log {authors:.3f} decades by Table 1, "
+        f"{optimised:.3f} optimised; it cannot be otherwise, as the log is of Table 2",
+        verdict="agrees" if optimised < authors else "differs",
     )
 
 

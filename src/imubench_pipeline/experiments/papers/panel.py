@@ -21,8 +21,8 @@ from imubench_pipeline.estimators.model_choice import PAPERS
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import Whittle, whittle_of
 from imubench_pipeline.experiments.papers.maia_printed import DURATION, MTI_GYRO
+from imubench_pipeline.model.published import AccuracyRow
 from imubench_pipeline.noise.simulate import channel_rng, simulate
-from imubench_pipeline.typing import Row
 
 LOGS = 100
 """Enough to tell ratios of 1.1 and 1.5; more, and whole rates: `benchmarks/accuracy.py`."""
@@ -33,7 +33,7 @@ _FITS: tuple[Literal["paper", "weighted"], ...] = ("paper", "weighted")
 Values = Mapping[str, float | None]
 
 
-def panel_rows(logs: int = LOGS) -> Iterator[Row]:
+def panel_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
     """Yield the rows of the table ``accuracy``.
 
     The likelihood is that of the papers' model, up to half of the sampling rate.
@@ -55,18 +55,18 @@ def panel_rows(logs: int = LOGS) -> Iterator[Row]:
             # The root mean square of n normal errors is known to 1 / sqrt(2 n).
             spread = 1.96 / math.sqrt(2.0 * len(given)) if given else 0.0
             ratio = None if rmse is None else rmse / bounds[name]
-            yield {
-                "method": method,
-                "parameter": name,
-                "logs": logs,
-                "given": len(given),
-                "rmse": rmse,
-                "bias": float(np.mean(errors)) if given else None,
-                "bound": bounds[name],
-                "ratio": ratio,
-                "ratio_lower": None if ratio is None else ratio * (1.0 - spread),
-                "ratio_upper": None if ratio is None else ratio * (1.0 + spread),
-            }
+            yield AccuracyRow(
+                method=method,
+                parameter=name,
+                logs=logs,
+                given=len(given),
+                rmse=rmse,
+                bias=float(np.mean(errors)) if given else None,
+                bound=bounds[name],
+                ratio=ratio,
+                ratio_lower=None if ratio is None else ratio * (1.0 - spread),
+                ratio_upper=None if ratio is None else ratio * (1.0 + spread),
+            )
 
 
 def _estimates(number: int, before: Whittle | None) -> tuple[dict[str, Values], Whittle]:

@@ -7,21 +7,21 @@ from collections.abc import Iterator, Sequence
 from imubench_pipeline.experiments.papers import engers, maia, silva
 from imubench_pipeline.experiments.papers.claims import Paper, rows_of
 from imubench_pipeline.experiments.papers.evidence import Evidence
-from imubench_pipeline.typing import Row
+from imubench_pipeline.model.published import PublishedRow
 
 PAPERS: Sequence[Paper] = (maia.PAPER, silva.PAPER, engers.PAPER)
 
 
-def published_rows(evidence: Evidence) -> Iterator[Row]:
+def published_rows(evidence: Evidence) -> Iterator[PublishedRow]:
     """Yield the rows of the table ``published``: of the papers of which the run has logs."""
     for paper in PAPERS:
         if any(evidence.has(*log) for log in paper.about.logs):
             yield from rows_of(paper, evidence)
 
 
-def rows_without_a_run() -> Iterator[Row]:
+def rows_without_a_run() -> Iterator[PublishedRow]:
     """Yield the rows that printed figures and closed forms alone give, without any log."""
     for paper in PAPERS:
         for row in rows_of(paper, Evidence()):
-            if row["basis"] in ("computed", "checked"):
+            if row.basis in ("computed", "checked"):
                 yield row

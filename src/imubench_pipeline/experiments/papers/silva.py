@@ -28,6 +28,7 @@ from imubench_pipeline.experiments.papers.silva_runs import (
     turned,
 )
 from imubench_pipeline.experiments.papers.silva_weeks import of_weeks
+from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 
 AT_REST = Log(SENSOR, "sim_published", "gyro_x")
@@ -50,10 +51,10 @@ def _parameter(name: str) -> Callable[[Evidence], Found]:
         row = run.parameter(AT_REST, name, "likelihood_gm")
         if row is None:
             return nothing(NO_LOG)
-        if row["value"] is None:
-            status = row["status"].replace("_", " ")
-            return Found(words=status, verdict="differs", reason=row["reason"])
-        return Found(value=row["value"], lower=row["lower"], upper=row["upper"])
+        if row.value is None:
+            status = row.status.replace("_", " ")
+            return Found(words=status, verdict="differs", reason=row.reason)
+        return Found(value=row.value, lower=row.lower, upper=row.upper)
 
     return found
 
@@ -65,9 +66,9 @@ def _read(name: str) -> Callable[[Evidence], Found]:
         row = run.parameter(AT_REST, name, "curve")
         if row is None:
             return nothing(NO_LOG)
-        if row["value"] is None:
-            return Found(words="no such slope", verdict="differs", reason=row["reason"])
-        return Found(value=row["value"])
+        if row.value is None:
+            return Found(words="no such slope", verdict="differs", reason=row.reason)
+        return Found(value=row.value)
 
     return found
 
@@ -242,14 +243,23 @@ def _future() -> Iterator[Claim]:
 
 
 def _aligned(run: Evidence) -> Found:
-    rows = run.rows("calibration", sensor=f"{SENSOR}_triad", recording="sim_aligned")
-    row = next((row for row in rows if row["parameter"] == "heading"), None)
-    if row is None or row["value"] is None:
+    rows = run.rows(
+        CalibrationRow, sensor=f"{SENSOR}_triad", recording="sim_aligned", parameter="heading"
+    )
+    row = next(iter(rows), None)
+    if (
+        row is None
+        or row.value is None
+        or row.lower is None
+        or row.upper is None
+        or row.duration is None
+        or row.truth is None
+    ):
         return nothing("it takes the simulated log of the triad")
-    half = (row["upper"] - row["lower"]) / 2.0
+    half = (row.upper - row.lower) / 2.0
     return Found(
-        words=f"heading {row['value'] / DEGREE:.1f}° ± {half / DEGREE:.1f}° (95 %) after "
-        f"{row['duration'] / 60.0:.0f} min of turns by 180°; it is {row['truth'] / DEGREE:g}°",
+        words=f"heading {row.value / DEGREE:.1f}° ± {half / DEGREE:.1f}° (95 %) after "
+        f"{row.duration / 60.0:.0f} min of turns by 180°; it is {row.truth / DEGREE:g}°",
         verdict="done here",
     )
 

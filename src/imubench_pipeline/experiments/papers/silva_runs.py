@@ -23,6 +23,7 @@ from imubench_pipeline.experiments.papers.about import Verdict
 from imubench_pipeline.experiments.papers.claims import Claim, Found, nothing, number, said
 from imubench_pipeline.experiments.papers.evidence import Evidence
 from imubench_pipeline.experiments.papers.silva_settling import settling
+from imubench_pipeline.model.experiments import EarthRateRow
 
 DEGREE = math.pi / 180.0
 PRINTED = {
@@ -114,9 +115,10 @@ def turned() -> Iterator[Claim]:
 def _turns(run: str) -> Callable[[Evidence], Found]:
     def found(evidence: Evidence) -> Found:
         rows = evidence.rows(
-            "earth_rate", sensor=SENSOR, recording=f"sim_run_{run}", part="whole", method="pairs"
+            EarthRateRow, sensor=SENSOR, recording=f"sim_run_{run}", part="whole", method="pairs"
         )
-        return Found(value=float(rows[0]["turns"])) if rows else nothing(NO_LOG)
+        turns = rows[0].turns if rows else None
+        return nothing(NO_LOG) if turns is None else Found(value=float(turns))
 
     return found
 
