@@ -265,11 +265,10 @@ def implausible(
 
 def implausible_of(quality: Quality, sensor: Sensor | None) -> list[FindingRow]:
     """Return the rows of findings on what can be of no sensor at rest in its unit."""
-    about = quality.recording
+    about = quality.row
     turn = GravityTurn(**quality.gravity) if quality.gravity else None
-    static = about.get("kind", "static") == "static"
-    findings = implausible(quality.channels, turn, sensor, static=static)
-    return [finding.row(about["sensor"], about["recording"]) for finding in findings]
+    findings = implausible(quality.channels, turn, sensor, static=about.kind == "static")
+    return [finding.row(about.sensor, about.recording) for finding in findings]
 
 
 def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:

@@ -78,10 +78,10 @@ class Log(Shown):
     ) -> None:
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         self._logs = channel_logs(folder)
-        self._about = quality.recording
+        self._about = quality.row
         self.quality, self.declared = quality, sensor
-        self.sensor = str(self._about["sensor"])
-        self.recording = str(self._about["recording"])
+        self.sensor = self._about.sensor
+        self.recording = self._about.recording
         self.bandwidth = bandwidth
         self.channels = tuple(self._logs)
         self._at_rest = was_at_rest(folder)
@@ -96,7 +96,7 @@ class Log(Shown):
     @property
     def simulated(self) -> bool:
         """Whether the log is simulated, by its own mark or the notes beside it."""
-        return bool(self._about["simulated"])
+        return self._about.simulated
 
     @property
     def rates(self) -> dict[str, float]:
@@ -160,7 +160,7 @@ class Log(Shown):
         if not self._at_rest:
             raise ValueError(
                 f"{self.name}: the notes beside the log say that the sensor was turned "
-                f"({self._about['kind']}); expected a log at rest: noise is told from that alone"
+                f"({self._about.kind}); expected a log at rest: noise is told from that alone"
             )
         names = listed(channels) or self.channels
         if missing := [name for name in names if name not in self._logs]:
@@ -352,8 +352,8 @@ def _ingested(
     folder = Path(tempfile.mkdtemp(prefix="imubench."))
     try:
         found = ingest_as_planned(source, json.dumps(settings), *names, folder, guarded=guarded)
-        if found.recording["status"] != "ok":
-            raise RecordingError(str(found.recording["reason"]))
+        if found.row.status != "ok":
+            raise RecordingError(str(found.row.reason))
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise

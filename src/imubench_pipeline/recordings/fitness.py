@@ -24,7 +24,6 @@ from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterR
 from imubench_pipeline.model.recordings import DoubtRow, FindingRow, RecordingRow
 from imubench_pipeline.model.table import ChannelRow, OfRecordingRow
 from imubench_pipeline.tables.findings import LEFT_OUT
-from imubench_pipeline.typing import Row
 
 Key = tuple[str, str]  # sensor, recording
 Fitness = Literal["fit", "fit with doubts", "unfit"]
@@ -298,18 +297,12 @@ def words(of_recording: Iterable[Doubt]) -> str:
     )
 
 
-def left_out(recordings: Iterable[Row]) -> dict[Key, str]:
-    """Return the recordings that were analysed and do not decide, each with the reason.
-
-    Parameters
-    ----------
-    recordings : iterable of mapping
-        Rows of the table ``recordings``.
-    """
+def left_out(recordings: Iterable[RecordingRow]) -> dict[Key, str]:
+    """Return the recordings that were analysed and do not decide, each with the reason."""
     return {
-        (row["sensor"], row["recording"]): f"{row['recording']} does not decide: {row['doubts']}"
+        _key(row): f"{row.recording} does not decide: {row.doubts}"
         for row in recordings
-        if row["status"] == "ok" and row["decides"] is False
+        if row.status == "ok" and row.decides is False
     }
 
 

@@ -107,14 +107,14 @@ def outcome(results: Path, sensor: str, recording: str) -> str:
         quality = Quality.read(results / "recordings" / sensor / recording / "quality.json")
     except (OSError, RecordingError) as error:
         return f"{name}: {error}"
-    about = quality.recording
-    if about["status"] != "ok":
-        return f"{name}: {about['status']}: {about.get('reason')}"
+    about = quality.row
+    if about.status != "ok" or about.duration is None:
+        return f"{name}: {about.status}: {about.reason}"
     kinds = dict.fromkeys(
         row.finding.replace("_", " ") for row in quality.findings if row.severity != "note"
     )
-    hours = about["duration"] / 3600.0
-    told = f"{name}: {hours:.3g} h at {about['rate']:.6g} Hz, {len(quality.channels)} channels"
+    hours = about.duration / 3600.0
+    told = f"{name}: {hours:.3g} h at {about.rate:.6g} Hz, {len(quality.channels)} channels"
     return told + (f"; in doubt: {', '.join(kinds)}" if kinds else "")
 
 

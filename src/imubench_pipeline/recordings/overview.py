@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow
 from imubench_pipeline.recordings.recording import (
     ChannelLog,
     channel_logs,
@@ -30,8 +31,6 @@ from imubench_pipeline.recordings.recording import (
 from imubench_pipeline.settings.sensor import TEMPERATURE
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
-
-Row = dict[str, Any]
 
 BUCKETS = 400
 """Stretches of time of an envelope, unless told otherwise."""
@@ -60,8 +59,8 @@ _LOW, _HIGH, TOTAL, PRESENT = range(4)
 class Overview:
     """Rows of the tables ``envelope`` and ``histogram`` of one recording."""
 
-    envelope: list[Row]
-    histogram: list[Row]
+    envelope: list[EnvelopeRow]
+    histogram: list[HistogramRow]
 
 
 def overview(folder: Path, sensor: str, recording: str, buckets: int | None = None) -> Overview:
@@ -88,10 +87,11 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
         if len(drawn) == 0:
             continue
         times = edges / log.rate + read_metadata(log.path).get("begins", 0.0)
-        result.envelope.extend(names | row for row in envelope_rows(times, figures))
+        result.envelope.extend(EnvelopeRow(**names, **row) for row in envelope_rows(times, figures))
         if log.channel != TEMPERATURE:
             low, high = float(figures[:, _LOW].min()), float(figures[:, _HIGH].max())
-            result.histogram.extend(names | row for row in _bins(log, bin_edges(drawn, low, high)))
+            bins = _bins(log, bin_edges(drawn, low, high))
+            result.histogram.extend(HistogramRow(**names, **row) for row in bins)
     return result
 
 
@@ -135,7 +135,7 @@ def _drawn(values: Array, stride: float) -> Array:
     return values[at[at < len(values)].astype(np.int64)]
 
 
-def envelope_rows(times: Array, figures: Array) -> Iterator[Row]:
+def envelope_rows(times: Array, figures: Array) -> Iterator[dict[str, Any]]:
     """Yield the rows of the table ``envelope``, without the names.
 
     The times of the edges, s, have the shape (b + 1,), the figures (b, 4) as in `no_figures`.
@@ -151,7 +151,7 @@ def envelope_rows(times: Array, figures: Array) -> Iterator[Row]:
             yield row | {"low": None, "high": None, "mean": None}
 
 
-def _bins(log: ChannelLog, edges: Array) -> Iterator[Row]:
+def _bins(log: ChannelLog, edges: Array) -> Iterator[dict[str, Any]]:
     """Yield the rows of the table ``histogram``, without the names."""
     counts = np.zeros(len(edges) - 1, dtype=np.int64)
     for values in log.blocks():

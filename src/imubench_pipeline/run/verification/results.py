@@ -172,7 +172,7 @@ class Results:
             if other.name not in samples:
                 yield self._stray(f"{place}/{other.name}")
         known_log = path.with_name(KNOWN)
-        if samples and not quality.recording["simulated"] and not known_log.exists():
+        if samples and not quality.row.simulated and not known_log.exists():
             words = "expected what is known of the log, found no such file"
             yield Fault(f"{place}/{KNOWN}", words, self.run_again)
 
