@@ -11,6 +11,7 @@ from imubench_pipeline.experiments.papers import engers
 from imubench_pipeline.experiments.papers.claims import rows_of
 from imubench_pipeline.experiments.papers.engers_axes import AXES, DEGREE, OF_BIAS, OF_NOISE
 from imubench_pipeline.experiments.papers.evidence import Evidence
+from imubench_pipeline.model.published import PublishedRow
 from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import read_simulated
 from imubench_pipeline.tables import build
@@ -58,7 +59,7 @@ def test_table_8_has_its_columns_mixed() -> None:
     assert AXES[0].floor == 0.00041
 
 
-def of_figure(number: int) -> dict:
+def of_figure(number: int) -> PublishedRow:
     (row,) = [row for row in ROWS if row["place"] == f"Figure {number}"]
     return row
 
@@ -127,7 +128,7 @@ def test_what_is_typed_here_is_what_the_board_is_simulated_from() -> None:
         assert si[bias, "bias"] == pytest.approx(axis.bias * DEGREE)
 
 
-def found_in(rows: dict[str, list[dict]], place: str, quantity: str) -> dict:
+def found_in(rows: dict[str, list[dict]], place: str, quantity: str) -> PublishedRow:
     """Return the line of a run that has these rows of tables."""
     evidence = Evidence({name: build(name, own) for name, own in rows.items()})
     (line,) = [

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
+from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.recordings.fitness import doubts, fitness
 from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.settings.quality import QualitySettings
@@ -29,7 +30,7 @@ NAMES = {"sensor": "s", "device": "d", "recording": "r", "kind": "static"}
 CATALOGUE = read_sensors(PROJECT / "config/sensors")
 ROWS = 30_000
 
-Rows = list[dict[str, Any]]
+Rows = list[FindingRow]
 
 
 @cache
