@@ -29,7 +29,6 @@ from scipy.stats import binomtest
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import estimate_of
-from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channel_logs
@@ -274,7 +273,7 @@ def estimated(made: Case, log: ChannelLog) -> Found:
     estimate_channel(key, log, curve_of(log), SETTINGS, None, rows)
     methods = {str(row["method"]) for row in rows.parameters}
     method = "compensated" if "compensated" in methods else "likelihood"
-    own = [ParameterRow(**row) for row in rows.parameters if row["method"] == method]
+    own = [row for row in rows.parameters if row.method == method]
     return Found(
         estimate_of(method, own),
         {str(row["parameter"]): _parameter(row) for row in rows.temperature},

@@ -306,9 +306,9 @@ def estimate(
 def _why_not(into: Estimation, channel: str) -> str:
     """Return why temperature was not taken out of a channel."""
     reasons = [
-        row["reason"] or "the data do not favour it"
+        row.reason or "the data do not favour it"
         for row in into.temperature
-        if (row["channel"], row["parameter"]) == (channel, "sensitivity")
+        if (row.channel, row.parameter) == (channel, "sensitivity")
     ]
     return "; ".join(reasons) or "its clock has no readings of the temperature"
 
