@@ -18,6 +18,8 @@ from imubench_pipeline.experiments.calibration.least_squares import (
 from imubench_pipeline.experiments.calibration.rate_table import Calibration, calibrate, residuals
 from imubench_pipeline.experiments.calibration.schedule import Schedule
 from imubench_pipeline.experiments.calibration.still import bias_at_rest
+from imubench_pipeline.model.experiments import CalibrationPointRow, CalibrationRow
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.recordings.kept import kept_logs
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
@@ -34,7 +36,7 @@ from imubench_pipeline.steps.noise_source import (
 from imubench_pipeline.steps.positions import attitude_rows, true_angles
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import CALIBRATED
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 
 UNITS = {
@@ -54,13 +56,13 @@ _OF_RUN = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "present_
 
 def calibration_tables(
     folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
-) -> dict[str, list[Row]]:
+) -> dict[str, Sequence[TableRow]]:
     """Return the rows of the tables of a gyro on a rate table, or at rest where it points known.
 
     `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
     of `imubench_pipeline.run.plan.Plan.experiment_settings`. A rejected recording has no rows.
     """
-    rows: dict[str, list[Row]] = {name: [] for name in CALIBRATED}
+    rows: dict[str, Sequence[TableRow]] = {name: [] for name in CALIBRATED}
     logs = kept_logs(folder)
     if not logs:
         return rows
@@ -79,7 +81,7 @@ def calibration_tables(
     if channel not in logs:
         run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
         reason = f"{channel} cannot be used; the findings of the recording say why"
-        return rows | asdict(_without(asdict(key) | {"run": run}, "not_shown", reason))
+        return rows | vars(_without(asdict(key) | {"run": run}, "not_shown", reason))
     log = GyroLog(
         key,
         logs[channel],
@@ -88,8 +90,8 @@ def calibration_tables(
         _truth(simulated, channel),
     )
     if isinstance(declared, OnRateTable):
-        return rows | asdict(_on_rate_table(log, declared))
-    return rows | asdict(_at_rest(log, declared))
+        return rows | vars(_on_rate_table(log, declared))
+    return rows | vars(_at_rest(log, declared))
 
 
 def _positions(sections: Mapping[str, Any]) -> tuple[InPositions, dict[str, float]] | None:
@@ -137,8 +139,8 @@ def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, floa
 class Rows:
     """Rows of the tables that a calibration leaves."""
 
-    calibration: list[Row] = field(default_factory=list)
-    calibration_points: list[Row] = field(default_factory=list)
+    calibration: list[CalibrationRow] = field(default_factory=list)
+    calibration_points: list[CalibrationPointRow] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -198,7 +200,8 @@ def _at_rest(gyro: GyroLog, declared: AtRest) -> Rows:
     fixed = _figure(gyro, "bias", bias.fixed, bias.fixed_sigma, limits, noise)
     limits, noise = bias.present_interval(), bias.present_noise_sigma
     present = _figure(gyro, "present_bias", bias.present, bias.present_sigma, limits, noise)
-    return Rows([about | fixed, about | present, *_open(names, bias.not_observable)])
+    found = [CalibrationRow(**(about | row)) for row in (fixed, present)]
+    return Rows([*found, *_open(names, bias.not_observable)])
 
 
 def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Rows:
@@ -231,23 +234,23 @@ def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Rows:
         "rates": len(left.dwell),
         "scatter": _finite(fit.line.p_value[0]) if fit.line.freedom else None,
     }
-    rows = Rows([about | row for row in _line(gyro, fit)])
+    rows = Rows([CalibrationRow(**(about | row)) for row in _line(gyro, fit)])
     rows.calibration += _open(names, fit.not_observable)
     for k, dwell in enumerate(left.dwell.tolist()):
         stretch = schedule.stretches[dwell]
         rows.calibration_points.append(
-            asdict(gyro.key)
-            | {
-                "number": dwell + 1,
-                "start": stretch.start / schedule.rate + gyro.begins,
-                "stop": stretch.stop / schedule.rate + gyro.begins,
-                "table_rate": float(schedule.table_rates[dwell]),
-                "earth_rate": earth,
-                "mean": float(left.mean[k]),
-                "line": float(left.line[k]),
-                "residual": float(left.value[k]),
-                "sigma": float(left.sigma[k]),
-            }
+            CalibrationPointRow(
+                **asdict(gyro.key),
+                number=dwell + 1,
+                start=stretch.start / schedule.rate + gyro.begins,
+                stop=stretch.stop / schedule.rate + gyro.begins,
+                table_rate=float(schedule.table_rates[dwell]),
+                earth_rate=earth,
+                mean=float(left.mean[k]),
+                line=float(left.line[k]),
+                residual=float(left.value[k]),
+                sigma=float(left.sigma[k]),
+            )
         )
     return rows
 
@@ -322,25 +325,32 @@ def _figure(
     }
 
 
-def _open(names: Row, quantities: tuple[NotObservable, ...]) -> Iterator[Row]:
+def _open(
+    names: Mapping[str, Any], quantities: tuple[NotObservable, ...]
+) -> Iterator[CalibrationRow]:
     """Yield what the run cannot tell, each with its reason."""
     for unknown in quantities:
-        yield {
+        yield CalibrationRow(
             **names,
-            "parameter": unknown.quantity,
-            "unit": UNITS[unknown.quantity],
-            "status": "not_observable",
-            "reason": unknown.reason,
-            "half_width": unknown.half_width,
-        }
+            parameter=unknown.quantity,
+            unit=UNITS[unknown.quantity],
+            status="not_observable",
+            reason=unknown.reason,
+            half_width=unknown.half_width,
+        )
 
 
 def _without(names: Mapping[str, Any], status: str, reason: str) -> Rows:
     """Return the rows of a run of which nothing can be estimated."""
-    about = {"status": status, "reason": reason}
     return Rows(
         [
-            {**names, "parameter": parameter, "unit": UNITS[parameter], **about}
+            CalibrationRow(
+                **names,
+                parameter=parameter,
+                unit=UNITS[parameter],
+                status=status,
+                reason=reason,
+            )
             for parameter in _OF_RUN[names["run"]]
         ]
     )
