@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.settings.extras import extra
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
@@ -147,9 +148,9 @@ def _rejection(recordings: pa.Table, column: str, asked: str) -> str:
     if column == "channel":
         return ""
     reasons = [
-        f"{row['status']} one ({row['reason']})"
-        for row in recordings.to_pylist()
-        if row[column] == asked and row["status"] != "ok"
+        f"{row.status} one ({row.reason})"
+        for row in RecordingRow.rows_of(_part(recordings, column, asked))
+        if row.status != "ok"
     ]
     return f" but a {reasons[0]}" if reasons else ""
 

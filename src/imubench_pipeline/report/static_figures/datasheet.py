@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from imubench_pipeline.model.comparisons import DatasheetRow
 from imubench_pipeline.report.palette import method_appearance
-from imubench_pipeline.report.practical import System
+from imubench_pipeline.report.practical import NO_VALUE, System
 from imubench_pipeline.report.static_figures.curves import channel_axes, draw_measured, finish
 from imubench_pipeline.report.static_figures.style import line_look, style
 from imubench_pipeline.report.static_figures.terms import TERM_LOOKS
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
-from imubench_pipeline.typing import Row
 
 _NAMES = {"N": "$N$", "adev_minimum": "bias instability", "K": "$K$"}
+_KINDS: Mapping[str | None, str | None] = {"typ": None, "1sigma": "1σ"}
 _DASHES = ((0, (4, 2)), (0, (1, 1.4)), (0, (5, 1.5, 1, 1.5)), (0, (8, 2)))
 _SIGNS = (("deg", "°"), ("sqrt(Hz)", "√Hz"), ("sqrt(h)", "√h"), ("sqrt(s)", "√s"), ("ug", "µg"))
 
@@ -26,8 +29,8 @@ def datasheet_figure(view: ChannelView, system: System = "practical") -> Figure 
     N is a line of slope -1/2, K one of +1/2; a bias instability is the level of the minimum, as
     vendors mean it. None where the datasheet has no such figure.
     """
-    rows = _printed(view)
-    if not rows:
+    printed = _printed(view)
+    if not printed:
         return None
     figure, axes, scale = channel_axes(view, system, "with the datasheet")
     draw_measured(axes, view, scale)
@@ -42,10 +45,10 @@ def datasheet_figure(view: ChannelView, system: System = "practical") -> Figure 
         )
     levels = []
     drawn: dict[str, int] = {}
-    for row in rows:
-        statistic = row["statistic"]
+    for row, comparable in printed:
+        statistic = row.statistic
         number = drawn[statistic] = drawn.get(statistic, -1) + 1
-        line = _line(statistic, row["comparable"], view.tau) * scale
+        line = _line(statistic, comparable, view.tau) * scale
         levels += [float(line.min()), float(line.max())]
         colour = TERM_LOOKS["F" if statistic == "adev_minimum" else statistic]["color"]
         axes.plot(
@@ -58,12 +61,12 @@ def datasheet_figure(view: ChannelView, system: System = "practical") -> Figure 
     return finish(figure, axes, view, scale, *levels)
 
 
-def _printed(view: ChannelView) -> list[Row]:
-    """Return the figures that have a line, each reading of them once."""
+def _printed(view: ChannelView) -> list[tuple[DatasheetRow, float]]:
+    """Return the figures that have a line, each reading of them once, with their values in SI."""
     chosen = {
-        (row["statistic"], row["comparable"], row["sidedness"], row["kind"]): row
+        (row.statistic, row.comparable, row.sidedness, row.kind): (row, row.comparable)
         for row in view.datasheet
-        if row["method"] == view.recommended and row["comparable"] and row["statistic"] in _NAMES
+        if row.method == view.recommended and row.comparable and row.statistic in _NAMES
     }
     return list(chosen.values())
 
@@ -76,15 +79,15 @@ def _line(statistic: str, value: float, tau: NDArray[np.float64]) -> NDArray[np.
     return np.full_like(tau, value)
 
 
-def _label(row: Row) -> str:
-    unit = row["unit"]
+def _label(row: DatasheetRow) -> str:
+    unit = row.unit or ""
     for written, sign in _SIGNS:
         unit = unit.replace(written, sign)
-    kind = {"typ": None, "1sigma": "1σ"}.get(row["kind"], row["kind"])
     notes = [
-        kind,
-        f"read as {row['sidedness']}" if row["sidedness"] else None,
+        _KINDS.get(row.kind, row.kind),
+        f"read as {row.sidedness}" if row.sidedness else None,
     ]
     about = ", ".join(filter(None, notes))
-    text = f"datasheet {_NAMES[row['statistic']]}: {row['printed']:g} {unit}"
+    number = NO_VALUE if row.printed is None else f"{row.printed:g}"
+    text = f"datasheet {_NAMES[row.statistic]}: {number} {unit}"
     return f"{text} ({about})" if about else text

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.path import Path
 
 from imubench_pipeline.estimators.estimate import COMPARED
+from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.static_figures.names import SYMBOLS, channel_name
@@ -29,7 +30,6 @@ from imubench_pipeline.report.static_figures.style import (
     style,
 )
 from imubench_pipeline.report.view import ChannelView
-from imubench_pipeline.typing import Row
 
 Kind = Literal["estimate", "not identified", "limit"]
 
@@ -73,20 +73,23 @@ def marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> 
         yield _mark(row, place + spread * ((number + 0.5) / len(rows) - 0.5))
 
 
-def _is_shown(row: Row) -> bool:
-    return row["value"] is not None or bool(row["upper"])
+def _is_shown(row: ParameterRow) -> bool:
+    return row.value is not None or bool(row.upper)
 
 
-def _mark(row: Row, place: float) -> Mark:
-    lower, upper = row["lower"], row["upper"]
+def _mark(row: ParameterRow, place: float) -> Mark:
+    lower, upper = row.lower, row.upper
     if lower is not None and lower < 0.0:
         # A ramp has a sign, and a logarithmic axis shows its size.
-        lower, upper = (-upper, -lower) if upper <= 0.0 else (None, max(-lower, upper))
-    if row["value"] is not None:
-        return Mark(place, "estimate", abs(row["value"]), lower, upper)
+        if upper is None:
+            lower = None
+        else:
+            lower, upper = (-upper, -lower) if upper <= 0.0 else (None, max(-lower, upper))
+    if row.value is not None:
+        return Mark(place, "estimate", abs(row.value), lower, upper)
     if not lower:
         return Mark(place, "limit", upper)
-    fitted = None if row["fitted"] is None else abs(row["fitted"])
+    fitted = None if row.fitted is None else abs(row.fitted)
     return Mark(place, "not identified", fitted, lower, upper)
 
 
@@ -199,9 +202,9 @@ def _draw_panel(
             for mark in marks(view, symbol, place, 0.8 * step)
         ]
         truths += [
-            (place, view.truth[symbol]["value"] * unit.per_si)
+            (place, view.truth[symbol].value * unit.per_si)
             for view, place in zip(block.views, block.places, strict=True)
-            if symbol in view.truth and view.truth[symbol]["value"] > 0.0
+            if symbol in view.truth and view.truth[symbol].value > 0.0
         ]
         _draw_marks(axes, of_block, looks[block.sensor], unit.per_si, step)
         if not of_block:
@@ -280,7 +283,7 @@ def _draw_marks(
 def _say_why(axes: Axes, block: _Block, symbol: str) -> None:
     """Write why a row of a panel is empty."""
     statuses = {
-        row["status"].replace("_", " ")
+        row.status.replace("_", " ")
         for view in block.views
         if view.recommended in view.parameters
         for row in view.named(view.recommended, symbol)

@@ -52,7 +52,7 @@ def spectrum_figure(view: ChannelView, system: System = "practical") -> Figure |
     if _METHOD in view.parameters:
         _draw_terms(axes, view, unit.per_si)
     if np.isfinite(fitted).any():
-        name = next((f": {row['model']}" for row in view.models if row["chosen"]), "")
+        name = next((f": {row.model}" for row in view.models if row.chosen), "")
         axes.plot(frequency, fitted, label=f"fit by likelihood{name}", zorder=3.0, **SUM_LOOK)
     _draw_lines(axes, view)
     log_x(axes, extent(frequency))
@@ -118,9 +118,9 @@ def _draw_lines(axes: Axes, view: ChannelView) -> None:
     apart = (frequency[-1] / frequency[0]) ** _BESIDE
     named: list[float] = []
     look = TERM_LOOKS["S"]
-    strongest = sorted(view.lines, key=lambda row: -row["ratio"])
+    strongest = sorted(view.lines, key=lambda row: -(row.ratio or 0.0))
     for number, row in enumerate(strongest):
-        line = row["frequency"]
+        line = row.frequency
         label = f"{TERM_NAMES[view.quantity]['S']} ({len(strongest)})" if number == 0 else None
         axes.axvline(line, lw=0.5, label=label, zorder=1.5, **look)
         crowded = any(1.0 / apart < line / other < apart for other in named)

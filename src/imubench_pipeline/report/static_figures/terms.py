@@ -148,11 +148,11 @@ def term_label(view: ChannelView, term: Term, system: System) -> str:
         for unit in [page_unit(view.quantity, symbol, system)]
     )
     doubts = {
-        row["status"].replace("_", " ")
+        row.status.replace("_", " ")
         for symbol, value in term.values.items()
         for row in view.named(view.recommended, symbol)
-        if row["value"] is None and row["fitted"] is not None
-        if math.isclose(row["fitted"], value)
+        if row.value is None and row.fitted is not None
+        if math.isclose(row.fitted, value)
     }
     return f"{TERM_NAMES[view.quantity][term.symbol]}, {values}" + "".join(
         f" ({doubt})" for doubt in sorted(doubts)
