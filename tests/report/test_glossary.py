@@ -23,6 +23,7 @@ from imubench_pipeline.datasheets import deltas as datasheet
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators import estimate, lines
 from imubench_pipeline.estimators.identifiability import bounds_of
+from imubench_pipeline.model.published import AccuracyRow
 from imubench_pipeline.navigation import pooled
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.error_budget import Gyrocompass, Start, budget
@@ -618,11 +619,11 @@ def test_a_flat_earth_overstates_by_up_to_a_tenth() -> None:
 
 def test_what_is_said_of_reading_the_curve_is_of_the_run() -> None:
     assert "Reading the curve is the weakest." in text()
-    row = {"method": "curve", "logs": 100, "bias": -0.29}
     rows = [
-        row | {"parameter": name, "given": given, "rmse": 0.3, "bound": 0.04}
+        AccuracyRow(method="curve", parameter=name, logs=100, given=given, rmse=0.3, bias=-0.29,
+                    bound=0.04)
         for name, given in (("N", 100), ("B", 17), ("T_B", 17), ("K", 0))
-    ]
+    ]  # fmt: skip
     assert words_of_reading(rows) == (
         "In 100 simulated logs of 10 h it finds B in 17, 29 % too small, and K in none: "
     )

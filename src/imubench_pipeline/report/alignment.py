@@ -12,13 +12,11 @@ from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.practical import degrees_text, duration_text, number_text, page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.words import sentence
-from imubench_pipeline.typing import Row
 
 _SHOWN = (60.0, 600.0, 3600.0)
 """Times of the table, s; the figure has more."""
 
 _POSITIONS = {1: "one position", 2: "two opposite positions"}
-_ANGLES = ("roll", "pitch", "heading")
 
 
 def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
@@ -32,18 +30,16 @@ def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
             entries.append(
                 {
                     "view": view,
-                    "latitude": degrees_text(about["latitude"]),
+                    "latitude": degrees_text(about.latitude),
                     "biases": (
-                        f"Fixed biases of {unit.text(about['gyro_bias'], 3)} {unit.sign} "
-                        f"({about['gyro_bias_from']}) and "
-                        f"{fine.text(about['accelerometer_bias'], 3)} {fine.sign} "
-                        f"({about['accelerometer_bias_from']})."
+                        f"Fixed biases of {unit.text(about.gyro_bias, 3)} {unit.sign} "
+                        f"({about.gyro_bias_from}) and "
+                        f"{fine.text(about.accelerometer_bias, 3)} {fine.sign} "
+                        f"({about.accelerometer_bias_from})."
                     ),
                     "axes": _axes(about),
-                    "lines": [_line(row) for row in rows if row["time"] in _SHOWN],
-                    "none": list(
-                        dict.fromkeys(sentence(row["reason"]) for row in rows if row["reason"])
-                    ),
+                    "lines": [_line(row) for row in rows if row.time in _SHOWN],
+                    "none": list(dict.fromkeys(sentence(row.reason) for row in rows if row.reason)),
                     "check": _check(rows),
                     "drawn": _drawn(rows, arrays),
                 }
@@ -51,11 +47,11 @@ def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
     return entries
 
 
-def _axes(row: Row) -> str:
+def _axes(row: AlignmentRow) -> str:
     """Return which axes stand for others that the log has not, in a sentence."""
     lent_axes = []
-    for name, words in (("gyros", "gyro"), ("accelerometers", "accelerometer")):
-        pairs = [entry.split(": ") for entry in row[name].split(", ")]
+    for channels, words in ((row.gyros, "gyro"), (row.accelerometers, "accelerometer")):
+        pairs = [entry.split(": ") for entry in channels.split(", ")]
         lent = [axis for axis, channel in pairs if not channel.endswith(f"_{axis}")]
         if lent:
             lent_axes.append(f"{words} {' and '.join(lent)}")
@@ -64,12 +60,14 @@ def _axes(row: Row) -> str:
     return f"The log has no {', '.join(lent_axes)}: the axes that are there stand for them."
 
 
-def _line(row: Row) -> dict[str, Any]:
+def _line(row: AlignmentRow) -> dict[str, Any]:
     return {
-        "position": _POSITIONS[row["positions"]],
-        "method": row["method"],
-        "time": duration_text(row["time"]),
-        **{name: _angle(row[name]) for name in _ANGLES},
+        "position": _POSITIONS[row.positions],
+        "method": row.method,
+        "time": duration_text(row.time),
+        "roll": _angle(row.roll),
+        "pitch": _angle(row.pitch),
+        "heading": _angle(row.heading),
     }
 
 
@@ -77,39 +75,43 @@ def _angle(value: float | None) -> str:
     return "not to be had" if value is None else degrees_text(value, 3)
 
 
-def _check(rows: Sequence[Row]) -> str:
+def _check(rows: Sequence[AlignmentRow]) -> str:
     """Return what simulated triads say of the standard deviations, in a sentence."""
     comparisons = []
     for row in rows:
-        if row["simulated"] is None:
+        if row.simulated is None:
             continue
-        ratios = {name: row[f"error_{name}"] for name in _ANGLES}
-        ratio_words = ", ".join(
-            f"{name} {number_text(ratio, 3)}" for name, ratio in ratios.items() if ratio is not None
+        ratios = (
+            ("roll", row.error_roll),
+            ("pitch", row.error_pitch),
+            ("heading", row.error_heading),
         )
-        comparisons.append(f"in {_POSITIONS[row['positions']]} {ratio_words}")
+        ratio_words = ", ".join(
+            f"{name} {number_text(ratio, 3)}" for name, ratio in ratios if ratio is not None
+        )
+        comparisons.append(f"in {_POSITIONS[row.positions]} {ratio_words}")
     if not comparisons:
         return ""
-    number = next(row["simulated"] for row in rows if row["simulated"] is not None)
-    last = duration_text(max(row["time"] for row in rows))
+    number = next(row.simulated for row in rows if row.simulated is not None)
+    last = duration_text(max(row.time for row in rows))
     return (
         f"Check: {number} simulated triads of this noise, aligned for {last} by the filter; rms "
         f"of their errors over the predicted σ: {'; '.join(comparisons)}."
     )
 
 
-def _drawn(rows: Sequence[Row], arrays: Arrays) -> list[dict[str, Any]]:
+def _drawn(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str, Any]]:
     """Return the courses of the figure: level is the worse of roll and pitch."""
     courses = []
     for positions in _POSITIONS:
         for method in ("coarse", "fine"):
-            own = [r for r in rows if r["positions"] == positions and r["method"] == method]
+            own = [r for r in rows if r.positions == positions and r.method == method]
             values = {
-                "heading": [r["heading"] for r in own],
-                "level": [_worse(r["roll"], r["pitch"]) for r in own],
+                "heading": [r.heading for r in own],
+                "level": [_worse(r.roll, r.pitch) for r in own],
             }
             for angle, sigma in values.items():
-                points = [(r["time"], s) for r, s in zip(own, sigma, strict=True) if s]
+                points = [(r.time, s) for r, s in zip(own, sigma, strict=True) if s]
                 if points:
                     courses.append(
                         {

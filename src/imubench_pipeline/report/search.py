@@ -25,15 +25,15 @@ def _entries(site: Site) -> Iterator[Found]:
         about = site.settings["sensors"].get(sensor, {}).get("price_class") or ""
         yield "sensor", site.names[sensor], quote(site.sensor_page(sensor)), f"{sensor} {about}"
     for view in site.views:
-        findings = (term(row["finding"]).name for row in view.findings)
+        findings = (term(row.finding).name for row in view.findings)
         state = [*dict.fromkeys(findings), *(["simulated"] if view.simulated else [])]
         if view.left_out:
-            state += [view.row["status"], view.row["reason"] or ""]
-        words = f"{view.sensor} {view.row['device']} {', '.join(state)}"
+            state += [view.row.status, view.row.reason or ""]
+        words = f"{view.sensor} {view.row.device} {', '.join(state)}"
         yield "recording", f"{site.names[view.sensor]}: {view.name}", quote(view.page), words
     devices = {view.device_page: view for view in site.views if view.device_page}
     for page, view in devices.items():
-        yield "device", f"{site.names[view.sensor]}: device {view.row['device']}", quote(page), ""
+        yield "device", f"{site.names[view.sensor]}: device {view.row.device}", quote(page), ""
     for name, requirement in site.settings["requirements"].items():
         yield "requirement", requirement["title"], f"index.html#requirement-{name}", name
     for file, title in site.navigation:
@@ -42,6 +42,6 @@ def _entries(site: Site) -> Iterator[Found]:
         yield "term", entry.name, f"theory.html#{entry.section}", entry.short
     sections = {paper.name: paper.key for paper in PAPERS}
     for row in site.rows(PublishedRow):
-        title = f"{row['place']}: {row['quantity']}"
-        words = f"{row['paper']} {row['printed_as']} {row['verdict']}"
-        yield "paper", title, f"papers.html#{sections[row['paper']]}", words
+        title = f"{row.place}: {row.quantity}"
+        words = f"{row.paper} {row.printed_as} {row.verdict}"
+        yield "paper", title, f"papers.html#{sections[row.paper]}", words

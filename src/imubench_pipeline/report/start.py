@@ -8,7 +8,7 @@ from typing import Any
 from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
 from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
 from imubench_pipeline.model.published import CoverageRow
-from imubench_pipeline.model.recordings import FailureRow, FileRow
+from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
 from imubench_pipeline.report.decisions import matrix, strip
@@ -26,7 +26,6 @@ from imubench_pipeline.report.words import (
     sentence,
     spread_words,
 )
-from imubench_pipeline.typing import Row
 
 _STEPS = 3
 """What is to do next that the start page names; the table has all."""
@@ -43,9 +42,9 @@ def _start(site: Site) -> dict[str, Any]:
         "matrix": matrix(site),
         "failures": list(_failures(site)),
         "rejected": [
-            {"view": view, "reason": folded(view.row["reason"])} for view in views if view.rejected
+            {"view": view, "reason": folded(view.row.reason)} for view in views if view.rejected
         ],
-        "skipped": [row for row in site.rows(FileRow) if row["status"] == "skipped"],
+        "skipped": [row for row in site.rows(FileRow) if row.status == "skipped"],
         "warned": [
             {
                 "view": view,
@@ -76,7 +75,7 @@ def _start(site: Site) -> dict[str, Any]:
 def _in_doubt(site: Site, warned: Sequence[RecordingView]) -> str:
     """Return how many recordings have warnings, and how many have some that nobody expects."""
     unexpected = sum(
-        any(row["finding"] not in site.on_purpose(view) for row in view.warnings) for view in warned
+        any(row.finding not in site.on_purpose(view) for row in view.warnings) for view in warned
     )
     text = f"{counted(len(warned), 'recording')} in doubt"
     if unexpected == len(warned):
@@ -89,7 +88,7 @@ def _failures(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the steps that failed, with the recording that is left out for it."""
     views = {view.full_name: view for view in site.views}
     for row in site.rows(FailureRow):
-        yield {**row, "view": views.get((row["sensor"], row["recording"]))}
+        yield {**row, "view": views.get((row.sensor, row.recording or ""))}
 
 
 def _without_result(
@@ -109,7 +108,7 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
     failed = sum(view.left_out for view in views) - rejected
     of = f" of {counted(len(sensors), 'sensor')}" if several else ""
     parts = [counted(len(views), "recording") + of]
-    lasting = sum(view.row["duration"] or 0.0 for view in views)
+    lasting = sum(view.row.duration or 0.0 for view in views)
     if lasting:
         parts.append(f"{duration_text(lasting)} of data")
     if recorded := dated(views):
@@ -121,13 +120,13 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
 
 def dated(views: Sequence[RecordingView]) -> str:
     """Return when recordings were made; empty where none says."""
-    started = sorted(view.row["started"][:10] for view in views if view.row["started"])
+    started = sorted(view.row.started[:10] for view in views if view.row.started)
     if not started:
         return ""
     text = f"recorded from {started[0]} to {started[-1]}"
     if started[0] == started[-1]:
         text = f"recorded on {started[0]}"
-    if any(not view.row["started"] and not view.left_out for view in views):
+    if any(not view.row.started and not view.left_out for view in views):
         text += f" ({len(started)} of {len(views)} say when)"
     return text
 
@@ -154,13 +153,13 @@ _LINE = 100
 """Characters of a reason that stand on one line."""
 
 
-def _grouped(rows: Sequence[Row]) -> list[tuple[str, str]]:
+def _grouped(rows: Sequence[FindingRow]) -> list[tuple[str, str]]:
     """Return each finding once, with its channels."""
     grouped: dict[str, dict[str, None]] = {}
     for row in rows:
-        channels = grouped.setdefault(row["finding"], {})
-        if row["channel"]:
-            channels[row["channel"].replace("_", " ")] = None
+        channels = grouped.setdefault(row.finding, {})
+        if row.channel:
+            channels[row.channel.replace("_", " ")] = None
     return [(name, ", ".join(channels)) for name, channels in grouped.items()]
 
 
@@ -169,9 +168,7 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
     rows = site.rows(RankingRow)
     for ranking in rankings(rows, site.settings["requirements"], simulated, site.system):
         decisive = {
-            row["sensor"]: row
-            for row in rows
-            if row["requirement"] == ranking["name"] and row["decides"]
+            row.sensor: row for row in rows if row.requirement == ranking["name"] and row.decides
         }
         basis = {
             group["sensor"]: _basis(site, decisive[group["sensor"]]) for group in ranking["groups"]
@@ -196,39 +193,41 @@ def _next_steps(site: Site) -> Iterator[dict[str, Any]]:
         name: requirement["title"] for name, requirement in site.settings["requirements"].items()
     }
     for row in site.rows(NextStepRow)[:_STEPS]:
-        about = "; ".join(titles[name] for name in listed_names(row["requirements"], titles))
+        about = "; ".join(titles[name] for name in listed_names(row.requirements, titles))
         own = [
             view.simulated
             for view in site.views
-            if view.sensor == row["sensor"] and row["recording"] in (None, view.name)
+            if view.sensor == row.sensor and row.recording in (None, view.name)
         ]
         yield {
-            "sensor": row["sensor"],
+            "sensor": row.sensor,
             "simulated": all(own),
-            "text": sentence(row["text"]),
+            "text": sentence(row.text),
             "about": about,
         }
 
 
 def _basis(site: Site, row: RankingRow) -> str:
     """Return on which data a sensor is judged, and what puts them in doubt."""
-    own = [v for v in site.views if v.sensor == row["sensor"] and v.static]
-    chosen = next((view for view in own if view.name == row["recording"]), None)
-    left_out = f" Left out: {row['left_out']}." if row["left_out"] else ""
-    if chosen is None or not row["recordings"]:
+    own = [v for v in site.views if v.sensor == row.sensor and v.static]
+    chosen = next((view for view in own if view.name == row.recording), None)
+    left_out = f" Left out: {row.left_out}." if row.left_out else ""
+    if chosen is None or not row.recordings:
         return left_out.strip()
     axes = counted(len(chosen.recommended()), "axis", "axes")
-    log = f"recording {chosen.name} ({duration_text(chosen.row['duration'])}, {axes})"
-    if row["recordings"] == 1:
+    log = f"recording {chosen.name} ({duration_text(chosen.row.duration)}, {axes})"
+    if row.recordings == 1:
         text = f"Judged by {log}; other specimens may differ."
     else:
-        of = f"{counted(row['recordings'], 'recording')} of {counted(row['specimens'], 'specimen')}"
+        of = counted(row.recordings, "recording")
+        if row.specimens is not None:
+            of += f" of {counted(row.specimens, 'specimen')}"
         text = f"Judged by {of}, of which {log} is nearest to what is expected of the next one."
-    if row["spread"] is not None:
+    if row.spread is not None:
         text += f" Spread: {spread_words(row)}."
-    doubts = list(dict.fromkeys(finding["finding"] for finding in chosen.warnings))
-    if row["recordings"] > 1:  # those of all of them
-        text += f" Doubts: {row['doubts']}." if row["doubts"] else ""
+    doubts = list(dict.fromkeys(finding.finding for finding in chosen.warnings))
+    if row.recordings > 1:  # those of all of them
+        text += f" Doubts: {row.doubts}." if row.doubts else ""
     elif doubts:
         text += f" Doubts: {', '.join(term(name).name for name in doubts)}."
     return text + left_out
@@ -238,7 +237,7 @@ def _sensor(site: Site, name: str) -> dict[str, Any]:
     own = [view for view in site.views if view.sensor == name]
     counts = counted(len(own), "recording")
     for status in ("rejected", "failed"):
-        number = sum(view.row["status"] == status for view in own)
+        number = sum(view.row.status == status for view in own)
         counts += f", {number} {status}" if number else ""
     simulated = all(view.simulated for view in own)
     if simulated:
@@ -253,7 +252,7 @@ def _sensor(site: Site, name: str) -> dict[str, Any]:
 
 def _recordings(site: Site) -> dict[str, Any]:
     filters = {
-        "status": list(dict.fromkeys(view.row["status"] for view in site.views)),
+        "status": list(dict.fromkeys(view.row.status for view in site.views)),
         "sensor": [site.names[sensor] for sensor in site.sensors],
     }
     return {"views": site.views, "summary": summary(site.views), "filters": filters}

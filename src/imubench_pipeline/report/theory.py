@@ -11,7 +11,6 @@ from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
-from imubench_pipeline.typing import Row
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -26,17 +25,17 @@ THEORY = Entry(file="theory.html", title="Theory", context=_context, tables=("ac
 """The page that the terms of all others lead to."""
 
 
-def words_of_reading(rows: Sequence[Row]) -> str:
+def words_of_reading(rows: Sequence[AccuracyRow]) -> str:
     """Return what comes of reading the curve, by the table ``accuracy``; empty where that is."""
-    of_curve = {row["parameter"]: row for row in rows if row["method"] == "curve"}
+    of_curve = {row.parameter: row for row in rows if row.method == "curve"}
     if not of_curve:
         return ""
     bias, walk = of_curve["B"], of_curve["K"]
     off = ""
-    if bias["bias"] is not None:
-        size = number_text(100.0 * abs(bias["bias"]), 2)
-        off = f", {size} % too {'small' if bias['bias'] < 0 else 'large'}"
+    if bias.bias is not None:
+        size = number_text(100.0 * abs(bias.bias), 2)
+        off = f", {size} % too {'small' if bias.bias < 0 else 'large'}"
     return (
-        f"In {bias['logs']} simulated logs of 10 h it finds B in {bias['given'] or 'none'}{off}, "
-        f"and K in {walk['given'] or 'none'}: "
+        f"In {bias.logs} simulated logs of 10 h it finds B in {bias.given or 'none'}{off}, "
+        f"and K in {walk.given or 'none'}: "
     )
