@@ -42,6 +42,7 @@ from imubench_pipeline.experiments.aided.measures import (
 from imubench_pipeline.experiments.aided.runs import EPOCH, Drive, Outage, schedule
 from imubench_pipeline.experiments.aided.signals import Signals, Spreads, signals
 from imubench_pipeline.experiments.aided.trajectories import NAMES, trajectory
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.error_budget import Start, Uncalibrated, budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.run.plan import Plan
@@ -49,7 +50,6 @@ from imubench_pipeline.settings.config import NavigateSettings
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.steps import navigate
-from imubench_pipeline.typing import Row
 
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 ACCEL = NoiseModel(N=9.6e-4, B=3.4e-4, T_B=38.3, K=1.7e-5)
@@ -248,7 +248,7 @@ def claim(results: Path, sensors: list[str], how: NavigateSettings, simulated: s
     return 0
 
 
-def figure(row: Row, name: str, factor: float) -> str:
+def figure(row: TableRow, name: str, factor: float) -> str:
     """Return a figure of a row with its limits."""
     if row.get(name) is None:
         return "–"

@@ -6,22 +6,22 @@ from typing import Any
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judgements
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.typing import Row
 from tests.rows import typed
 
 
 def ranking_rows(
-    errors: Iterable[Row],
+    errors: Iterable[TableRow],
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Mapping[str, Any]],
-    recordings: Iterable[Row] = (),
-    doubts: Iterable[Row] = (),
-    parameters: Iterable[Row] = (),
-    backtests: Iterable[Row] = (),
+    recordings: Iterable[TableRow] = (),
+    doubts: Iterable[TableRow] = (),
+    parameters: Iterable[TableRow] = (),
+    backtests: Iterable[TableRow] = (),
 ) -> Iterator[RankingRow]:
     basis = Basis.of(
         typed(RecordingRow, recordings),

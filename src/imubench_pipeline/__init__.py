@@ -41,12 +41,13 @@ sigma_min      lowest point of the curve, at tau_min
 Types
 -----
 `typing.Array` is an array of 64-bit floats: the samples of one channel have shape (n,), missing
-ones are NaN. `typing.Row` is a row of a table, by column. A log that is longer than memory goes as
-an iterator of blocks, arrays of consecutive samples.
+ones are NaN. A row of a table has a class in `model`, with a field for each column. A log that is
+longer than memory goes as an iterator of blocks, arrays of consecutive samples.
 
 Rooms
 -----
-From the lowest: `units`, `earth` and `typing`; `settings` (what users declare), `allan` (the Allan
+From the lowest: `units`, `earth` and `typing`; `model` (the rows of every table); `settings` (what
+users declare), `allan` (the Allan
 variance), `tables` (columns, reading, writing), `noise` (what each noise is), `readers` (log
 files), `recordings` (logs, judged and kept), `estimators` (parameters), `datasheets`, `simulate` (a
 whole sensor), `navigation` (what noise means in use), `experiments` (known rates), `export`,

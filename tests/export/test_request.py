@@ -13,13 +13,13 @@ from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_r
 from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.export.request import Request, imu_of, load, made
 from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.config import ExportSettings
 from imubench_pipeline.steps.exports import exports
 from imubench_pipeline.tables import build, write, write_arrow
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.typing import Row
 from tests.conftest import few
 from tests.export.sensors import ACCEL, GYRO
 
@@ -39,8 +39,8 @@ def curve(model: NoiseModel) -> AllanCurve:
 
 @pytest.fixture(scope="module")
 def tables() -> dict[str, pa.Table]:
-    parameters: list[Row] = []
-    allan: list[Row] = []
+    parameters: list[TableRow] = []
+    allan: list[TableRow] = []
     for channel, model in CHANNELS.items():
         key = Key("mti_7", "sim_a", channel)
         values = {name: Parameter(getattr(model, name)) for name in ("N", "B", "T_B", "K")}

@@ -76,7 +76,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "has_range": any(row.sigma_lower is not None for row in rows),
         "latitude": latitude_text(rows) if rows else "",
         "parts": parts,
-        "has_samples": any(row["channel"] == channel for row in envelope),
+        "has_samples": any(row.channel == channel for row in envelope),
         "has_drift": any(row.quantity == "drift" for row in view.rows(EarthRateSeriesRow)),
         "published": list(published_lines(view.rows(EarthRatePublishedRow))),
         "needs": needs(prediction),

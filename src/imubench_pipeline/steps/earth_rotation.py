@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -27,6 +27,14 @@ from imubench_pipeline.experiments.earth_rate.prediction import Outlook, predict
 from imubench_pipeline.experiments.earth_rate.published import RunDesign, published_row
 from imubench_pipeline.experiments.earth_rate.turning import find_turning
 from imubench_pipeline.experiments.earth_rate.turns import FoundDwell, Turning
+from imubench_pipeline.model.experiments import (
+    EarthRatePredictionRow,
+    EarthRatePublishedRow,
+    EarthRateRow,
+    EarthRateSeriesRow,
+    TurningRow,
+)
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import kept_logs
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
@@ -43,7 +51,7 @@ from imubench_pipeline.steps.noise_source import (
 )
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import TURNED
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 
 WHOLE = "whole"
@@ -67,9 +75,12 @@ _POSITION_ELSEWHERE = (
 )
 
 
+_Timed = TypeVar("_Timed", TurningRow, EarthRateSeriesRow)
+
+
 def earth_rate_tables(
     folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
-) -> dict[str, list[Row]]:
+) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a gyro that was turned; none of a rejected recording.
 
     Parameters
@@ -82,7 +93,7 @@ def earth_rate_tables(
     settings : str
         As `imubench_pipeline.run.plan.Plan.experiment_settings` gives them.
     """
-    rows: dict[str, list[Row]] = {name: [] for name in TURNED}
+    rows: dict[str, list[TableRow]] = {name: [] for name in TURNED}
     sections = json.loads(settings)
     logs = kept_logs(folder)
     if not logs:
@@ -102,16 +113,20 @@ def earth_rate_tables(
     how = EarthRateSettings.model_validate(sections["earth_rate"])
     source = noise_source(folder, static, key, Sensor.model_validate(sections["sensor"]), how.draws)
     begins = metadata.get("begins", 0.0)
-    rows |= asdict(_earth_rate(key, logs[channel], declared, source, how, begins))
+    found = _earth_rate(key, logs[channel], declared, source, how, begins)
+    rows |= vars(found)
     if simulated is not None and turns is not None:
-        published = _published(key, simulated, turns, rows["earth_rate"])
+        published = _published(key, simulated, turns, found.earth_rate)
         rows["earth_rate_published"] = list(published)
     return rows
 
 
 def _published(
-    key: Key, simulated: SimulatedRecording, turns: SimulatedTurns, estimates: Sequence[Row]
-) -> Iterator[Row]:
+    key: Key,
+    simulated: SimulatedRecording,
+    turns: SimulatedTurns,
+    estimates: Sequence[EarthRateRow],
+) -> Iterator[EarthRatePublishedRow]:
     """Yield what the source of a simulated recording prints, beside what is found of it."""
     rate = quantity_to_si(simulated.rate, "frequency")
     schedule = RunDesign(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
@@ -120,20 +135,20 @@ def _published(
         for name, axis in simulated.channels.items()
         if name == key.channel
     )
-    values = {(row["part"], row["method"]): row.get("value") for row in estimates}
+    values = {(row.part, row.method): row.value for row in estimates}
     for figure in turns.published:
         part = figure.part
         text = simulated.duration if part == WHOLE else part.removeprefix("last ")
         value = quantity_to_si(figure.printed, "angular_rate")
-        yield (
-            asdict(key)
-            | {"part": part, "place": figure.where, "printed": figure.printed}
-            | published_row(value, schedule, quantity_to_si(text, "time"), noise)
-            | {
-                "simulated": values.get((part, "pairs")),
-                "simulated_filter": values.get((part, "filter")),
-                "assumed": ", ".join(turns.assumed) or None,
-            }
+        yield EarthRatePublishedRow(
+            **asdict(key),
+            part=part,
+            place=figure.where,
+            printed=figure.printed,
+            **published_row(value, schedule, quantity_to_si(text, "time"), noise),
+            simulated=values.get((part, "pairs")),
+            simulated_filter=values.get((part, "filter")),
+            assumed=", ".join(turns.assumed) or None,
         )
 
 
@@ -141,10 +156,10 @@ def _published(
 class EarthRate:
     """Rows of the tables that an experiment leaves."""
 
-    earth_rate: list[Row] = field(default_factory=list)
-    earth_rate_series: list[Row] = field(default_factory=list)
-    turning: list[Row] = field(default_factory=list)
-    earth_rate_prediction: list[Row] = field(default_factory=list)
+    earth_rate: list[EarthRateRow] = field(default_factory=list)
+    earth_rate_series: list[EarthRateSeriesRow] = field(default_factory=list)
+    turning: list[TurningRow] = field(default_factory=list)
+    earth_rate_prediction: list[EarthRatePredictionRow] = field(default_factory=list)
 
 
 def _names(key: Key, declared: TwoPosition, source: NoiseSource | None = None) -> dict[str, Any]:
@@ -217,7 +232,7 @@ def _earth_rate(
         extent = {"dwells": len(chosen), "turns": len(chosen) - 1}
         ranges = sigma_ranges(courses.measured.blocks, model, drawn, bias)
         rows = _estimates(names | extent, part, courses, source, unsure, log.rate)
-        tables.earth_rate += [row | ranges.get(row["method"], {}) for row in rows]
+        tables.earth_rate += [EarthRateRow(**(row | ranges.get(row["method"], {}))) for row in rows]
         tables.earth_rate_series += _later(_series(key, part, courses), begins)
     return tables
 
@@ -247,7 +262,7 @@ def _predict(
         quantity_to_si(settings.run_time, "time"), 3.0 * declared.seconds("dwell") + turning
     )
     rows = prediction_rows(outlook, declared.seconds("dwell") - turning, settings.goals, run_time)
-    into.earth_rate_prediction += [asdict(key) | row for row in rows]
+    into.earth_rate_prediction += [EarthRatePredictionRow(**asdict(key), **row) for row in rows]
 
 
 def _experiment(dwells: Sequence[Dwell], rate: float, declared: TwoPosition) -> Experiment:
@@ -263,11 +278,12 @@ def _parts(declared: TwoPosition, duration: float) -> Iterator[tuple[str, float]
         yield f"last {text}", max(duration - quantity_to_si(text, "time"), 0.0)
 
 
-def _later(rows: Iterator[Row], begins: float) -> Iterator[Row]:
+def _later(rows: Iterator[_Timed], begins: float) -> Iterator[_Timed]:
     """Yield rows with their times counted from the first sample of the recording."""
     for row in rows:
-        times = {name: row[name] for name in ("start", "stop", "time") if name in row}
-        yield {**row, **{name: time + begins for name, time in times.items()}}
+        times = {name: row.get(name) for name in ("start", "stop", "time")}
+        later = {name: time + begins for name, time in times.items() if time is not None}
+        yield replace(row, **later)
 
 
 def _dwells(turning: Turning, rate: float) -> Iterator[tuple[FoundDwell, Dwell]]:
@@ -284,38 +300,40 @@ def _used(samples: Array, turning: Turning, rate: float) -> Array:
     return used
 
 
-def _turning_rows(key: Key, turning: Turning, samples: Array, rate: float) -> Iterator[Row]:
+def _turning_rows(key: Key, turning: Turning, samples: Array, rate: float) -> Iterator[TurningRow]:
     """Yield the rows of the table ``turning``."""
     names = asdict(key)
     for text in turning.doubts:
-        yield names | {"what": "doubt", "doubts": text}
+        yield TurningRow(**names, what="doubt", doubts=text)
     used = _used(samples, turning, rate)
     for number, (dwell, part) in enumerate(_dwells(turning, rate), 1):
         values = used[part.start : part.stop]
         finite = np.isfinite(values)
-        yield names | {
-            "what": "dwell",
-            "number": number,
-            "start": dwell.start,
-            "stop": dwell.stop,
-            "sense": dwell.sense,
-            "found_by": dwell.found_by,
-            "mean": float(values[finite].mean()) if finite.any() else None,
-            "doubts": "; ".join(dwell.doubts) or None,
-        }
+        yield TurningRow(
+            **names,
+            what="dwell",
+            number=number,
+            start=dwell.start,
+            stop=dwell.stop,
+            sense=dwell.sense,
+            found_by=dwell.found_by,
+            mean=float(values[finite].mean()) if finite.any() else None,
+            doubts="; ".join(dwell.doubts) or None,
+        )
     for number, turn in enumerate(turning.turns, 1):
-        yield names | {
-            "what": "turn",
-            "number": number,
-            "start": turn.start,
-            "stop": turn.stop,
-            "time": turn.time,
-            "found_by": turn.found_by,
-            "peak": turn.peak,
-            "doubts": "; ".join(turn.doubts) or None,
-        }
+        yield TurningRow(
+            **names,
+            what="turn",
+            number=number,
+            start=turn.start,
+            stop=turn.stop,
+            time=turn.time,
+            found_by=turn.found_by,
+            peak=turn.peak,
+            doubts="; ".join(turn.doubts) or None,
+        )
     for number, (start, stop) in enumerate(turning.knocks, 1):
-        yield names | {"what": "knock", "number": number, "start": start, "stop": stop}
+        yield TurningRow(**names, what="knock", number=number, start=start, stop=stop)
 
 
 def _estimates(
@@ -391,30 +409,33 @@ def _figure(course: Course, unsure: dict[str, Any]) -> dict[str, Any]:
     return row | unsure
 
 
-def _without(names: dict[str, Any], part: str, status: str, reason: str) -> Iterator[Row]:
+def _without(names: dict[str, Any], part: str, status: str, reason: str) -> Iterator[EarthRateRow]:
     """Yield the rows of a part of which nothing can be estimated."""
     for method in METHODS:
-        yield names | {
-            "part": part,
-            "method": method,
-            "parameter": "earth_rate",
-            "unit": "rad/s",
-            "truth": EARTH_RATE,
-            "status": status,
-            "reason": reason,
-        }
+        yield EarthRateRow(
+            **names,
+            part=part,
+            method=method,
+            parameter="earth_rate",
+            unit="rad/s",
+            truth=EARTH_RATE,
+            status=status,
+            reason=reason,
+        )
 
 
-def _series(key: Key, part: str, courses: Courses) -> Iterator[Row]:
+def _series(key: Key, part: str, courses: Courses) -> Iterator[EarthRateSeriesRow]:
     """Yield the rows of the table ``earth_rate_series``."""
     drift = Course("smoother", courses.drift_time, courses.drift, courses.drift_sigma)
     shown = [*(("rate", course) for course in courses.courses), ("drift", drift)]
     for quantity, course in shown:
-        names = asdict(key) | {"part": part, "method": course.method, "quantity": quantity}
         for k in thin(len(course.time)):
-            sigma = None if course.sigma is None else float(course.sigma[k])
-            yield names | {
-                "time": float(course.time[k]),
-                "value": float(course.rate[k]),
-                "sigma": sigma,
-            }
+            yield EarthRateSeriesRow(
+                **asdict(key),
+                part=part,
+                method=course.method,
+                quantity=quantity,
+                time=float(course.time[k]),
+                value=float(course.rate[k]),
+                sigma=None if course.sigma is None else float(course.sigma[k]),
+            )
