@@ -28,7 +28,7 @@ from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate, Parameter
 from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.estimators.likelihood import fit
-from imubench_pipeline.estimators.model_choice import PAPERS
+from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
 from imubench_pipeline.estimators.whittle import whittle_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -66,7 +66,7 @@ def of_log(case: Case, others: int, number: int) -> tuple[Found, str, float]:
     if number < others:
         limit = _LIMITED * case.rate
         whittle = whittle_of(spectrum.select(spectrum.upper <= limit), limit)
-        best = whittle.maximum(PAPERS)
+        best = whittle.maximum(PAPERS_MODEL)
         values = [best.parameter("N"), float(best.biases[0]), float(best.times[0])]
         values.append(best.parameter("K"))
         found["likelihood_gm, rate/20"] = {

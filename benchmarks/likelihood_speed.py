@@ -15,7 +15,7 @@ import numpy as np
 import scipy.fft
 
 from imubench_pipeline.estimators.likelihood import fit
-from imubench_pipeline.estimators.model_choice import PAPERS, compare
+from imubench_pipeline.estimators.model_choice import PAPERS_MODEL, compare_models
 from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import whittle_of
@@ -54,8 +54,8 @@ def main() -> None:
         timed(lambda: scipy.fft.dct(log, norm="ortho"), of("DCT of the log, scipy"))
         spectrum, _ = timed(lambda: spectra([log], len(log), RATE), of("spectra"))
         whittle = whittle_of(spectrum, 0.5 * RATE)
-        best = timed(partial(whittle.maximum, PAPERS), of("fit of the papers' model"))
-        timed(partial(compare, whittle, quantization=True), of("fits of all models"))
+        best = timed(partial(whittle.maximum, PAPERS_MODEL), of("fit of the papers' model"))
+        timed(partial(compare_models, whittle, quantization=True), of("fits of all models"))
         timed(partial(sample, whittle, best, rng), of("posterior of a model"))
         timed(lambda: fit(log, RATE), of("everything, with lines, band and all intervals"))
     print(f"{given.samples:,} samples, median of {given.runs} runs")

@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.frame import frame_of
+from imubench_pipeline.estimators.frame import select_for_fit
 from imubench_pipeline.estimators.lines import Line
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import NoiseModel, Sinusoid
@@ -43,7 +43,7 @@ def without(name: str, number: int) -> bool:
 
 def found_in(log: NDArray[np.float64]) -> list[Line]:
     """Return the lines that the likelihood leaves out."""
-    return list(frame_of(*spectra([log], len(log), RATE)).lines)
+    return list(select_for_fit(*spectra([log], len(log), RATE)).lines)
 
 
 def bin_width(frequency: float) -> float:

@@ -7,11 +7,11 @@ import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
 from imubench_pipeline.estimators.filter_fits import highest_cutoff
-from imubench_pipeline.estimators.frame import frame_of
+from imubench_pipeline.estimators.frame import select_for_fit
 from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.estimators.low_pass import Filter
-from imubench_pipeline.estimators.model_choice import PAPERS, compare
+from imubench_pipeline.estimators.model_choice import PAPERS_MODEL, compare_models
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -58,7 +58,7 @@ def test_n_and_its_cutoff_are_not_off_together_behind_a_filter_beside_a_process(
 def test_each_model_of_the_noise_has_a_cutoff_of_its_own():
     found = behind_a_filter(0)
     models = found.low_pass.models
-    assert PAPERS in models and len(models) > 1
+    assert PAPERS_MODEL in models and len(models) > 1
     chosen = found.candidates[0].terms
     for terms, of_model in models.items():
         assert of_model.gained >= -1e-3
@@ -113,10 +113,10 @@ def test_no_mean_is_shorter_than_of_two_samples(seed):
         NoiseModel(N=1e-4, B=3e-4, T_B=2.0), rate, samples + 1, np.random.default_rng(seed)
     )
     spectrum, lines = spectra([0.5 * (log[1:] + log[:-1])], samples, rate)
-    frame = frame_of(spectrum, lines)
+    frame = select_for_fit(spectrum, lines)
     means = [one for one in frame.low_pass.allowed if one.filter.kind == "boxcar"]
     assert means
-    candidates = compare(frame.whittle(spectrum), quantization=False)
+    candidates = compare_models(frame.whittle(spectrum), quantization=False)
     found = refine_cutoff(
         replace(frame.low_pass, allowed=means, kind="boxcar"), spectrum, frame.used, candidates[:2]
     )

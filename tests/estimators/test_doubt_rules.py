@@ -8,7 +8,7 @@ import pytest
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.doubts import add_doubts, instead_of_walk
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.model_choice import Candidate
@@ -34,8 +34,8 @@ def estimate() -> Estimate:
     return Estimate("likelihood", parameters, curve={"B_curve": Parameter(1.0)})
 
 
-def frame(highest: float = RATE / 2.0, *, cut: bool = False) -> Frame:
-    return Frame([], EVERY, EVERY, Band(highest, "found"), cut=cut)
+def frame(highest: float = RATE / 2.0, *, cut: bool = False) -> FitSelection:
+    return FitSelection([], EVERY, EVERY, Band(highest, "found"), cut=cut)
 
 
 def doubted(

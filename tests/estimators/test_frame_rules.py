@@ -9,7 +9,7 @@ from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import Allowed, FilterTrial, OfModel, Reading
-from imubench_pipeline.estimators.frame import Frame, frame_of
+from imubench_pipeline.estimators.frame import FitSelection, select_for_fit
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.model_choice import Candidate
@@ -33,8 +33,8 @@ def behind(*cutoffs: float, white: float = 1.0, **more: object) -> Cutoff:
     )  # fmt: skip
 
 
-def frame(low_pass: Cutoff | None = None, highest: float = 50.0) -> Frame:
-    return Frame([], EVERY, EVERY, Band(highest, "found"), low_pass)
+def frame(low_pass: Cutoff | None = None, highest: float = 50.0) -> FitSelection:
+    return FitSelection([], EVERY, EVERY, Band(highest, "found"), low_pass)
 
 
 @pytest.mark.parametrize(
@@ -54,8 +54,8 @@ def test_a_filter_well_below_nyquist_has_a_cutoff_of_each_model(
     cutoffs: tuple[float, ...], times: list[float], expected: bool
 ) -> None:
     T_B = np.array(times) / (2.0 * np.pi * cutoffs[0])
-    assert frame(behind(*cutoffs)).has_a_bend_of_each_model(FLAT, T_B) is expected
-    assert not frame().has_a_bend_of_each_model(FLAT, T_B)
+    assert frame(behind(*cutoffs)).needs_cutoff_per_model(FLAT, T_B) is expected
+    assert not frame().needs_cutoff_per_model(FLAT, T_B)
 
 
 def test_quantization_shows_in_a_wide_band_behind_no_filter() -> None:
@@ -107,10 +107,10 @@ def test_a_band_that_is_asked_for_has_processes_of_ten_samples() -> None:
     spectrum = replace(
         FLAT, density=np.random.default_rng(1).chisquare(FLAT.ordinates) / FLAT.ordinates
     )
-    found = frame_of(spectrum, [], band=20.0)
+    found = select_for_fit(spectrum, [], band=20.0)
     assert (found.band.highest, found.shortest, found.low_pass) == (20.0, 0.1, None)
     assert (found.used == (spectrum.upper <= 20.0 * (1.0 + 1e-9))).all()
-    whole = frame_of(spectrum, [])
+    whole = select_for_fit(spectrum, [])
     assert whole.used.all() and whole.band.highest == 50.0 and whole.shortest == 0.1
     assert whole.low_pass is not None and whole.low_pass.behind is None
     assert not whole.cut and whole.whittle(spectrum).behind is None
@@ -122,8 +122,8 @@ def test_where_nothing_explains_all_the_bend_is_left_out() -> None:
     gain = 1.0 / (1.0 + (wide.frequency / 20.0) ** 8)
     spectrum = replace(wide, density=gain * rng.chisquare(wide.ordinates) / wide.ordinates)
     every = np.ones(len(gain), dtype=np.bool_)
-    of = Frame([], every, every, Band(50.0, "found"), None, stated=90.0).limited(spectrum)
+    of = FitSelection([], every, every, Band(50.0, "found"), None, stated=90.0).limited(spectrum)
     assert of.cut and 2.0 < of.band.highest <= 9.0
     assert (of.used == (spectrum.upper <= of.band.highest * (1.0 + 1e-9))).all()
     flat = replace(wide, density=rng.chisquare(wide.ordinates) / wide.ordinates)
-    assert not Frame([], every, every, Band(50.0, "found"), None).limited(flat).cut
+    assert not FitSelection([], every, every, Band(50.0, "found"), None).limited(flat).cut

@@ -5,7 +5,7 @@ import pytest
 
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.intervals import (
@@ -23,7 +23,7 @@ RATE, DURATION = 1.0, 200_000.0
 N, K, B, T_B, R = 1.0, 1e-2, 1.0, 300.0, 1e-2
 VALUES = {"N": N, "K": K, "F": B}
 EVEN = (np.arange(4000) + 0.5) / 4000
-FRAME = Frame([], np.ones(1, dtype=np.bool_), np.ones(1, dtype=np.bool_), Band(0.5, "set"))
+FRAME = FitSelection([], np.ones(1, dtype=np.bool_), np.ones(1, dtype=np.bool_), Band(0.5, "set"))
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,11 @@ from scipy import optimize
 from imubench_pipeline.estimators.goodness import goodness
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import (
-    CANDIDATES,
-    PAPERS,
+    CANDIDATE_MODELS,
+    PAPERS_MODEL,
     Candidate,
-    compare,
-    disagreement,
+    compare_models,
+    describe_disagreement,
     rescore,
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
@@ -37,7 +37,7 @@ def spectrum_of(log: np.ndarray) -> Spectrum:
 
 
 def candidates_of(log: np.ndarray, quantization: bool = True) -> list[Candidate]:
-    return compare(whittle_of(spectrum_of(log), RATE / 2), quantization=quantization)
+    return compare_models(whittle_of(spectrum_of(log), RATE / 2), quantization=quantization)
 
 
 def flicker(B: float, samples: int, rng: np.random.Generator) -> np.ndarray:
@@ -174,7 +174,7 @@ def test_no_better_process_is_missed(rng) -> None:
 def test_scores_follow_from_the_costs(rng) -> None:
     log = simulate(NoiseModel(N=N, B=3e-3, T_B=8.0, K=2e-4), RATE, 30_000, rng)
     spectrum = spectrum_of(log)
-    candidates = compare(whittle_of(spectrum, RATE / 2), quantization=True)
+    candidates = compare_models(whittle_of(spectrum, RATE / 2), quantization=True)
     parameters = {
         "N": 1, "N+K": 2, "N+GM": 3, "N+GM+K": 4, "N+F": 2, "N+F+K": 3, "N+F+GM": 4,
         "N+F+GM+K": 5, "N+GM+GM": 5, "N+GM+GM+K": 6,
@@ -190,7 +190,7 @@ def test_scores_follow_from_the_costs(rng) -> None:
         assert candidate.aic == pytest.approx(2 * candidate.maximum.cost + number * 2)
     for scores, weights in (
         ([c.bic for c in candidates], [c.weight for c in candidates]),
-        ([c.aic for c in candidates], [c.share for c in candidates]),
+        ([c.aic for c in candidates], [c.akaike_weight for c in candidates]),
     ):
         assert sum(weights) == pytest.approx(1.0, rel=1e-12)
         # The odds of two models are e to the power of half the difference of their scores.
@@ -204,7 +204,7 @@ def test_each_candidate_is_judged_by_its_own_fit(rng) -> None:
     log = simulate(NoiseModel(N=N, K=3e-4, R=2e-5), RATE, 30_000, rng)
     spectrum = spectrum_of(log)
     whittle = whittle_of(spectrum, RATE / 2)
-    candidates = by_name(compare(whittle, quantization=False))
+    candidates = by_name(compare_models(whittle, quantization=False))
     assert candidates["N+K+R"].goodness.verdict == "explained"
     assert candidates["N"].goodness.verdict == "not explained"
     for name, candidate in candidates.items():
@@ -270,7 +270,7 @@ def test_all_three_of_the_papers_are_told_where_they_are_strong(rng, logs: int, 
     for _ in range(logs):
         candidates = candidates_of(simulate(model, RATE, 100_000, rng))
         names[candidates[0].terms.name] += 1
-        found = by_name(candidates)[PAPERS.name].maximum
+        found = by_name(candidates)[PAPERS_MODEL.name].maximum
         times.append(float(found.times[0]))
         levels.append(float(found.biases[0]))
     assert names["N+GM+K"] >= least
@@ -379,7 +379,7 @@ def test_models_of_more_parameters_than_a_quarter_of_the_bins_are_left_out(rng, 
     log = simulate(NoiseModel(N=N, K=1e-2), RATE, bins + 1, rng)
     candidates = candidates_of(log)
     assert len(candidates[0].terms.name) > 0
-    for terms in CANDIDATES:
+    for terms in CANDIDATE_MODELS:
         there = any(c.terms == terms for c in candidates)
         assert there == (terms.parameters < bins // 4)
     assert max(c.terms.parameters for c in candidates) < bins // 4
@@ -394,9 +394,9 @@ def scored(terms: Terms, bic: float, aic: float) -> Candidate:
 
 def test_a_disagreement_of_aic_and_bic_is_said_with_its_size() -> None:
     simple, rich = scored(Terms("N"), 100.0, 97.5), scored(Terms("NK"), 101.3, 95.1)
-    assert disagreement([simple, rich]) == "AIC favours N+K by 2.4, BIC N by 1.3"
-    assert disagreement([simple, scored(Terms("NK"), 104.0, 98.0)]) is None
-    assert disagreement([simple]) is None
+    assert describe_disagreement([simple, rich]) == "AIC favours N+K by 2.4, BIC N by 1.3"
+    assert describe_disagreement([simple, scored(Terms("NK"), 104.0, 98.0)]) is None
+    assert describe_disagreement([simple]) is None
 
 
 def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:
@@ -407,7 +407,7 @@ def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:
         log = simulate(NoiseModel(N=1e-3, K=K, R=1e-5), 5.0, 3000, rng)
         whittle = whittle_of(spectra([log], len(log), 5.0)[0], 2.5)
         penalty = np.log(len(whittle.spectrum.density))
-        for candidate in compare(whittle, quantization=False):
+        for candidate in compare_models(whittle, quantization=False):
             found = candidate.maximum
             if found.terms.ramp:
                 alone = found.parameter("K") == 0.0
@@ -425,7 +425,7 @@ def test_what_models_gain_counts_for_their_scores_and_their_order(rng: np.random
     assert found[0].maximum is second.maximum
     assert found[0].bic == pytest.approx(candidates[0].bic - 2.0)
     assert found[0].aic == pytest.approx(second.aic - 2.0 * gain)
-    assert sum(one.share for one in found) == pytest.approx(1.0)
+    assert sum(one.akaike_weight for one in found) == pytest.approx(1.0)
     ratio = found[0].weight / found[1].weight
     assert ratio == pytest.approx(np.exp(0.5 * (found[1].bic - found[0].bic)))
     assert [one.maximum for one in rescore(candidates, {})] == [one.maximum for one in candidates]

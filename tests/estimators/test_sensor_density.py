@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.posterior import Posterior
@@ -101,7 +101,7 @@ def of_rules(
 ) -> Parameter | None:
     """N_sensor of a fit with N = 1 from 0.9 to 1.1, and processes of B = 1."""
     every, powers = ONES > 0.0, np.ones(1 + len(times))
-    frame = Frame([], every, every, Band(5.0, "found"), low_pass, shortest=0.3)
+    frame = FitSelection([], every, every, Band(5.0, "found"), low_pass, shortest=0.3)
     terms = terms or Terms("N", len(times))
     drawn = np.column_stack([np.linspace(0.9, 1.1, 4001), *np.ones((len(times), 4001))])
     posterior = Posterior(drawn, np.tile(times, (4001, 1)), np.zeros(4001), 4001.0)

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.spectral_findings import slow_noise_missing, spectral_findings
 from imubench_pipeline.tables.findings import Finding
@@ -71,7 +71,7 @@ def test_nothing_is_said_below_a_low_pass_or_without_n() -> None:
 def test_a_band_that_ends_before_nyquist_is_told() -> None:
     def found(source: str) -> list[Finding]:
         every = np.ones(BINS, dtype=np.bool_)
-        return spectral_findings("gyro_x", Frame([], every, every, Band(5.0, source)), None)
+        return spectral_findings("gyro_x", FitSelection([], every, every, Band(5.0, source)), None)
 
     assert found("found: the spectrum follows its model") == []
     (note,) = found("found: beyond 5 Hz the spectrum bends")

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.estimators.estimate import FAMILY, SI_UNITS
-from imubench_pipeline.estimators.model_choice import CANDIDATES
+from imubench_pipeline.estimators.model_choice import CANDIDATE_MODELS
 from imubench_pipeline.navigation.verdicts.evidence import parameters_behind
 from imubench_pipeline.noise import (
     PARAMETERS,
@@ -142,7 +142,7 @@ def test_the_family_of_the_likelihood_is_registered() -> None:
     glossary = {name for section in GLOSSARY.values() for name in section}
     assert set(FAMILY) <= set(PARAMETERS) & glossary
     assert set(FAMILY) <= set(AxisSettings.model_fields)
-    for candidate in CANDIDATES:
+    for candidate in CANDIDATE_MODELS:
         assert set(candidate.name.split("+")) <= symbols
 
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter
-from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 
@@ -62,7 +62,7 @@ _WITHOUT = (0, 4)
 def add_doubts(
     estimate: Estimate,
     papers: Estimate,
-    frame: Frame,
+    frame: FitSelection,
     candidates: Sequence[Candidate],
     papers_candidate: Candidate,
     drift: str | None = None,

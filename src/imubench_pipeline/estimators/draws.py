@@ -14,7 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import FAMILY, JointDraws
-from imubench_pipeline.estimators.model_choice import LIKE_A_WALK, UNIT_ROOT, UNLIKELY, Candidate
+from imubench_pipeline.estimators.model_choice import (
+    BIC_PENALTY_RARE_TERM,
+    BIC_PENALTY_UNIT_ROOT,
+    WALK_LIKE_TIME_FRACTION,
+    Candidate,
+)
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.typing import Array
@@ -35,8 +40,8 @@ def drawn_share(candidate: Candidate, bins: int) -> float:
     """
     terms = candidate.terms
     of_times = terms.gauss_markov * (0.5 * math.log(bins) - 1.0)
-    of_unlikely = 0.5 * UNLIKELY * (terms.ramp + ("Q" in terms.linear))
-    return candidate.share * math.exp(-of_times - of_unlikely)
+    of_unlikely = 0.5 * BIC_PENALTY_RARE_TERM * (terms.ramp + ("Q" in terms.linear))
+    return candidate.akaike_weight * math.exp(-of_times - of_unlikely)
 
 
 def joint_draws(
@@ -65,8 +70,8 @@ def joint_draws(
     counts = [len(posterior.parameters) for _, posterior, _ in parts]
     mass = np.repeat([share / n for (_, _, share), n in zip(parts, counts, strict=True)], counts)
     times = np.column_stack((first[:, FAMILY.index("T_B")], further[:, :, 1]))
-    slow = (times > LIKE_A_WALK * longest).any(axis=1)
-    mass = np.cumsum(np.where(slow, math.exp(-0.5 * UNIT_ROOT), 1.0) * mass)
+    slow = (times > WALK_LIKE_TIME_FRACTION * longest).any(axis=1)
+    mass = np.cumsum(np.where(slow, math.exp(-0.5 * BIC_PENALTY_UNIT_ROOT), 1.0) * mass)
     rows = np.searchsorted(mass, (np.arange(number) + 0.5) / number * mass[-1])
     return JointDraws(first[rows], further[rows])
 

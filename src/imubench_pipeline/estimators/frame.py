@@ -1,7 +1,7 @@
-"""What of a spectrum is fitted, and behind what: lines apart, the sensor's low-pass, the band.
+"""Selection of the bins that are fitted: excluded lines, the sensor's low-pass filter, the band.
 
-Noise alone and noise behind a low-pass are decided together, by likelihood over the whole spectrum
-(`imubench_pipeline.estimators.cutoff`). Frequencies are left out only where neither explains them.
+Noise without and with a low-pass filter are compared by their likelihood over the whole spectrum
+(`imubench_pipeline.estimators.cutoff`). Frequencies are excluded only where neither model fits.
 """
 
 from __future__ import annotations
@@ -33,46 +33,46 @@ from imubench_pipeline.typing import Array
 
 Mask = NDArray[np.bool_]
 
-_FOR_LINES = 0.05
-"""Part of the rate below which a model is fitted that lines stand out of."""
+_LINE_MODEL_BAND = 0.05
+"""Fraction of the sampling rate: the noise model for line detection is fitted below it."""
 
-_TO_NYQUIST = "found: the spectrum follows its model up to Nyquist"
+_SOURCE_UP_TO_NYQUIST = "found: the spectrum follows its model up to Nyquist"
 
-_FASTEST = 3.0
-"""Sampling intervals: shortest correlation of a process where longer ones explain nothing."""
+_MIN_CORRELATION_SAMPLES = 3.0
+"""Shortest correlation time, in samples, that is tried where longer ones do not fit."""
 
-_APART = 60.0
-"""Correlation time of a process over that of a filter beyond which each has its own bend."""
+_SEPARATE_BEND_RATIO = 60.0
+"""Ratio of the correlation times of a process and a filter above which their bends are separate."""
 
-_QUANTIZATION_BAND = 1 / 10
-"""Part of the rate that the band must reach for quantization noise to show."""
+_MIN_QUANTIZATION_BAND = 1 / 10
+"""Fraction of the sampling rate that the band must reach to make quantization noise visible."""
 
-FEWEST_BINS = 20
-"""The papers' model can be fitted to so many, and to spare."""
+MIN_BINS = 20
+"""Bins that a fit needs; the papers' model has four parameters."""
 
 
 @dataclass(frozen=True)
-class Frame:
-    """What of a spectrum is fitted."""
+class FitSelection:
+    """The part of a spectrum that is fitted."""
 
     lines: Sequence[Line]
     clear: Mask
     used: Mask
-    """(b,): the bins clear of lines, and those of them that are fitted."""
+    """(b,): the bins without lines, and the subset that is fitted."""
     band: Band  # highest frequency that is fitted, and why
     low_pass: Cutoff | None = None
-    """The sensor's low-pass; None where a band is asked for, which is taken as it is."""
+    """The sensor's low-pass filter; None where the user sets the band."""
     shortest: float | None = None
-    """Shortest correlation time of a process, s; None: as `whittle_of` has it."""
-    stated: float | None = None  # cut-off of the sensor's own filter, where it is stated, Hz
-    cut: bool = False  # frequencies are left out that neither a process nor a filter explains
+    """Shortest correlation time of a process, s; None: the default of `whittle_of`."""
+    stated: float | None = None  # configured cut-off of the sensor's filter, Hz, if known
+    cut: bool = False  # frequencies are excluded that neither a process nor a filter fits
 
     def whittle(self, spectrum: Spectrum) -> Whittle:
         """Return the likelihood of the bins that are fitted."""
         return self._whittle(spectrum, self.used, SHAPES)
 
-    def whole(self, spectrum: Spectrum) -> Whittle:
-        """Return that of all bins, to carry a fit on to those that are not."""
+    def likelihood_of_all_bins(self, spectrum: Spectrum) -> Whittle:
+        """Return the likelihood over all bins, including those that are not fitted."""
         return self._whittle(spectrum, np.ones(len(self.used), dtype=np.bool_), COARSE)
 
     def _whittle(self, spectrum: Spectrum, bins: Mask, shapes: int) -> Whittle:
@@ -85,20 +85,20 @@ class Frame:
             behind=behind.select(bins) if behind is not None else None,
         )
 
-    def has_a_bend_of_each_model(self, spectrum: Spectrum, times: Array) -> bool:
-        """Return whether each model of the noise, of given T_B in s, has a cut-off of its own.
+    def needs_cutoff_per_model(self, spectrum: Spectrum, times: Array) -> bool:
+        """Return whether the cut-off must be fitted for each noise model separately.
 
-        So it is where the low-pass bends the spectrum well below Nyquist; higher up, what folds
-        decides, unless a process is as fast as the low-pass, or nearly.
+        It must if the filter bends the spectrum well below Nyquist, or if a process (``times``:
+        T_B, s) is nearly as fast as the filter. Near Nyquist, aliasing determines the cut-off.
         """
         if self.low_pass is None or self.low_pass.behind is None:
             return False
         cutoffs = [allowed.filter.cutoff for allowed in self.low_pass.allowed]
-        shared = len(times) > 0 and times.min() < _APART / (2.0 * np.pi * cutoffs[0])
+        shared = len(times) > 0 and times.min() < _SEPARATE_BEND_RATIO / (2.0 * np.pi * cutoffs[0])
         return bool(shared or max(cutoffs) < UNFOLDED * spectrum.rate)
 
-    def refine(self, spectrum: Spectrum, candidates: Sequence[Candidate]) -> Frame:
-        """Return the same behind a low-pass that is fitted together with the best of models."""
+    def refine(self, spectrum: Spectrum, candidates: Sequence[Candidate]) -> FitSelection:
+        """Return the selection with cut-off and noise model refitted jointly."""
         if self.low_pass is None:
             return self
         low_pass = refine_cutoff(self.low_pass, spectrum, self.used, candidates)
@@ -106,63 +106,66 @@ class Frame:
         return replace(self, low_pass=low_pass, band=replace(self.band, source=source))
 
     def rescore(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Return models by what they explain with a cut-off of their own, the best first."""
+        """Return the candidates, sorted by their fits with a cut-off for each model."""
         models = self.low_pass.models if self.low_pass is not None else {}
         gained = {terms: model.gained for terms, model in models.items()}
         return rescore(candidates, gained)
 
     @property
     def folding(self) -> float:
-        """Density of white noise that the log shows at low frequencies, over N^2."""
+        """Density of the white noise in the log at low frequencies over N^2, with aliasing."""
         if self.low_pass is None or self.low_pass.behind is None:
             return 1.0
         return float(self.low_pass.behind.white[0])
 
     def in_the_log(self, posterior: Posterior, terms: Terms, rng: np.random.Generator) -> Posterior:
-        """Return draws of a model behind the low-pass with N as the log shows it, at its lowest.
+        """Return draws of a model with N as in the log at its lowest frequencies.
 
-        What is not known of the filter bends the spectrum down to there, and is in N.
+        An uncertain filter bends the spectrum down to these frequencies, so N includes the
+        uncertainty of the filter.
         """
         factors = np.array(math.sqrt(self.folding))
         if self.low_pass is not None and self.low_pass.readings:
             number = len(posterior.parameters)
             factors = factors * self.low_pass.factors(number, rng, terms, in_the_log=True)
-        return _scaled(posterior, terms, factors)
+        return _scale_white_noise(posterior, terms, factors)
 
     def before_the_filter(
         self, posterior: Posterior, terms: Terms, rng: np.random.Generator
     ) -> Posterior:
-        """Return draws of a model behind the low-pass with what is not known of that in N."""
+        """Return draws of a model with N before the filter, including the filter's uncertainty."""
         if self.low_pass is None or not self.low_pass.readings:
             return posterior
-        return _scaled(
+        return _scale_white_noise(
             posterior, terms, self.low_pass.factors(len(posterior.parameters), rng, terms)
         )
 
     def shows_quantization(self, rate: float) -> bool:
-        """Return whether quantization noise would show: no filter in front, and high enough."""
+        """Return whether quantization noise is visible: no filter, and a sufficient band."""
         behind = self.low_pass is not None and self.low_pass.behind is not None
-        return not behind and self.band.highest >= _QUANTIZATION_BAND * rate
+        return not behind and self.band.highest >= _MIN_QUANTIZATION_BAND * rate
 
-    def with_fast_processes(self, rate: float) -> Frame:
-        """Return the whole spectrum behind no filter, with processes of a few samples."""
+    def with_fast_processes(self, rate: float) -> FitSelection:
+        """Return all bins without a filter, with processes as short as a few samples."""
         return replace(
             self,
             used=self.clear,
-            band=Band(0.5 * rate, _TO_NYQUIST),
-            low_pass=_none(self.low_pass),
-            shortest=_FASTEST / rate,
+            band=Band(0.5 * rate, _SOURCE_UP_TO_NYQUIST),
+            low_pass=_without_filter_fit(self.low_pass),
+            shortest=_MIN_CORRELATION_SAMPLES / rate,
         )
 
-    def limited(self, spectrum: Spectrum) -> Frame:
-        """Return the frequencies that no filter bends, behind none: where nothing explains all."""
+    def limited(self, spectrum: Spectrum) -> FitSelection:
+        """Return the frequencies that no filter bends, where no model fits all of them."""
         band = find_band(spectrum, self.clear, bandwidth=self.stated)
         used = self.clear & (spectrum.upper <= band.highest * (1.0 + 1e-9))
         cut = band.highest < 0.5 * spectrum.rate
-        return Frame(self.lines, self.clear, used, band, _none(self.low_pass), cut=cut)
+        return FitSelection(
+            self.lines, self.clear, used, band, _without_filter_fit(self.low_pass), cut=cut
+        )
 
 
-def _scaled(posterior: Posterior, terms: Terms, factors: Array) -> Posterior:
+def _scale_white_noise(posterior: Posterior, terms: Terms, factors: Array) -> Posterior:
     if "N" not in terms.linear:
         return posterior
     parameters = posterior.parameters.copy()
@@ -170,42 +173,42 @@ def _scaled(posterior: Posterior, terms: Terms, factors: Array) -> Posterior:
     return replace(posterior, parameters=parameters)
 
 
-def _none(low_pass: Cutoff | None) -> Cutoff | None:
-    """Return a low-pass that is told, and not fitted behind."""
+def _without_filter_fit(low_pass: Cutoff | None) -> Cutoff | None:
+    """Return a low-pass that is reported, but not part of the fitted model."""
     return None if low_pass is None else replace(low_pass, behind=None, readings=(), models={})
 
 
-def frame_of(
+def select_for_fit(
     spectrum: Spectrum,
     line_spectra: Sequence[LineSpectrum],
     *,
     band: float | None = None,
     bandwidth: float | None = None,
     resolution: float = 0.0,
-) -> Frame:
-    """Find the lines of a spectrum and the sensor's low-pass.
+) -> FitSelection:
+    """Find the spectral lines and the low-pass filter, and select the bins to fit.
 
     Parameters
     ----------
     line_spectra : sequence of LineSpectrum
-        As `imubench_pipeline.estimators.spectrum.spectra` gives them.
+        As returned by `imubench_pipeline.estimators.spectrum.spectra`.
     band : float, optional
-        Highest frequency to use, Hz; by default all are used, behind the low-pass that shows.
+        Highest frequency to use, Hz; by default all, behind the low-pass filter if one is found.
     bandwidth : float, optional
-        Cut-off of the sensor's own filter, where it is stated, Hz.
+        Configured cut-off of the sensor's filter, Hz, if known.
     resolution : float
-        Step of the register, SI; 0 where none shows.
+        Resolution of the register, SI; 0 if it is not visible.
     """
-    lines, clear = _lines(spectrum, line_spectra, band)
+    lines, clear = _find_lines(spectrum, line_spectra, band)
     nyquist = 0.5 * spectrum.rate
     if band is not None:
         limit = find_band(spectrum, clear, asked=band)
         used = clear & (spectrum.upper <= limit.highest * (1.0 + 1e-9))
-        return Frame(lines, clear, used, limit, shortest=PROCESSES / spectrum.rate)
+        return FitSelection(lines, clear, used, limit, shortest=PROCESSES / spectrum.rate)
     low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
     if low_pass.or_quantization:
         low_pass = replace(low_pass, behind=None, readings=())
-    used, source = clear, _TO_NYQUIST
+    used, source = clear, _SOURCE_UP_TO_NYQUIST
     if low_pass.behind is not None and low_pass.ruled is not None:
         used = clear & ~low_pass.ruled
         source = f"found: behind a {low_pass.words}, {source.removeprefix('found: ')}"
@@ -217,17 +220,17 @@ def frame_of(
             "leaves nothing of it"
         )
     shortest = PROCESSES / spectrum.rate
-    return Frame(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
+    return FitSelection(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
 
 
-def _lines(
+def _find_lines(
     spectrum: Spectrum, line_spectra: Sequence[LineSpectrum], band: float | None
 ) -> tuple[list[Line], Mask]:
-    """Return the lines, and the bins clear of them."""
+    """Return the lines, and a mask of the bins without lines."""
     all_bins = np.ones(len(spectrum.frequency), dtype=np.bool_)
-    start = min(band or np.inf, _FOR_LINES * spectrum.rate)
+    start = min(band or np.inf, _LINE_MODEL_BAND * spectrum.rate)
     below = spectrum.upper <= start
-    if below.sum() < FEWEST_BINS:
+    if below.sum() < MIN_BINS:
         below = all_bins
     maximum = whittle_of(spectrum.select(below), start, COARSE).maximum(Terms("NFK", 1))
     low = spectrum.block > 1

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
-from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.identifiability import durations_needed, parameter_names
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
@@ -95,7 +95,7 @@ def describe(
     chosen: Candidate,
     alike: Sequence[Candidate],
     draws: dict[Terms, Posterior],
-    frame: Frame,
+    frame: FitSelection,
 ) -> Estimate:
     """Describe a fit: values with intervals, what is not identified, and what is absent.
 

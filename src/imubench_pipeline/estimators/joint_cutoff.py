@@ -66,7 +66,7 @@ def worth_joining(candidates: Sequence[Candidate], always: Terms) -> list[Candid
         candidate
         for candidate in candidates
         if candidate.bic < best.bic + _WORTH_JOINING
-        or candidate.share >= _LEAST_SHARE
+        or candidate.akaike_weight >= _LEAST_SHARE
         or candidate.terms == always
     ]
 

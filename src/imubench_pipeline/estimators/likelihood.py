@@ -29,7 +29,7 @@ from imubench_pipeline.estimators.estimate import (
     JointDraws,
     Parameter,
 )
-from imubench_pipeline.estimators.frame import FEWEST_BINS, Frame, frame_of
+from imubench_pipeline.estimators.frame import MIN_BINS, FitSelection, select_for_fit
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
 from imubench_pipeline.estimators.joint_cutoff import worth_joining
 from imubench_pipeline.estimators.lines import Line, carried_sinusoids
@@ -39,7 +39,12 @@ from imubench_pipeline.estimators.missing import (
     fill_missing,
     slow_part,
 )
-from imubench_pipeline.estimators.model_choice import LEAST_SHARE, PAPERS, Candidate, compare
+from imubench_pipeline.estimators.model_choice import (
+    MIN_AKAIKE_WEIGHT,
+    PAPERS_MODEL,
+    Candidate,
+    compare_models,
+)
 from imubench_pipeline.estimators.posterior import Posterior, sample
 from imubench_pipeline.estimators.sensor_density import sensor_density
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
@@ -81,7 +86,7 @@ class Likelihood:
         The bins clear of lines, and those of them that are used: below the end of the band.
     fitted : ndarray, shape (b,)
         Density of the chosen model in each bin, its ramp included; NaN where there is none.
-    frame : Frame
+    frame : FitSelection
         What was fitted, and behind what.
     stretch : WhiteStretch or None
         Where the Allan deviation of the log has the slope -1/2.
@@ -95,7 +100,7 @@ class Likelihood:
     clear: NDArray[np.bool_]
     used: NDArray[np.bool_]
     fitted: Array
-    frame: Frame
+    frame: FitSelection
     stretch: WhiteStretch | None = None
 
     @property
@@ -202,7 +207,9 @@ def fit_blocks(
     spans = spans_of(segments, samples)
     if not holes:
         spectrum, lines = spectra(blocks(), samples, rate, spans)
-        frame = frame_of(spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution)
+        frame = select_for_fit(
+            spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution
+        )
         return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
     means = block_means(blocks(), spans)
     parts = divide_at_holes(means, spans)
@@ -216,11 +223,13 @@ def fit_blocks(
         complete = fill_missing(blocks(), path, model, rate, rng)
         spectrum, lines = spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
-        frame = frame_of(spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution)
-        if frame.used.sum() < FEWEST_BINS:
+        frame = select_for_fit(
+            spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution
+        )
+        if frame.used.sum() < MIN_BINS:
             break
         if number < rounds:
-            model = model_of(compare(frame.whittle(spectrum), quantization=False)[0].maximum)
+            model = model_of(compare_models(frame.whittle(spectrum), quantization=False)[0].maximum)
     return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
 
 
@@ -245,7 +254,7 @@ def _first_model(
 
 def fit_spectrum(
     spectrum: Spectrum,
-    frame: Frame,
+    frame: FitSelection,
     *,
     rng: np.random.Generator,
     stretch: WhiteStretch | None,
@@ -254,15 +263,17 @@ def fit_spectrum(
 
     ``stretch``: where the Allan deviation of the log has the slope -1/2.
     """
-    if frame.used.sum() < FEWEST_BINS:
+    if frame.used.sum() < MIN_BINS:
         return _too_short(spectrum, frame)
     frame, whittle, candidates = fit_models(spectrum, frame)
     chosen = candidates[0]
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
-    alike = [chosen] + [c for c in candidates[1:] if c.share >= LEAST_SHARE and not c.terms.ramp]
+    alike = [chosen] + [
+        c for c in candidates[1:] if c.akaike_weight >= MIN_AKAIKE_WEIGHT and not c.terms.ramp
+    ]
     number = count_fast_processes(chosen.maximum, frame.folding, stretch)
     wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms, number)]
-    papers = next(c for c in candidates if c.terms == PAPERS)
+    papers = next(c for c in candidates if c.terms == PAPERS_MODEL)
     posteriors: dict[Terms, Posterior] = {}
     for candidate in (c for c in candidates if c in alike or c in wider or c is papers):
         posteriors[candidate.terms] = sample(whittle, candidate.maximum, rng)
@@ -276,7 +287,10 @@ def fit_spectrum(
         estimate = replace(estimate, parameters={**estimate.parameters, SENSOR: sensor})
     of_papers = _InTheLog(whittle, frame, in_the_log, stretch, [papers], [])
     gauss_markov = of_papers.estimate("likelihood_gm")
-    fitted = frame.whole(spectrum).density(chosen.maximum) + chosen.maximum.ramp**2 * spectrum.ramp
+    fitted = (
+        frame.likelihood_of_all_bins(spectrum).density(chosen.maximum)
+        + chosen.maximum.ramp**2 * spectrum.ramp
+    )
     drift = instead_of_walk(whittle, chosen.maximum)
     estimate, gauss_markov = add_doubts(estimate, gauss_markov, frame, candidates, papers, drift)
     sinusoids = carried_sinusoids(frame.lines)
@@ -318,7 +332,7 @@ class _InTheLog:
     def __init__(
         self,
         whittle: Whittle,
-        frame: Frame,
+        frame: FitSelection,
         posteriors: Mapping[Terms, Posterior],
         stretch: WhiteStretch | None,
         alike: Sequence[Candidate],
@@ -375,11 +389,11 @@ class _InTheLog:
         return joint_draws(parts, self._whittle.longest)
 
 
-def _too_short(spectrum: Spectrum, frame: Frame) -> Likelihood:
+def _too_short(spectrum: Spectrum, frame: FitSelection) -> Likelihood:
     """Return what is left to say of a log with too few bins to fit."""
     reason = (
         f"{frame.used.sum()} bins of the spectrum are left up to {frame.band.highest:.4g} Hz, "
-        f"{FEWEST_BINS} are needed: too short a log"
+        f"{MIN_BINS} are needed: too short a log"
     )
     if not frame.clear.all():
         reason += f", or lines that hide too much of it ({(~frame.clear).sum()} bins)"
@@ -401,7 +415,9 @@ def _too_short(spectrum: Spectrum, frame: Frame) -> Likelihood:
     )
 
 
-def fit_models(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
+def fit_models(
+    spectrum: Spectrum, frame: FitSelection
+) -> tuple[FitSelection, Whittle, list[Candidate]]:
     """Fit all models in a frame, and in another one where it explains more.
 
     Where noise up to Nyquist, behind the filter that shows, is not explained: with processes of a
@@ -409,10 +425,10 @@ def fit_models(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
     likelihood and the models tried, the best first.
     """
 
-    def fitted(tried: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
+    def fitted(tried: FitSelection) -> tuple[FitSelection, Whittle, list[Candidate]]:
         whittle = tried.whittle(spectrum)
         quantization = tried.shows_quantization(spectrum.rate)
-        candidates = compare(whittle, quantization=quantization)
+        candidates = compare_models(whittle, quantization=quantization)
         return tried, whittle, tried.rescore(candidates)
 
     first = fitted(frame)
@@ -421,20 +437,20 @@ def fit_models(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
     if not _explains(first):
         flexible = [candidate for candidate in first[2] if candidate.terms == _FLEXIBLE]
         first = fitted(frame.refine(spectrum, flexible))
-    if _explains(first) and first[0].has_a_bend_of_each_model(spectrum, first[2][0].maximum.times):
-        first = fitted(first[0].refine(spectrum, worth_joining(first[2], PAPERS)))
+    if _explains(first) and first[0].needs_cutoff_per_model(spectrum, first[2][0].maximum.times):
+        first = fitted(first[0].refine(spectrum, worth_joining(first[2], PAPERS_MODEL)))
     if _explains(first):
         return first
     faster = fitted(frame.with_fast_processes(spectrum.rate))
     if _explains(faster):
         return faster
     limited = frame.limited(spectrum)
-    if limited.band.highest >= frame.band.highest or limited.used.sum() < FEWEST_BINS:
+    if limited.band.highest >= frame.band.highest or limited.used.sum() < MIN_BINS:
         return first
     return fitted(limited)
 
 
-def _explains(fitted: tuple[Frame, Whittle, list[Candidate]]) -> bool:
+def _explains(fitted: tuple[FitSelection, Whittle, list[Candidate]]) -> bool:
     return fitted[2][0].goodness.verdict == "explained"
 
 

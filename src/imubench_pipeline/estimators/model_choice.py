@@ -1,4 +1,4 @@
-"""Which model the data favour: candidates compared by BIC over the bins, AIC beside it."""
+"""Comparison of the candidate noise models by BIC, and by AIC, over the bins of a spectrum."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from imubench_pipeline.estimators.goodness import Goodness, goodness
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.typing import Array
 
-PAPERS = Terms("NK", 1)
-"""N, B, T_B and K: the model of the papers."""
+PAPERS_MODEL = Terms("NK", 1)
+"""Model of the papers: N, B, T_B and K."""
 
-CANDIDATES = (
+CANDIDATE_MODELS = (
     Terms("N"),
     Terms("NK"),
     Terms("N", 1),
-    PAPERS,
+    PAPERS_MODEL,
     Terms("NF"),
     Terms("NFK"),
     Terms("NF", 1),
@@ -28,21 +28,26 @@ CANDIDATES = (
     Terms("N", 2),
     Terms("NK", 2),
 )
-"""Models that are always tried; then a ramp and quantization noise are added to the best, the
-latter to all of them where it is favoured."""
+"""Models that are always fitted. A ramp and quantization noise are then added to the best one; if
+BIC favours quantization noise, it is added to all of them."""
 
-LIKE_A_WALK = 1 / 10
-"""Part of the longest correlation time beyond which a process looks like a random walk."""
+WALK_LIKE_TIME_FRACTION = 1 / 10
+"""Fraction of the longest correlation time above which a process looks like a random walk."""
 
-UNIT_ROOT = 4.0
-"""BIC by which such a process, or a ramp, must be the better where there is no walk: a walk often
-looks as if it came back to its mean, or had a trend (D. Dickey and W. Fuller, J. Am. Stat. Assoc.
-74, 1979; C. R. Nelson and H. Kang, Econometrica 49, 1981)."""
+BIC_PENALTY_UNIT_ROOT = 4.0
+"""Added to the BIC of a model with such a process, or with a ramp, but without a random walk.
 
-UNLIKELY = 6.0
-"""BIC by which a model with a ramp, or with quantization noise, must be the better. Few sensors
-have either, and both take what chance leaves at an end of the spectrum: with the plain BIC 2 to 6 %
-of simulated logs without a ramp get one beside a random walk, and 1 to 3 % quantization noise."""
+A random walk often looks mean-reverting or trending (D. Dickey and W. Fuller, J. Am. Stat. Assoc.
+74, 1979; C. R. Nelson and H. Kang, Econometrica 49, 1981).
+"""
+
+BIC_PENALTY_RARE_TERM = 6.0
+"""Added to the BIC of a model for a ramp, and for quantization noise.
+
+Few sensors have either, and both fit random deviations at one end of the spectrum. With the plain
+BIC, 2 to 6 % of simulated logs without a ramp get one in addition to a random walk, and 1 to 3 %
+get quantization noise.
+"""
 
 
 @dataclass(frozen=True)
@@ -52,12 +57,16 @@ class Candidate:
     maximum: Maximum
     bic: float
     aic: float
-    """2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process or a ramp stands
-    for a random walk, 4 is added to the BIC; for a ramp and for quantization noise, 6 each."""
-    weight: float  # weight of the model among the candidates, proportional to e^(-BIC/2)
-    share: float
-    """That of e^(-AIC/2): an interval over models must not hang on a choice that the log hardly
-    makes, and BIC leaves out what is weak."""
+    """BIC = -2 log L + p log(number of bins), with penalties, and AIC = -2 log L + 2 p.
+
+    The penalties of BIC: `BIC_PENALTY_UNIT_ROOT` where a Gauss-Markov process or a ramp replaces a
+    random walk; `BIC_PENALTY_RARE_TERM` for a ramp, and for quantization noise.
+    """
+    weight: float  # Schwarz weight among the candidates, proportional to e^(-BIC/2)
+    akaike_weight: float
+    """Akaike weight, proportional to e^(-AIC/2), used to average intervals over models (K. P.
+    Burnham and D. R. Anderson, "Model Selection and Multimodel Inference", 2002, section 2.9). BIC
+    would exclude weak terms that the log does not rule out."""
     goodness: Goodness
 
     @property
@@ -66,44 +75,47 @@ class Candidate:
         return self.maximum.terms
 
 
-def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
-    """Fit all candidates and sort them, the best by BIC first.
+def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
+    """Return all candidates, fitted and sorted by BIC, best first.
 
-    With ``quantization`` that noise is tried too: the band must reach frequencies that show it.
+    ``quantization`` adds models with quantization noise; the band must then reach frequencies at
+    which this noise is visible.
     """
     bins = len(whittle.spectrum.density)
     tried: dict[Terms, Maximum] = {}
-    bic = partial(_bic, bins=bins, longest=whittle.longest)
+    bic = partial(_penalised_bic, bins=bins, longest=whittle.longest)
 
     def add(terms: Terms) -> None:
         if terms not in tried and terms.parameters < bins // 4:
             tried[terms] = whittle.maximum(terms)
 
-    for terms in CANDIDATES:
+    for terms in CANDIDATE_MODELS:
         add(terms)
     if quantization:
-        without_rounding = min(tried.values(), key=bic)
-        rounded = Terms("Q" + without_rounding.terms.linear, without_rounding.terms.gauss_markov)
+        without_quantization = min(tried.values(), key=bic)
+        rounded = Terms(
+            "Q" + without_quantization.terms.linear, without_quantization.terms.gauss_markov
+        )
         add(rounded)
-        if rounded in tried and bic(tried[rounded]) < bic(without_rounding):
-            # Without quantization noise other terms had to stand for it.
-            for terms in CANDIDATES:
+        if rounded in tried and bic(tried[rounded]) < bic(without_quantization):
+            # Without this term, other terms had to fit the quantization noise.
+            for terms in CANDIDATE_MODELS:
                 add(Terms("Q" + terms.linear, terms.gauss_markov))
-    # A single walk often looks like a ramp: a ramp is only believed beside a random walk.
+    # A single random walk often looks like a ramp: a ramp is accepted only with a random walk.
     best = min(tried.values(), key=bic).terms
     linear = best.linear if "K" in best.linear else best.linear + "K"
     add(Terms(linear, best.gauss_markov, ramp=True))
     order = sorted(tried.values(), key=bic)
     bics = np.array([bic(maximum) for maximum in order])
     aics = np.array([2.0 * (maximum.cost + maximum.terms.parameters) for maximum in order])
-    weights, shares = relative(bics), relative(aics)
+    weights, akaike_weights = information_weights(bics), information_weights(aics)
     return [
         Candidate(
             maximum,
             float(bics[i]),
             float(aics[i]),
             float(weights[i]),
-            float(shares[i]),
+            float(akaike_weights[i]),
             goodness(
                 whittle.spectrum.ordinates,
                 whittle.data(maximum),
@@ -116,52 +128,56 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     ]
 
 
-def _bic(maximum: Maximum, bins: int, longest: float) -> float:
-    """Return the BIC of a fit, with what is asked of a model that few sensors have."""
+def _penalised_bic(maximum: Maximum, bins: int, longest: float) -> float:
+    """Return the BIC of a fit, with a penalty for terms that few sensors have."""
     terms, times = maximum.terms, maximum.times
-    slow = len(times) > 0 and times[-1] > LIKE_A_WALK * longest
-    like_a_walk = "K" not in terms.linear and slow
-    # A ramp is tried beside a walk: it stands for the walk where none is left.
-    like_a_walk |= terms.ramp and maximum.parameter("K") == 0.0
-    unlikely = terms.ramp + ("Q" in terms.linear)
+    slow = len(times) > 0 and times[-1] > WALK_LIKE_TIME_FRACTION * longest
+    is_walk_like = "K" not in terms.linear and slow
+    # A ramp is fitted together with a random walk: if K is 0, the ramp replaces the walk.
+    is_walk_like |= terms.ramp and maximum.parameter("K") == 0.0
+    rare_terms = terms.ramp + ("Q" in terms.linear)
     return (
         2.0 * maximum.cost
         + terms.parameters * math.log(bins)
-        + UNIT_ROOT * like_a_walk
-        + UNLIKELY * unlikely
+        + BIC_PENALTY_UNIT_ROOT * is_walk_like
+        + BIC_PENALTY_RARE_TERM * rare_terms
     )
 
 
 def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
-    """Return candidates sorted anew, by what each model, with a ramp or without, gains."""
+    """Return the candidates with updated scores, sorted by BIC.
+
+    ``gained`` is the gain of log likelihood of each model without a ramp; the model with a ramp
+    gains as much.
+    """
     gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
     bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
     aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)
-    weights, shares = relative(bics), relative(aics)
+    weights, akaike_weights = information_weights(bics), information_weights(aics)
     return [
         replace(
             candidates[i],
             bic=float(bics[i]),
             aic=float(aics[i]),
             weight=float(weights[i]),
-            share=float(shares[i]),
+            akaike_weight=float(akaike_weights[i]),
         )
         for i in np.argsort(bics, kind="stable")
     ]
 
 
-LEAST_SHARE = 0.05
-"""Candidates of a smaller share by AIC do not enter the intervals."""
+MIN_AKAIKE_WEIGHT = 0.05
+"""Candidates with a smaller Akaike weight do not enter the intervals."""
 
 
-def relative(scores: Array) -> Array:
-    """Return the shares of models by their scores, BIC or AIC; their sum is 1."""
+def information_weights(scores: Array) -> Array:
+    """Return the weights of models from their scores, BIC or AIC: e^(-score/2), normalised to 1."""
     weights = np.exp(-0.5 * (scores - scores.min()))
     return np.asarray(weights / weights.sum())
 
 
-def disagreement(candidates: Sequence[Candidate]) -> str | None:
-    """Say so where AIC favours another model than BIC."""
+def describe_disagreement(candidates: Sequence[Candidate]) -> str | None:
+    """Return a note if AIC and BIC prefer different models, else None."""
     by_aic = min(candidates, key=lambda candidate: candidate.aic)
     chosen = candidates[0]
     if by_aic is chosen:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Maximum
@@ -25,7 +25,7 @@ _SOME_FLOOR = 0.03
 
 
 def sensor_density(
-    frame: Frame,
+    frame: FitSelection,
     maximum: Maximum,
     posterior: Posterior,
     spectrum: Spectrum,
@@ -35,7 +35,7 @@ def sensor_density(
 
     Parameters
     ----------
-    frame : Frame
+    frame : FitSelection
     maximum : Maximum
         The best fit behind the filter of the frame.
     posterior : Posterior
@@ -62,7 +62,7 @@ def sensor_density(
         fast = maximum.times < _AS_FAST / spectrum.rate
         if not fast.any():
             return None
-        whole = frame.whole(spectrum)
+        whole = frame.likelihood_of_all_bins(spectrum)
         shapes = [whole.gauss_markov(float(time))[0] for time in maximum.times[fast]]
         before = math.sqrt(N**2 + float(maximum.process_powers[fast] @ np.array(shapes)))
         reason = (

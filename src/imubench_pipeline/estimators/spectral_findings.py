@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 from scipy.special import chdtr
 
-from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.lines import MOST, Line, joined_finding
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.settings.sensor import quantity_of
@@ -37,13 +37,13 @@ _APART = 1.4
 """Ratio of the ordinates in one sum and in the next that is looked at."""
 
 
-def spectral_findings(channel: str, frame: Frame, white: float | None) -> list[Finding]:
+def spectral_findings(channel: str, frame: FitSelection, white: float | None) -> list[Finding]:
     """Return what the spectrum of a channel shows: lines, and where its band ends.
 
     Parameters
     ----------
     channel : str
-    frame : Frame
+    frame : FitSelection
         What of the spectrum was fitted.
     white : float or None
         N that the estimate of the channel has, SI; None: it has none.

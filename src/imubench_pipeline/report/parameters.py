@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import PARAMETERS, SENSOR, SHOWN
-from imubench_pipeline.estimators.model_choice import LEAST_SHARE, relative
+from imubench_pipeline.estimators.model_choice import MIN_AKAIKE_WEIGHT, information_weights
 from imubench_pipeline.model.estimates import ParameterRow, SimulatedTruthRow
 from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.report.practical import (
@@ -60,9 +60,9 @@ def model_words(channel: ChannelView, method: str) -> str:
     text = model_text(channel.parameters[method][0].model)
     if method != "likelihood" or not channel.models:
         return text
-    shares = relative(np.array([row.aic for row in channel.models]))
+    shares = information_weights(np.array([row.aic for row in channel.models]))
     others = sum(
-        share >= LEAST_SHARE and not row.chosen and "R" not in row.model.split("+")
+        share >= MIN_AKAIKE_WEIGHT and not row.chosen and "R" not in row.model.split("+")
         for share, row in zip(shares, channel.models, strict=True)
     )
     return f"{text} or {counted(others, 'other')}" if others else text

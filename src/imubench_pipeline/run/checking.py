@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
-from imubench_pipeline.estimators.frame import FEWEST_BINS, frame_of
+from imubench_pipeline.estimators.frame import MIN_BINS, select_for_fit
 from imubench_pipeline.estimators.likelihood import fit_models
 from imubench_pipeline.estimators.spectral_findings import spectral_findings
 from imubench_pipeline.estimators.spectrum import spectra
@@ -63,7 +63,7 @@ def findings_of_channel(
         # Filling holes takes a model: that is the estimation's.
         return [] if len(curve_of_channel(log, settings).tau) else [too_sparse(channel, log)]
     spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
-    frame = frame_of(spectrum, line_spectra, bandwidth=bandwidth)
-    if frame.used.sum() >= FEWEST_BINS:
+    frame = select_for_fit(spectrum, line_spectra, bandwidth=bandwidth)
+    if frame.used.sum() >= MIN_BINS:
         frame, _, _ = fit_models(spectrum, frame)
     return spectral_findings(channel, frame, None)

@@ -26,7 +26,7 @@ from imubench_pipeline.estimators.estimate import (
     Parameter,
 )
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.model_choice import disagreement
+from imubench_pipeline.estimators.model_choice import describe_disagreement
 from imubench_pipeline.estimators.rows import allan_rows, draw_rows, limit_rows, parameter_rows
 from imubench_pipeline.estimators.spectral_findings import slow_noise_missing, spectral_findings
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
@@ -304,7 +304,7 @@ def _model_rows(key: Key, fit: Likelihood) -> Iterator[ModelRow]:
 
 
 def _note(fit: Likelihood) -> str:
-    notes = [fit.candidates[0].goodness.where, disagreement(fit.candidates)]
+    notes = [fit.candidates[0].goodness.where, describe_disagreement(fit.candidates)]
     return "; ".join(note for note in notes if note)
 
 

@@ -18,10 +18,10 @@ import numpy as np
 from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators import likelihood
 from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
-from imubench_pipeline.estimators.frame import Frame, frame_of
+from imubench_pipeline.estimators.frame import FitSelection, select_for_fit
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.missing import block_means, divide_at_holes
-from imubench_pipeline.estimators.model_choice import Candidate, compare
+from imubench_pipeline.estimators.model_choice import Candidate, compare_models
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, block_of, spectra
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.estimators.thermal.path_errors import without_errors
@@ -108,9 +108,9 @@ def fit_temperature(
     when block sizes are unequal", Biometrika 58, 1971.
     """
     spans = path.segments
-    find_frame = partial(frame_of, band=band, bandwidth=bandwidth, resolution=resolution)
+    find_frame = partial(select_for_fit, band=band, bandwidth=bandwidth, resolution=resolution)
 
-    def frame(spectrum: Spectrum, lines: list[LineSpectrum]) -> Frame:
+    def frame(spectrum: Spectrum, lines: list[LineSpectrum]) -> FitSelection:
         if plain is not None and len(plain.frame.used) == len(spectrum.frequency):
             return plain.frame
         return find_frame(spectrum, lines)
@@ -197,7 +197,7 @@ class _Fit:
         rate: float,
         spans: Sequence[Span],
         path: TemperaturePath,
-        frame: Callable[[Spectrum, list[LineSpectrum]], Frame],
+        frame: Callable[[Spectrum, list[LineSpectrum]], FitSelection],
         longest_lag: float | None,
     ) -> None:
         series = BlockSeries(spans, block_of(spans))
@@ -279,7 +279,7 @@ class _Fit:
         return min((self._settle(regressors, start) for start in starts), key=lambda f: f.cost)
 
     def _compared(self, whittle: Whittle) -> Sequence[Candidate]:
-        return compare(whittle, quantization=self.quantization)
+        return compare_models(whittle, quantization=self.quantization)
 
     def _weights(self, whittle: Whittle, candidates: Sequence[Candidate]) -> Array:
         return self.chosen.ordinates / whittle.density(candidates[0].maximum)
@@ -348,7 +348,7 @@ def _described(
     plain: Likelihood,
     path: TemperaturePath,
     lines: list[LineSpectrum],
-    find_frame: Callable[[Spectrum, list[LineSpectrum]], Frame],
+    find_frame: Callable[[Spectrum, list[LineSpectrum]], FitSelection],
     rng: np.random.Generator,
 ) -> ThermalFit:
     """Return the fit as it is told, with the noise that temperature leaves.

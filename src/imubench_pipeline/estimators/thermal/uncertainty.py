@@ -230,9 +230,9 @@ def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     """
     chosen = candidates[0]
     alike = {
-        place: c.share
+        place: c.akaike_weight
         for place, c in enumerate(candidates)
-        if c is chosen or (c.share >= _LEAST_SHARE and not c.terms.ramp)
+        if c is chosen or (c.akaike_weight >= _LEAST_SHARE and not c.terms.ramp)
     }
     walks = (
         place for place, c in enumerate(candidates) if "K" in c.terms.linear and not c.terms.ramp
@@ -240,7 +240,7 @@ def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     walk = next(walks, None)
     if walk is not None:
         # What temperature takes from a walk leaves the fit without one all too easily.
-        alike.setdefault(walk, candidates[walk].share)
+        alike.setdefault(walk, candidates[walk].akaike_weight)
         alike[walk] = max(alike[walk], _LEAST_WALK * sum(alike.values()))
     total = sum(alike.values())
     return [(candidates[place], share / total) for place, share in alike.items()]

@@ -17,7 +17,7 @@ from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate
 from imubench_pipeline.estimators.identifiability import bounds_of
-from imubench_pipeline.estimators.model_choice import PAPERS
+from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import Whittle, whittle_of
 from imubench_pipeline.experiments.papers.maia_printed import DURATION, MTI_GYRO
@@ -81,7 +81,7 @@ def _estimates(number: int, before: Whittle | None) -> tuple[dict[str, Values], 
     estimates = [reading.read(curve), *(least_squares.solve(curve, method=m) for m in _FITS)]
     spectrum, _ = spectra([log], samples, _RATE)
     whittle = before.of(spectrum) if before else whittle_of(spectrum, _RATE / 2.0)
-    best = whittle.maximum(PAPERS)
+    best = whittle.maximum(PAPERS_MODEL)
     powers = [best.parameter("N"), float(best.biases[0]), float(best.times[0]), best.parameter("K")]
     by_likelihood = {
         name: value if value > 0.0 else None for name, value in zip(PARAMETERS, powers, strict=True)
