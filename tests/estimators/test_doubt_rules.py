@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.doubts import add_doubts, instead_of_walk
+from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.goodness import Goodness
@@ -134,7 +134,7 @@ def of_slope(power: float, bins: float = 8.0) -> tuple[str | None, float]:
     density = N**2 * (1.0 + (bins / (2.0 * DURATION) / f) ** power)
     whittle = whittle_of(replace(SPECTRUM, density=density), RATE / 2.0)
     maximum = whittle.maximum(Terms("NK"))
-    return instead_of_walk(whittle, maximum), maximum.parameter("K")
+    return describe_drift_alternative(whittle, maximum), maximum.parameter("K")
 
 
 def test_a_walk_is_one_by_its_slope_and_by_what_it_adds_beyond_the_lowest_cosines() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.identifiability import (
-    WANTED,
+    TARGET_RELATIVE_ERROR,
     bounds_of,
     durations_needed,
     ideal_spectrum,
@@ -284,11 +284,13 @@ def test_at_the_duration_that_is_needed_the_bound_is_ten_per_cent() -> None:
     for name, duration in zip(names[1:], needed[1:], strict=True):
         assert duration is not None
         exact = integrated(MTI_7, 100.0, duration, 10.0)[name]
-        assert exact == pytest.approx(WANTED, rel=0.02), name
+        assert exact == pytest.approx(TARGET_RELATIVE_ERROR, rel=0.02), name
     # Far less than 10 h is enough for N.
     short = durations_needed(MTI_7_FOUND, 100.0, 60.0, 10.0)
     assert short[0] is not None
-    assert bounds_of(MTI_7, 100.0, short[0], 10.0)["N"] == pytest.approx(WANTED, rel=0.03)
+    assert bounds_of(MTI_7, 100.0, short[0], 10.0)["N"] == pytest.approx(
+        TARGET_RELATIVE_ERROR, rel=0.03
+    )
     # The duration of the log itself is only where the search begins.
     assert short[1:3] == pytest.approx(needed[1:3], rel=0.02)
 
@@ -317,7 +319,9 @@ def test_durations_of_a_strong_drift_are_not_those_at_which_it_looks_like_a_rand
     found = maximum_of(Terms("NK", 1), [1e-8, 1e-12, 1e-2], 500.0)
     needed = durations_needed(found, 100.0, HOURS_10, 50.0)[2]
     assert needed is not None
-    assert integrated(model, 100.0, 31_200.0, 10.0)["B"] == pytest.approx(WANTED, rel=0.02)
+    assert integrated(model, 100.0, 31_200.0, 10.0)["B"] == pytest.approx(
+        TARGET_RELATIVE_ERROR, rel=0.02
+    )
     assert needed == pytest.approx(31_200, rel=0.03)
 
 
@@ -354,13 +358,13 @@ def test_durations_are_those_of_a_scan_of_many_lengths(model: NoiseModel) -> Non
     bounds = [bounds_of(model, 10.0, float(length), 5.0) for length in lengths]
     for name, duration in zip(parameter_names(found.terms), needed, strict=True):
         errors = np.array([bound[name] for bound in bounds])
-        enough = np.flatnonzero(errors <= WANTED)
+        enough = np.flatnonzero(errors <= TARGET_RELATIVE_ERROR)
         if not len(enough):
             assert duration is None or duration > lengths[-2], name
         elif enough[0] > 0:
             place = enough[0] - 1, enough[0]
             crossing = np.interp(
-                -np.log(WANTED), -np.log(errors[[*place]]), np.log(lengths[[*place]])
+                -np.log(TARGET_RELATIVE_ERROR), -np.log(errors[[*place]]), np.log(lengths[[*place]])
             )
             assert duration == pytest.approx(np.exp(crossing), rel=0.02), name
 

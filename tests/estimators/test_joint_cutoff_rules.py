@@ -152,7 +152,7 @@ def test_bins_are_ruled_by_the_ends_where_the_filter_leaves_less() -> None:
     flat = ideal_spectrum(RATE, 30.0, RATE / 2.0)
     steep = Filter("bilinear", 4, 5.0)
     shape = steep.white(Frequencies(flat.frequency, RATE))
-    leak = steep.leak(Frequencies(flat.frequency, RATE), flat.length)
+    leak = steep.leakage(Frequencies(flat.frequency, RATE), flat.length)
     spectrum = replace(flat, density=4.0 * (shape + leak))
     fits = FilterFits(spectrum)
     fits.slow = []

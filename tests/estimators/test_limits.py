@@ -8,7 +8,7 @@ from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.least_squares import fit
-from imubench_pipeline.estimators.limits import Errors, fit_errors, with_limits
+from imubench_pipeline.estimators.limits import Errors, add_limits, fit_errors
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from tests.conftest import few
@@ -247,7 +247,7 @@ def test_longer_logs_tell_more_parameters(samples: int, known: str) -> None:
     curve = curve_of(SENSOR, samples)
     used = everything(curve, 1 / 9)
     errors = fit_errors(curve, used, NoiseModel(**SENSOR), "weighted")
-    found = with_limits(estimate_of(SENSOR), curve, used).parameters
+    found = add_limits(estimate_of(SENSOR), curve, used).parameters
     assert [name for name in SENSOR if found[name].status == "ok"] == known.split()
     for name, truth in SENSOR.items():
         parameter, error = found[name], errors.of(name)
@@ -271,7 +271,7 @@ def test_limits_of_what_is_known_lie_about_the_value_by_two_standard_errors(meth
     curve = curve_of(SENSOR, 1_000_000)
     used = everything(curve, 1 / 9)
     errors = fit_errors(curve, used, NoiseModel(**SENSOR), method)
-    for name, parameter in with_limits(estimate_of(SENSOR, method), curve, used).parameters.items():
+    for name, parameter in add_limits(estimate_of(SENSOR, method), curve, used).parameters.items():
         assert parameter.lower is not None and parameter.upper is not None
         assert parameter.value is not None
         assert parameter.lower * parameter.upper == pytest.approx(parameter.value**2)
@@ -281,7 +281,7 @@ def test_limits_of_what_is_known_lie_about_the_value_by_two_standard_errors(meth
 
 def test_what_is_not_in_the_fit_stays_absent_without_limits() -> None:
     curve = curve_of({"N": 1.0}, 10_000)
-    found = with_limits(estimate_of({"N": 1.0}), curve, everything(curve, 1 / 9)).parameters
+    found = add_limits(estimate_of({"N": 1.0}), curve, everything(curve, 1 / 9)).parameters
     assert found["N"].status == "ok"
     for name in ("B", "T_B", "K"):
         parameter = found[name]
@@ -292,7 +292,7 @@ def test_what_is_not_in_the_fit_stays_absent_without_limits() -> None:
 def test_an_estimate_without_a_term_is_returned_as_it_is() -> None:
     curve = curve_of({"N": 1.0}, 10_000)
     estimate = estimate_of({})
-    found = with_limits(estimate, curve, everything(curve))
+    found = add_limits(estimate, curve, everything(curve))
     assert found.parameters == estimate.parameters
     assert {one.value for one in found.curve.values()} == {None}
 
@@ -301,7 +301,7 @@ def test_an_estimate_without_a_term_is_returned_as_it_is() -> None:
 def test_one_tau_tells_none_of_four_parameters(method: str) -> None:
     curve = curve_of(SENSOR, 10_000)
     used = curve.cluster_size == 10
-    found = with_limits(estimate_of(SENSOR, method), curve, used).parameters
+    found = add_limits(estimate_of(SENSOR, method), curve, used).parameters
     for name, parameter in found.items():
         assert (parameter.value, parameter.status) == (None, "not_identified")
         assert parameter.fitted == SENSOR[name]
@@ -317,7 +317,7 @@ def test_a_weak_bias_at_a_time_that_ran_into_its_bound_is_not_identified() -> No
     for name in ("B", "T_B"):
         parameters[name] = Parameter(truth[name], "at_bound", "T_B runs to the end of its search")
     curve = curve_of(truth, 100_000)
-    found = with_limits(Estimate("weighted", parameters), curve, everything(curve, 1 / 9))
+    found = add_limits(Estimate("weighted", parameters), curve, everything(curve, 1 / 9))
     for name in ("B", "T_B"):
         parameter = found.parameters[name]
         assert (parameter.value, parameter.status) == (None, "not_identified")
@@ -357,7 +357,7 @@ def test_a_process_alone_that_a_short_log_cannot_tell_has_no_value(method: str) 
     # As of a gyro that is turned: neither white noise nor a walk is there to be judged beside it.
     truth = {"B": 1.0, "T_B": 10.0}
     curve = curve_of(truth, 60, cluster_sizes(60, per_decade=10, longest=1 / 9))
-    found = with_limits(estimate_of(truth, method), curve, everything(curve))
+    found = add_limits(estimate_of(truth, method), curve, everything(curve))
     for name in ("B", "T_B"):
         assert found.parameters[name].status == "not_identified"
         assert found.parameters[name].fitted == truth[name]
@@ -376,7 +376,7 @@ def test_the_lowest_point_is_known_as_its_derivatives_say() -> None:
     curve = curve_of(SENSOR, SAMPLES)
     used = everything(curve, 1 / 9)
     model = NoiseModel(**SENSOR)
-    found = with_limits(estimate_of(SENSOR), curve, used).curve
+    found = add_limits(estimate_of(SENSOR), curve, used).curve
     fine = np.geomspace(20.0, 5_000.0, 200_001)
 
     def lowest(**changed: float) -> np.ndarray:
@@ -409,7 +409,7 @@ def test_limits_of_what_is_not_known_are_linear_but_for_a_time() -> None:
         curve = curve_of(SENSOR, samples)
         used = everything(curve, 1 / 9)
         errors = fit_errors(curve, used, NoiseModel(**SENSOR), "weighted")
-        found = with_limits(estimate_of(SENSOR), curve, used).parameters
+        found = add_limits(estimate_of(SENSOR), curve, used).parameters
         for name, value in SENSOR.items():
             one, error = found[name], errors.of(name)
             if one.status != "not_identified" or not 0.5 < error < 10.0:

@@ -72,7 +72,7 @@ def test_the_ends_of_the_transform_are_what_is_left_in_a_deep_stopband() -> None
     spectrum, _ = spectra([log], len(log), RATE)
     deep = (spectrum.frequency > 17.0) & (spectrum.frequency < 21.0)
     part = spectrum.select(deep)
-    leak = one.leak(Frequencies(part.frequency, RATE), part.length)
+    leak = one.leakage(Frequencies(part.frequency, RATE), part.length)
     assert (one.white(Frequencies(part.frequency, RATE)) < 0.2 * leak).all()
     assert np.average(part.density / leak) == pytest.approx(1.0, abs=0.3)
 
@@ -97,7 +97,7 @@ def test_the_ends_are_those_of_the_variance_of_differences(kind: Kind) -> None:
     omega = 2.0 * np.pi * FREQUENCY / RATE
     ends = 4.0 * variance / (30.0 * RATE**2) * np.cos(0.5 * omega) ** 2
     ends *= (1.0 - one.slow(AT)) ** 2 / (2.0 - 2.0 * np.cos(omega)) ** 2
-    assert one.leak(AT, length) == pytest.approx(ends, rel=1e-4)
+    assert one.leakage(AT, length) == pytest.approx(ends, rel=1e-4)
 
 
 @pytest.mark.parametrize("samples", [2, 3, 7.5])

@@ -362,7 +362,7 @@ def _ruled_by_ends(
     N = fits.density(best)[0]
     gains, low_pass = BinGains(spectrum), best.low_pass
     within = gains.white(low_pass) + rounding / N**2
-    white, leak = within.mean(axis=0), gains.leak(low_pass)
+    white, leak = within.mean(axis=0), gains.leakage(low_pass)
     rules = (leak > _ENDS_RULE * white) | (within.min(axis=0) < _STEEP * within.max(axis=0))
     return np.asarray(rules & (spectrum.density < _SOMETHING_ELSE * N**2 * (white + leak)))
 

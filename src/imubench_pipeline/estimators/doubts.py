@@ -1,9 +1,10 @@
-"""What is wrong with a fit, and which of its values may be wrong for that.
+"""Tests for ambiguous models; parameters that another model would change become doubtful.
 
-What looks like a random walk may be a drift with temperature or time (`instead_of_walk`). A drift
-that turns a few times over a log has its power in the lowest cosines of the transform, where a weak
-random walk has most of its own; beyond them, it falls as f^-4 and a walk as f^-2. So a walk is
-believed that is still needed without the lowest cosines, and whose spectrum is not steeper.
+An apparent random walk may be a drift with temperature or time (`describe_drift_alternative`). A
+drift with a few turning points in the log has its power in the lowest cosines of the transform, and
+so has a weak random walk. Above them the spectrum of the drift falls as f^-4, and the spectrum of
+the walk as f^-2. A walk is therefore accepted if the model still needs it without the lowest
+cosines, and if the spectrum is not steeper than that of a walk.
 """
 
 from __future__ import annotations
@@ -18,45 +19,56 @@ from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 
-_WORSE = 6.0
-"""BIC by which the papers' model must be the worse for the data to be against it."""
+_DELTA_BIC_AGAINST_PAPERS = 6.0
+"""BIC of the papers' model over that of the best model above which its values are doubtful."""
 
-_CLEARLY = 2.5
-"""AIC by which a model without a random walk must be the better for K to be doubted: so it is for
-three quarters of the walks that are processes of a twentieth of the log, and for 2 % of those that
-are walks."""
+_DELTA_AIC_WITHOUT_WALK = 2.5
+"""Advantage in AIC of a model without a random walk at which K is doubtful.
 
-_LITTLE = 0.25
-"""Part of K that is left beside a ramp below which the ramp may stand for the walk: so it does, and
-AIC clearly prefers it, for 1 % of the walks that are walks."""
+Of processes with a correlation time of a twentieth of the log that are fitted as a walk, three
+quarters exceed it; of true random walks, 2 % do.
+"""
 
-_HARDLY = 9.0
-"""BIC up to which a model with fewer terms may be the true one: up to so much, flicker noise beside
-a process stands for chance in one log of a few hundred."""
+_MIN_WALK_BESIDE_RAMP = 0.25
+"""K fitted with a ramp over K without it, at or below which the ramp may replace the walk.
 
-_NEEDLESS = 8.0
-"""BIC up to which quantization noise or a ramp may be chance, or part of a walk."""
+This happens, with a clearly better AIC, for 1 % of true random walks.
+"""
 
-_OTHERWISE = 4.0
-"""AIC by which a model with other terms of bias instability must be better than processes alone
-for B and T_B to be doubted."""
+_DELTA_BIC_EXTRA_TERM = 9.0
+"""Disadvantage in BIC up to which a model with fewer terms may be the true one.
 
-_AS_GOOD = 4.0
-"""BIC up to which a model without bias instability is about as good as one with it."""
+In one of a few hundred logs, flicker noise fitted together with a process gains as much by chance.
+"""
 
-_OF_DRIFT = 5
-"""Lowest cosines of a log, half a period to two and a half, that a drift is granted."""
+_DELTA_BIC_RARE_TERM = 8.0
+"""Gain in BIC up to which quantization noise or a ramp may be chance, or part of a walk."""
 
-_NEEDED = 3.0
-"""Gain, twice the log likelihood, from which a walk is needed beyond them: so it is for 97 % of the
-walks that are known to 14 to 20 %, and for one in seven of the smooth drifts that pass for one."""
+_DELTA_AIC_OTHER_BIAS_TERMS = 4.0
+"""Advantage in AIC, over Gauss-Markov processes alone, at which other terms of bias instability make
+B and T_B doubtful."""
 
-_STEEPER = 8.0
-"""The same by which a spectrum of f^-4 must be the better: so it is for 1 % of the walks, and for
-some of the drifts with sharp bends."""
+_DELTA_BIC_WITHOUT_BIAS = 4.0
+"""Disadvantage in BIC up to which a model without bias instability is about as good."""
 
-_WITHOUT = (0, 4)
-"""Lowest cosines without which the slope is looked at: chance in a few of them hides it."""
+_DRIFT_COSINES = 5
+"""Number of lowest cosines, half a period to two and a half per log, that a drift may explain."""
+
+_MIN_WALK_GAIN = 3.0
+"""Twice the gain in log likelihood from which a walk is needed above these cosines.
+
+97 % of the walks whose K is known to 14 to 20 % reach it, and one in seven of the smooth drifts
+that are fitted as a walk.
+"""
+
+_DELTA_AIC_SMOOTH_DRIFT = 8.0
+"""Advantage in AIC of a spectrum of f^-4 over f^-2 at which K is doubtful.
+
+1 % of the walks exceed it, and some of the drifts with sharp bends.
+"""
+
+_EXCLUDED_COSINES = (0, 4)
+"""Numbers of lowest cosines that are excluded from the slope test: their scatter can hide it."""
 
 
 def add_doubts(
@@ -67,29 +79,35 @@ def add_doubts(
     papers_candidate: Candidate,
     drift: str | None = None,
 ) -> tuple[Estimate, Estimate]:
-    """Return the two estimates of a likelihood with their doubts.
+    """Return the two estimates of a likelihood with doubtful parameters marked.
 
-    They are by the model that the data favour, the first of the candidates, and by the papers'
-    model, which is among them; ``drift`` says why the random walk may be a smooth drift.
+    ``estimate`` is by the best model, the first of the candidates, and ``papers`` by the papers'
+    model, which is among them. ``drift`` is the reason why the random walk may be a smooth drift.
     """
     chosen = candidates[0]
     if frame.cut:
         estimate, papers = (
             _flag_excluded_band(each, frame.band.highest) for each in (estimate, papers)
         )
-    rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
+    rival = (
+        drift
+        or _doubt_walk_by_slow_process(chosen, candidates)
+        or _doubt_walk_by_ramp(chosen, candidates)
+    )
     if rival is not None:
         estimate, papers = (cast_doubt(each, ("K",), rival) for each in (estimate, papers))
-    other = _with_fewer_terms(chosen, candidates) or _with_other_terms(chosen, candidates)
+    other = _doubt_bias_by_fewer_terms(chosen, candidates) or _doubt_bias_by_other_terms(
+        chosen, candidates
+    )
     if other is not None:
         estimate = cast_doubt(estimate, ("B", "T_B"), other, of_curve=False)
     for name in ("Q", "R"):
-        needless = _hardly_needed(name, chosen, candidates)
+        needless = _doubt_rare_term(name, chosen, candidates)
         if needless is not None:
             estimate = cast_doubt(estimate, (name,), needless)
-    estimate = _with_one_bias(estimate)
+    estimate = _equate_bias_statuses(estimate)
     against = papers_candidate.bic - chosen.bic
-    if against > _WORSE:
+    if against > _DELTA_BIC_AGAINST_PAPERS:
         reason = (
             f"the data favour {chosen.terms.name} over "
             f"{papers_candidate.terms.name} by {against:.1f} in BIC"
@@ -98,10 +116,10 @@ def add_doubts(
     return estimate, papers
 
 
-def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Say so where AIC clearly prefers a model without the random walk of the chosen one.
+def _doubt_walk_by_slow_process(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Return a reason if AIC clearly prefers a model without the random walk of the chosen one.
 
-    A slow process passes for a walk: BIC with what is asked of such a process takes the walk.
+    A slow process looks like a walk: BIC, which penalises such processes, selects the walk.
     """
     if "K" not in chosen.terms.linear:
         return None
@@ -111,7 +129,7 @@ def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str |
         if "K" not in candidate.terms.linear and not candidate.terms.ramp
     ]
     best = min(without, key=lambda candidate: candidate.aic, default=chosen)
-    if best.aic > chosen.aic - _CLEARLY:
+    if best.aic > chosen.aic - _DELTA_AIC_WITHOUT_WALK:
         return None
     return (
         f"{best.terms.name}, which has no random walk, is better by "
@@ -119,17 +137,17 @@ def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str |
     )
 
 
-def _beside_a_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Say so where AIC prefers a ramp beside the random walk, which leaves little of the walk."""
+def _doubt_walk_by_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Return a reason if AIC prefers walk and ramp, and the ramp leaves little of the walk."""
     terms = chosen.terms
     if "K" not in terms.linear or terms.ramp:
         return None
     beside = replace(terms, ramp=True)
     best = next((candidate for candidate in candidates if candidate.terms == beside), None)
-    if best is None or best.aic > chosen.aic - _CLEARLY:
+    if best is None or best.aic > chosen.aic - _DELTA_AIC_WITHOUT_WALK:
         return None
     K, least = chosen.maximum.parameter("K"), best.maximum.parameter("K")
-    if least > _LITTLE * K:
+    if least > _MIN_WALK_BESIDE_RAMP * K:
         return None
     return (
         f"{beside.name} is better by {chosen.aic - best.aic:.1f} in AIC, and the ramp leaves "
@@ -137,24 +155,27 @@ def _beside_a_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | 
     )
 
 
-def _with_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Say so where two terms of bias instability are hardly better than one, or one than none."""
+def _doubt_bias_by_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Return a reason if a model with fewer terms of bias instability is hardly worse."""
     terms, biases = chosen.terms, sum(chosen.terms.biases)
     if biases == 0:
         return None
     fewer = [candidate for candidate in candidates if sum(candidate.terms.biases) < min(biases, 2)]
     best = min(fewer, key=lambda candidate: candidate.bic, default=None)
-    if best is None or best.bic > chosen.bic + (_HARDLY if biases > 1 else _AS_GOOD):
+    if best is None or best.bic > chosen.bic + (
+        _DELTA_BIC_EXTRA_TERM if biases > 1 else _DELTA_BIC_WITHOUT_BIAS
+    ):
         return None
     worse = f"{best.terms.name} is hardly worse than {terms.name}, by "
     worse += f"{best.bic - chosen.bic:.1f} in BIC, and has "
     return worse + ("another B; B_curve is that of both" if biases > 1 else "no B")
 
 
-def _with_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Say so where AIC clearly prefers other terms of bias instability to processes without a walk.
+def _doubt_bias_by_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Return a reason if AIC clearly prefers other terms of bias instability.
 
-    BIC asks more of processes that are as slow as a walk, and may so join one to another process.
+    Only for models with processes and without a walk: BIC penalises processes as slow as a walk,
+    and may therefore merge one with another process.
     """
     best = min(candidates, key=lambda candidate: candidate.aic)
     terms = chosen.terms
@@ -163,25 +184,25 @@ def _with_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str
     if best.terms.biases == terms.biases:
         return None
     better = chosen.aic - best.aic
-    if better < _OTHERWISE:
+    if better < _DELTA_AIC_OTHER_BIAS_TERMS:
         return None
     name = best.terms.name
     return f"{name}, with other terms of bias instability, is better by {better:.1f} in AIC"
 
 
-def _hardly_needed(name: str, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Say so where a model without its quantization noise (Q) or ramp (R) is hardly worse."""
+def _doubt_rare_term(name: str, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Return a reason if the model without quantization noise (Q) or ramp (R) is hardly worse."""
     terms = chosen.terms
     without = replace(terms, linear=terms.linear.replace(name, ""), ramp=terms.ramp and name != "R")
     other = next((candidate for candidate in candidates if candidate.terms == without), None)
-    if without == terms or other is None or other.bic > chosen.bic + _NEEDLESS:
+    if without == terms or other is None or other.bic > chosen.bic + _DELTA_BIC_RARE_TERM:
         return None
     worse = f"{other.bic - chosen.bic:.1f} in BIC"
     return f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
 
 
-def _with_one_bias(estimate: Estimate) -> Estimate:
-    """Return an estimate whose bias of the curve is as sure as its only term, and the reverse."""
+def _equate_bias_statuses(estimate: Estimate) -> Estimate:
+    """Return an estimate with the same status for B_curve and B, where B is the only such term."""
     B, of_curve = estimate.parameters["B"], estimate.curve.get("B_curve")
     if estimate.further or of_curve is None:
         return estimate
@@ -202,9 +223,9 @@ def _with_one_bias(estimate: Estimate) -> Estimate:
 def cast_doubt(
     estimate: Estimate, names: Sequence[str], reason: str, *, of_curve: bool = True
 ) -> Estimate:
-    """Return an estimate whose values of some parameters are doubtful, where they are plain ones.
+    """Return an estimate with parameters of status ``ok`` made doubtful.
 
-    With B go the figures of the curve, unless ``of_curve`` is False.
+    With B, the figures of the curve become doubtful too, unless ``of_curve`` is False.
     """
 
     def doubted_in(
@@ -227,7 +248,7 @@ def cast_doubt(
 
 
 def _flag_excluded_band(estimate: Estimate, highest: float) -> Estimate:
-    """Return an estimate from which frequencies, Hz, were left out: faster processes are unseen."""
+    """Mark B as not identified where frequencies above ``highest``, Hz, were excluded."""
     B = estimate.parameters["B"]
     if B.status != "absent":
         return estimate
@@ -239,27 +260,30 @@ def _flag_excluded_band(estimate: Estimate, highest: float) -> Estimate:
     return replace(estimate, parameters={**estimate.parameters, "B": B})
 
 
-def instead_of_walk(whittle: Whittle, chosen: Maximum) -> str | None:
-    """Say so where a drift explains a spectrum about as well as its random walk does."""
+def describe_drift_alternative(whittle: Whittle, chosen: Maximum) -> str | None:
+    """Return a reason if a drift explains the spectrum about as well as the random walk does."""
     terms = chosen.terms
     if "K" not in terms.linear or chosen.parameter("K") == 0.0:
         return None
-    beyond = _beyond(whittle, _OF_DRIFT)
+    beyond = _likelihood_without_lowest_cosines(whittle, _DRIFT_COSINES)
     bare = replace(terms, linear=terms.linear.replace("K", ""))
     if len(beyond.spectrum.density) <= terms.parameters:
-        return f"the log has too few frequencies beyond the {_OF_DRIFT} lowest, which drift has too"
-    if 2.0 * (beyond.maximum(bare).cost - beyond.maximum(terms).cost) < _NEEDED:
         return (
-            f"beyond the {_OF_DRIFT} lowest frequencies {bare.name} explains the log as well, and "
-            "in these a drift with temperature or time passes for a random walk"
+            f"the log has too few frequencies beyond the {_DRIFT_COSINES} lowest, "
+            "which drift has too"
+        )
+    if 2.0 * (beyond.maximum(bare).cost - beyond.maximum(terms).cost) < _MIN_WALK_GAIN:
+        return (
+            f"beyond the {_DRIFT_COSINES} lowest frequencies {bare.name} explains the log as "
+            "well, and in these a drift with temperature or time passes for a random walk"
         )
     first = float(whittle.spectrum.frequency[0])
-    for number in _WITHOUT:
-        rest = _beyond(whittle, number)
+    for number in _EXCLUDED_COSINES:
+        rest = _likelihood_without_lowest_cosines(whittle, number)
         steep = (first / rest.spectrum.frequency) ** 2
         drift = rest.with_column("K", rest.column("K") * steep)
         better = 2.0 * (rest.maximum(terms).cost - drift.maximum(terms).cost)
-        if better > _STEEPER:
+        if better > _DELTA_AIC_SMOOTH_DRIFT:
             return (
                 f"a smooth drift, whose spectrum falls as f^-4, and {bare.name} are better by "
                 f"{better:.1f} in AIC: a drift with temperature or time passes for a random walk"
@@ -267,7 +291,7 @@ def instead_of_walk(whittle: Whittle, chosen: Maximum) -> str | None:
     return None
 
 
-def _beyond(whittle: Whittle, number: int) -> Whittle:
+def _likelihood_without_lowest_cosines(whittle: Whittle, number: int) -> Whittle:
     """Return the likelihood without the lowest cosines of each part of the log."""
     spectrum = whittle.spectrum
     place = 2.0 * spectrum.frequency * spectrum.length

@@ -11,7 +11,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.estimators.goodness import goodness
-from imubench_pipeline.estimators.low_pass import BOXCAR, Filter, Frequencies, Kind
+from imubench_pipeline.estimators.low_pass import BOXCAR_CUTOFF_LENGTH, Filter, Frequencies, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, whittle_of
 from imubench_pipeline.estimators.whittle_kernels import TOLERANCE, best_powers
@@ -105,15 +105,15 @@ class BinGains:
         """Return what is left of white noise, of flicker noise and of slow noise."""
         low_pass = trial.low_pass
         white, flicker, slow = (gain.mean(axis=0) for gain in low_pass.gains(self._within))
-        return white + self.leak(low_pass), flicker, slow
+        return white + self.leakage(low_pass), flicker, slow
 
     def white(self, low_pass: Filter) -> Array:
         """Return what is left of white noise at points within each bin, shape (6, b)."""
         return low_pass.white(self._within)
 
-    def leak(self, low_pass: Filter) -> Array:
+    def leakage(self, low_pass: Filter) -> Array:
         """Return what the ends of the transform add, of single samples."""
-        return np.where(self._single, low_pass.leak(self._mean, self._length), 0.0)
+        return np.where(self._single, low_pass.leakage(self._mean, self._length), 0.0)
 
 
 def highest_cutoff(kind: Kind, order: int, rate: float) -> float:
@@ -310,7 +310,7 @@ class FilterFits:
         if kind != "boxcar":
             return scan
         lengths = np.arange(_WHOLE, 2, -1)
-        return np.unique(np.concatenate([scan, BOXCAR * self.rate / lengths]))
+        return np.unique(np.concatenate([scan, BOXCAR_CUTOFF_LENGTH * self.rate / lengths]))
 
     def explains(self, trial: FilterTrial) -> bool:
         """Return whether the filter gives the spectrum where it bends."""

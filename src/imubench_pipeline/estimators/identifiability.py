@@ -1,4 +1,8 @@
-"""The Cramér-Rao bound of a model: what a log can tell, and how long one would have to be."""
+"""Cramér-Rao bounds of a noise model's parameters, and the log duration that they require.
+
+The information matrix is that of the Whittle likelihood: I_ij = 1/2 sum_k nu_k d_i log S_k
+d_j log S_k, with nu_k ordinates in bin k and S_k the density (P. Whittle, Ark. Mat. 2, 1953).
+"""
 
 from __future__ import annotations
 
@@ -12,11 +16,11 @@ from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-WANTED = 0.1
-"""Relative standard deviation that `durations_needed` asks for."""
+TARGET_RELATIVE_ERROR = 0.1
+"""Relative standard deviation at which `durations_needed` calls a parameter known."""
 
-_SHORTEST, _LONGEST = 1e-4, 1e4
-_A_DECADE = 6
+_MIN_DURATION_RATIO, _MAX_DURATION_RATIO = 1e-4, 1e4
+_DURATIONS_PER_DECADE = 6
 
 
 def relative_errors(whittle: Whittle, maximum: Maximum) -> Array:
@@ -28,16 +32,16 @@ def relative_errors(whittle: Whittle, maximum: Maximum) -> Array:
     sensitivity = whittle.sensitivity(maximum)
     if maximum.terms.ramp:
         sensitivity[-1] *= maximum.ramp
-    return _bounds(sensitivity)
+    return _invert_information(sensitivity)
 
 
-def _bounds(sensitivity: Array) -> Array:
+def _invert_information(sensitivity: Array) -> Array:
     """Return the square roots of the diagonal of the inverse of the information."""
     bounds = np.full(len(sensitivity), np.inf)
     size = np.linalg.norm(sensitivity, axis=1)
     sensitive = size > 1e-9
     if sensitive.any():
-        # Not from the information itself: squared, what can hardly be told apart is lost.
+        # QR of the sensitivities: forming the information would square their condition number.
         root = np.linalg.qr((sensitivity[sensitive] / size[sensitive, None]).T, mode="r")
         if np.abs(np.diag(root)).min() > 0.0:
             inverse = np.linalg.inv(root)
@@ -46,7 +50,7 @@ def _bounds(sensitivity: Array) -> Array:
 
 
 def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
-    """Return the bins of a whole log of a duration, up to a frequency, without data.
+    """Return the bins of a gapless log of a duration, up to a frequency, without data.
 
     Raises
     ------
@@ -82,13 +86,18 @@ def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
 
 
 def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -> dict[str, float]:
-    """Return the Cramér-Rao bounds of a model's parameters in a log, relative to them.
+    """Return the Cramér-Rao bounds of a model's parameters in a log, relative to their values.
 
-    By the names of `parameter_names`; lines are apart. Rate and highest frequency used are in Hz.
+    The keys are the names of `parameter_names`; spectral lines are not included. Rate
+    and highest frequency used are in Hz.
     """
-    maximum = _as_maximum(model)
+    maximum = _convert_to_maximum(model)
     spectrum = ideal_spectrum(rate, duration, highest)
-    return dict(zip(parameter_names(maximum.terms), _errors(spectrum, maximum), strict=True))
+    return dict(
+        zip(
+            parameter_names(maximum.terms), _compute_relative_errors(spectrum, maximum), strict=True
+        )
+    )
 
 
 def parameter_names(terms: Terms) -> list[str]:
@@ -103,38 +112,40 @@ def parameter_names(terms: Terms) -> list[str]:
 def durations_needed(
     maximum: Maximum, rate: float, duration: float, highest: float
 ) -> list[float | None]:
-    """Return how long a log would tell each parameter to `WANTED`, s.
+    """Return the log duration, s, that determines each parameter to `TARGET_RELATIVE_ERROR`.
 
-    In the order of `relative_errors`; None where 10,000 times the log would not do. Rate and
-    highest frequency used are in Hz.
+    In the order of `relative_errors`; None where 10,000 times the duration does not suffice. Rate
+    and highest frequency used are in Hz.
     """
     lengths = np.geomspace(
-        duration * _SHORTEST,
-        duration * _LONGEST,
-        1 + round(math.log10(_LONGEST / _SHORTEST) * _A_DECADE),
+        duration * _MIN_DURATION_RATIO,
+        duration * _MAX_DURATION_RATIO,
+        1 + round(math.log10(_MAX_DURATION_RATIO / _MIN_DURATION_RATIO) * _DURATIONS_PER_DECADE),
     )
     lengths = lengths[lengths * 2.0 * min(highest, 0.5 * rate) > 4.0 * maximum.terms.parameters]
     excesses: dict[int, Array] = {}
 
     def excess(place: int) -> Array:
         if place not in excesses:
-            errors = _errors(ideal_spectrum(rate, float(lengths[place]), highest), maximum)
-            excesses[place] = np.log(errors / WANTED)
+            errors = _compute_relative_errors(
+                ideal_spectrum(rate, float(lengths[place]), highest), maximum
+            )
+            excesses[place] = np.log(errors / TARGET_RELATIVE_ERROR)
         return excesses[place]
 
     return [
-        _crossing(np.log(lengths), excess, excesses, number)
+        _find_crossing(np.log(lengths), excess, excesses, number)
         for number in range(len(parameter_names(maximum.terms)))
     ]
 
 
-def _crossing(
+def _find_crossing(
     log_lengths: Array, excess: Callable[[int], Array], excesses: dict[int, Array], number: int
 ) -> float | None:
-    """Return the length at which the error of a parameter, which falls with it, is `WANTED`.
+    """Return the length at which the error of a parameter falls to `TARGET_RELATIVE_ERROR`.
 
-    ``excess`` gives log(error / `WANTED`) of all parameters at a place in the lengths; the search
-    begins between the places that are known already, and looks at few more.
+    ``excess`` returns log(error / `TARGET_RELATIVE_ERROR`) of all parameters at an index of the
+    lengths. The search starts from the indices in ``excesses``, which are already evaluated.
     """
     low, high = -1, len(log_lengths)
     for place, values in excesses.items():
@@ -146,7 +157,7 @@ def _crossing(
     while high - low > 1:
         place = (low + high) // 2
         if steps % 3 < 2 and excesses:
-            place = _guess(log_lengths, excesses, number, low, high)
+            place = _guess_crossing(log_lengths, excesses, number, low, high)
         if excess(place)[number] > 0.0:
             low = place
         else:
@@ -161,10 +172,12 @@ def _crossing(
     return float(np.exp(log_lengths[low] + part * (log_lengths[high] - log_lengths[low])))
 
 
-def _guess(log_lengths: Array, excesses: dict[int, Array], number: int, low: int, high: int) -> int:
-    """Return a place between two where the error may be `WANTED`.
+def _guess_crossing(
+    log_lengths: Array, excesses: dict[int, Array], number: int, low: int, high: int
+) -> int:
+    """Return an index between two where the error may be `TARGET_RELATIVE_ERROR`.
 
-    From what is known at both, or as an error falls with the square root of the length.
+    It is interpolated, or extrapolated with error ~ length^(-1/2) where only one end is known.
     """
     left = excesses[low][number] if low >= 0 else np.inf
     right = excesses[high][number] if high < len(log_lengths) else -np.inf
@@ -178,25 +191,27 @@ def _guess(log_lengths: Array, excesses: dict[int, Array], number: int, low: int
     else:
         return (low + high) // 2
     place = int(np.searchsorted(log_lengths, where))
-    # The place before the crossing, then the one after it.
+    # First the index before the crossing, then the one after it.
     return min(max(place - (low < place - 1), low + 1), high - 1)
 
 
-def _errors(spectrum: Spectrum, maximum: Maximum) -> Array:
-    """Return the relative bounds of a model in a spectrum's bins."""
+def _compute_relative_errors(spectrum: Spectrum, maximum: Maximum) -> Array:
+    """Return the relative Cramér-Rao bounds of a model, given the bins of a spectrum."""
     times = maximum.times if len(maximum.times) else np.array([1.0])
-    return relative_errors(_Exact(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0), maximum)
+    return relative_errors(
+        _UntabulatedWhittle(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0), maximum
+    )
 
 
-class _Exact(Whittle):
-    """A likelihood that is asked for few shapes of Gauss-Markov processes: no table of them."""
+class _UntabulatedWhittle(Whittle):
+    """A likelihood that computes Gauss-Markov shapes on demand, without the table of shapes."""
 
     def gauss_markov(self, time: float) -> Array:
         """Return the density of a Gauss-Markov process of B = 1 in each bin."""
         return self.shape_of.gauss_markov(time)
 
 
-def _as_maximum(model: NoiseModel) -> Maximum:
+def _convert_to_maximum(model: NoiseModel) -> Maximum:
     values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
     letters = "".join(letter for letter in "QNFK" if values[letter] > 0)
     processes = [(model.B, model.T_B)] if model.B > 0 and model.T_B else []

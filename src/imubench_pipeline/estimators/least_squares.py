@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar, nnls
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import Estimate, Parameter, not_shown
-from imubench_pipeline.estimators.limits import with_limits
+from imubench_pipeline.estimators.limits import add_limits
 from imubench_pipeline.noise import (
     PEAK_TAU,
     NoiseModel,
@@ -79,7 +79,7 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
         SI, with 95 % limits from the covariance of the Allan variances. ``absent``: the fit is
         best without the term; ``at_bound``: T_B at the end of the search, which goes as far as
         the process still peaks inside the tau used; ``not_identified``: the log cannot tell
-        the value, see `imubench_pipeline.estimators.limits.with_limits`.
+        the value, see `imubench_pipeline.estimators.limits.add_limits`.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
     ValueError
         If the method is not known.
     """
-    return with_limits(*_solved(curve, method, longest))
+    return add_limits(*_solved(curve, method, longest))
 
 
 def fit_if_possible(curve: AllanCurve, *, method: Method, longest: float) -> Estimate:

@@ -18,7 +18,7 @@ from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
 from imubench_pipeline.estimators.cutoff import Cutoff
-from imubench_pipeline.estimators.doubts import add_doubts, instead_of_walk
+from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
 from imubench_pipeline.estimators.estimate import (
     BROADBAND_TIME,
@@ -291,7 +291,7 @@ def fit_spectrum(
         frame.likelihood_of_all_bins(spectrum).density(chosen.maximum)
         + chosen.maximum.ramp**2 * spectrum.ramp
     )
-    drift = instead_of_walk(whittle, chosen.maximum)
+    drift = describe_drift_alternative(whittle, chosen.maximum)
     estimate, gauss_markov = add_doubts(estimate, gauss_markov, frame, candidates, papers, drift)
     sinusoids = carried_sinusoids(frame.lines)
     estimate = replace(estimate, lines=sinusoids, draws=of_data.joint_draws())

@@ -1,8 +1,9 @@
-"""Limits of the parameters of a weighted fit, and which of them the log can tell.
+"""Confidence limits of the parameters of a weighted fit, and the parameters that are identified.
 
-A fit weighs the Allan variances as if each stood alone. Its errors follow from their true
-covariance C, that of the fitted model, with J the derivatives of the relative Allan variance by
-the logarithms of the parameters and W the weights (the "sandwich"):
+A fit weighs the Allan variances as if they were independent. Its errors follow from their true
+covariance C under the fitted model. J are the derivatives of the relative Allan variance by the
+logarithms of the parameters, and W the weights (the "sandwich" estimator: H. White, Econometrica
+48, 1980):
 
     Cov = G C G^T,   G = (J^T W J)^-1 J^T W.
 """
@@ -29,30 +30,30 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
 
-_MOST_ERROR = 0.5
+_MAX_RELATIVE_ERROR = 0.5
 """Relative standard error beyond which a parameter is not identified."""
 
-_MOST_ERROR_TIME = 0.75
-"""That of T_B beyond which B is not identified either.
+_MAX_RELATIVE_ERROR_TIME = 0.75
+"""Relative standard error of T_B beyond which B is not identified either.
 
-The best of many T_B fits the chance waves of any curve: in white logs B alone often has a
-standard error below a half, but its T_B has one of 0.75 or less in fewer than 1 of 200.
+The best of many T_B fits the random undulations of any curve. In white logs B alone often has a
+relative standard error below 0.5, but T_B has one of 0.75 or less in fewer than 1 of 200 logs.
 """
 
-_MOST_ERROR_HELD = 0.25
-"""That of B at a T_B held at its bound, and of K with a B held that is not identified.
+_MAX_RELATIVE_ERROR_HELD = 0.25
+"""Maximum relative standard error of B with T_B fixed at its bound, and of N and K with B fixed.
 
 B^2 or K^2 is then two standard errors from 0.
 """
 
-_NOTHING_KNOWN = 10.0
-"""Relative standard errors beyond this say no more, and their limits would overflow."""
+_CLIP_RELATIVE_ERROR = 10.0
+"""Upper bound of reported relative standard errors; larger ones would overflow in the limits."""
 
-_STEP = 1e-3
-"""Of log T_B, for the derivative."""
+_LOG_TIME_STEP = 1e-3
+"""Step of log T_B in the finite difference."""
 
-_STEP_OF_LOWEST = 0.05
-"""Of the logarithm of a parameter, for the derivatives of the lowest point of the curve."""
+_LOG_PARAMETER_STEP = 0.05
+"""Step of a log parameter in the finite differences of the lowest point of the curve."""
 
 
 @dataclass(frozen=True)
@@ -65,32 +66,32 @@ class Errors:
     def of(self, name: str) -> float:
         """Return the relative standard error of a parameter, at most 10."""
         variance = float(self._at(name, name))
-        return min(math.sqrt(max(variance, 0.0)), _NOTHING_KNOWN)
+        return min(math.sqrt(max(variance, 0.0)), _CLIP_RELATIVE_ERROR)
 
     def factors(
         self, name: str, doubtful: Sequence[str], beside: float | None = None
     ) -> tuple[float, float]:
         """Return the factors from a parameter to its 95 % limits.
 
-        They hold with and without the ``doubtful`` terms: without one, the parameter moves by
-        what its correlation with the density of that term tells. ``beside`` is the standard error
-        with those terms held; by default they vary. An amplitude whose square is closer to 0
-        than 1.96 standard errors may be 0.
+        They are valid with and without the ``doubtful`` terms: without one, the parameter moves by
+        its regression on the density of that term. ``beside`` is the standard error with those
+        terms fixed; by default they vary. If the square of an amplitude is less than 1.96 standard
+        errors from 0, its lower limit is 0.
         """
         error = self.of(name) if beside is None else beside
         low, high = -SIGMAS * error, SIGMAS * error
         for term in doubtful:
-            if term == name or not self.of(term) < _NOTHING_KNOWN:
+            if term == name or not self.of(term) < _CLIP_RELATIVE_ERROR:
                 continue
             slope = self._at(name, term) / self._at(term, term)
-            # The density is the square: that it falls to 0 is -1/2 in the logarithm of the root.
+            # The density is the square: its decrease to 0 is -1/2 in the log of the amplitude.
             moved = -0.5 * slope
             rest = error
             if beside is None:
                 rest = math.sqrt(max(error**2 - slope * self._at(name, term), 0.0))
             low = min(low, moved - SIGMAS * rest)
             high = max(high, moved + SIGMAS * rest)
-        most = SIGMAS * _NOTHING_KNOWN
+        most = SIGMAS * _CLIP_RELATIVE_ERROR
         may_be_zero = name != "T_B" and 2.0 * error > 1.0 / SIGMAS
         return 0.0 if may_be_zero else math.exp(max(low, -most)), math.exp(min(high, most))
 
@@ -108,11 +109,10 @@ def fit_errors(
 ) -> Errors:
     """Return the errors of a weighted least squares fit at the values of its model.
 
-    ``used`` are the tau of the fit, ``method`` says its weights
-    (`imubench_pipeline.estimators.least_squares.fit`), and ``held`` are the parameters that it did
-    not vary.
+    ``used`` selects the tau of the fit, ``method`` its weights
+    (`imubench_pipeline.estimators.least_squares.fit`), and ``held`` are the fixed parameters.
     """
-    expected, derivatives = _derivatives(curve, used, model)
+    expected, derivatives = _differentiate_model(curve, used, model)
     names = [name for name in derivatives if name not in held]
     if not names:
         return Errors(names, np.empty((0, 0)))
@@ -127,11 +127,11 @@ def fit_errors(
     if len(columns) < len(names) or not (size > 0).all():
         return Errors(names, np.diag(np.full(len(names), np.inf)))
     gain = np.linalg.pinv(columns / size) * root / size[:, None]
-    covariance = gain @ _relative_covariance(curve, used, model) @ gain.T
+    covariance = gain @ _compute_relative_covariance(curve, used, model) @ gain.T
     return Errors(names, covariance)
 
 
-def _derivatives(
+def _differentiate_model(
     curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
 ) -> tuple[Array, dict[str, Array]]:
     """Return the model's Allan variances, and their relative derivatives by log parameters."""
@@ -144,9 +144,9 @@ def _derivatives(
     if model.B > 0 and model.T_B is not None:
         earlier, parts["B"], later = (
             NoiseModel(B=model.B, T_B=model.T_B * math.exp(step)).allan_variance(tau, rate)
-            for step in (-_STEP, 0.0, _STEP)
+            for step in (-_LOG_TIME_STEP, 0.0, _LOG_TIME_STEP)
         )
-        slope = (later - earlier) / (2.0 * _STEP)
+        slope = (later - earlier) / (2.0 * _LOG_TIME_STEP)
     if model.K > 0:
         parts["K"] = NoiseModel(K=model.K).allan_variance(tau, rate)
     expected = np.asarray(np.sum(list(parts.values()), axis=0))
@@ -156,12 +156,14 @@ def _derivatives(
     return expected, derivatives
 
 
-def _relative_covariance(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> Array:
+def _compute_relative_covariance(
+    curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
+) -> Array:
     """Return the covariance of the Allan variances over the model's, shape (m, m)."""
     sizes, rate = curve.cluster_size[used], curve.rate
     expected = model.allan_variance(curve.tau[used], rate)
     covariance = variance_covariance(model, rate, curve.samples, sizes)
-    # Holes and segments leave fewer differences, which the degrees of freedom know.
+    # Gaps and segments leave fewer differences: scale by the ratio of degrees of freedom.
     whole = [
         equivalent_degrees(int(alpha), int(n), curve.samples - 2 * int(n) + 1)
         for alpha, n in zip(curve.exponent[used], sizes, strict=True)
@@ -170,16 +172,16 @@ def _relative_covariance(curve: AllanCurve, used: NDArray[np.bool_], model: Nois
     return np.asarray(covariance * np.outer(scale, scale))
 
 
-def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -> Estimate:
-    """Return an estimate with 95 % limits, and without the values that the log cannot tell.
+def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -> Estimate:
+    """Return an estimate with 95 % limits, and without values that the log does not determine.
 
-    A parameter of a relative standard error above 50 % is ``not_identified``; so are B and T_B
-    where the T_B of the peak is not known to 75 %, and where B at a T_B that ran into its bound is
-    not known to 25 %. Beside such a B, N and K are judged as if it were held, to 25 %.
+    A parameter with a relative standard error above 50 % is ``not_identified``. So are B and T_B
+    if the error of T_B exceeds 75 %, or if T_B is at its bound and the error of B exceeds 25 %.
+    N and K are then tested with B fixed, against 25 %.
 
-    The limits of an amplitude that is not identified begin at 0; a limit is None where nothing is
-    known. A B or T_B that stays ``at_bound`` has none. In the estimate every term that is there has
-    a value; it is of the ``used`` tau.
+    The lower limit of an amplitude that is not identified is 0; a limit is None where it cannot be
+    bounded. A B or T_B that stays ``at_bound`` has no limits. ``estimate`` must have a value for
+    every term of its model; ``used`` selects the tau that were fitted.
     """
     model = estimate.model
     if not model.terms:
@@ -192,19 +194,21 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
     unknown: dict[str, str] = {}
     if estimate.parameters["T_B"].status == "at_bound":
         errors_at_bound = fit_errors(curve, used, model, estimate.method, held=["T_B"])
-        unknown = _unknown_at_bound(errors_at_bound.of("B"))
+        unknown = _explain_unknown_at_bound(errors_at_bound.of("B"))
     elif "B" in errors.names:
-        unknown = _unknown_bias(errors.of("B"), errors.of("T_B"))
+        unknown = _explain_unknown_bias(errors.of("B"), errors.of("T_B"))
     apart = errors
     if "B" in unknown:
         apart = fit_errors(curve, used, model, estimate.method, held=["B", "T_B"])
     for name in ("N", "K"):
-        if name not in errors.names or errors.of(name) <= _MOST_ERROR:
+        if name not in errors.names or errors.of(name) <= _MAX_RELATIVE_ERROR:
             continue
-        if "B" in unknown and apart.of(name) <= _MOST_ERROR_HELD:
-            # What the curve shows is this term; only a B that it does not show could replace it.
+        if "B" in unknown and apart.of(name) <= _MAX_RELATIVE_ERROR_HELD:
+            # The term is visible; only a B that is not identified could replace it.
             continue
-        unknown[name] = f"its relative standard error is {_percent(errors.of(name))}, above 50 %"
+        unknown[name] = (
+            f"its relative standard error is {_format_percent(errors.of(name))}, above 50 %"
+        )
     doubtful = [name for name in ("B", "K") if name in unknown]
     parameters = dict(estimate.parameters)
     for name, parameter in estimate.parameters.items():
@@ -212,14 +216,14 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
             continue
         parameters[name] = replace(parameter, fitted=parameter.value)
         if name in unknown:
-            lower, upper = _wide_limits(name, parameter.value, errors)
+            lower, upper = _compute_wide_limits(name, parameter.value, errors)
             reason = f"{parameter.reason}; {unknown[name]}" if parameter.reason else unknown[name]
             parameters[name] = Parameter(
                 None, "not_identified", reason, lower, upper, fitted=parameter.value
             )
         elif parameter.status == "ok":
-            # Beyond a half it has a value only as what the curve shows beside a doubtful B.
-            error_beside_bias = apart.of(name) if errors.of(name) > _MOST_ERROR else None
+            # Above 50 % the parameter has a value only with the doubtful B fixed.
+            error_beside_bias = apart.of(name) if errors.of(name) > _MAX_RELATIVE_ERROR else None
             low, high = errors.factors(name, doubtful, error_beside_bias)
             parameters[name] = replace(
                 parameters[name], lower=parameter.value * low, upper=parameter.value * high
@@ -231,11 +235,13 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
     return Estimate(
         estimate.method,
         parameters,
-        curve={"B_curve": bias} | _lowest_point(model, errors, curve),
+        curve={"B_curve": bias} | _estimate_lowest_point(model, errors, curve),
     )
 
 
-def _lowest_point(model: NoiseModel, errors: Errors, curve: AllanCurve) -> dict[str, Parameter]:
+def _estimate_lowest_point(
+    model: NoiseModel, errors: Errors, curve: AllanCurve
+) -> dict[str, Parameter]:
     """Return the lowest point of the fitted curve, with limits from the errors of the fit."""
     tau = averaging_times(curve.rate, curve.samples / curve.rate)
     best = models_of(model)
@@ -247,16 +253,18 @@ def _lowest_point(model: NoiseModel, errors: Errors, curve: AllanCurve) -> dict[
     ends = []
     for sign in (-1.0, 1.0):
         moved = [
-            models_of(replace(model, **{name: value * math.exp(sign * _STEP_OF_LOWEST)}))
+            models_of(replace(model, **{name: value * math.exp(sign * _LOG_PARAMETER_STEP)}))
             for name, value in zip(errors.names, at, strict=True)
         ]
         ends.append([lowest_point(models, tau)[:2] for models in moved])
-    slopes = np.log(np.array(ends[1]) / np.array(ends[0]))[:, :, 0].T / (2.0 * _STEP_OF_LOWEST)
+    slopes = np.log(np.array(ends[1]) / np.array(ends[0]))[:, :, 0].T / (2.0 * _LOG_PARAMETER_STEP)
     described = {}
     for (name, parameter), slope in zip(lowest.items(), slopes, strict=True):
-        error = min(math.sqrt(max(float(slope @ errors.covariance @ slope), 0.0)), _NOTHING_KNOWN)
-        if error > _MOST_ERROR:
-            reason = f"its relative standard error is {_percent(error)}, above 50 %"
+        error = min(
+            math.sqrt(max(float(slope @ errors.covariance @ slope), 0.0)), _CLIP_RELATIVE_ERROR
+        )
+        if error > _MAX_RELATIVE_ERROR:
+            reason = f"its relative standard error is {_format_percent(error)}, above 50 %"
             described[name] = Parameter(None, "not_identified", reason, fitted=parameter.value)
             continue
         factor = math.exp(SIGMAS * error)
@@ -267,44 +275,49 @@ def _lowest_point(model: NoiseModel, errors: Errors, curve: AllanCurve) -> dict[
     return described
 
 
-def _unknown_at_bound(error: float) -> dict[str, str]:
-    """Return why B and a T_B at its bound are not identified, if so, by the error of B there."""
-    if error <= _MOST_ERROR_HELD:
+def _explain_unknown_at_bound(error: float) -> dict[str, str]:
+    """Return reasons if B and a T_B at its bound are not identified, from the error of B there."""
+    if error <= _MAX_RELATIVE_ERROR_HELD:
         return {}
-    reason = f"the relative standard error of B there is {_percent(error)}, above 25 %"
+    reason = f"the relative standard error of B there is {_format_percent(error)}, above 25 %"
     return {"B": reason, "T_B": reason}
 
 
-def _unknown_bias(error: float, error_of_time: float) -> dict[str, str]:
-    """Return why B and T_B are not identified, by their errors: both, T_B or none."""
-    of_time = f"the relative standard error of T_B is {_percent(error_of_time)}"
-    if error > _MOST_ERROR:
-        of_bias = f"the relative standard error of B is {_percent(error)}, above 50 %"
+def _explain_unknown_bias(error: float, error_of_time: float) -> dict[str, str]:
+    """Return reasons if B and T_B, or T_B alone, are not identified, from their errors."""
+    of_time = f"the relative standard error of T_B is {_format_percent(error_of_time)}"
+    if error > _MAX_RELATIVE_ERROR:
+        of_bias = f"the relative standard error of B is {_format_percent(error)}, above 50 %"
         return {"B": of_bias, "T_B": f"{of_bias}; {of_time}"}
-    if error_of_time > _MOST_ERROR_TIME:
+    if error_of_time > _MAX_RELATIVE_ERROR_TIME:
         no_peak = "no peak of a Gauss-Markov process is shown"
         return {
-            "B": f"{no_peak}: the relative standard error of B is {_percent(error)}, but {of_time}",
+            "B": (
+                f"{no_peak}: the relative standard error of B is {_format_percent(error)}, "
+                f"but {of_time}"
+            ),
             "T_B": f"{no_peak}: {of_time}",
         }
-    if error_of_time > _MOST_ERROR:
+    if error_of_time > _MAX_RELATIVE_ERROR:
         return {"T_B": f"{of_time}, above 50 %"}
     return {}
 
 
-def _percent(error: float) -> str:
-    if error >= _NOTHING_KNOWN:
-        return f"{100.0 * _NOTHING_KNOWN:.0f} % or more"
+def _format_percent(error: float) -> str:
+    if error >= _CLIP_RELATIVE_ERROR:
+        return f"{100.0 * _CLIP_RELATIVE_ERROR:.0f} % or more"
     return f"{100.0 * error:.0f} %"
 
 
-def _wide_limits(name: str, value: float, errors: Errors) -> tuple[float | None, float | None]:
-    """Return limits of what is not identified: an amplitude may be 0.
+def _compute_wide_limits(
+    name: str, value: float, errors: Errors
+) -> tuple[float | None, float | None]:
+    """Return limits of a parameter that is not identified; an amplitude may be 0.
 
-    Its upper limit is linear in the amplitude: with a logarithm it would run away.
+    The upper limit is linear in the amplitude, because a logarithmic one would diverge.
     """
     error = errors.of(name)
-    limited = error < _NOTHING_KNOWN
+    limited = error < _CLIP_RELATIVE_ERROR
     if name == "T_B":
         low, high = errors.factors(name, [])
         return (value * low, value * high) if limited else (None, None)
