@@ -39,8 +39,11 @@ from scipy.signal import lfilter
 from scipy.special import logsumexp
 
 from imubench_pipeline.estimators import likelihood
-from imubench_pipeline.estimators.deterministic.courses import Courses, find_courses
-from imubench_pipeline.estimators.deterministic.verdict import verdict_of
+from imubench_pipeline.estimators.deterministic.courses import (
+    DeterministicSignals,
+    find_deterministic_signals,
+)
+from imubench_pipeline.estimators.deterministic.verdict import assess_signals
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
@@ -179,9 +182,9 @@ def _inside(rng: Rng) -> float:
     return float(rng.uniform(0.1, 0.9))
 
 
-def searched(log: Array, rate: float) -> Courses:
+def searched(log: Array, rate: float) -> DeterministicSignals:
     """Search a log as the step ``estimate`` does."""
-    return find_courses(lambda: [log], len(log), rate)
+    return find_deterministic_signals(lambda: [log], len(log), rate)
 
 
 def found(logs: int, first: int) -> None:
@@ -196,7 +199,7 @@ def found(logs: int, first: int) -> None:
                 place = rng.uniform(0.05, 0.95) * hours * 3600.0
                 log[round(place * rate) :] += size * sigma
                 near = 0
-                for course in searched(log, rate).courses:
+                for course in searched(log, rate).signals:
                     away = abs(course.start - place) < 2.0 * noise.processes[0][1]
                     if course.kind == "bias_step" and away and not near:
                         near = 1
@@ -265,10 +268,10 @@ def false(logs: int, first: int) -> None:
                 log = noise.log(_stream(name, hours, i), rate, hours)
                 start = time.perf_counter()
                 courses = searched(log, rate)
-                verdict = verdict_of("gyro_x", "rad/s", courses)
+                verdict = assess_signals("gyro_x", "rad/s", courses)
                 spent += time.perf_counter() - start
                 counts["logs"] += 1
-                counts["with a course"] += bool(courses.courses) or courses.telegraph
+                counts["with a course"] += bool(courses.signals) or courses.telegraph
                 counts["with a finding"] += bool(verdict.findings)
                 for finding in verdict.findings:
                     counts[finding.finding] += 1
@@ -285,7 +288,7 @@ def drift(logs: int, first: int) -> None:
         counts: Counter[str] = Counter()
         for i in range(first, first + logs):
             log, _ = _changed(name, change, i)
-            verdict = verdict_of("gyro_x", "rad/s", searched(log, RATE))
+            verdict = assess_signals("gyro_x", "rad/s", searched(log, RATE))
             counts["logs"] += 1
             names = {finding.finding for finding in verdict.findings}
             counts["named"] += expected in names
@@ -309,7 +312,7 @@ def walk(logs: int, first: int) -> None:
         for i in range(first, first + logs):
             log, _ = _changed(name, change, i)
             courses = searched(log, RATE)
-            less = np.concatenate(list(courses.less([log])))
+            less = np.concatenate(list(courses.subtract_from([log])))
             for which, samples in (("as it is", log), ("less what is found", less)):
                 K = likelihood.fit(samples, RATE).estimates[0].parameters["K"]
                 if K.lower is not None and K.upper is not None:

@@ -1,4 +1,4 @@
-"""The parts of a course's description, each by its definition."""
+"""The parts of a signal's description, each by its definition."""
 
 from dataclasses import replace
 
@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.deterministic.courses import (
-    Courses,
-    _change_point,
+    DeterministicSignals,
+    _compute_walk_leverage,
     _describe,
-    _leverage_on_walk,
-    _limits,
+    _find_change_point,
+    _find_limits,
     _place_steps,
 )
-from imubench_pipeline.estimators.deterministic.means import Means, Part, means_of
-from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, covariance_of_sizes
+from imubench_pipeline.estimators.deterministic.means import Means, Part, block_means
+from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, average_covariance
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
-from imubench_pipeline.estimators.deterministic.search import Searched
+from imubench_pipeline.estimators.deterministic.search import SearchResult
 from tests.deterministic.logs import RATE
 
 
@@ -32,7 +32,7 @@ def test_the_first_sample_of_the_second_level_is_found_by_its_squares(at: int) -
         return float(sum(np.nansum((half - np.nanmean(half)) ** 2) for half in halves))
 
     squares = [left(place) for place in range(1, 40)]
-    assert left(_change_point(samples)) == pytest.approx(min(squares))
+    assert left(_find_change_point(samples)) == pytest.approx(min(squares))
 
 
 @pytest.mark.parametrize(("size", "placed"), [(8.5, True), (7.5, False)])
@@ -41,10 +41,10 @@ def test_a_step_is_placed_to_the_sample_from_eight_errors_of_a_block_on(
 ) -> None:
     rng = np.random.default_rng(1)
     log = rng.standard_normal(40_000)
-    means = means_of([log], len(log), RATE)
+    means = block_means([log], len(log), RATE)
     white = np.sqrt(np.median(means.parts[0].power) / means.block)
     log += size * white * (np.arange(40_000) >= 20_003)
-    fit = Ordinates(means_of([log], len(log), RATE)).fit([Regressor("step", 0, 2000.0)])
+    fit = Ordinates(block_means([log], len(log), RATE)).fit([Regressor("step", 0, 2000.0)])
     fit = replace(fit, sizes=np.array([size * white]))
     (step,) = _place_steps(lambda: np.array_split(log, 7), means, fit)
     assert (step.where != 2000.0) is placed
@@ -63,13 +63,13 @@ def test_a_course_has_limits_where_the_likelihood_has_lost_half_of_chi_squared()
         X = np.column_stack([np.exp(-blocks / time), np.ones(n)])
         return float(np.sum((values - values.mean()) ** 2) - np.linalg.lstsq(X, values)[1][0])
 
-    low, high = _limits(ordinates, fit, warm)
+    low, high = _find_limits(ordinates, fit, warm)
     # In steps that grow by a half: the first beyond.
     for end in (low, high):
         assert gain(500.0) - gain(end) > 3.84
         assert gain(500.0) - gain(500.0 + (end - 500.0) / 1.5) < 3.84
     pause = Regressor("restart", 0, 100.0, 8.0)
-    assert _limits(ordinates, fit, pause) == (96.0, 104.0)
+    assert _find_limits(ordinates, fit, pause) == (96.0, 104.0)
 
 
 def test_what_regressors_take_of_the_lowest_ordinates_they_take_of_a_walk() -> None:
@@ -78,7 +78,7 @@ def test_what_regressors_take_of_the_lowest_ordinates_they_take_of_a_walk() -> N
     leverage = np.array([0.9, 0.3, 1.0, 1.0, 0.0, 0.0, 0.0])
     # No noise is fitted: what is asked of the fit does not use it.
     fit = Fit((), nothing, nothing, None, density, nothing, leverage, 0.0)  # type: ignore[arg-type]  # no noise
-    assert _leverage_on_walk(fit) == pytest.approx(0.6, rel=1e-3)
+    assert _compute_walk_leverage(fit) == pytest.approx(0.6, rel=1e-3)
 
 
 def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
@@ -96,10 +96,10 @@ def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
     values = sizes @ rows + rng.standard_normal(n)
     ordinates = Ordinates(Means(block, RATE, (Part(500, values, np.ones(n), 0.0),)))
     fit = ordinates.fit(kinds)
-    searched = Searched(fit, fit, (1.0, 2.0, 3.0, 4.0, 5.0), False)
+    searched = SearchResult(fit, fit, (1.0, 2.0, 3.0, 4.0, 5.0), False)
     step, warm, drift, restart = _describe(ordinates, searched)
     interval, start = block / RATE, 500 / RATE
-    covariance = covariance_of_sizes(ordinates, fit)
+    covariance = average_covariance(ordinates, fit)
     assert [one.gain for one in (step, warm, drift, restart)] == [1.0, 2.0, 3.0, 5.0]
     assert step.start == step.end == pytest.approx(start + 700.25 * interval)
     assert restart.start == pytest.approx(start + 1200.0 * interval)
@@ -108,7 +108,7 @@ def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
     assert warm.time == pytest.approx(150.0 * interval)
     assert drift.time == pytest.approx(interval / 0.005)
     for one, regressor in ((step, kinds[0]), (warm, kinds[1]), (drift, kinds[2])):
-        low, high = _limits(ordinates, fit, regressor)
+        low, high = _find_limits(ordinates, fit, regressor)
         if one is step:
             assert one.place_error == pytest.approx(0.5 * (high - low) * interval)
             assert one.time is None
@@ -127,15 +127,15 @@ def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
     along = fit.sizes[2:4] / drift.size
     least = 1.96 * np.sqrt(along @ covariance[2:4, 2:4] @ along)
     spread = []
-    for where in _limits(ordinates, fit, kinds[2]):
+    for where in _find_limits(ordinates, fit, kinds[2]):
         moved = [replace(x, where=where) if x is kinds[2] else x for x in kinds]
-        spread.append(np.hypot(*ordinates.solved(moved, fit.density)[0][2:4]))
+        spread.append(np.hypot(*ordinates.solve(moved, fit.density)[0][2:4]))
     half = 0.5 * np.ptp([drift.size, *spread])
     assert drift.size_upper - drift.size == pytest.approx(np.hypot(least, half))
     # At samples: of its own part alone, a block's middle after half a block.
     other = Part(500 + (n + 50) * block, np.zeros(200), np.ones(200), 0.0)
     means = replace(ordinates.means, parts=(*ordinates.means.parts, other))
-    found = Courses((step, warm, drift, restart), means, searched)
+    found = DeterministicSignals((step, warm, drift, restart), means, searched)
     at = found.at(0, 25_000)
     assert not at[:500].any() and not at[other.start :].any()
     t = (np.arange(500, other.start) + 0.5 - 500) / block
@@ -144,7 +144,7 @@ def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
     expected += fit.sizes[5] * (t >= 1200.0)
     np.testing.assert_allclose(at[500 : other.start], expected, atol=1e-9)
     np.testing.assert_allclose(found.at(1_234, 9_876), at[1_234:9_876])
-    left = np.concatenate(list(found.less(np.array_split(np.ones(25_000), 9))))
+    left = np.concatenate(list(found.subtract_from(np.array_split(np.ones(25_000), 9))))
     np.testing.assert_allclose(left, 1.0 - at)
     rest = found.without().parts[0].mean
     np.testing.assert_allclose(rest, values - np.delete(fit.sizes, 4) @ np.delete(rows, 4, axis=0))

@@ -4,25 +4,32 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.deterministic.courses import Courses, find_courses
+from imubench_pipeline.estimators.deterministic.courses import (
+    DeterministicSignals,
+    find_deterministic_signals,
+)
 from tests.conftest import few
 from tests.deterministic.logs import RATE, SIGMA, K, static_log, times
 
 Array = NDArray[np.float64]
 
 
-def courses_of(log: Array, segments: tuple[tuple[int, int], ...] | None = None) -> Courses:
-    return find_courses(lambda: [log[:70_000], log[70_000:]], len(log), RATE, segments=segments)
+def signals_in(
+    log: Array, segments: tuple[tuple[int, int], ...] | None = None
+) -> DeterministicSignals:
+    return find_deterministic_signals(
+        lambda: [log[:70_000], log[70_000:]], len(log), RATE, segments=segments
+    )
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("walk", few([K], [0.0, 3e-5]))
 def test_a_log_of_noise_alone_has_none(walk: float) -> None:
     log = static_log(3, walk=walk)
-    found = courses_of(log)
-    assert found.courses == ()
+    found = signals_in(log)
+    assert found.signals == ()
     assert not found.telegraph
-    assert np.concatenate(list(found.less([log]))) == pytest.approx(log, abs=0.0)
+    assert np.concatenate(list(found.subtract_from([log]))) == pytest.approx(log, abs=0.0)
 
 
 def test_flicker_noise_has_none() -> None:
@@ -32,7 +39,7 @@ def test_flicker_noise_has_none() -> None:
     normal = rng.standard_normal((2, len(frequency)))
     scale = np.sqrt(0.5 * density * 400_000 * RATE)
     log = np.fft.irfft(scale * (normal[0] + 1j * normal[1]))[:200_000]
-    assert courses_of(log + 1e-5 * rng.standard_normal(len(log))).courses == ()
+    assert signals_in(log + 1e-5 * rng.standard_normal(len(log))).signals == ()
 
 
 @pytest.mark.release
@@ -40,30 +47,30 @@ def test_steps_are_found_with_their_sizes_and_places() -> None:
     log = static_log(5)
     truth = [(2500.0, 4.0 * SIGMA), (6000.0, -5.0 * SIGMA)]
     stepped = log + sum(size * (times(log) >= place) for place, size in truth)
-    found = courses_of(stepped)
-    assert [course.kind for course in found.courses] == ["bias_step"] * 2
-    for course, (place, size) in zip(
-        sorted(found.courses, key=lambda one: one.start), truth, strict=True
+    found = signals_in(stepped)
+    assert [signal.kind for signal in found.signals] == ["bias_step"] * 2
+    for signal, (place, size) in zip(
+        sorted(found.signals, key=lambda one: one.start), truth, strict=True
     ):
-        assert course.size_lower < size < course.size_upper
-        assert course.start == pytest.approx(place, abs=10.0)
-        assert course.place_error is not None and 0.0 < course.place_error < 30.0
-    left = np.concatenate(list(found.less([stepped]))) - log
+        assert signal.size_lower < size < signal.size_upper
+        assert signal.start == pytest.approx(place, abs=10.0)
+        assert signal.place_error is not None and 0.0 < signal.place_error < 30.0
+    left = np.concatenate(list(found.subtract_from([stepped]))) - log
     assert np.std(left) < 0.3 * SIGMA
 
 
 def test_a_step_far_beyond_the_noise_is_placed_to_the_sample() -> None:
     log = static_log(6)
-    found = courses_of(log + 0.1 * (times(log) >= 4000.35))
-    (step,) = found.courses
+    found = signals_in(log + 0.1 * (times(log) >= 4000.35))
+    (step,) = found.signals
     assert step.size == pytest.approx(0.1, rel=0.01)
-    left = np.concatenate(list(found.less([log + 0.1 * (times(log) >= 4000.35)]))) - log
+    left = np.concatenate(list(found.subtract_from([log + 0.1 * (times(log) >= 4000.35)]))) - log
     assert np.ptp(left) < 3.0 * SIGMA
 
 
 def test_a_warm_up_is_found_with_its_time_constant() -> None:
     log = static_log(7)
-    (warm,) = courses_of(log + 20.0 * SIGMA * np.exp(-times(log) / 600.0)).courses
+    (warm,) = signals_in(log + 20.0 * SIGMA * np.exp(-times(log) / 600.0)).signals
     assert warm.kind == "warm_up_drift"
     assert warm.size_lower < 20.0 * SIGMA < warm.size_upper
     assert warm.time_lower is not None
@@ -73,9 +80,9 @@ def test_a_warm_up_is_found_with_its_time_constant() -> None:
 
 def test_periodic_drift_is_found_with_its_period() -> None:
     log = static_log(8)
-    (drift,) = courses_of(
+    (drift,) = signals_in(
         log + 3.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 1200.0 + 1.0)
-    ).courses
+    ).signals
     assert drift.kind == "periodic_drift"
     assert drift.size_lower < 3.0 * SIGMA < drift.size_upper
     assert drift.time == pytest.approx(1200.0, rel=0.01)
@@ -85,9 +92,9 @@ def test_periodic_drift_is_found_with_its_period() -> None:
 def test_telegraph_noise_is_named_and_left() -> None:
     log = static_log(9, hours=1.5)
     flips = np.cumsum(np.random.default_rng(1).random(len(log)) < 1.0 / 300.0 / RATE) % 2
-    found = courses_of(log + 8.0 * SIGMA * flips)
+    found = signals_in(log + 8.0 * SIGMA * flips)
     assert found.telegraph
-    assert found.courses == ()
+    assert found.signals == ()
 
 
 def test_a_step_between_segments_is_none_and_one_inside_is_found() -> None:
@@ -95,7 +102,7 @@ def test_a_step_between_segments_is_none_and_one_inside_is_found() -> None:
     half = len(log) // 2
     log[half:] += 1.0
     log += 5.0 * SIGMA * (times(log) >= 3000.0)
-    (step,) = courses_of(log, ((0, half), (half, len(log)))).courses
+    (step,) = signals_in(log, ((0, half), (half, len(log)))).signals
     assert step.start == pytest.approx(3000.0, abs=10.0)
     assert step.size_lower < 5.0 * SIGMA < step.size_upper
 
@@ -106,17 +113,17 @@ def test_steps_are_found_among_missing_samples() -> None:
     rng = np.random.default_rng(2)
     log[rng.random(len(log)) < 0.05] = np.nan
     log[90_000:110_000] = np.nan
-    (step,) = courses_of(log).courses
+    (step,) = signals_in(log).signals
     assert step.size_lower < 5.0 * SIGMA < step.size_upper
 
 
 def test_a_log_too_short_to_be_searched_has_none() -> None:
-    assert courses_of(np.random.default_rng(3).standard_normal(100)).courses == ()
+    assert signals_in(np.random.default_rng(3).standard_normal(100)).signals == ()
 
 
 def test_a_part_of_a_cycle_is_found_though_a_walk_would_hide_it() -> None:
     log = static_log(12, walk=0.0)
-    (drift,) = courses_of(log + 40.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0)).courses
+    (drift,) = signals_in(log + 40.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0)).signals
     assert drift.kind == "periodic_drift"
     assert drift.time_lower is not None
     assert drift.time_upper is not None
@@ -126,8 +133,8 @@ def test_a_part_of_a_cycle_is_found_though_a_walk_would_hide_it() -> None:
 
 def test_a_weak_part_of_a_cycle_rivals_the_walk_that_it_looks_like() -> None:
     log = static_log(12, walk=0.0)
-    found = courses_of(log + 3.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0))
-    assert found.courses == ()
+    found = signals_in(log + 3.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0))
+    assert found.signals == ()
     assert "periodic drift" in (found.against_random_walk or "")
 
 
@@ -144,23 +151,23 @@ def with_pauses(log: Array, size: float) -> Array:
 @pytest.mark.parametrize("seed", few([30], [31, 32, 33]))
 @pytest.mark.parametrize("size", few([3.0], [1.0, 20.0]))
 def test_another_bias_after_each_pause_is_no_random_walk(seed: int, size: float) -> None:
-    found = courses_of(with_pauses(static_log(seed, walk=0.0), size * SIGMA))
+    found = signals_in(with_pauses(static_log(seed, walk=0.0), size * SIGMA))
     assert found.searched is not None
     K_left = found.searched.fit.noise.parameter("K")
     # Steps of 20 sigma look like 3.5e-5; a log of noise alone may show a little.
-    alone = courses_of(static_log(seed, walk=0.0)).searched
+    alone = signals_in(static_log(seed, walk=0.0)).searched
     assert alone is not None
     told = "pauses" in (found.against_random_walk or "")
     assert told or K_left < 2.0 * alone.fit.noise.parameter("K") + 2e-6
     if size >= 20.0:
-        assert {course.kind for course in found.courses} == {"bias_step"}
-        inside = [round((course.start / 10_800 - 0.1) / 0.16, 1) % 1 for course in found.courses]
+        assert {signal.kind for signal in found.signals} == {"bias_step"}
+        inside = [round((signal.start / 10_800 - 0.1) / 0.16, 1) % 1 for signal in found.signals]
         assert inside == [0.0] * len(inside)
 
 
 def test_a_walk_through_pauses_stays_one() -> None:
     for seed in (21, 22):
-        found = courses_of(with_pauses(static_log(seed, walk=2e-5), 0.0))
+        found = signals_in(with_pauses(static_log(seed, walk=2e-5), 0.0))
         assert found.against_random_walk is None
         assert found.searched is not None
         assert found.searched.fit.noise.parameter("K") > 1e-5
@@ -168,4 +175,4 @@ def test_a_walk_through_pauses_stays_one() -> None:
 
 def test_a_walk_that_is_well_seen_has_no_rival() -> None:
     for seed in (20, 21):
-        assert courses_of(static_log(seed, walk=2e-5)).against_random_walk is None
+        assert signals_in(static_log(seed, walk=2e-5)).against_random_walk is None

@@ -1,4 +1,4 @@
-"""Ordinates, their bins, and sizes of courses, against plain least squares and integrals."""
+"""Ordinates, their bins, and sizes of signals, against plain least squares and integrals."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,8 @@ from imubench_pipeline.estimators.deterministic.halves import compare_halves
 from imubench_pipeline.estimators.deterministic.means import Means, Part
 from imubench_pipeline.estimators.deterministic.ordinates import (
     Ordinates,
-    _log_determinant,
-    covariance_of_sizes,
+    _compute_log_determinant,
+    average_covariance,
 )
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.whittle import Maximum, Terms
@@ -36,7 +36,7 @@ def test_amplitudes_are_those_of_weighted_least_squares_in_each_part(rng) -> Non
     np.testing.assert_allclose(ordinates.length, np.repeat([50.0, 75.0], [99, 149]))
     density = 1.0 + 0.1 / k
     steps = [Regressor("step", 0, 30.0), Regressor("sinusoid", 0, 0.02), Regressor("step", 1, 70.5)]
-    sizes, covariance, residual, leverage = ordinates.solved(steps, density)
+    sizes, covariance, residual, leverage = ordinates.solve(steps, density)
     X = np.zeros((4, 248))
     X[0, :99], X[1:3, :99] = dct(steps[0].means(100)[0]), dct(steps[1].means(100))
     X[3, 99:] = dct(steps[2].means(150)[0])
@@ -75,8 +75,8 @@ def test_bins_are_means_of_ordinates_by_what_they_count(rng) -> None:
 
 
 def test_a_log_of_few_ordinates_or_of_one_value_is_not_usable(rng) -> None:
-    assert of(rng.standard_normal(65)).usable and not of(rng.standard_normal(64)).usable
-    assert not of(np.ones(100)).usable
+    assert of(rng.standard_normal(65)).is_usable and not of(rng.standard_normal(64)).is_usable
+    assert not of(np.ones(100)).is_usable
 
 
 def test_errors_are_averaged_over_the_walks_that_the_log_allows(rng) -> None:
@@ -105,7 +105,7 @@ def test_errors_are_averaged_over_the_walks_that_the_log_allows(rng) -> None:
     mean = np.trapezoid(weight * size, x) / mass
     expected = np.trapezoid(weight * (variance + (size - mean) ** 2), x) / mass
     # A sum over two dozen walks stands for the integral.
-    assert covariance_of_sizes(ordinates, fit)[0, 0] == pytest.approx(expected, rel=0.05)
+    assert average_covariance(ordinates, fit)[0, 0] == pytest.approx(expected, rel=0.05)
 
 
 def test_two_halves_have_each_their_slow_noise(rng) -> None:
@@ -142,4 +142,6 @@ def test_two_halves_have_each_their_slow_noise(rng) -> None:
 def test_the_determinant_of_amplitudes_of_any_unit(rng) -> None:
     root = rng.standard_normal((3, 3)) * np.array([1e-6, 1.0, 1e3])
     covariance = root.T @ root
-    assert _log_determinant(covariance) == pytest.approx(np.linalg.slogdet(covariance)[1], abs=1e-3)
+    assert _compute_log_determinant(covariance) == pytest.approx(
+        np.linalg.slogdet(covariance)[1], abs=1e-3
+    )

@@ -4,21 +4,25 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from imubench_pipeline.estimators.deterministic.means import means_of
+from imubench_pipeline.estimators.deterministic.means import block_means
 from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
-from imubench_pipeline.estimators.deterministic.scores import FALSE_ALARM, Gain, best_scores
+from imubench_pipeline.estimators.deterministic.scores import (
+    FALSE_ALARM_PROBABILITY,
+    Gain,
+    find_best_scores,
+)
 from tests.deterministic.logs import RATE, SIGMA, static_log, times
 
 
 def test_the_best_step_of_the_transform_gains_what_least_squares_say() -> None:
     log = static_log(1, hours=0.5)
     log += 4.0 * SIGMA * (times(log) > 700.0)
-    ordinates = Ordinates(means_of([log], len(log), RATE))
+    ordinates = Ordinates(block_means([log], len(log), RATE))
     fit = ordinates.fit([Regressor("exponential", 0, 150.0)])
     step = next(
         score
-        for score in best_scores(ordinates, fit, fit.density)
+        for score in find_best_scores(ordinates, fit, fit.density)
         if score.regressor.kind == "step"
     )
     gain = Gain(ordinates, fit.regressors, fit.density, 0)
@@ -37,7 +41,7 @@ def test_the_best_step_of_the_transform_gains_what_least_squares_say() -> None:
 @pytest.mark.parametrize("cycles", [0.3, 0.7, 2.4])
 def test_a_sinusoid_gains_what_least_squares_of_both_amplitudes_say(cycles: float) -> None:
     log = static_log(4, hours=0.5)
-    ordinates = Ordinates(means_of([log], len(log), RATE))
+    ordinates = Ordinates(block_means([log], len(log), RATE))
     fit = ordinates.fit([Regressor("step", 0, 100.0)])
     sinusoid = Regressor("sinusoid", 0, cycles / ordinates.sizes[0])
     scale = np.sqrt(ordinates.weights(fit.density))
@@ -50,7 +54,7 @@ def test_a_sinusoid_gains_what_least_squares_of_both_amplitudes_say(cycles: floa
 
 def test_leverages_sum_up_to_the_number_of_amplitudes() -> None:
     log = static_log(2, hours=0.5)
-    ordinates = Ordinates(means_of([log], len(log), RATE))
+    ordinates = Ordinates(block_means([log], len(log), RATE))
     regressors = [Regressor("step", 0, 300.0), Regressor("sinusoid", 0, 0.004)]
     assert ordinates.fit(regressors).leverage.sum() == pytest.approx(3.0)
 
@@ -58,9 +62,9 @@ def test_leverages_sum_up_to_the_number_of_amplitudes() -> None:
 @pytest.mark.release
 def test_the_threshold_of_a_step_counts_the_places_that_noise_tells_apart() -> None:
     log = static_log(3, hours=0.5)
-    ordinates = Ordinates(means_of([log], len(log), RATE))
+    ordinates = Ordinates(block_means([log], len(log), RATE))
     fit = ordinates.fit([])
-    scores = best_scores(ordinates, fit, fit.density)
+    scores = find_best_scores(ordinates, fit, fit.density)
     step = next(score for score in scores if score.regressor.kind == "step")
     n = ordinates.sizes[0]
     # The matched filter of noise at all places, and how alike it is at neighbouring ones.
@@ -72,7 +76,7 @@ def test_the_threshold_of_a_step_counts_the_places_that_noise_tells_apart() -> N
     apart = (n - 1) * np.sqrt(2.0 * (1.0 - alike))
     # Rice: a normal process crosses a level so often; and it begins above it with a chance.
     chance = stats.chi2(1).sf(step.threshold) + apart / np.pi * np.exp(-0.5 * step.threshold)
-    assert chance == pytest.approx(FALSE_ALARM["step"], rel=0.1)
+    assert chance == pytest.approx(FALSE_ALARM_PROBABILITY["step"], rel=0.1)
 
 
 @pytest.mark.parametrize("kind", ["exponential", "sinusoid", "pulse", "ramp"])
@@ -85,9 +89,11 @@ def test_the_best_of_each_kind_gains_what_least_squares_say(kind: str) -> None:
         "pulse": 40.0 * SIGMA * (np.floor(t / 0.5) == 1234.0),
         "ramp": 6.0 * SIGMA * t / 1800.0,
     }[kind]
-    ordinates = Ordinates(means_of([log], len(log), RATE))
+    ordinates = Ordinates(block_means([log], len(log), RATE))
     fit = ordinates.fit([Regressor("step", 0, 2500.0)])
-    (score,) = [x for x in best_scores(ordinates, fit, fit.density) if x.regressor.kind == kind]
+    (score,) = [
+        x for x in find_best_scores(ordinates, fit, fit.density) if x.regressor.kind == kind
+    ]
     n, interval = ordinates.sizes[0], ordinates.means.interval
     scale = np.sqrt(ordinates.weights(fit.density))
     data = ordinates.coefficient * scale
@@ -98,7 +104,7 @@ def test_the_best_of_each_kind_gains_what_least_squares_say(kind: str) -> None:
         left = [float(np.linalg.lstsq(part.T, data)[1][0]) for part in (beside, rows)]
         return left[0] - left[1]
 
-    # Of slow courses the lowest ordinates alone are looked at.
+    # Of slow signals the lowest ordinates alone are looked at.
     assert score.gain == pytest.approx(gain(score.regressor), rel=0.02)
     if kind == "pulse":
         assert score.regressor.where == 1234.0
@@ -117,9 +123,9 @@ def test_thresholds_count_what_was_tried() -> None:
     log = static_log(3, hours=0.5)
     halves = [(0, len(log) // 2), (len(log) // 2, len(log))]
     for spans, parts in (([(0, len(log))], 1), (halves, 2)):
-        ordinates = Ordinates(means_of([log], len(log), RATE, spans))
+        ordinates = Ordinates(block_means([log], len(log), RATE, spans))
         fit = ordinates.fit([])
-        found = list(best_scores(ordinates, fit, fit.density))
+        found = list(find_best_scores(ordinates, fit, fit.density))
         assert len(found) == 5 * parts
         threshold = {score.regressor.kind: score.threshold for score in found}
         n = ordinates.sizes[0]
@@ -131,22 +137,24 @@ def test_thresholds_count_what_was_tried() -> None:
         level = threshold["exponential"]
         crossed = one.sf(level) + 24 / np.pi * np.exp(-0.5 * level)
         assert min(crossed, 24 * one.sf(level)) == pytest.approx(0.0015 / parts, rel=1e-6)
-        slow = [x.regressor.kind for x in best_scores(ordinates, fit, fit.density, smooth=True)]
+        slow = [
+            x.regressor.kind for x in find_best_scores(ordinates, fit, fit.density, smooth=True)
+        ]
         assert sorted(slow) == sorted(["exponential", "sinusoid", "ramp"] * parts)
 
 
 def test_what_others_explain_wholly_gains_nothing() -> None:
     log = static_log(3, hours=0.5)
-    ordinates = Ordinates(means_of([log], len(log), RATE))
+    ordinates = Ordinates(block_means([log], len(log), RATE))
     fit = ordinates.fit([Regressor("ramp", 0)])
-    scores = {x.regressor.kind: x for x in best_scores(ordinates, fit, fit.density)}
+    scores = {x.regressor.kind: x for x in find_best_scores(ordinates, fit, fit.density)}
     assert scores["ramp"].gain == 0.0
     # No step is placed at the ends.
     n = ordinates.sizes[0]
     for level, where in ((2, 3.0), (n - 2, n - 3.0)):
         jump = log + 1.0 * (np.arange(len(log)) >= level * ordinates.means.block)
-        far = Ordinates(means_of([jump], len(jump), RATE))
+        far = Ordinates(block_means([jump], len(jump), RATE))
         (step,) = [
-            x for x in best_scores(far, far.fit([]), fit.density) if x.regressor.kind == "step"
+            x for x in find_best_scores(far, far.fit([]), fit.density) if x.regressor.kind == "step"
         ]
         assert step.regressor.where == where

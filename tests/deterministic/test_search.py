@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from imubench_pipeline.estimators.deterministic.means import Means, Part, means_of
+from imubench_pipeline.estimators.deterministic.means import Means, Part, block_means
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import Gain, Score
 from imubench_pipeline.estimators.deterministic.search import (
     Rival,
-    anew_at_pauses,
     find_candidates,
-    lies_at_pause,
+    find_walk_rival,
+    fit_steps_at_pauses,
+    fit_with_candidate,
+    is_at_pause,
+    list_restarts,
     polish,
-    restarts,
-    rival_of_walk,
     search,
-    with_candidate,
 )
 from imubench_pipeline.estimators.whittle import Terms
 from tests.deterministic.logs import RATE, SIGMA, static_log, times
@@ -31,11 +31,11 @@ def log() -> np.ndarray:
 
 
 def of(log: np.ndarray) -> Ordinates:
-    return Ordinates(means_of([log], len(log), RATE))
+    return Ordinates(block_means([log], len(log), RATE))
 
 
 def with_pauses(log: np.ndarray, pauses: tuple[tuple[float, float], ...]) -> Ordinates:
-    means = means_of([log], len(log), RATE)
+    means = block_means([log], len(log), RATE)
     part = replace(means.parts[0], pauses=pauses)
     return Ordinates(replace(means, parts=(part,)))
 
@@ -43,14 +43,14 @@ def with_pauses(log: np.ndarray, pauses: tuple[tuple[float, float], ...]) -> Ord
 def test_a_step_within_two_blocks_of_a_pause_may_be_in_it() -> None:
     pause = Regressor("restart", 0, 100.0, 20.0)
     places = (87.9, 88.1, 100.0, 111.9, 112.1)
-    found = [lies_at_pause(Regressor("step", 0, place), pause) for place in places]
+    found = [is_at_pause(Regressor("step", 0, place), pause) for place in places]
     assert found == [False, True, True, True, False]
-    assert not lies_at_pause(Regressor("step", 1, 100.0), pause)
+    assert not is_at_pause(Regressor("step", 1, 100.0), pause)
     part = Part(0, np.zeros(99), np.zeros(99), 0.0, ((10.0, 4.0), (50.5, 9.0)))
     means = Means(10, 1.0, (replace(part, pauses=()), part))
     ordinates = Ordinates(means)
     expected = (Regressor("restart", 1, 10.0, 4.0), Regressor("restart", 1, 50.5, 9.0))
-    assert restarts(ordinates) == expected
+    assert list_restarts(ordinates) == expected
 
 
 def test_a_step_in_a_pause_is_put_at_the_pause(log: np.ndarray) -> None:
@@ -74,8 +74,8 @@ def test_a_step_in_a_pause_is_put_at_the_pause(log: np.ndarray) -> None:
 )
 def test_a_place_is_moved_to_where_it_fits_best(right: Regressor, off: float) -> None:
     n = 3600
-    course = 50.0 * (np.array([1.0, 0.7])[: right.columns] @ right.means(n))
-    values = course + np.random.default_rng(4).standard_normal(n)
+    signal = 50.0 * (np.array([1.0, 0.7])[: right.columns] @ right.means(n))
+    values = signal + np.random.default_rng(4).standard_normal(n)
     ordinates = Ordinates(Means(10, RATE, (Part(0, values, np.ones(n), 0.0),)))
     density = np.full(n - 1, ordinates.means.interval)
     beside = Regressor("ramp", 0)
@@ -97,7 +97,7 @@ def test_a_sinusoid_in_a_hump_of_the_spectrum_counts_for_less(log: np.ndarray) -
     ordinates = of(swinging)
     fit = ordinates.fit([])
     sinusoid = Regressor("sinusoid", 0, 15.0 / ordinates.sizes[0])
-    tried, gain = with_candidate(ordinates, fit, Score(sinusoid, 99.0, 10.0), fit.density)
+    tried, gain = fit_with_candidate(ordinates, fit, Score(sinusoid, 99.0, 10.0), fit.density)
     plain = 2.0 * (tried.log_likelihood - fit.log_likelihood)
     # Ordinates 3 to 16 away from the thirtieth, over what the noise has there.
     ratio = tried.residual**2 * ordinates.weights(tried.density)
@@ -114,7 +114,7 @@ def test_a_sinusoid_in_a_hump_of_the_spectrum_counts_for_less(log: np.ndarray) -
     humped = loud.mean + 20.0 * SIGMA * np.fft.irfft(spectrum, len(hump))
     other = Ordinates(replace(ordinates.means, parts=(replace(loud, mean=humped),)))
     fit = other.fit([])
-    tried, gain = with_candidate(other, fit, Score(sinusoid, 99.0, 10.0), fit.density)
+    tried, gain = fit_with_candidate(other, fit, Score(sinusoid, 99.0, 10.0), fit.density)
     ratio = tried.residual**2 * other.weights(tried.density)
     beside = ratio[(away >= 3) & (away <= 16)]
     level = beside.mean() - 2.0 * np.sqrt(2.0 / 28)
@@ -127,18 +127,18 @@ def test_steps_at_pauses_are_judged_by_their_number(log: np.ndarray) -> None:
     pauses = ((700.0, 6.0), (1500.0, 6.0), (2500.0, 6.0))
     ordinates = with_pauses(log, pauses)
     fit = ordinates.fit([])
-    found = anew_at_pauses(ordinates, fit, 2.0)
+    found = fit_steps_at_pauses(ordinates, fit, 2.0)
     assert found is not None
-    assert [x.where for x in found.courses] == [700.0, 1500.0, 2500.0]
+    assert [x.where for x in found.signals] == [700.0, 1500.0, 2500.0]
     gain = 2.0 * (found.fit.log_likelihood - fit.log_likelihood)
     threshold = stats.chi2(3).isf(0.001)
     assert found.beyond == pytest.approx(gain - 2.0 - threshold)
     # As good by AIC: three places that are known for one random walk, and a half.
     assert found.near == pytest.approx(threshold - 4.0 + 0.5)
-    assert anew_at_pauses(of(log), fit) is None
+    assert fit_steps_at_pauses(of(log), fit) is None
     one = ordinates.fit([Regressor("step", 0, 702.0), Regressor("restart", 0, 1500.0, 6.0)])
-    rest = anew_at_pauses(ordinates, one)
-    assert rest is not None and [x.where for x in rest.courses] == [2500.0]
+    rest = fit_steps_at_pauses(ordinates, one)
+    assert rest is not None and [x.where for x in rest.signals] == [2500.0]
     gain = 2.0 * (rest.fit.log_likelihood - one.log_likelihood)
     assert rest.beyond == pytest.approx(gain - stats.chi2(1).isf(0.001))
 
@@ -176,7 +176,7 @@ def test_a_rival_is_judged_over_the_walk_and_its_own_threshold() -> None:
     log += 2.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 2400.0 + 0.5)
     ordinates = of(log)
     fit = ordinates.fit([])
-    found = rival_of_walk(ordinates, fit)
+    found = find_walk_rival(ordinates, fit)
     assert found is not None
     bare = ordinates.fit([], fit.density, Terms("NF", 1))
     walk = 2.0 * (fit.log_likelihood - bare.log_likelihood)
@@ -184,11 +184,11 @@ def test_a_rival_is_judged_over_the_walk_and_its_own_threshold() -> None:
     for score, density in find_candidates(ordinates, bare):
         kind = score.regressor.kind
         if kind not in ("ramp", "pulse"):
-            gain = with_candidate(ordinates, bare, score, density)[1]
+            gain = fit_with_candidate(ordinates, bare, score, density)[1]
             factor = 1.0 if kind == "step" else 1.15
             beyond[gain - walk - factor * score.threshold] = kind
     best = max(beyond)
-    assert (found.courses[0].kind, found.beyond) == (beyond[best], pytest.approx(best))
+    assert (found.signals[0].kind, found.beyond) == (beyond[best], pytest.approx(best))
     # Nothing stands against a walk that is not there.
     none = replace(fit, noise=replace(fit.noise, powers=fit.noise.powers * [1, 1, 0, 1]))
-    assert rival_of_walk(ordinates, none) is None
+    assert find_walk_rival(ordinates, none) is None

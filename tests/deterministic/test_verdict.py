@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.deterministic.courses import find_courses
-from imubench_pipeline.estimators.deterministic.means import Steadiness
+from imubench_pipeline.estimators.deterministic.courses import find_deterministic_signals
+from imubench_pipeline.estimators.deterministic.means import Stationarity
 from imubench_pipeline.estimators.deterministic.verdict import (
     Verdict,
+    assess_signals,
     deterministic_rows,
-    verdict_of,
 )
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, JointDraws, Parameter, Status
 from imubench_pipeline.tables.schemas import TABLES
@@ -16,7 +16,9 @@ from tests.deterministic.logs import RATE, SIGMA, K, N, static_log, times
 
 
 def verdict(log: np.ndarray) -> Verdict:
-    return verdict_of("gyro_x", "rad/s", find_courses(lambda: [log], len(log), RATE))
+    return assess_signals(
+        "gyro_x", "rad/s", find_deterministic_signals(lambda: [log], len(log), RATE)
+    )
 
 
 def names(of: Verdict) -> list[str]:
@@ -32,12 +34,12 @@ def test_a_steady_log_has_no_finding_and_no_doubt() -> None:
 def test_a_step_is_a_finding_and_a_row() -> None:
     log = static_log(2)
     log += 5.0 * SIGMA * (times(log) >= 3000.0)
-    courses = find_courses(lambda: [log], len(log), RATE)
-    (finding,) = verdict_of("gyro_x", "rad/s", courses).findings
+    signals = find_deterministic_signals(lambda: [log], len(log), RATE)
+    (finding,) = assess_signals("gyro_x", "rad/s", signals).findings
     assert finding.finding == "bias_step"
     assert finding.value == pytest.approx(5.0 * SIGMA, rel=0.3)
     key = {"sensor": "s", "recording": "r", "channel": "gyro_x"}
-    (row,) = deterministic_rows(key, "rad/s", courses)
+    (row,) = deterministic_rows(key, "rad/s", signals)
     assert set(row) == {column.name for column in TABLES["deterministic"]}
 
 
@@ -45,7 +47,7 @@ def test_noise_that_grows_makes_n_doubtful() -> None:
     log = static_log(3)
     of = verdict(log + 0.15 * times(log) / times(log)[-1] * (log - log.mean()))
     assert "noise_grows" in names(of)
-    estimate = of.applied(Estimate("likelihood", {"N": Parameter(N), "K": Parameter(K)}))
+    estimate = of.apply(Estimate("likelihood", {"N": Parameter(N), "K": Parameter(K)}))
     assert estimate.parameters["N"].status == "doubtful"
     assert estimate.parameters["N"].value == N
     assert estimate.parameters["K"].status == "ok"
@@ -58,7 +60,7 @@ def test_heavy_tails_widen_the_interval_of_n_by_the_scatter_of_powers() -> None:
     # The excess kurtosis of a Laplace distribution is 3: variances scatter by (2 + 3) / 2.
     assert of.widening == pytest.approx(np.sqrt(2.5), rel=0.05)
     known = Estimate("likelihood", {"N": Parameter(N, lower=0.99 * N, upper=1.01 * N)})
-    wider = of.applied(known).parameters["N"]
+    wider = of.apply(known).parameters["N"]
     assert wider.upper == pytest.approx(N * (1.0 + 0.01 * of.widening), rel=1e-3)
 
 
@@ -77,7 +79,7 @@ def drawn_white(of: Estimate) -> np.ndarray:
 
 def test_the_draws_are_widened_as_the_interval_of_n_is() -> None:
     given = of_draws(N * np.exp(0.01 * np.linspace(-1.0, 1.0, 201)))
-    wider = Verdict((), {}, widening=2.0).applied(given)
+    wider = Verdict((), {}, widening=2.0).apply(given)
     assert np.ptp(np.log(drawn_white(wider))) == pytest.approx(0.04)
     assert given.draws is not None
     assert wider.draws is not None
@@ -88,12 +90,12 @@ def test_the_draws_are_widened_as_the_interval_of_n_is() -> None:
 def test_the_draws_have_n_of_all_the_log_where_it_grows_or_varies() -> None:
     doubt: dict[str, tuple[Status, str]] = {"N": ("doubtful", "it grows")}
     given = of_draws(np.append(np.full(200, N), 0.0))
-    grown = drawn_white(Verdict((), doubt, growth=0.3).applied(given))
+    grown = drawn_white(Verdict((), doubt, growth=0.3).apply(given))
     assert grown[-1] == 0.0
     assert np.log(np.quantile(grown[:-1] / N, [0.0, 0.5, 1.0])) == pytest.approx(
         [-0.15, 0.0, 0.15], abs=2e-3
     )
-    varied = drawn_white(Verdict((), doubt, scatter=0.2).applied(given))
+    varied = drawn_white(Verdict((), doubt, scatter=0.2).apply(given))
     assert np.std(np.log(varied[:-1])) == pytest.approx(0.2, rel=0.02)
 
 
@@ -110,11 +112,11 @@ def test_a_walk_on_one_half_alone_is_a_finding() -> None:
 def test_what_makes_b_doubtful_makes_the_curve_doubtful() -> None:
     curve = {name: Parameter(1.0) for name in ("B_curve", "sigma_min", "tau_min")}
     estimate = Estimate("likelihood", {"B": Parameter(1.0)}, curve=curve)
-    found = Verdict((), {"B": ("doubtful", "the halves differ")}).applied(estimate).curve
+    found = Verdict((), {"B": ("doubtful", "the halves differ")}).apply(estimate).curve
     assert {one.status for one in found.values()} == {"doubtful"}
-    found = Verdict((), {"K": ("doubtful", "the halves differ")}).applied(estimate).curve
+    found = Verdict((), {"K": ("doubtful", "the halves differ")}).apply(estimate).curve
     assert [one.status for one in found.values()] == ["ok", "doubtful", "doubtful"]
-    found = Verdict((), {"K": ("not_identified", "a drift is as good")}).applied(estimate).curve
+    found = Verdict((), {"K": ("not_identified", "a drift is as good")}).apply(estimate).curve
     assert {one.status for one in found.values()} == {"ok"}
 
 
@@ -130,5 +132,5 @@ def test_what_makes_b_doubtful_makes_the_curve_doubtful() -> None:
 def test_a_change_of_noise_is_told_if_it_is_sure_and_matters(
     trend: float, error: float, spread: float, chi_squared: float, grows: bool, varies: bool
 ) -> None:
-    steady = Steadiness(trend, error, spread, chi_squared, 0.0, 3600.0)
-    assert (steady.grows, steady.varies) == (grows, varies)
+    steady = Stationarity(trend, error, spread, chi_squared, 0.0, 3600.0)
+    assert (steady.has_trend, steady.is_variable) == (grows, varies)

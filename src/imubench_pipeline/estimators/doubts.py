@@ -45,8 +45,8 @@ _DELTA_BIC_RARE_TERM = 8.0
 """Gain in BIC up to which quantization noise or a ramp may be chance, or part of a walk."""
 
 _DELTA_AIC_OTHER_BIAS_TERMS = 4.0
-"""Advantage in AIC, over Gauss-Markov processes alone, at which other terms of bias instability make
-B and T_B doubtful."""
+"""Advantage in AIC, over Gauss-Markov processes alone, at which other terms of bias instability
+make B and T_B doubtful."""
 
 _DELTA_BIC_WITHOUT_BIAS = 4.0
 """Disadvantage in BIC up to which a model without bias instability is about as good."""

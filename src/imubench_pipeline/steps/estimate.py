@@ -17,8 +17,8 @@ from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
 from imubench_pipeline.estimators.agreement import disagreements, doubt_contradicted
 from imubench_pipeline.estimators.curve_limits import with_fitted_limits
-from imubench_pipeline.estimators.deterministic.courses import find_courses
-from imubench_pipeline.estimators.deterministic.verdict import deterministic_rows, verdict_of
+from imubench_pipeline.estimators.deterministic.courses import find_deterministic_signals
+from imubench_pipeline.estimators.deterministic.verdict import assess_signals, deterministic_rows
 from imubench_pipeline.estimators.estimate import (
     PARAMETERS,
     SI_UNITS,
@@ -101,8 +101,8 @@ def estimate_channel(
     sensor's own filter, where it is known, Hz.
     """
     channel = _Channel(key, log, curve, settings, bandwidth)
-    verdict = verdict_of(key.channel, channel.unit, channel.courses)
-    into.deterministic += deterministic_rows(asdict(key), channel.unit, channel.courses)
+    verdict = assess_signals(key.channel, channel.unit, channel.signals)
+    into.deterministic += deterministic_rows(asdict(key), channel.unit, channel.signals)
     into.add_findings(key, verdict.findings)
     estimates = channel.by_curve()
     if _BY_LIKELIHOOD & set(settings.methods):
@@ -121,7 +121,7 @@ def estimate_channel(
         if method in estimates:
             estimate = estimates[method]
             if method != "compensated":
-                estimate = verdict.applied(estimate)
+                estimate = verdict.apply(estimate)
             into.estimates.setdefault(key.channel, {})[method] = estimate
             into.parameters += parameter_rows(key, estimate, recommended=method == best)
             into.draws += draw_rows(key, estimate)
@@ -151,11 +151,11 @@ class _Channel:
         self._bandwidth = bandwidth
         self._band = quantity_to_si(settings.band, "frequency") if settings.band else None
         unfiltered = _unfiltered(self._band, bandwidth)
-        self.courses = find_courses(
+        self.signals = find_deterministic_signals(
             log.blocks, log.grid, log.rate, segments=log.segments, highest=unfiltered
         )
         self._presence = presence(log.blocks(), log.grid, log.segments) if log.holes else None
-        self._bare = self._curve_of(self._blocks()) if self.courses.courses else curve
+        self._bare = self._curve_of(self._blocks()) if self.signals.signals else curve
         self.fitted: Likelihood | None = None
 
     def by_curve(self) -> dict[str, Estimate]:
@@ -189,7 +189,7 @@ class _Channel:
 
         limited = partial(with_fitted_limits, segments=log.segments, presence=self._presence)
         into.allan += allan_rows(key, limited(self.curve, fitted))
-        if not self.courses.courses:  # else what they explain is taken out
+        if not self.signals.signals:  # else what they explain is taken out
             white = fitted.estimates[0].parameters["N"].lower
             lack = slow_noise_missing(key.channel, fitted.spectrum, fitted.fitted, white)
             into.add_findings(key, [lack] if lack else [])
@@ -225,7 +225,7 @@ class _Channel:
             rng = channel_rng(self.settings.seed, of_clock, "temperature")
             into.paths[log.path] = temperature_path(log.temperatures(), log.segments, rng)
         # A warm-up is what temperature explains: it stays in the log that they are fitted to.
-        plain = self._fitted(log.blocks) if self.courses.courses else fitted
+        plain = self._fitted(log.blocks) if self.signals.signals else fitted
         return fit_temperature(
             log.blocks,
             log.grid,
@@ -256,7 +256,7 @@ class _Channel:
 
     def _blocks(self) -> Iterator[Array]:
         """Yield the log without what is deterministic in it."""
-        return self.courses.less(self.log.blocks())
+        return self.signals.subtract_from(self.log.blocks())
 
     def _stream(self, use: str) -> np.random.Generator:
         """Return a random stream that depends on the samples, and on no name of a file."""

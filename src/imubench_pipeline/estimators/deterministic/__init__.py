@@ -1,6 +1,6 @@
-"""What is no noise in a log: found beside it by likelihood, and taken out of it.
+"""Deterministic signals in a log: detected by likelihood together with noise, and removed from it.
 
-A step of the bias, the exponential of a warm-up or the course of a day pass for a random walk or
-a slow process where a spectrum alone is looked at, for all of them rise towards low frequencies.
-They are told apart by their phases: the cosine transform of the log has them as regressors.
+A step of the bias, the exponential of a warm-up and a daily cycle look like a random walk or a slow
+process in the spectrum alone, because all of them rise towards low frequencies. Their phases
+distinguish them: they are regressors of the cosine transform of the log.
 """

@@ -1,4 +1,4 @@
-"""What is no noise in a log: steps of the bias, warm-ups and periodic drift, with their sizes."""
+"""Deterministic signals of a log: bias steps, warm-ups and periodic drift, with their sizes."""
 
 from __future__ import annotations
 
@@ -10,48 +10,48 @@ from typing import Literal
 import numpy as np
 
 from imubench_pipeline.allan.phase import Span
-from imubench_pipeline.estimators.deterministic.means import Means, means_of
-from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, covariance_of_sizes
+from imubench_pipeline.estimators.deterministic.means import Means, block_means
+from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, average_covariance
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
-from imubench_pipeline.estimators.deterministic.scores import FEWEST_CYCLES, Gain
-from imubench_pipeline.estimators.deterministic.search import Searched, move_regressors, search
+from imubench_pipeline.estimators.deterministic.scores import MIN_CYCLES, Gain
+from imubench_pipeline.estimators.deterministic.search import SearchResult, move_regressors, search
 from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.typing import Array
 
 Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]
 
-_NAMES: dict[str, Kind] = {
+_KIND_NAMES: dict[str, Kind] = {
     "step": "bias_step",
     "restart": "bias_step",
     "exponential": "warm_up_drift",
     "sinusoid": "periodic_drift",
 }
-"""Pulses are single bad blocks and ramps are a term of the noise model: neither is taken out."""
+"""Pulses are single bad blocks, and ramps a term of the noise model: neither is removed."""
 
-_LARGE = 8.0
-"""Standard errors of a block that a step has to be, to be placed to the sample."""
+_MIN_STEP_SIGMAS = 8.0
+"""Size of a step, in standard errors of a block, above which it is placed to the sample."""
 
-_MOST_STEPS = 8
-"""More, among as many regressors as are taken, are telegraph noise."""
+_MAX_STEPS = 8
+"""More steps, when the search reaches its maximum of regressors, are telegraph noise."""
 
-_HALF_LOG_LIKELIHOOD = 1.92
-_MOST_LEVERAGE = 0.5
-"""Part of what a log tells of its random walk that may go to what is taken out."""
+_DELTA_LOG_LIKELIHOOD_95 = 1.92
+_MAX_WALK_LEVERAGE = 0.5
+"""Maximum fraction of the information on the random walk that the removed signals may take."""
 
 
 @dataclass(frozen=True)
-class Course:
-    """A deterministic course that was found."""
+class DeterministicSignal:
+    """A deterministic signal in a log, with its size and interval."""
 
     kind: Kind
     start: float
     end: float
-    """The part of the log that has it, s from the first sample; both the place of a step."""
+    """Start and end in the log, s from the first sample; both are the place of a step."""
     size: float
     size_lower: float
     size_upper: float
-    """Change at a step; value at the beginning of a warm-up, which it loses; amplitude of periodic
-    drift; with 95 % limits, rad/s or m/s²."""
+    """Change at a step; initial value of a decaying warm-up; amplitude of periodic drift; with 95 %
+    limits, rad/s or m/s²."""
     time: float | None
     time_lower: float | None
     time_upper: float | None
@@ -63,74 +63,74 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Courses:
-    """What was found in a log beside noise."""
+class DeterministicSignals:
+    """The deterministic signals of a log."""
 
-    courses: tuple[Course, ...]
+    signals: tuple[DeterministicSignal, ...]
     means: Means | None  # the block means that were searched; None where the log is too short
-    searched: Searched | None
+    searched: SearchResult | None
     telegraph: bool = False
-    """There are more steps than can be told one by one: nothing was taken out."""
+    """Whether there are too many steps to resolve; no signal is then removed."""
 
-    def less(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Yield the blocks of a log, in order, SI, without what was found."""
+    def subtract_from(self, blocks: Iterable[Array]) -> Iterator[Array]:
+        """Yield the blocks of a log, in order, SI, less the signals."""
         reached = 0
         for values in blocks:
             stop = reached + len(values)
-            yield values - self.at(reached, stop) if self.courses else values
+            yield values - self.at(reached, stop) if self.signals else values
             reached = stop
 
     def at(self, start: int, stop: int) -> Array:
-        """Return the sum of all courses at samples of the log, SI."""
+        """Return the sum of all signals at samples of the log, SI."""
         total = np.zeros(stop - start)
         if self.means is None:
             return total
-        for course in self.courses:
-            part = self.means.parts[course.regressor.part]
-            first, last = self._span(course.regressor.part)
+        for signal in self.signals:
+            part = self.means.parts[signal.regressor.part]
+            first, last = self._find_span(signal.regressor.part)
             low, high = max(start, first), min(stop, last)
             if high <= low:
                 continue
             places = (np.arange(low, high) + 0.5 - part.start) / self.means.block
-            total[low - start : high - start] += course.amplitudes @ course.regressor.at(places)
+            total[low - start : high - start] += signal.amplitudes @ signal.regressor.at(places)
         return total
 
-    def _span(self, number: int) -> tuple[int, int]:
-        """Return the samples that a part stands for: up to the next, its last blocks included."""
+    def _find_span(self, number: int) -> tuple[int, int]:
+        """Return the range of samples of a part, up to the start of the next part."""
         assert self.means is not None
         parts = self.means.parts
         last = number == len(parts) - 1
         return parts[number].start, (1 << 62) if last else parts[number + 1].start
 
     def without(self) -> Means:
-        """Return the block means less what was found.
+        """Return the block means less the signals.
 
         Raises
         ------
         ValueError
-            If the log is too short to have been searched.
+            If the log was too short for a search.
         """
         if self.means is None:
             raise ValueError("the log is too short to be searched")
         parts = []
         for number, part in enumerate(self.means.parts):
             mean = part.mean.copy()
-            for course in self.courses:
-                if course.regressor.part == number:
-                    mean -= course.amplitudes @ course.regressor.means(len(mean))
+            for signal in self.signals:
+                if signal.regressor.part == number:
+                    mean -= signal.amplitudes @ signal.regressor.means(len(mean))
             parts.append(replace(part, mean=mean))
         return replace(self.means, parts=tuple(parts))
 
     @property
     def against_random_walk(self) -> str | None:
-        """Why a random walk cannot be told from a deterministic course, or None."""
+        """Reason why random walk and deterministic signal are not distinguishable, or None."""
         if self.searched is None or self.means is None or self.searched.many:
             return None
         rival = self.searched.rival
         if rival is not None:
-            course = _in_words(rival.courses, self.means)
-            return f"{course} would explain the log about as well as a random walk"
-        if self.courses and _leverage_on_walk(self.searched.fit) > _MOST_LEVERAGE:
+            signal = _describe_alternative(rival.signals, self.means)
+            return f"{signal} would explain the log about as well as a random walk"
+        if self.signals and _compute_walk_leverage(self.searched.fit) > _MAX_WALK_LEVERAGE:
             return (
                 "what is taken out as deterministic takes most of what the log tells of a random "
                 "walk with it"
@@ -138,12 +138,12 @@ class Courses:
         return None
 
 
-def _in_words(courses: Sequence[Regressor], means: Means) -> str:
-    regressor = courses[0]
+def _describe_alternative(signals: Sequence[Regressor], means: Means) -> str:
+    regressor = signals[0]
     if regressor.kind == "restart":
-        if len(courses) == 1:
+        if len(signals) == 1:
             return "a step of the bias at a pause of the log"
-        return f"steps of the bias at {len(courses)} pauses of the log"
+        return f"steps of the bias at {len(signals)} pauses of the log"
     start = means.parts[regressor.part].start / means.rate
     where = regressor.where * means.interval
     if regressor.kind == "step":
@@ -153,82 +153,82 @@ def _in_words(courses: Sequence[Regressor], means: Means) -> str:
     return f"a periodic drift with a period of {means.interval / regressor.where:.3g} s"
 
 
-def _leverage_on_walk(fit: Fit) -> float:
+def _compute_walk_leverage(fit: Fit) -> float:
     """Return the part of the information on a random walk that the regressors take."""
-    # What is known of K comes from the ordinates that rise as 1/f^2 to the lowest.
+    # The information on K is in the lowest ordinates, where the density rises as 1/f^2.
     information = np.minimum(fit.density / np.median(fit.density), 1e300) - 1.0
     slow = np.clip(information / (1.0 + information), 0.0, 1.0) ** 2
     return float(np.sum(slow * fit.leverage) / max(float(np.sum(slow)), 1e-300))
 
 
-def find_courses(
+def find_deterministic_signals(
     blocks: Callable[[], Iterable[Array]],
     samples: int,
     rate: float,
     *,
     segments: Sequence[Span] | None = None,
     highest: float | None = None,
-) -> Courses:
-    """Find steps, warm-ups and periodic drift in a log.
+) -> DeterministicSignals:
+    """Return the steps, warm-ups and periodic drift in a log.
 
     Parameters
     ----------
     blocks : callable
-        Gives the log in order, in SI, as often as it is called; NaN where a sample is missing.
+        Returns the log in order, in SI, at each call; NaN where a sample is missing.
     samples : int
         L, the length of all blocks together.
     rate : float
         Hz.
     segments : sequence of (int, int), optional
-        First and one-past-last sample of each part that no time relates to the others.
+        First and one-past-last sample of each segment; time between segments is unknown.
     highest : float, optional
-        Frequency up to which the log shows its noise unfiltered, Hz.
+        Highest frequency without effect of a filter, Hz.
 
     Returns
     -------
-    Courses
-        None found where the log is too short.
+    DeterministicSignals
+        Without signals if the log is too short.
     """
-    means = means_of(blocks(), samples, rate, segments)
+    means = block_means(blocks(), samples, rate, segments)
     if not means.parts:
-        return Courses((), None, None)
+        return DeterministicSignals((), None, None)
     ordinates = Ordinates(means, highest)
-    if not ordinates.usable:
-        return Courses((), None, None)
+    if not ordinates.is_usable:
+        return DeterministicSignals((), None, None)
     searched = search(ordinates)
     if searched.many:
         steps = sum(x.kind in ("step", "restart") for x in searched.fit.regressors)
-        # Bursts of noise look like pulses, and are another finding.
-        return Courses((), means, searched, telegraph=steps > _MOST_STEPS)
+        # Bursts of noise look like pulses, and have a finding of their own.
+        return DeterministicSignals((), means, searched, telegraph=steps > _MAX_STEPS)
     if any(x.kind == "step" for x in searched.fit.regressors):
         placed = _place_steps(blocks, means, searched.fit)
         if placed != searched.fit.regressors:
             searched = move_regressors(ordinates, searched, placed)
-    return Courses(tuple(_describe(ordinates, searched)), means, searched)
+    return DeterministicSignals(tuple(_describe(ordinates, searched)), means, searched)
 
 
-def _describe(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
-    """Yield the courses with their sizes and intervals."""
+def _describe(ordinates: Ordinates, searched: SearchResult) -> Iterator[DeterministicSignal]:
+    """Yield the signals with their sizes and intervals."""
     fit, means = searched.fit, ordinates.means
-    covariance = covariance_of_sizes(ordinates, fit)
+    covariance = average_covariance(ordinates, fit)
     column = 0
     for regressor, gain in zip(fit.regressors, searched.gains, strict=True):
         own = slice(column, column + regressor.columns)
         column = own.stop
-        if regressor.kind not in _NAMES:
+        if regressor.kind not in _KIND_NAMES:
             continue
         amplitudes = fit.sizes[own]
         part = means.parts[regressor.part]
         start = part.start / means.rate
         end = start + len(part.mean) * means.interval
-        size = _size(amplitudes)
+        size = _compute_size(amplitudes)
         along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
         error = SIGMAS * math.sqrt(float(along @ covariance[own, own] @ along))
-        low, high = _limits(ordinates, fit, regressor)
+        low, high = _find_limits(ordinates, fit, regressor)
         if regressor.kind not in ("exponential", "restart"):
-            # Where it is taken to be has been chosen to make it large; and of a swing that is
-            # shorter than its period the size hangs on the period.
-            error = math.hypot(error, _spread(ordinates, fit, regressor, own, (low, high)))
+            # The place was selected to maximise the size; and the amplitude of less than one
+            # period depends on the period.
+            error = math.hypot(error, _compute_spread(ordinates, fit, regressor, own, (low, high)))
         place = start + regressor.where * means.interval
         period = regressor.kind == "sinusoid"
         step = regressor.kind in ("step", "restart")
@@ -238,8 +238,8 @@ def _describe(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
             times = tuple(means.interval / f for f in (regressor.where, high, low))
         else:
             times = tuple(means.interval * t for t in (regressor.where, low, high))
-        yield Course(
-            kind=_NAMES[regressor.kind],
+        yield DeterministicSignal(
+            kind=_KIND_NAMES[regressor.kind],
             start=place if step else start,
             end=place if step else end,
             size=size,
@@ -255,8 +255,8 @@ def _describe(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
         )
 
 
-def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float, float]:
-    """Return 95 % limits of a place, time constant or frequency: those of its likelihood."""
+def _find_limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float, float]:
+    """Return the 95 % profile likelihood limits of a place, time constant or frequency."""
     if regressor.kind == "restart":
         half = 0.5 * regressor.length
         return regressor.where - half, regressor.where + half
@@ -265,7 +265,7 @@ def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float
     best = gain.of(regressor)
     n = ordinates.sizes[regressor.part]
     unit = {"step": 0.25, "exponential": 0.02 * regressor.where, "sinusoid": 0.02 / n}
-    least = FEWEST_CYCLES / n if regressor.kind == "sinusoid" else 1e-6
+    least = MIN_CYCLES / n if regressor.kind == "sinusoid" else 1e-6
     limits = []
     for side in (-1.0, 1.0):
         away = unit[regressor.kind]
@@ -273,26 +273,28 @@ def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float
             moved = regressor.where + side * away
             if not least < moved < n:
                 break
-            if best - gain.of(replace(regressor, where=moved)) > 2.0 * _HALF_LOG_LIKELIHOOD:
+            if best - gain.of(replace(regressor, where=moved)) > 2.0 * _DELTA_LOG_LIKELIHOOD_95:
                 break
             away *= 1.5
         limits.append(min(max(regressor.where + side * away, least), float(n)))
     return limits[0], limits[1]
 
 
-def _spread(
+def _compute_spread(
     ordinates: Ordinates, fit: Fit, regressor: Regressor, own: slice, limits: tuple[float, float]
 ) -> float:
-    """Return half the range of a size over the limits of its place."""
+    """Return half the range of the size over the limits of its place."""
     sizes = []
     for where in limits:
         moved = tuple(replace(x, where=where) if x is regressor else x for x in fit.regressors)
-        sizes.append(ordinates.solved(moved, fit.density)[0][own])
-    return 0.5 * float(np.ptp([_size(amplitudes) for amplitudes in (fit.sizes[own], *sizes)]))
+        sizes.append(ordinates.solve(moved, fit.density)[0][own])
+    return 0.5 * float(
+        np.ptp([_compute_size(amplitudes) for amplitudes in (fit.sizes[own], *sizes)])
+    )
 
 
-def _size(amplitudes: Array) -> float:
-    """Return the amplitude of a sinusoid, or the signed size of another course."""
+def _compute_size(amplitudes: Array) -> float:
+    """Return the amplitude of a sinusoid, or the signed size of another signal."""
     return float(np.hypot(*amplitudes)) if len(amplitudes) > 1 else float(amplitudes[0])
 
 
@@ -301,8 +303,8 @@ def _place_steps(
 ) -> tuple[Regressor, ...]:
     """Return the regressors with large steps placed to the sample, in one pass over the log.
 
-    Around a step that is many times the noise of a block the place is where the squares of the
-    samples about the levels on both sides are least.
+    The place of a step much larger than the noise of a block is the least-squares change point of
+    the samples around it.
     """
     size = means.block
     wanted: dict[int, tuple[int, int, float]] = {}
@@ -314,7 +316,7 @@ def _place_steps(
             continue
         part = means.parts[regressor.part]
         white = math.sqrt(float(np.nanmedian(part.power)) / size)
-        if abs(change) > _LARGE * white:
+        if abs(change) > _MIN_STEP_SIGMAS * white:
             middle = part.start + round(regressor.where * size)
             first = max(part.start, middle - 3 * size)
             last = min(part.start + len(part.mean) * size, middle + 3 * size)
@@ -334,15 +336,15 @@ def _place_steps(
         samples = np.concatenate(pieces[i])
         if np.isfinite(samples).sum() < 4:
             continue
-        at = first + _change_point(samples)
+        at = first + _find_change_point(samples)
         part = means.parts[placed[i].part]
         placed[i] = replace(placed[i], where=(at - part.start) / size)
-    # Two steps stand for one inside a block, until it is placed.
+    # A step inside a block may be found as two, which coincide once placed.
     return tuple(dict.fromkeys(placed))
 
 
-def _change_point(samples: Array) -> int:
-    """Return where two levels explain samples best: the first of the second level."""
+def _find_change_point(samples: Array) -> int:
+    """Return the least-squares change point: the index of the first sample of the second level."""
     present = np.isfinite(samples)
     values = np.where(present, samples - np.nanmean(samples), 0.0)
     count = np.cumsum(present)

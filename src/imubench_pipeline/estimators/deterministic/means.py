@@ -1,6 +1,6 @@
-"""Block means of a log, and the power of its fast noise in each block: one pass.
+"""Block means of a log and the power of its fast noise in each block, in one pass.
 
-`steadiness_of` says whether that power stays the same from the beginning of a log to its end.
+`assess_stationarity` tests whether that power is constant over the log.
 """
 
 from __future__ import annotations
@@ -14,50 +14,50 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.phase import Span, spans_of, split
 from imubench_pipeline.typing import Array
 
-_MOST = 1 << 14
-"""Blocks of a log, about: a step is placed to so many parts of it, and better where it is large."""
+_MAX_BLOCKS = 1 << 14
+"""Approximate number of blocks of a log; it is the resolution of the place of a small step."""
 
-_LEAST = 10
-"""Samples in a block: its mean lies below the low-pass of most sensors."""
+_MIN_BLOCK_SAMPLES = 10
+"""Samples of a block; its mean is below the low-pass cut-off of most sensors."""
 
-_FEWEST = 512
-"""Blocks of a short log, whose blocks are smaller for it."""
+_MIN_BLOCKS = 512
+"""Blocks of a short log, whose blocks have fewer samples."""
 
-_SHORTEST_PART = 64
-"""Blocks: of a shorter part nothing is told."""
+_MIN_PART_BLOCKS = 64
+"""Shorter parts are not analysed."""
 
-_MAD = 1.4826
-"""Standard deviation over the median absolute deviation, of normal noise."""
+_SIGMA_OVER_MAD = 1.4826
+"""Standard deviation over median absolute deviation of normal noise."""
 
-_LONGEST_HOLE = 1 / 5
-"""Part of a segment: a longer hole divides it."""
+_MAX_GAP_FRACTION = 1 / 5
+"""Fraction of a segment; a longer gap splits it."""
 
-_SHORTEST_PAUSE = 2.0
-"""s: a sensor or its host takes as long to begin anew."""
+_MIN_PAUSE = 2.0
+"""Shortest gap, s, in which a sensor or its host can restart."""
 
-_MOST_PAUSES = 48
+_MAX_PAUSES = 48
 
 _SECTIONS = 16
 
-_FEWEST_IN_SECTION = 16
-"""Blocks of a section."""
+_MIN_SECTION_BLOCKS = 16
+"""Blocks that each section needs for the test of stationarity."""
 
-_TREND = 4.5
-"""Standard errors of a slope, of 14 degrees of freedom: a chance of 1 in 2000."""
+_MIN_TREND_SIGMAS = 4.5
+"""Slope over its standard error with 14 degrees of freedom: false-alarm probability 1 in 2000."""
 
-_LEAST_TREND = 0.02
-"""Relative change of N over the log that is worth a finding."""
+_MIN_RELATIVE_TREND = 0.02
+"""Smallest relative change of N over the log that is reported."""
 
-_VARIES = 45.0
-"""Chi-squared of 15 degrees of freedom: a chance of 1 in 10,000."""
+_MIN_CHI_SQUARED = 45.0
+"""Chi-squared with 15 degrees of freedom: false-alarm probability 1 in 10,000."""
 
-_LEAST_SPREAD = 0.05
-"""Relative standard deviation of N over the sections that is worth a finding."""
+_MIN_RELATIVE_SPREAD = 0.05
+"""Smallest relative standard deviation of N over the sections that is reported."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """Block means of a part of a log without long holes."""
+    """Block means of a part of a log without long gaps."""
 
     start: int  # first sample
     mean: Array
@@ -68,8 +68,8 @@ class Part:
     kurtosis: float
     """Excess kurtosis of samples that are independent: twice that of their differences."""
     pauses: tuple[tuple[float, float], ...] = ()
-    """Middle and length, in blocks, of holes so long that the sensor may have begun anew; the
-    longest of them, in order."""
+    """Middle and length, in blocks, of the longest gaps in which the sensor may have restarted, in
+    order."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Means:
         return max(self.parts, key=lambda part: len(part.mean))
 
 
-def means_of(
+def block_means(
     blocks: Iterable[Array],
     samples: int,
     rate: float,
@@ -99,12 +99,12 @@ def means_of(
 ) -> Means:
     """Return the block means of a log in one pass, in bounded memory.
 
-    The blocks are the log in order, in SI, NaN where a sample is missing; ``segments`` first and
-    one-past-last sample of each, one by default.
+    The blocks are the log in order, in SI, NaN where a sample is missing. ``segments`` are the
+    first and one-past-last sample of each segment, by default one.
     """
     spans = spans_of(segments, samples)
     total = sum(stop - start for start, stop in spans)
-    size = max(-(-total // _MOST), min(_LEAST, max(total // _FEWEST, 1)))
+    size = max(-(-total // _MAX_BLOCKS), min(_MIN_BLOCK_SAMPLES, max(total // _MIN_BLOCKS, 1)))
     gathered: list[list[Array]] = [[] for _ in spans]
     rests: list[Array] = [np.empty(0) for _ in spans]
     for number, values in split(blocks, spans):
@@ -114,17 +114,17 @@ def means_of(
             values = np.concatenate((rest, values))
         whole = len(values) // size * size
         if whole:
-            gathered[number].append(_rows(values[:whole].reshape(-1, size)))
+            gathered[number].append(_compute_block_moments(values[:whole].reshape(-1, size)))
         rests[number] = values[whole:].copy()
     parts: list[Part] = []
     for (start, _), rows in zip(spans, gathered, strict=True):
         if rows:
-            parts += _parts(start, size, np.concatenate(rows, axis=1), size / rate)
+            parts += _split_at_gaps(start, size, np.concatenate(rows, axis=1), size / rate)
     return Means(size, rate, tuple(parts))
 
 
-def _rows(values: Array) -> Array:
-    """Return mean, power and fourth moment of differences, share present, shape (4, rows)."""
+def _compute_block_moments(values: Array) -> Array:
+    """Return mean, power and fourth moment of differences, fraction present, shape (4, rows)."""
     size = values.shape[1]
     if np.isfinite(values.sum()):
         level = values[0, 0]
@@ -147,13 +147,13 @@ def _rows(values: Array) -> Array:
     return np.array([mean, power, (squares**2).sum(axis=1) / pairs_or_nan, count / size])
 
 
-def _parts(start: int, size: int, rows: Array, interval: float) -> list[Part]:
-    """Divide a segment at its longest holes, and bridge the others."""
+def _split_at_gaps(start: int, size: int, rows: Array, interval: float) -> list[Part]:
+    """Split a segment at long gaps; interpolate short ones."""
     mean, power, fourth, share = rows
     covered = np.flatnonzero(share >= 0.5)
-    if len(covered) < _SHORTEST_PART:
+    if len(covered) < _MIN_PART_BLOCKS:
         return []
-    longest = max(2.0, _LONGEST_HOLE * len(mean))
+    longest = max(2.0, _MAX_GAP_FRACTION * len(mean))
     cuts = np.flatnonzero(np.diff(covered) > longest)
     parts = []
     for first, last in zip(
@@ -162,48 +162,52 @@ def _parts(start: int, size: int, rows: Array, interval: float) -> list[Part]:
         strict=True,
     ):
         span = slice(int(first), int(last) + 1)
-        if span.stop - span.start < _SHORTEST_PART:
+        if span.stop - span.start < _MIN_PART_BLOCKS:
             continue
         parts.append(
             Part(
                 start + span.start * size,
-                _bridged(mean[span], share[span] >= 0.5),
+                _fill_gaps(mean[span], share[span] >= 0.5),
                 np.where(share[span] >= 0.5, power[span], np.nan),
-                _kurtosis(power[span], fourth[span], share[span] >= 0.5),
-                _pauses(share[span] < 0.5, interval),
+                _compute_kurtosis(power[span], fourth[span], share[span] >= 0.5),
+                _find_pauses(share[span] < 0.5, interval),
             )
         )
     return parts
 
 
-def _pauses(missing: NDArray[np.bool_], interval: float) -> tuple[tuple[float, float], ...]:
+def _find_pauses(missing: NDArray[np.bool_], interval: float) -> tuple[tuple[float, float], ...]:
     """Return middle and length of the longest runs of missing blocks, in order."""
     edges = np.flatnonzero(np.diff(missing.astype(np.int8), prepend=0, append=0))
     first, end = edges[::2].astype(np.float64), edges[1::2].astype(np.float64)
-    long = np.flatnonzero((end - first) * interval >= _SHORTEST_PAUSE)
-    longest = long[np.argsort(first[long] - end[long], kind="stable")][:_MOST_PAUSES]
+    long = np.flatnonzero((end - first) * interval >= _MIN_PAUSE)
+    longest = long[np.argsort(first[long] - end[long], kind="stable")][:_MAX_PAUSES]
     in_order = np.sort(longest)
     return tuple(zip(0.5 * (first + end)[in_order], (end - first)[in_order], strict=True))
 
 
-def _kurtosis(power: Array, fourth: Array, present: NDArray[np.bool_]) -> float:
+def _compute_kurtosis(power: Array, fourth: Array, present: NDArray[np.bool_]) -> float:
     """Return the excess kurtosis of samples whose differences have these moments."""
     usable = present & np.isfinite(fourth)
     square = 2.0 * float(power[usable].mean()) if usable.any() else 0.0
     return 2.0 * (float(fourth[usable].mean()) / square**2 - 3.0) if square > 0.0 else 0.0
 
 
-def _bridged(mean: Array, present: NDArray[np.bool_]) -> Array:
-    """Fill blocks without samples: interpolated, with the white noise of the others.
+def _fill_gaps(mean: Array, present: NDArray[np.bool_]) -> Array:
+    """Fill blocks without samples by interpolation, plus white noise as in the other blocks.
 
-    A long hole is bridged between the means of several blocks, for the white noise of one would
-    be a slow course over it.
+    A long gap is interpolated between means of several blocks: the white noise of a single block
+    would create a slow signal across the gap.
     """
     if present.all():
         return mean
     filled = mean.copy()
     neighbours = np.diff(mean)[present[1:] & present[:-1]]
-    white = _MAD * float(np.median(np.abs(neighbours))) / np.sqrt(2.0) if len(neighbours) else 0.0
+    white = (
+        _SIGMA_OVER_MAD * float(np.median(np.abs(neighbours))) / np.sqrt(2.0)
+        if len(neighbours)
+        else 0.0
+    )
     rng = np.random.default_rng(int((~present).sum()))
     missing = np.flatnonzero(~present)
     for run in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):
@@ -219,47 +223,50 @@ def _bridged(mean: Array, present: NDArray[np.bool_]) -> Array:
 
 
 @dataclass(frozen=True)
-class Steadiness:
-    """How the density of the fast noise changes over a log."""
+class Stationarity:
+    """Change of the density of the fast noise over a log."""
 
     trend: float
     trend_error: float
     """Relative change of the density N from beginning to end, and its standard error."""
-    spread: float  # relative standard deviation of N over sections of the log beyond chance
+    spread: float  # relative standard deviation of N over sections, less its estimation error
     chi_squared: float  # of the sections about their mean
     start: float
     end: float
-    """Of the part that was looked at, s."""
+    """Start and end of the analysed part, s."""
 
     @property
-    def grows(self) -> bool:
-        """Whether N changes steadily."""
-        return abs(self.trend) > _TREND * self.trend_error and abs(self.trend) > _LEAST_TREND
+    def has_trend(self) -> bool:
+        """Whether N has a significant trend."""
+        return (
+            abs(self.trend) > _MIN_TREND_SIGMAS * self.trend_error
+            and abs(self.trend) > _MIN_RELATIVE_TREND
+        )
 
     @property
-    def varies(self) -> bool:
-        """Whether N changes otherwise."""
-        return self.chi_squared > _VARIES and self.spread > _LEAST_SPREAD
+    def is_variable(self) -> bool:
+        """Whether N varies significantly between sections."""
+        return self.chi_squared > _MIN_CHI_SQUARED and self.spread > _MIN_RELATIVE_SPREAD
 
 
-def steadiness_of(means: Means) -> Steadiness | None:
-    """Return how the power of the fast noise changes over the longest part of a log.
+def assess_stationarity(means: Means) -> Stationarity | None:
+    """Return the change of the power of the fast noise over the longest part of a log.
 
-    None for a short log, or one of constant samples.
+    None for a short log, or one with constant samples.
     """
     part = means.longest
     size = len(part.power) // _SECTIONS
-    if size < _FEWEST_IN_SECTION or means.block < 2:
+    if size < _MIN_SECTION_BLOCKS or means.block < 2:
         return None
     sections = part.power[: size * _SECTIONS].reshape(_SECTIONS, size)
     finite = np.isfinite(sections)
-    if (finite.sum(axis=1) < _FEWEST_IN_SECTION // 2).any():
+    if (finite.sum(axis=1) < _MIN_SECTION_BLOCKS // 2).any():
         return None
     count = finite.sum(axis=1)
     power = np.nansum(sections, axis=1) / count
     if not (power > 0.0).all():
         return None
-    # Heavy tails and bursts scatter the powers of blocks, which widens this with them.
+    # The error is from the scatter of the block powers: heavy tails and bursts increase both.
     scatter = np.sqrt(np.nansum((sections - power[:, None]) ** 2, axis=1) / (count - 1) / count)
     level = np.log(power)
     error = scatter / power
@@ -273,7 +280,7 @@ def steadiness_of(means: Means) -> Steadiness | None:
     chi_squared = float(weight @ (level - middle) ** 2)
     beyond = max(float(np.var(level, ddof=1) - np.mean(error**2)), 0.0)
     start = part.start / means.rate
-    return Steadiness(
+    return Stationarity(
         # N is the square root of the power.
         trend=float(np.expm1(0.5 * slope)),
         trend_error=0.5 * slope_error * float(np.exp(0.5 * slope)),

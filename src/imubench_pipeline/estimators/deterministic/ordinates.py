@@ -1,13 +1,13 @@
-"""The cosine transform of block means, and the noise that it shows beside regressors.
+"""Cosine transform of block means, and the joint fit of noise and regressors to it.
 
-The coefficients c_k are independent, of variance S(omega_k) of the noise model, so that
-generalised least squares are weighted sums. Regressors that are taken out of the lowest
-ordinates take noise with them: an ordinate of leverage h_k counts as 1 - h_k of one.
+The coefficients c_k are independent with the variance S(omega_k) of the noise model, so that
+generalised least squares reduces to weighted sums. Removing regressors also removes noise from the
+lowest ordinates: an ordinate with leverage h_k counts as 1 - h_k of one.
 
-How well sizes of courses are known hangs on the random walk beside them, which is hardly known. A
-step is a difference of two long means, and its error is that of the slowest noise. A walk that is
-hardly to be seen is often fitted as none: with the noise as fitted, the size would seem surer than
-it is. So errors are averaged over the walks that the log allows.
+The uncertainty of the amplitudes depends on a poorly known random walk. A step is a difference of
+two long means, and its error comes from the slowest noise. A weak walk is often fitted as none, and
+with this fit the error of the amplitude would be too small. The covariance is therefore averaged
+over the walks that the log allows (`average_covariance`).
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from imubench_pipeline.estimators.spectrum import Spectrum, bin_edges
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.typing import Array
 
-NOISE = Terms("NFK", 1)
-"""One model for all noise: it nests what a log without regressors may be, K among it."""
+NOISE_TERMS = Terms("NFK", 1)
+"""General noise model, which includes the models of logs without regressors."""
 
-_ROUNDS = 2
-_LEAST_WEIGHT = 0.05
-"""Of an ordinate that regressors explain nearly whole."""
+_FIT_ROUNDS = 2
+_MIN_WEIGHT = 0.05
+"""Weight of an ordinate that the regressors explain almost completely."""
 
-_WALKS = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
-"""K that are tried, as deviation at the lowest frequency over that of the other noise."""
+_WALK_GRID = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
+"""Grid of K: square root of the density at the lowest frequency over that of the other noise."""
 
-_ABOUT_FITTED = np.geomspace(0.6, 1.6, 9)
-"""K that are tried, over that of the fit."""
+_FITTED_WALK_FACTORS = np.geomspace(0.6, 1.6, 9)
+"""Grid of K, relative to the fitted K."""
 
-_LEAST_REST = 1e-3
-"""Part of the density that is left to other noise, at least."""
+_MIN_OTHER_NOISE = 1e-3
+"""Minimum fraction of the density that is not random walk."""
 
-_LEAST_ALONE = 1e-9
-"""Part of the variance of an amplitude that it has alone, at least."""
+_MIN_INDEPENDENT_VARIANCE = 1e-9
+"""Ridge on the correlation matrix of the amplitudes, against collinear regressors."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Fit:
 
 
 class Ordinates:
-    """The ordinates of all parts of a log, used up to a frequency in Hz, by default all."""
+    """The ordinates of all parts of a log, used up to ``highest``, Hz, by default all."""
 
     def __init__(self, means: Means, highest: float | None = None) -> None:
         self.means = means
@@ -83,7 +83,7 @@ class Ordinates:
         self._columns: dict[Regressor, Array] = {}
 
     @property
-    def usable(self) -> bool:
+    def is_usable(self) -> bool:
         """Whether there are enough ordinates for the noise model."""
         return int(self.used.sum()) >= 64 and float(np.ptp(self.coefficient)) > 0.0
 
@@ -107,7 +107,7 @@ class Ordinates:
         return bin_edges(self.frequency[self._order])
 
     def spectrum(self, residual: Array, weight: Array) -> Spectrum:
-        """Return the binned spectrum of coefficients that count for ``weight`` each."""
+        """Return the binned spectrum of coefficients, each counted with its ``weight``."""
         order, edges = self._order, self._edges
         interval = self.means.interval
         frequency, length = self.frequency[order], self.length[order]
@@ -150,28 +150,31 @@ class Ordinates:
         )
 
     def fit(
-        self, regressors: Sequence[Regressor], start: Array | None = None, terms: Terms = NOISE
+        self,
+        regressors: Sequence[Regressor],
+        start: Array | None = None,
+        terms: Terms = NOISE_TERMS,
     ) -> Fit:
         """Fit noise and regressors together.
 
-        ``start``, shape (k,), is a density of the noise that the first weights are taken from.
+        ``start``, shape (k,), is the noise density for the weights of the first iteration.
         """
         weight = np.ones_like(self.coefficient)
         residual, leverage = self.coefficient, np.zeros_like(weight)
         sizes, covariance = np.empty(0), np.empty((0, 0))
-        rounds = _ROUNDS if regressors else 1
+        rounds = _FIT_ROUNDS if regressors else 1
         density = start
         for _ in range(rounds):
             if regressors and density is not None:
-                sizes, covariance, residual, leverage = self.solved(regressors, density)
-                weight = np.maximum(1.0 - leverage, _LEAST_WEIGHT)
+                sizes, covariance, residual, leverage = self.solve(regressors, density)
+                weight = np.maximum(1.0 - leverage, _MIN_WEIGHT)
             whittle = self._whittle.of(self.spectrum(residual, weight))
             noise = whittle.maximum(terms)
             density = self.density(noise)
         if density is None:
             raise ValueError("no round was made")
         if regressors:
-            sizes, covariance, residual, leverage = self.solved(regressors, density)
+            sizes, covariance, residual, leverage = self.solve(regressors, density)
         return Fit(
             tuple(regressors),
             sizes,
@@ -183,11 +186,11 @@ class Ordinates:
             self.log_likelihood(residual, density),
         )
 
-    def carried_on(self, fit: Fit, held_out: int) -> Array:
-        """Return the density of noise fitted to all but the lowest ordinates of each part."""
-        spectrum = self.spectrum(fit.residual, np.maximum(1.0 - fit.leverage, _LEAST_WEIGHT))
+    def extrapolate_density(self, fit: Fit, held_out: int) -> Array:
+        """Return the density of noise fitted without the lowest ordinates, extrapolated to them."""
+        spectrum = self.spectrum(fit.residual, np.maximum(1.0 - fit.leverage, _MIN_WEIGHT))
         beyond = np.rint(2.0 * spectrum.frequency * spectrum.length) > held_out
-        if beyond.sum() < 4 * NOISE.parameters:
+        if beyond.sum() < 4 * NOISE_TERMS.parameters:
             return fit.density
         whittle = self._whittle.select(spectrum, beyond)
         return self.density(whittle.maximum(fit.noise.terms))
@@ -202,10 +205,10 @@ class Ordinates:
         """Return the inverse variance of each coefficient; 0 where it is not used."""
         return np.where(self.used, self.means.interval / density, 0.0)
 
-    def solved(
+    def solve(
         self, regressors: Sequence[Regressor], density: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Return amplitudes, their covariance, what is left, and the leverage of each ordinate."""
+        """Return amplitudes, their covariance, the residual, and the leverage of each ordinate."""
         weight = self.weights(density)
         owner = [r.part for r in regressors for _ in range(r.columns)]
         columns = [row for r in regressors for row in self.columns(r)]
@@ -236,26 +239,27 @@ class Ordinates:
         return sizes, covariance, residual, leverage
 
 
-def covariance_of_sizes(ordinates: Ordinates, fit: Fit) -> Array:
-    """Return the covariance of the amplitudes of a fit, (p, p), over the walks that the log allows.
+def average_covariance(ordinates: Ordinates, fit: Fit) -> Array:
+    """Return the covariance of the amplitudes of a fit, (p, p), averaged over K.
 
-    All K are as likely beforehand; each counts by its restricted likelihood, in which the
-    amplitudes are integrated over. The other noise is held.
+    The prior of K is uniform; the weights are the restricted likelihood (REML), in which the
+    amplitudes are integrated out (D. A. Harville, J. Am. Stat. Assoc. 72, 1977). The other noise is
+    fixed.
     """
     if not fit.regressors:
         return fit.covariance
     walk = 1.0 / (2.0 * np.pi * ordinates.frequency) ** 2
     fitted = fit.noise.parameter("K") ** 2 * walk
-    rest = np.maximum(fit.density - fitted, _LEAST_REST * fit.density)
+    rest = np.maximum(fit.density - fitted, _MIN_OTHER_NOISE * fit.density)
     lowest = int(np.argmin(ordinates.frequency))
     unit = walk * rest[lowest] / walk[lowest]
-    about = np.sqrt(fitted[lowest] / rest[lowest]) * _ABOUT_FITTED
-    walks = np.unique(np.concatenate((_WALKS, about)))
+    about = np.sqrt(fitted[lowest] / rest[lowest]) * _FITTED_WALK_FACTORS
+    walks = np.unique(np.concatenate((_WALK_GRID, about)))
     likelihoods, sizes, covariances = [], [], []
     for K in walks:
         density = rest + K**2 * unit
-        size, covariance, residual, _ = ordinates.solved(fit.regressors, density)
-        integrated = 0.5 * _log_determinant(covariance)
+        size, covariance, residual, _ = ordinates.solve(fit.regressors, density)
+        integrated = 0.5 * _compute_log_determinant(covariance)
         likelihoods.append(ordinates.log_likelihood(residual, density) + integrated)
         sizes.append(size)
         covariances.append(covariance)
@@ -266,9 +270,9 @@ def covariance_of_sizes(ordinates: Ordinates, fit: Fit) -> Array:
     return np.asarray(within + np.einsum("w,wi,wj->ij", weight, away, away))
 
 
-def _log_determinant(covariance: Array) -> float:
-    """Return that of a covariance, which two amplitudes that are one do not make infinite."""
+def _compute_log_determinant(covariance: Array) -> float:
+    """Return the log determinant of a covariance, finite also for collinear amplitudes."""
     variance = np.maximum(np.diag(covariance), 1e-300)
     correlation = covariance / np.sqrt(np.outer(variance, variance))
-    ridge = _LEAST_ALONE * np.eye(len(variance))
+    ridge = _MIN_INDEPENDENT_VARIANCE * np.eye(len(variance))
     return float(np.sum(np.log(variance)) + np.linalg.slogdet(correlation + ridge)[1])

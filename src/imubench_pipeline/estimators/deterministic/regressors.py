@@ -1,6 +1,6 @@
-"""What is no noise: steps, exponentials, sinusoids, ramps, and their cosine transforms.
+"""Deterministic signals: steps, exponentials, sinusoids, ramps, and their cosine transforms.
 
-All are given on the block means of one part of a log, in blocks from its beginning.
+They are sampled at the block means of one part of a log; time is in blocks from its start.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ import scipy.fft
 
 from imubench_pipeline.typing import Array
 
-_ALIKE = 1e-9
-"""Difference of two frequencies below which their beat is constant over any part."""
+_MIN_BEAT_ANGLE = 1e-9
+"""Half the sum or difference of two angles, below which the beat is constant over any part."""
 
 Kind = Literal["step", "restart", "exponential", "sinusoid", "ramp", "pulse"]
 
 
 @dataclass(frozen=True)
 class Regressor:
-    """A deterministic course of unit size in one part of a log."""
+    """A deterministic signal of unit amplitude in one part of a log."""
 
     kind: Kind
-    """``step``: 0 before its place, 1 from it on; ``restart``: the same at a pause, over which its
-    means are interpolated as those of the log are; ``exponential``: 1 at the beginning of the part;
-    ``sinusoid``: a cosine and a sine; ``ramp``: 1 a block; ``pulse``: 1 in one block."""
+    """``step``: 0 before its place, 1 from there on; ``restart``: the same at a pause, interpolated
+    across it as the log is; ``exponential``: 1 at the start of the part; ``sinusoid``: a cosine and
+    a sine; ``ramp``: slope 1 per block; ``pulse``: 1 in one block."""
     part: int  # number of the part
     where: float = 0.0
     """Place of a step or pulse, time constant of an exponential, both in blocks; frequency of a
-    sinusoid in cycles a block."""
+    sinusoid in cycles per block."""
     length: float = 0.0  # of the pause of a restart, blocks
 
     @property
     def columns(self) -> int:
-        """Amplitudes that it has."""
+        """Number of amplitudes."""
         return 2 if self.kind == "sinusoid" else 1
 
     def means(self, n: int) -> Array:
@@ -61,14 +61,14 @@ class Regressor:
     def coefficients(self, n: int) -> Array:
         """Return its orthonormal DCT-II coefficients 1 ... n - 1, shape (columns, n - 1)."""
         if self.kind == "sinusoid":
-            return np.sinc(self.where) * _of_sinusoid(n, 2.0 * np.pi * self.where)
+            return np.sinc(self.where) * _transform_sinusoid(n, 2.0 * np.pi * self.where)
         if self.kind == "exponential":
             left = math.exp(-1.0 / self.where)
-            return self.where * (1.0 - left) * _of_exponential(n, left)
+            return self.where * (1.0 - left) * _transform_exponential(n, left)
         return np.asarray(scipy.fft.dct(self.means(n), type=2, norm="ortho", axis=1)[:, 1:])
 
     def at(self, blocks: Array) -> Array:
-        """Return its values, shape (columns, s), at times in blocks from where its part begins."""
+        """Return its values, shape (columns, s), at times in blocks from the start of its part."""
         if self.kind in ("step", "restart"):
             return (blocks >= self.where).astype(np.float64)[None]
         if self.kind == "pulse":
@@ -82,32 +82,32 @@ class Regressor:
 
 
 @lru_cache(maxsize=8)
-def _half_angles(n: int) -> tuple[Array, Array, Array]:
+def _tabulate_half_angles(n: int) -> tuple[Array, Array, Array]:
     """Return cosine and sine of pi k / 2 n, and (-1)^k, for k = 1 ... n - 1."""
     k = np.arange(1, n, dtype=np.float64)
     half = np.asarray(0.5 * np.pi * k / n)
     return np.cos(half), np.sin(half), np.asarray(1.0 - 2.0 * (k % 2.0))
 
 
-def _of_sinusoid(n: int, angle: float) -> Array:
+def _transform_sinusoid(n: int, angle: float) -> Array:
     """Return the coefficients of cos and sin of angle (i + 1/2), shape (2, n - 1).
 
-    By sum_i cos(t (i + 1/2)) = sin(n t) / (2 sin(t / 2)), and likewise of the sine, for sum and
-    difference t of both angles.
+    It uses sum_i cos(t (i + 1/2)) = sin(n t) / (2 sin(t / 2)), and the same sum of sines, for t the
+    sum and the difference of both angles.
     """
-    cos, sin, sign = _half_angles(n)
+    cos, sin, sign = _tabulate_half_angles(n)
     a, b = math.sin(0.5 * angle) * cos, math.cos(0.5 * angle) * sin
     both = np.zeros((2, n - 1))
     for half in (a + b, a - b):
-        beats = np.abs(half) > _ALIKE
+        beats = np.abs(half) > _MIN_BEAT_ANGLE
         below = 1.0 / np.where(beats, 2.0 * half, 1.0)
         both[0] += np.where(beats, math.sin(n * angle) * sign * below, float(n))
         both[1] += np.where(beats, (1.0 - math.cos(n * angle) * sign) * below, 0.0)
     return 0.5 * math.sqrt(2.0 / n) * both
 
 
-def _of_exponential(n: int, left: float) -> Array:
+def _transform_exponential(n: int, left: float) -> Array:
     """Return the coefficients of left^i, shape (1, n - 1): a geometric sum."""
-    cos, sin, sign = _half_angles(n)
+    cos, sin, sign = _tabulate_half_angles(n)
     below = (1.0 - left) ** 2 + 4.0 * left * sin**2
     return math.sqrt(2.0 / n) * ((1.0 - left**n * sign) * (1.0 - left) * cos / below)[None]

@@ -1,8 +1,8 @@
-"""How far each regressor stands out of given noise: the matched filter, at every place at once.
+"""Matched filters for the regressors in given noise, evaluated at all places at once.
 
 The numerator of a step at place t is sum_k w_k r_k s_k(t) with s_k(t) = -sqrt(2 / n)
 sin(pi k t / n) / (2 sin(pi k / 2 n)), a sine transform over k; the denominators are cosine
-transforms. What other regressors explain already is projected out.
+transforms. The columns of other regressors are projected out.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.estimators.deterministic.regressors import Kind, Regressor
 from imubench_pipeline.typing import Array
 
-FALSE_ALARM: dict[Kind, float] = {
+FALSE_ALARM_PROBABILITY: dict[Kind, float] = {
     "step": 0.001,
     "restart": 0.001,
     "exponential": 0.0015,
@@ -28,71 +28,70 @@ FALSE_ALARM: dict[Kind, float] = {
     "ramp": 0.002,
     "pulse": 0.001,
 }
-"""Chance that a log without any shows one of a kind."""
+"""False-alarm probability for each kind in a log without deterministic signals."""
 
-_EDGE = 3
-"""Blocks at the ends of a part where no step is looked for."""
+_EDGE_BLOCKS = 3
+"""Blocks at the ends of a part in which no step is searched."""
 
-_TIMES = 24
-"""Time constants that are tried."""
+_TIME_CONSTANTS = 24
+"""Number of time constants that are tried."""
 
-_SHORTEST, _LONGEST = 1 / 200, 1 / 2
-"""Time constants, as parts of the part of the log."""
+_MIN_TIME_FRACTION, _MAX_TIME_FRACTION = 1 / 200, 1 / 2
+"""Shortest and longest time constant, as fractions of the part of the log."""
 
-_SLOW_ORDINATES = 2048
-"""In which exponentials are looked for."""
+_EXPONENTIAL_ORDINATES = 2048
+"""Number of lowest ordinates in which exponentials are searched."""
 
-_MOST_CYCLES = 64
-_CYCLES = 0.25
-"""Distance of the frequencies that are tried, cycles in the part."""
+_MAX_CYCLES = 64
+_CYCLE_STEP = 0.25
+"""Spacing of the frequencies that are tried, cycles in the part."""
 
-FEWEST_CYCLES = 0.25
-"""A day in a log of six hours; of less a sinusoid is a ramp and a bend."""
+MIN_CYCLES = 0.25
+"""Cycles in the part, e.g. a day in a log of six hours; fewer are a ramp and a bend."""
 
-_KNOWN = 1e-3
-"""Part of a regressor that others leave: less is told by rounding errors."""
+_MIN_INDEPENDENT_POWER = 1e-3
+"""Minimum fraction of a regressor's power that is independent of others; less is rounding error."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """The best regressor of a kind."""
+    """The best regressor of a kind, with its gain."""
 
     regressor: Regressor
     gain: float  # twice the log likelihood that it adds, for given noise
-    threshold: float  # what it must reach (`FALSE_ALARM`)
+    threshold: float  # what it must reach (`FALSE_ALARM_PROBABILITY`)
 
 
-def best_scores(
+def find_best_scores(
     ordinates: Ordinates, fit: Fit, density: Array, *, smooth: bool = False
 ) -> Iterator[Score]:
-    """Yield the best further regressor of each kind in each part, beside those of a fit.
+    """Yield the best additional regressor of each kind in each part, given those of a fit.
 
-    ``density``, shape (k,), is that of the noise, SI²/Hz; ``smooth`` asks for slow courses only,
-    not for steps and pulses.
+    ``density``, shape (k,), is that of the noise, SI²/Hz; ``smooth`` excludes steps and pulses.
     """
     weight = ordinates.weights(density)
     residual = ordinates.coefficient
     if fit.regressors:
-        residual = ordinates.solved(fit.regressors, density)[2]
+        residual = ordinates.solve(fit.regressors, density)[2]
     parts = len(ordinates.sizes)
     for number, n in enumerate(ordinates.sizes):
         of_part = ordinates.part(number)
         w, r = weight[of_part], residual[of_part]
         others = [x for x in fit.regressors if x.part == number]
-        basis = _orthonormal([row for x in others for row in ordinates.columns(x)], w)
+        basis = _orthonormalise([row for x in others for row in ordinates.columns(x)], w)
         if not smooth:
-            yield from _steps_and_pulses(number, n, w, r, basis, parts)
-        yield _exponentials(number, n, w, r, basis, parts)
-        yield _sinusoids(number, n, w, r, basis, parts)
+            yield from _score_steps_and_pulses(number, n, w, r, basis, parts)
+        yield _score_exponentials(number, n, w, r, basis, parts)
+        yield _score_sinusoids(number, n, w, r, basis, parts)
         ramp = Regressor("ramp", number)
-        gain = _gains(ordinates.columns(ramp), w, r, basis)[0]
-        yield Score(ramp, gain, float(chdtri(1, FALSE_ALARM["ramp"] / parts)))
+        gain = _compute_gains(ordinates.columns(ramp), w, r, basis)[0]
+        yield Score(ramp, gain, float(chdtri(1, FALSE_ALARM_PROBABILITY["ramp"] / parts)))
 
 
 class Gain:
-    """What regressors of one part add to the likelihood beside others, for given noise.
+    """Gain of log likelihood by additional regressors of one part, for given noise.
 
-    ``regressors`` are there already; ``density``, shape (k,), is that of the noise, SI²/Hz.
+    ``regressors`` are in the fit already; ``density``, shape (k,), is that of the noise, SI²/Hz.
     """
 
     def __init__(
@@ -102,7 +101,7 @@ class Gain:
         of_part = ordinates.part(part)
         self._weight = ordinates.weights(density)[of_part]
         others = [row for x in regressors if x.part == part for row in ordinates.columns(x)]
-        self._basis = _orthonormal(others, self._weight)
+        self._basis = _orthonormalise(others, self._weight)
         coefficient = ordinates.coefficient[of_part]
         self._residual = coefficient - (self._basis @ (self._weight * coefficient)) @ self._basis
 
@@ -110,20 +109,22 @@ class Gain:
         """Return twice the log likelihood that a regressor adds."""
         columns = regressor.coefficients(self._ordinates.sizes[regressor.part])
         if len(columns) == 1:
-            return float(_gains(columns, self._weight, self._residual, self._basis)[0])
-        # Cosine and sine of a few cycles are not orthogonal: what the one takes, the other lacks.
-        first = _orthonormal([self._beside(columns[0])], self._weight)
+            return float(_compute_gains(columns, self._weight, self._residual, self._basis)[0])
+        # Cosine and sine of a few cycles are not orthogonal: fit one after the other.
+        first = _orthonormalise([self._project_out(columns[0])], self._weight)
         projection = first @ (self._weight * self._residual)
         both = np.concatenate([self._basis, first])
         left = self._residual - projection @ first
-        return float(projection @ projection + _gains(columns[1:], self._weight, left, both)[0])
+        return float(
+            projection @ projection + _compute_gains(columns[1:], self._weight, left, both)[0]
+        )
 
-    def _beside(self, column: Array) -> Array:
+    def _project_out(self, column: Array) -> Array:
         return np.asarray(column - (self._basis @ (self._weight * column)) @ self._basis)
 
 
-def _orthonormal(columns: Sequence[Array], w: Array) -> Array:
-    """Return a basis of columns that is orthonormal with weights, shape (q, k)."""
+def _orthonormalise(columns: Sequence[Array], w: Array) -> Array:
+    """Return a basis of columns that is orthonormal in the weighted product, shape (q, k)."""
     if not columns:
         return np.empty((0, len(w)))
     X = np.array(columns)
@@ -136,45 +137,47 @@ def _orthonormal(columns: Sequence[Array], w: Array) -> Array:
     )
 
 
-def _gains(columns: Array, w: Array, r: Array, basis: Array) -> Array:
+def _compute_gains(columns: Array, w: Array, r: Array, basis: Array) -> Array:
     """Return the gain of each of several columns, shape (c, k)."""
     weighted = columns * w
     above = weighted @ r
     whole = np.einsum("ck,ck->c", weighted, columns)
     left = whole - np.sum((weighted @ basis.T) ** 2, axis=1)
-    return _filtered(above, whole, left)
+    return _normalise_output(above, whole, left)
 
 
-def _filtered(above: Array, whole: Array, left: Array) -> Array:
-    """Return the squared output of the filter over what others leave of each regressor's power."""
-    return np.asarray(np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0))
+def _normalise_output(above: Array, whole: Array, left: Array) -> Array:
+    """Return the squared filter output over the independent power of each regressor."""
+    return np.asarray(
+        np.where(left > _MIN_INDEPENDENT_POWER * whole, above**2 / np.maximum(left, 1e-300), 0.0)
+    )
 
 
-def _steps_and_pulses(
+def _score_steps_and_pulses(
     number: int, n: int, w: Array, r: Array, basis: Array, parts: int
 ) -> Iterator[Score]:
     k = np.arange(1, n)
     slope = -math.sqrt(2.0 / n) / (2.0 * np.sin(np.pi * k / (2.0 * n)))
-    above = _sines(slope * w * r)
+    above = _sum_sines(slope * w * r)
     power = slope**2 * w
     padded = np.concatenate(([0.0], power))
     turned = scipy.fft.fft(padded).real
     whole = 0.5 * (turned[0] - turned[1:])
     left = whole.copy()
     for row in basis:
-        left -= _sines(slope * w * row) ** 2
-    gains = _filtered(above, whole, left)
-    gains[: _EDGE - 1] = 0.0
-    gains[n - _EDGE :] = 0.0
+        left -= _sum_sines(slope * w * row) ** 2
+    gains = _normalise_output(above, whole, left)
+    gains[: _EDGE_BLOCKS - 1] = 0.0
+    gains[n - _EDGE_BLOCKS :] = 0.0
     place = int(np.argmax(gains))
-    # Neighbouring places see nearly the same: as many count as the noise lets one tell apart
-    # (Rice's formula), and not more than there are.
+    # Scores at neighbouring places are correlated: the number of independent places follows from
+    # the correlation (Rice's formula), and cannot exceed the number of places.
     alike = float(np.sum(power * np.cos(np.pi * k / n)) / np.sum(power))
     apart = (n - 1) * math.sqrt(2.0 * max(1.0 - alike, 0.0))
     yield Score(
         Regressor("step", number, float(place + 1)),
         float(gains[place]),
-        _threshold(FALSE_ALARM["step"] / parts, apart, n),
+        _compute_threshold(FALSE_ALARM_PROBABILITY["step"] / parts, apart, n),
     )
     k0 = np.concatenate(([0.0], w * r))
     above = scipy.fft.idct(k0, type=2, norm="ortho")
@@ -182,17 +185,20 @@ def _steps_and_pulses(
     left = whole.copy()
     for row in basis:
         left -= scipy.fft.idct(np.concatenate(([0.0], w * row)), type=2, norm="ortho") ** 2
-    gains = _filtered(above, whole, left)
+    gains = _normalise_output(above, whole, left)
     place = int(np.argmax(gains))
     yield Score(
         Regressor("pulse", number, float(place)),
         float(gains[place]),
-        _threshold(FALSE_ALARM["pulse"] / parts, math.inf, n),
+        _compute_threshold(FALSE_ALARM_PROBABILITY["pulse"] / parts, math.inf, n),
     )
 
 
-def _threshold(chance: float, apart: float, places: int) -> float:
-    """Return what the largest of many gains stays below: Rice's formula, or Bonferroni's."""
+def _compute_threshold(chance: float, apart: float, places: int) -> float:
+    """Return the threshold for the largest of many gains: Rice's formula, or Bonferroni's.
+
+    S. O. Rice, Bell Syst. Tech. J. 24, 1945: the rate of upcrossings of a Gaussian process.
+    """
     low, high = 4.0, 200.0
     for _ in range(50):
         middle = 0.5 * (low + high)
@@ -205,39 +211,43 @@ def _threshold(chance: float, apart: float, places: int) -> float:
     return high
 
 
-def _sines(values: Array) -> Array:
+def _sum_sines(values: Array) -> Array:
     """Return sum_k a_k sin(pi k t / n) for t = 1 ... n - 1."""
     return np.asarray(0.5 * scipy.fft.dst(values, type=1))
 
 
 @lru_cache(maxsize=8)
-def _exponential_columns(n: int) -> tuple[Array, Array]:
+def _tabulate_exponentials(n: int) -> tuple[Array, Array]:
     """Return time constants in blocks and their coefficients, shape (t, n - 1)."""
-    times = np.geomspace(max(_SHORTEST * n, 2.0), _LONGEST * n, _TIMES)
-    rows = [Regressor("exponential", 0, t).coefficients(n)[:, :_SLOW_ORDINATES] for t in times]
+    times = np.geomspace(max(_MIN_TIME_FRACTION * n, 2.0), _MAX_TIME_FRACTION * n, _TIME_CONSTANTS)
+    rows = [
+        Regressor("exponential", 0, t).coefficients(n)[:, :_EXPONENTIAL_ORDINATES] for t in times
+    ]
     return times, np.concatenate(rows)
 
 
-def _exponentials(number: int, n: int, w: Array, r: Array, basis: Array, parts: int) -> Score:
-    times, columns = _exponential_columns(n)
+def _score_exponentials(number: int, n: int, w: Array, r: Array, basis: Array, parts: int) -> Score:
+    times, columns = _tabulate_exponentials(n)
     low = slice(0, columns.shape[1])
-    gains = _gains(columns, w[low], r[low], basis[:, low])
+    gains = _compute_gains(columns, w[low], r[low], basis[:, low])
     best = int(np.argmax(gains))
     return Score(
         Regressor("exponential", number, float(times[best])),
         float(gains[best]),
-        _threshold(FALSE_ALARM["exponential"] / parts, float(_TIMES), _TIMES),
+        _compute_threshold(
+            FALSE_ALARM_PROBABILITY["exponential"] / parts, float(_TIME_CONSTANTS), _TIME_CONSTANTS
+        ),
     )
 
 
 @lru_cache(maxsize=8)
-def _sinusoid_columns(n: int) -> tuple[Array, Array, int]:
-    """Return cycles in the part, coefficients of cosine and sine (2, c, k), and how many k."""
-    most = min(_MOST_CYCLES, n // 8)
-    cycles = np.arange(FEWEST_CYCLES, most + 1e-9, _CYCLES)
+def _tabulate_sinusoids(n: int) -> tuple[Array, Array, int]:
+    """Return cycles in the part, coefficients of cosine and sine (2, c, k), and the number k."""
+    most = min(_MAX_CYCLES, n // 8)
+    cycles = np.arange(MIN_CYCLES, most + 1e-9, _CYCLE_STEP)
     count = min(n - 1, 4 * most)
     columns = np.empty((2, len(cycles), count))
-    # The low ordinates of a slow course are those of fewer, longer blocks.
+    # The low ordinates of a slow signal are the same for fewer, longer blocks.
     few = min(n, 8 * most)
     scale = math.sqrt(n / few)
     for i, c in enumerate(cycles):
@@ -245,8 +255,8 @@ def _sinusoid_columns(n: int) -> tuple[Array, Array, int]:
     return cycles, columns, count
 
 
-def _sinusoids(number: int, n: int, w: Array, r: Array, basis: Array, parts: int) -> Score:
-    cycles, columns, count = _sinusoid_columns(n)
+def _score_sinusoids(number: int, n: int, w: Array, r: Array, basis: Array, parts: int) -> Score:
+    cycles, columns, count = _tabulate_sinusoids(n)
     w, r, basis = w[:count], r[:count], basis[:, :count]
     weighted = columns * w
     above = weighted @ r
@@ -258,7 +268,7 @@ def _sinusoids(number: int, n: int, w: Array, r: Array, basis: Array, parts: int
     b = b - np.sum(projected[1] ** 2, axis=1)
     c = c - np.sum(projected[0] * projected[1], axis=1)
     left = a * b - c**2
-    good = left > 10.0 * _KNOWN * whole
+    good = left > 10.0 * _MIN_INDEPENDENT_POWER * whole
     gains = np.where(
         good,
         (b * above[0] ** 2 - 2.0 * c * above[0] * above[1] + a * above[1] ** 2)
@@ -266,8 +276,8 @@ def _sinusoids(number: int, n: int, w: Array, r: Array, basis: Array, parts: int
         0.0,
     )
     best = int(np.argmax(gains))
-    # Of two amplitudes each; two places in a cycle are apart.
-    chance = FALSE_ALARM["sinusoid"] / parts / (2.0 * len(cycles) * _CYCLES)
+    # Each has two amplitudes; there are two independent frequencies per cycle.
+    chance = FALSE_ALARM_PROBABILITY["sinusoid"] / parts / (2.0 * len(cycles) * _CYCLE_STEP)
     return Score(
         Regressor("sinusoid", number, float(cycles[best]) / n),
         float(gains[best]),

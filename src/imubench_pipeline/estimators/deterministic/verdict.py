@@ -1,4 +1,4 @@
-"""What the deterministic courses of a channel mean: findings, and parameters to be doubted."""
+"""Findings from the deterministic signals of a channel, and caveats on its parameters."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
-from imubench_pipeline.estimators.deterministic.courses import Course, Courses
+from imubench_pipeline.estimators.deterministic.courses import (
+    DeterministicSignal,
+    DeterministicSignals,
+)
 from imubench_pipeline.estimators.deterministic.halves import Halves, compare_halves
-from imubench_pipeline.estimators.deterministic.means import Steadiness, steadiness_of
-from imubench_pipeline.estimators.deterministic.search import MOST
+from imubench_pipeline.estimators.deterministic.means import Stationarity, assess_stationarity
+from imubench_pipeline.estimators.deterministic.search import MAX_REGRESSORS
 from imubench_pipeline.estimators.estimate import (
     FAMILY,
     SIGMAS,
@@ -24,49 +27,49 @@ from imubench_pipeline.estimators.estimate import (
 from imubench_pipeline.model.estimates import DeterministicRow
 from imubench_pipeline.tables.findings import Finding
 
-_HEAVY = 0.3
-"""Excess kurtosis from which N is known less well than of normal samples."""
+_MIN_EXCESS_KURTOSIS = 0.3
+"""Excess kurtosis above which the interval of N is widened."""
 
-_TAKEN_OUT = "it is taken out of the noise"
+_REMOVED = "it is taken out of the noise"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a log that changes in time means for its estimates."""
+    """Consequences of a nonstationary log for its estimates."""
 
     findings: tuple[Finding, ...]
     caveats: Mapping[str, tuple[Status, str]]
-    """Status and reason of the parameters that are not to be relied on."""
-    widening: float = 1.0  # times the interval of N that a normal distribution would give
+    """Status and reason of the unreliable parameters."""
+    widening: float = 1.0  # factor on the interval of N for normal samples
     growth: float = 0.0
-    """Logarithm of N at the end of the log over that at its beginning, where it grows."""
+    """Logarithm of the ratio of N at the end of the log and at its start, if it has a trend."""
     scatter: float = 0.0
-    """Standard deviation of the logarithm of N over the log, where it varies otherwise."""
+    """Standard deviation of the logarithm of N over the log, if it varies without a trend."""
 
     @property
     def spread(self) -> float:
         """Standard deviation of the logarithm of N over the log."""
         return math.hypot(self.growth / math.sqrt(12.0), self.scatter)
 
-    def applied(self, estimate: Estimate) -> Estimate:
+    def apply(self, estimate: Estimate) -> Estimate:
         """Return an estimate with the caveats on the parameters that have a value.
 
-        The interval of N holds for N at any time of the log, as its draws do.
+        The interval and the draws of N are widened to include N at any time of the log.
         """
         if not self.caveats and self.widening == 1.0:
             return estimate
 
         def of(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
             judged = {
-                name: _with(parameter, self.caveats.get(name))
+                name: _add_caveat(parameter, self.caveats.get(name))
                 for name, parameter in parameters.items()
             }
             if "N" in judged:
-                judged["N"] = _widened(judged["N"], self.widening, self.spread)
+                judged["N"] = _widen_limits(judged["N"], self.widening, self.spread)
             return judged
 
         slow = [self.caveats[name] for name in ("B", "K") if name in self.caveats]
-        # The lowest point of the curve is where its slow terms begin.
+        # The lowest point of the curve depends on its slow terms.
         lowest = next((caveat for caveat in slow if caveat[0] == "doubtful"), None)
         of_curve = {"B_curve": self.caveats.get("B"), "sigma_min": lowest, "tau_min": lowest}
 
@@ -75,14 +78,14 @@ class Verdict:
             parameters=of(estimate.parameters),
             further=[of(group) for group in estimate.further],
             curve={
-                name: _with(parameter, of_curve.get(name))
+                name: _add_caveat(parameter, of_curve.get(name))
                 for name, parameter in estimate.curve.items()
             },
-            draws=self._drawn(estimate.draws),
+            draws=self._widen_draws(estimate.draws),
         )
 
-    def _drawn(self, draws: JointDraws | None) -> JointDraws | None:
-        """Return draws with N as wide as its interval, each with N of some time of the log."""
+    def _widen_draws(self, draws: JointDraws | None) -> JointDraws | None:
+        """Return draws with N as wide as its interval, each with N at one time of the log."""
         if draws is None:
             return None
         first, place = draws.first.copy(), FAMILY.index("N")
@@ -91,7 +94,7 @@ class Verdict:
         if not positive.any():
             return draws
         middle = float(np.median(N[positive]))
-        # Evenly over the log, and in an order that no other parameter has.
+        # Times are uniform over the log, in a random order, independent of other parameters.
         even = (np.arange(len(N)) + 0.5) / len(N)
         even = np.random.default_rng(len(N)).permutation(even)
         other_times = np.exp(self.growth * (even - 0.5) + self.scatter * ndtri(even))
@@ -99,7 +102,7 @@ class Verdict:
         return replace(draws, first=first)
 
 
-def _with(parameter: Parameter, caveat: tuple[Status, str] | None) -> Parameter:
+def _add_caveat(parameter: Parameter, caveat: tuple[Status, str] | None) -> Parameter:
     """Return a parameter with a caveat, if there is one and it has a value."""
     if caveat is None or parameter.status not in ("ok", "doubtful"):
         return parameter
@@ -111,8 +114,8 @@ def _with(parameter: Parameter, caveat: tuple[Status, str] | None) -> Parameter:
     return replace(parameter, status=status, reason=reason)
 
 
-def _widened(parameter: Parameter, times: float, spread: float) -> Parameter:
-    """Return a parameter with limits so many times as far, and a spread of its logarithm added."""
+def _widen_limits(parameter: Parameter, times: float, spread: float) -> Parameter:
+    """Return a parameter with limits ``times`` as wide, plus a ``spread`` of its logarithm."""
     value, lower, upper = parameter.value, parameter.lower, parameter.upper
     if value is None or lower is None or upper is None or (times, spread) == (1.0, 0.0):
         return parameter
@@ -120,7 +123,7 @@ def _widened(parameter: Parameter, times: float, spread: float) -> Parameter:
     def far(ratio: float) -> float:
         return math.exp(math.hypot(times * math.log(ratio), SIGMAS * spread))
 
-    # On the logarithm: no limit passes 0.
+    # On a logarithmic scale no limit becomes negative.
     return replace(
         parameter,
         lower=value / far(value / lower) if lower > 0.0 else lower,
@@ -128,98 +131,102 @@ def _widened(parameter: Parameter, times: float, spread: float) -> Parameter:
     )
 
 
-def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
-    """Return what was found of a channel, with its SI unit, and what it casts doubt on."""
-    findings = [_finding(channel, unit, course) for course in courses.courses]
+def assess_signals(channel: str, unit: str, signals: DeterministicSignals) -> Verdict:
+    """Return the findings of a channel, with its SI unit, and the caveats on its parameters."""
+    findings = [_describe_signal(channel, unit, signal) for signal in signals.signals]
     caveats: dict[str, tuple[Status, str]] = {}
-    if courses.means is None or courses.searched is None:
+    if signals.means is None or signals.searched is None:
         return Verdict((), {})
     widening = 1.0
-    kurtosis = courses.means.longest.kurtosis
-    if kurtosis > _HEAVY:
+    kurtosis = signals.means.longest.kurtosis
+    if kurtosis > _MIN_EXCESS_KURTOSIS:
         # The power of L samples has a relative variance of (2 + kurtosis) / L.
         widening = math.sqrt(1.0 + 0.5 * kurtosis)
-        findings.append(_heavy(channel, kurtosis, widening))
+        findings.append(_describe_heavy_tails(channel, kurtosis, widening))
     growth = scatter = 0.0
-    steady = steadiness_of(courses.means)
-    if steady is not None and (steady.grows or steady.varies):
-        finding = _unsteady(channel, steady)
+    steady = assess_stationarity(signals.means)
+    if steady is not None and (steady.has_trend or steady.is_variable):
+        finding = _describe_nonstationarity(channel, steady)
         findings.append(finding)
         caveats["N"] = ("doubtful", finding.detail)
-        growth, scatter = (math.log1p(steady.trend), 0.0) if steady.grows else (0.0, steady.spread)
-    if courses.telegraph:
-        reason = (
-            f"the bias of {channel} steps {MOST} times or more, as telegraph noise does: the steps "
-            "are left in the noise, where they pass for B, T_B and K"
+        growth, scatter = (
+            (math.log1p(steady.trend), 0.0) if steady.has_trend else (0.0, steady.spread)
         )
-        findings.append(Finding("telegraph_noise", "warning", reason, float(MOST), channel))
+    if signals.telegraph:
+        reason = (
+            f"the bias of {channel} steps {MAX_REGRESSORS} times or more, as telegraph noise does: "
+            "the steps are left in the noise, where they pass for B, T_B and K"
+        )
+        findings.append(
+            Finding("telegraph_noise", "warning", reason, float(MAX_REGRESSORS), channel)
+        )
         caveats |= {name: ("doubtful", reason) for name in ("B", "T_B", "K")}
         return Verdict(tuple(findings), caveats, widening, growth, scatter)
-    noise = courses.searched.fit.noise
-    for halves in compare_halves(courses.without(), noise):
+    noise = signals.searched.fit.noise
+    for halves in compare_halves(signals.without(), noise):
         if halves.differ:
-            finding = _differ(channel, halves)
+            finding = _describe_difference(channel, halves)
             findings.append(finding)
             doubted = ("K",) if halves.of == "K" else ("B", "T_B", "K")
             caveats |= {name: ("doubtful", finding.detail) for name in doubted}
             break
-    reason_against = courses.against_random_walk
+    reason_against = signals.against_random_walk
     if reason_against is not None:
         caveats["K"] = ("not_identified", reason_against)
     return Verdict(tuple(findings), caveats, widening, growth, scatter)
 
 
 def deterministic_rows(
-    key: Mapping[str, str], unit: str, courses: Courses
+    key: Mapping[str, str], unit: str, signals: DeterministicSignals
 ) -> Iterator[DeterministicRow]:
     """Yield the rows of the table ``deterministic``; the key is sensor, recording and channel."""
-    for course in courses.courses:
+    for signal in signals.signals:
         yield DeterministicRow(
             sensor=key["sensor"],
             recording=key["recording"],
             channel=key["channel"],
-            kind=course.kind,
-            start=course.start,
-            end=course.end,
-            size=course.size,
-            size_lower=course.size_lower,
-            size_upper=course.size_upper,
+            kind=signal.kind,
+            start=signal.start,
+            end=signal.end,
+            size=signal.size,
+            size_lower=signal.size_lower,
+            size_upper=signal.size_upper,
             unit=unit,
-            time=course.time,
-            time_lower=course.time_lower,
-            time_upper=course.time_upper,
-            place_error=course.place_error,
-            gain=course.gain,
+            time=signal.time,
+            time_lower=signal.time_lower,
+            time_upper=signal.time_upper,
+            place_error=signal.place_error,
+            gain=signal.gain,
         )
 
 
-def _finding(channel: str, unit: str, course: Course) -> Finding:
-    size = f"{course.size:.4g} {unit}"
-    limits = f"95 %: {course.size_lower:.4g} to {course.size_upper:.4g} {unit}"
-    if course.kind == "bias_step":
+def _describe_signal(channel: str, unit: str, signal: DeterministicSignal) -> Finding:
+    size = f"{signal.size:.4g} {unit}"
+    limits = f"95 %: {signal.size_lower:.4g} to {signal.size_upper:.4g} {unit}"
+    if signal.kind == "bias_step":
         name = "bias_step"
         detail = (
-            f"the bias of {channel} steps by {size} ({limits}) at {course.start:.6g} s "
-            f"(± {course.place_error or 0.0:.2g} s); {_TAKEN_OUT}"
+            f"the bias of {channel} steps by {size} ({limits}) at {signal.start:.6g} s "
+            f"(± {signal.place_error or 0.0:.2g} s); {_REMOVED}"
         )
-    elif course.kind == "warm_up_drift":
+    elif signal.kind == "warm_up_drift":
         name = "warm_up_drift"
         detail = (
             f"{channel} begins {size} ({limits}) away from where it settles, with a time constant "
-            f"of {course.time:.4g} s ({course.time_lower:.4g} to {course.time_upper:.4g} s); "
-            f"{_TAKEN_OUT}"
+            f"of {signal.time:.4g} s ({signal.time_lower:.4g} to {signal.time_upper:.4g} s); "
+            f"{_REMOVED}"
         )
     else:
         name = "periodic_drift"
         detail = (
             f"the bias of {channel} swings with an amplitude of {size} ({limits}) and a period of "
-            f"{course.time:.5g} s ({course.time_lower:.5g} to {course.time_upper:.5g} s); "
-            f"{_TAKEN_OUT}"
+            f"{signal.time:.5g} s ({signal.time_lower:.5g} to {signal.time_upper:.5g} s); "
+            f"{_REMOVED}"
         )
-    return Finding(name, "warning", detail, course.size, channel, course.start, course.end)
+    return Finding(name, "warning", detail, signal.size, channel, signal.start, signal.end)
 
 
-def _heavy(channel: str, kurtosis: float, widening: float) -> Finding:
+def _describe_heavy_tails(channel: str, kurtosis: float, widening: float) -> Finding:
     detail = (
         f"the fast noise of {channel} has heavier tails than a normal distribution (excess "
         f"kurtosis {kurtosis:.3g}); the interval of N is made {widening:.3g} times as wide"
@@ -227,8 +234,8 @@ def _heavy(channel: str, kurtosis: float, widening: float) -> Finding:
     return Finding("heavy_tails", "note", detail, kurtosis, channel)
 
 
-def _unsteady(channel: str, steady: Steadiness) -> Finding:
-    if steady.grows:
+def _describe_nonstationarity(channel: str, steady: Stationarity) -> Finding:
+    if steady.has_trend:
         word = "grows" if steady.trend > 0.0 else "falls"
         detail = (
             f"the fast noise of {channel} {word} by {100 * abs(steady.trend):.3g} % "
@@ -247,7 +254,7 @@ def _unsteady(channel: str, steady: Steadiness) -> Finding:
     )
 
 
-def _differ(channel: str, halves: Halves) -> Finding:
+def _describe_difference(channel: str, halves: Halves) -> Finding:
     name = "K_differs" if halves.of == "K" else "slow_noise_differs"
     noise = "K" if halves.of == "K" else "the slow noise"
     detail = (
