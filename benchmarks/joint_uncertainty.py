@@ -36,7 +36,7 @@ from scipy.signal import lfilter
 from scipy.stats import binomtest
 
 from imubench_pipeline.allan import cluster_sizes, of_blocks
-from imubench_pipeline.estimators.draws import joint_draws
+from imubench_pipeline.estimators.draws import draw_jointly
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.rows import recommended_estimates
@@ -143,7 +143,7 @@ def of_known_terms(case: Case, log: Array) -> Estimate:
     return Estimate(
         "likelihood",
         {name: Parameter(value or None) for name, value in values.items()},
-        draws=joint_draws([(terms, posterior, 1.0)], math.inf),
+        draws=draw_jointly([(terms, posterior, 1.0)], math.inf),
     )
 
 

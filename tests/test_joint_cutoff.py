@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
-from imubench_pipeline.estimators.filter_fits import highest_cutoff
+from imubench_pipeline.estimators.filter_fits import get_highest_cutoff
 from imubench_pipeline.estimators.frame import select_for_fit
 from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
@@ -120,5 +120,5 @@ def test_no_mean_is_shorter_than_of_two_samples(seed):
     found = refine_cutoff(
         replace(frame.low_pass, allowed=means, kind="boxcar"), spectrum, frame.used, candidates[:2]
     )
-    highest = Filter("boxcar", 1, highest_cutoff("boxcar", 1, rate)).half_power(rate)
+    highest = Filter("boxcar", 1, get_highest_cutoff("boxcar", 1, rate)).half_power(rate)
     assert found.frequency.lower < found.frequency.upper <= highest * (1.0 + 1e-9)

@@ -6,7 +6,7 @@ from scipy import signal
 
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
-from imubench_pipeline.estimators.lines import find, without_lines
+from imubench_pipeline.estimators.lines import find_lines, mask_lines
 from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
@@ -224,8 +224,8 @@ def test_a_line_is_no_bend(rng) -> None:
     log += 1e-2 * np.cos(2 * np.pi * 20.0 * np.arange(300_000) / RATE)
     spectrum, line_spectra = spectra([log], len(log), RATE)
     low = spectrum.block > 1
-    lines = find(line_spectra, WHITE, RATE, float(spectrum.upper[low].max()))
-    clear = without_lines(spectrum, lines, np.full(len(low), N**2))
+    lines = find_lines(line_spectra, WHITE, RATE, float(spectrum.upper[low].max()))
+    clear = mask_lines(spectrum, lines, np.full(len(low), N**2))
     assert find_band(spectrum, clear).highest == NYQUIST
     # The bins that it touches would be one.
     assert band_of(spectrum).highest < 20.0

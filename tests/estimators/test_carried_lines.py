@@ -8,11 +8,11 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.lines import (
-    MOST,
-    STRONGEST,
+    MAX_LINES,
+    MAX_SINGLE_LINES,
     Line,
-    carried_sinusoids,
-    joined_finding,
+    describe_grouping,
+    select_sinusoids,
 )
 from imubench_pipeline.estimators.spectral_findings import line_findings
 from imubench_pipeline.noise import NoiseModel
@@ -32,17 +32,19 @@ def model_of(lines: list[dict[str, Parameter]]) -> NoiseModel:
 
 
 def test_few_lines_are_carried_as_they_are() -> None:
-    lines = [*comb(MOST), *comb(5, "band")]
-    found = carried_sinusoids(lines)
-    assert [one["frequency"].value for one in found] == [line.frequency for line in lines[:MOST]]
+    lines = [*comb(MAX_LINES), *comb(5, "band")]
+    found = select_sinusoids(lines)
+    assert [one["frequency"].value for one in found] == [
+        line.frequency for line in lines[:MAX_LINES]
+    ]
     assert line_findings("gyro_x", lines, None)[1:] == []
 
 
-@pytest.mark.parametrize("number", [MOST + 1, 363, 1000])
+@pytest.mark.parametrize("number", [MAX_LINES + 1, 363, 1000])
 def test_many_lines_keep_their_power_and_that_of_their_integral(number: int) -> None:
     lines = comb(number)
-    found = carried_sinusoids(lines)
-    assert len(found) == MOST
+    found = select_sinusoids(lines)
+    assert len(found) == MAX_LINES
     model = model_of(found)
     amplitudes = np.array([line.amplitude for line in lines])
     frequencies = np.array([line.frequency for line in lines])
@@ -50,7 +52,7 @@ def test_many_lines_keep_their_power_and_that_of_their_integral(number: int) -> 
     at = np.array([part.frequency for part in model.sinusoids])
     assert np.sum(kept**2) == pytest.approx(np.sum(amplitudes**2))
     assert np.sum((kept / at) ** 2) == pytest.approx(np.sum((amplitudes / frequencies) ** 2))
-    strongest = set(np.sort(amplitudes)[-STRONGEST:].tolist())
+    strongest = set(np.sort(amplitudes)[-MAX_SINGLE_LINES:].tolist())
     assert strongest < set(kept.tolist())
     assert np.all(np.diff(at) > 0)
 
@@ -61,11 +63,11 @@ def test_a_comb_is_a_warning_that_says_how_many_and_how_much_power() -> None:
     assert (note.finding, warning.finding) == ("lines", "too_many_lines")
     assert warning.severity == "warning" and warning.value == 363
     powers = np.sort([0.5 * line.amplitude**2 for line in lines])
-    rest = powers[:-STRONGEST].sum()
+    rest = powers[:-MAX_SINGLE_LINES].sum()
     assert "the other 351" in warning.detail
     assert f"{100 * rest / powers.sum():.3g} % of that of all lines" in warning.detail
     assert f"({np.sqrt(rest):.3g} rad/s rms)" in warning.detail
-    assert joined_finding("gyro_x", "gyro", lines) == warning
+    assert describe_grouping("gyro_x", "gyro", lines) == warning
 
 
 def test_a_line_that_integrates_to_as_much_as_the_noise_is_warned_of() -> None:

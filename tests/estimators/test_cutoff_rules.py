@@ -7,15 +7,15 @@ import pytest
 
 from imubench_pipeline.estimators.cutoff import (
     Cutoff,
-    _process_or_filter,
-    _without_filter,
+    _describe_no_filter,
+    _explain_ambiguity,
     find_cutoff,
 )
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import FilterFits
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
-from imubench_pipeline.estimators.joint_cutoff import worth_joining
+from imubench_pipeline.estimators.joint_cutoff import select_joint_models
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
 from tests.conftest import few
@@ -33,7 +33,7 @@ def test_a_long_correlation_without_white_noise_may_be_a_process_or_a_filter() -
         fits.slow = []
         first = trial(cutoff)
         first = replace(first, cost=fits.cost(first))
-        return _process_or_filter(fits, [first], first.cost - beside, gained, stated)
+        return _explain_ambiguity(fits, [first], first.cost - beside, gained, stated)
 
     found = told(20.0)
     assert found is not None and found[1] == pytest.approx(2.0, rel=1e-3)
@@ -63,10 +63,10 @@ def test_what_stands_beside_a_filter_is_less_what_rounding_makes() -> None:
 
 
 def test_a_doubt_leaves_n_between_both() -> None:
-    plain = _without_filter(2.0, 1.0, None)
+    plain = _describe_no_filter(2.0, 1.0, None)
     assert (plain.N, plain.frequency.status) == (Parameter(2.0), "absent")
     for before in (0.5, 3.0):
-        found = _without_filter(2.0, 1.0, ("alike", before))
+        found = _describe_no_filter(2.0, 1.0, ("alike", before))
         assert found.N == Parameter(
             None, "not_identified", "alike", min(2.0, before), max(2.0, before), fitted=2.0
         )
@@ -84,7 +84,7 @@ def test_models_that_may_be_the_best_get_a_cutoff_of_their_own() -> None:
         of(Terms("NF"), 17.0, 0.03),
     )
     worse, asked = of(Terms("NFK"), 16.1, 0.029), of(Terms("QN"), 90.0, 0.0)
-    found = worth_joining([best, near, worse, likely, asked], Terms("QN"))
+    found = select_joint_models([best, near, worse, likely, asked], Terms("QN"))
     assert found == [best, near, likely, asked]
 
 

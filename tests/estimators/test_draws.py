@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.draws import drawn_share, joint_draws
+from imubench_pipeline.estimators.draws import compute_draw_weight, draw_jointly
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.likelihood import fit
@@ -27,7 +27,7 @@ def posterior(parameters: np.ndarray, times: np.ndarray | None = None) -> Poster
 def test_parameters_that_trade_off_stay_together(rng) -> None:
     one = rng.standard_normal(5000)
     N, K = np.exp(0.1 * one), 1e-3 * np.exp(-0.3 * one)
-    drawn = joint_draws([(Terms("NK"), posterior(np.column_stack((N, K))), 1.0)], LONGEST)
+    drawn = draw_jointly([(Terms("NK"), posterior(np.column_stack((N, K))), 1.0)], LONGEST)
     models = draw_models(Estimate("likelihood", {}, draws=drawn), 200, rng)
     assert len(models) == 200
     for model in models:
@@ -37,7 +37,7 @@ def test_parameters_that_trade_off_stay_together(rng) -> None:
 
 
 def test_models_are_drawn_by_their_shares_with_their_own_terms() -> None:
-    drawn = joint_draws(
+    drawn = draw_jointly(
         [
             (Terms("NK"), posterior(np.full((400, 2), [1.0, 0.1])), 0.5),
             (Terms("NF"), posterior(np.full((100, 2), [2.0, 0.2])), 0.25),
@@ -73,7 +73,7 @@ def test_models_are_drawn_by_their_shares_with_their_own_terms() -> None:
 def test_a_process_as_slow_as_a_walk_counts_less_than_a_walk() -> None:
     slow = posterior(np.full((1000, 2), [1.0, 0.5]), np.full((1000, 1), 0.2 * LONGEST))
     walk = posterior(np.full((1000, 2), [1.0, 0.1]))
-    drawn = joint_draws([(Terms("N", 1), slow, 0.5), (Terms("NK"), walk, 0.5)], LONGEST, 1000)
+    drawn = draw_jointly([(Terms("N", 1), slow, 0.5), (Terms("NK"), walk, 0.5)], LONGEST, 1000)
     names = [drawn.model(number).name for number in range(1000)]
     # BIC asks for 4 more: odds of e^-2.
     assert names.count("N+GM") / names.count("N+K") == pytest.approx(math.exp(-2.0), abs=2e-3)
@@ -94,7 +94,7 @@ def test_an_amplitude_costs_its_model_what_aic_asks_and_a_correlation_time_what_
 
     def odds(terms: Terms) -> float:
         plain = candidate(Terms("N"), 0.0)
-        return drawn_share(candidate(terms, 0.0), bins) / drawn_share(plain, bins)
+        return compute_draw_weight(candidate(terms, 0.0), bins) / compute_draw_weight(plain, bins)
 
     assert odds(Terms("NFK")) == pytest.approx(math.exp(-2.0))
     assert odds(Terms("N", 1)) == pytest.approx(math.exp(-1.0) / math.sqrt(bins))
@@ -107,18 +107,20 @@ def test_an_amplitude_costs_its_model_what_aic_asks_and_a_correlation_time_what_
 def test_a_weak_term_that_is_there_has_its_part_of_the_draws() -> None:
     # Better by 2 in log likelihood: the 95 % limits must hold what only that model says.
     without, having = candidate(Terms("NK"), 0.0), candidate(Terms("NFK"), -2.0)
-    part = drawn_share(having, 200) / (drawn_share(without, 200) + drawn_share(having, 200))
+    part = compute_draw_weight(having, 200) / (
+        compute_draw_weight(without, 200) + compute_draw_weight(having, 200)
+    )
     assert part == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
 
 
 def test_without_a_share_there_is_nothing_to_draw() -> None:
     with pytest.raises(ValueError, match="shares above 0"):
-        joint_draws([], LONGEST)
+        draw_jointly([], LONGEST)
 
 
 def test_fewer_draws_are_spread_over_all_and_more_repeat_them(rng) -> None:
     N = np.linspace(1.0, 2.0, 200)[:, None]
-    drawn = joint_draws([(Terms("N"), posterior(N), 1.0)], LONGEST)
+    drawn = draw_jointly([(Terms("N"), posterior(N), 1.0)], LONGEST)
     estimate = Estimate("likelihood", {}, draws=drawn)
     few = sorted(model.N for model in draw_models(estimate, 20, rng))
     assert np.diff(few) == pytest.approx(10.0 / 199.0)
@@ -128,7 +130,7 @@ def test_fewer_draws_are_spread_over_all_and_more_repeat_them(rng) -> None:
 
 def test_lines_are_drawn_beside_the_noise(rng) -> None:
     line = {"amplitude": Parameter(1.0, lower=0.9, upper=1.1), "frequency": Parameter(2.0)}
-    drawn = joint_draws([(Terms("N"), posterior(np.ones((50, 1))), 1.0)], LONGEST, 50)
+    drawn = draw_jointly([(Terms("N"), posterior(np.ones((50, 1))), 1.0)], LONGEST, 50)
     models = draw_models(Estimate("likelihood", {}, lines=[line], draws=drawn), 50, rng)
     amplitudes = [model.sinusoids[0].amplitude for model in models]
     assert np.std(amplitudes) == pytest.approx(0.05, rel=0.4)

@@ -11,10 +11,10 @@ from imubench_pipeline.estimators.filter_fits import (
     FilterFits,
     FilterTrial,
     Reading,
-    also_after_sampling,
-    density_in_the_log,
+    compute_density_in_log,
     draw_factors,
-    highest_cutoff,
+    get_highest_cutoff,
+    read_as_digital,
 )
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.low_pass import Filter, Frequencies, Kind
@@ -144,12 +144,12 @@ def test_white_noise_beside_a_process_is_no_floor_behind_a_filter(expected: Filt
     fits = FilterFits(replace(spectrum, density=slow))
     fits.slow = []
     kinds: tuple[Kind, Kind] = ("analogue", "bilinear")
-    of_first = [x for kind in kinds for x in fits._of(kind, 1, 1e-3)]
+    of_first = [x for kind in kinds for x in fits._find_maxima(kind, 1, 1e-3)]
     assert not [x for x in of_first if x.floor and x.correlation(RATE) > 2.0]
     fast = white(RATE / (2.0 * np.pi * 1.5), spectrum.frequency) + 0.01
     fits = FilterFits(replace(spectrum, density=fast))
     fits.slow = []
-    assert [x for x in fits._of("analogue", 1, 1e-3) if x.floor]
+    assert [x for x in fits._find_maxima("analogue", 1, 1e-3) if x.floor]
 
 
 def test_no_filter_bends_white_noise() -> None:
@@ -166,14 +166,14 @@ def test_no_filter_bends_white_noise() -> None:
 
 def test_the_lengths_of_means_that_are_tried_are_whole() -> None:
     fits = FilterFits(ideal_spectrum(RATE, 60.0, RATE / 2.0))
-    tried = fits._cutoffs("boxcar", 1, RATE / 500.0, 24)
+    tried = fits._make_scan("boxcar", 1, RATE / 500.0, 24)
     lengths = 0.442946 * RATE / tried
     for whole in range(3, 21):
         assert np.abs(lengths - whole).min() < 1e-9
     assert (tried.min(), tried.max()) == pytest.approx((RATE / 500.0, 0.222 * RATE))
     assert len(tried) == 24 + 18
     np.testing.assert_allclose(
-        fits._cutoffs("analogue", 1, 0.2, 5), 0.2 * 2000.0 ** (np.arange(5) / 4.0)
+        fits._make_scan("analogue", 1, 0.2, 5), 0.2 * 2000.0 ** (np.arange(5) / 4.0)
     )
 
 
@@ -202,16 +202,16 @@ def test_draws_of_the_density_in_the_log_have_their_own_limits(rng: np.random.Ge
 def test_the_density_in_the_log_has_the_folds_and_what_passes_no_filter(cutoff: float) -> None:
     # Of first order the folds add up to x coth x.
     x = np.pi * cutoff / RATE
-    found = density_in_the_log(Filter("analogue", 1, cutoff), 2.0, 3.0, RATE)
+    found = compute_density_in_log(Filter("analogue", 1, cutoff), 2.0, 3.0, RATE)
     assert found == pytest.approx(np.sqrt(4.0 * x / np.tanh(x) + 3.0), rel=1e-6)
     # What is done to the samples folds nothing.
-    digital = density_in_the_log(Filter("bilinear", 1, min(cutoff, 40.0)), 2.0, 0.0, RATE)
+    digital = compute_density_in_log(Filter("bilinear", 1, min(cutoff, 40.0)), 2.0, 0.0, RATE)
     assert digital == pytest.approx(2.0, rel=1e-9)
 
 
 def test_a_filter_applied_to_the_samples_folds_nothing_into_n() -> None:
     shown = (-0.01, 0.0, 0.02)
-    found = also_after_sampling(Reading(0.5, -0.1, 0.0, 0.2, shown), trial(CUTOFF), RATE)
+    found = read_as_digital(Reading(0.5, -0.1, 0.0, 0.2, shown), trial(CUTOFF), RATE)
     assert found.in_the_log == shown
     folded = 0.5 * np.log(white(CUTOFF, np.zeros(1), 200_000)[0])
     assert found.weight == pytest.approx(0.05)
@@ -266,4 +266,4 @@ def test_rounding_is_tried_beside_a_process_and_a_walk() -> None:
 def test_no_filter_of_the_samples_is_looked_for_beyond_nyquist() -> None:
     bilinear = [(kind, order) for kind, order in FAMILY if kind == "bilinear"]
     assert len(bilinear) == 4
-    assert all(0.4 * RATE < highest_cutoff(*each, RATE) < 0.5 * RATE for each in bilinear)
+    assert all(0.4 * RATE < get_highest_cutoff(*each, RATE) < 0.5 * RATE for each in bilinear)

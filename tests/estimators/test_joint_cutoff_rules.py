@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from imubench_pipeline.estimators.cutoff import Cutoff, _ruled_by_ends, find_cutoff
+from imubench_pipeline.estimators.cutoff import Cutoff, _find_leaky_bins, find_cutoff
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import Allowed, FilterFits
 from imubench_pipeline.estimators.goodness import Goodness
@@ -157,14 +157,14 @@ def test_bins_are_ruled_by_the_ends_where_the_filter_leaves_less() -> None:
     fits = FilterFits(spectrum)
     fits.slow = []
     best = trial(5.0, "bilinear", 4)
-    found = _ruled_by_ends(spectrum, fits, best, 0.0)
+    found = _find_leaky_bins(spectrum, fits, best, 0.0)
     rules = leak > 0.01 * shape
     # At its edge a bin may go either way, and where the filter falls by more than a half in it.
     assert (found | ~rules).all() and found[-1] and not found[flat.frequency < 5.0].any()
     # What rounding adds there is more than the ends; something ten times as strong is none of them.
-    assert not _ruled_by_ends(spectrum, fits, best, 4.0 * 200.0 * leak.max())[rules].any()
+    assert not _find_leaky_bins(spectrum, fits, best, 4.0 * 200.0 * leak.max())[rules].any()
     loud = replace(spectrum, density=spectrum.density * np.where(rules, 25.0, 1.0))
-    assert not _ruled_by_ends(loud, fits, best, 0.0)[-1]
+    assert not _find_leaky_bins(loud, fits, best, 0.0)[-1]
 
 
 def test_the_rounding_of_a_register_stands_behind_the_filter() -> None:

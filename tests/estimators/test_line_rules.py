@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from imubench_pipeline.estimators.lines import Line, find, without_lines
+from imubench_pipeline.estimators.lines import Line, find_lines, mask_lines
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, spectra
 from imubench_pipeline.noise import NoiseModel
 
@@ -35,7 +35,7 @@ def expected(*lines: tuple[float, float], segments: int = SEGMENTS, block: int =
 @pytest.mark.parametrize("amplitude", [3.0, 10.0])
 def test_a_sinusoid_has_its_amplitude_frequency_and_limits(beside: float, amplitude: float) -> None:
     frequency = (200 + beside) * STEP
-    (line,) = find([expected((frequency, amplitude))], WHITE, RATE, 0.0)
+    (line,) = find_lines([expected((frequency, amplitude))], WHITE, RATE, 0.0)
     assert line.kind == "sinusoid" and line.narrow
     assert line.amplitude == pytest.approx(amplitude, rel=0.01)
     assert line.frequency == pytest.approx(frequency, abs=0.02 * STEP)
@@ -57,14 +57,14 @@ def test_a_sinusoid_has_its_amplitude_frequency_and_limits(beside: float, amplit
 
 def test_the_chance_of_a_line_counts_bins_and_what_is_known_of_the_level() -> None:
     frequency, amplitude = 200 * STEP, 0.9
-    (line,) = find([expected((frequency, amplitude))], WHITE, RATE, 0.0)
+    (line,) = find_lines([expected((frequency, amplitude))], WHITE, RATE, 0.0)
     floor = stats.gamma(SEGMENTS).median() / SEGMENTS
     assert line.ratio == pytest.approx(floor + amplitude**2 / 4.0 / STEP * 2.0 / 3.0, rel=1e-6)
     known = SEGMENTS * 129 / 1.94 / 1.57
     chance = stats.f(2 * SEGMENTS, 2 * known).sf(line.ratio)
     assert line.false_alarm == pytest.approx(chance * (len(FREQUENCY) - 1 - 4), rel=1e-6)
     assert 1e-5 < line.false_alarm < 5e-3
-    assert not find([expected((frequency, 0.85 * amplitude))], WHITE, RATE, 0.0)
+    assert not find_lines([expected((frequency, 0.85 * amplitude))], WHITE, RATE, 0.0)
 
 
 def test_the_lowest_bins_and_the_last_one_show_no_line() -> None:
@@ -72,18 +72,18 @@ def test_the_lowest_bins_and_the_last_one_show_no_line() -> None:
         spectrum = expected()
         density = spectrum.density.copy()
         density[place] = 100.0
-        found = find([replace(spectrum, density=density)], WHITE, RATE, 0.0)
+        found = find_lines([replace(spectrum, density=density)], WHITE, RATE, 0.0)
         assert len(found) == number
     spectrum = expected()
     density = spectrum.density.copy()
     density[512] = 100.0
-    assert not find([replace(spectrum, density=density)], WHITE, RATE, 0.0)
+    assert not find_lines([replace(spectrum, density=density)], WHITE, RATE, 0.0)
 
 
 def test_a_hump_is_one_band_with_the_power_of_all() -> None:
     spectrum = expected()
     hump = 20.0 * np.exp(-0.5 * ((np.arange(len(FREQUENCY)) - 250.0) / 4.0) ** 2)
-    (line,) = find([replace(spectrum, density=1.0 + hump)], WHITE, RATE, 0.0)
+    (line,) = find_lines([replace(spectrum, density=1.0 + hump)], WHITE, RATE, 0.0)
     assert line.kind == "band"
     assert line.frequency == pytest.approx(250.0 * STEP, abs=0.02 * STEP)
     # Down to a tenth of its top: 2.15 sigma on either side.
@@ -96,7 +96,7 @@ def test_a_hump_is_one_band_with_the_power_of_all() -> None:
 def test_pieces_of_a_band_are_joined_by_their_power() -> None:
     bins = np.arange(len(FREQUENCY))
     first = 30.0 * (np.abs(bins - 250) < 6) + 90.0 * (np.abs(bins - 275) < 6)
-    (band,) = find([replace(expected(), density=1.0 + first)], WHITE, RATE, 0.0)
+    (band,) = find_lines([replace(expected(), density=1.0 + first)], WHITE, RATE, 0.0)
     assert band.kind == "band"
     assert band.frequency == pytest.approx((0.25 * 250 + 0.75 * 275) * STEP, abs=0.3 * STEP)
     assert band.amplitude**2 / 4.0 / STEP == pytest.approx(11 * 120.0, rel=0.05)
@@ -105,7 +105,7 @@ def test_pieces_of_a_band_are_joined_by_their_power() -> None:
     assert band.frequency_lower < 251 * STEP and band.frequency_upper > 274 * STEP
     assert band.amplitude_lower < band.amplitude < band.amplitude_upper
     apart = 30.0 * (np.abs(bins - 250) < 6) + 90.0 * (np.abs(bins - 300) < 6)
-    assert len(find([replace(expected(), density=1.0 + apart)], WHITE, RATE, 0.0)) == 2
+    assert len(find_lines([replace(expected(), density=1.0 + apart)], WHITE, RATE, 0.0)) == 2
 
 
 BLOCK = 8
@@ -113,17 +113,17 @@ BLOCK = 8
 
 
 def test_means_of_blocks_give_the_amplitude_of_the_samples() -> None:
-    found = find([expected((3.0, 2.0), block=BLOCK), expected()], WHITE, RATE, 4.0)
+    found = find_lines([expected((3.0, 2.0), block=BLOCK), expected()], WHITE, RATE, 4.0)
     (line,) = found
     assert (line.frequency, line.amplitude) == pytest.approx((3.0, 2.0), rel=0.01)
 
 
 def test_each_spectrum_has_its_own_side_of_the_crossover() -> None:
     for frequency, number in ((3.0, 1), (5.0, 0)):
-        found = find([expected((frequency, 2.0), block=BLOCK), expected()], WHITE, RATE, 4.0)
+        found = find_lines([expected((frequency, 2.0), block=BLOCK), expected()], WHITE, RATE, 4.0)
         assert len(found) == number
     for frequency, number in ((3.0, 0), (5.0, 1)):
-        found = find([expected(block=BLOCK), expected((frequency, 2.0))], WHITE, RATE, 4.0)
+        found = find_lines([expected(block=BLOCK), expected((frequency, 2.0))], WHITE, RATE, 4.0)
         assert len(found) == number
 
 
@@ -145,7 +145,9 @@ def test_what_a_fast_line_leaves_in_means_is_its_alias(
         return float(abs(np.sin(BLOCK * half) / (BLOCK * np.sin(half))))
 
     slow = seen * 9.0 * gain(frequency) / gain(1.0)
-    found = find([expected((1.0, slow), block=BLOCK), expected((frequency, 9.0))], WHITE, RATE, 4.0)
+    found = find_lines(
+        [expected((1.0, slow), block=BLOCK), expected((frequency, 9.0))], WHITE, RATE, 4.0
+    )
     assert [line.kind for line in found] == [kind, "sinusoid"]
 
 
@@ -168,7 +170,7 @@ def test_a_line_takes_the_bins_that_it_raises(place: float, amplitude: float, wi
     density = np.full(len(spectrum.frequency), 1.0 / RATE)
     for kind, half in (("sinusoid", 0.005), ("band", 0.5 * wide)):
         line = line_of(place, amplitude, kind, wide)
-        clear = without_lines(spectrum, [line], density)
+        clear = mask_lines(spectrum, [line], density)
         # A sinusoid falls as A^2 / (8 pi^2 D (f - f_0)^2): to a part of 0.3 of the error.
         error = 0.3 * density * np.minimum(np.sqrt(2.0 / spectrum.ordinates), 1.0)
         reach = amplitude / np.sqrt(8.0 * np.pi**2 * error * spectrum.length)

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal, stats
 
 from imubench_pipeline.estimators.likelihood import model_of
-from imubench_pipeline.estimators.lines import FALSE_ALARM, Line, find, without_lines
+from imubench_pipeline.estimators.lines import FALSE_ALARM_PROBABILITY, Line, find_lines, mask_lines
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
@@ -31,7 +31,7 @@ def search(log: np.ndarray, model: NoiseModel | None) -> tuple[list[Line], Spect
     spectrum, line_spectra = spectra([log], len(log), RATE)
     if model is None:
         model = model_of(whittle_of(spectrum, RATE / 2, 2).maximum(Terms("NFK")))
-    return find(line_spectra, model, RATE, crossover_of(spectrum)), spectrum
+    return find_lines(line_spectra, model, RATE, crossover_of(spectrum)), spectrum
 
 
 def crossover_of(spectrum: Spectrum) -> float:
@@ -166,10 +166,10 @@ def test_the_false_alarms_are_as_many_as_is_said(rng) -> None:
         noise = DEVIATION * rng.standard_normal((segments, points))
         power = np.abs(np.fft.rfft(noise * window)) ** 2 / np.sum(window**2) / RATE
         spectrum = LineSpectrum(frequency, power.mean(axis=0), segments, points, 1 / RATE, 1)
-        alarms += bool(find([spectrum], WHITE, RATE, 0.0))
+        alarms += bool(find_lines([spectrum], WHITE, RATE, 0.0))
     # Neighbouring bins of a Hann window are correlated, which leaves fewer than there are bins.
-    assert alarms >= stats.binom(logs, FALSE_ALARM / 2).ppf(0.003) > 0
-    assert alarms <= stats.binom(logs, FALSE_ALARM).ppf(0.997)
+    assert alarms >= stats.binom(logs, FALSE_ALARM_PROBABILITY / 2).ppf(0.003) > 0
+    assert alarms <= stats.binom(logs, FALSE_ALARM_PROBABILITY).ppf(0.997)
 
 
 def test_a_resonance_is_wider_than_a_sinusoid(rng) -> None:
@@ -259,7 +259,7 @@ def test_bins_that_a_line_leaves_as_they_are_are_kept(
         log = DEVIATION * rng.standard_normal(samples) + wave(samples, A, frequency)
         lines, spectrum = search(log, WHITE)
         found = of_the_line(lines, frequency)
-        clear = without_lines(spectrum, found, np.full(len(spectrum.frequency), N**2))
+        clear = mask_lines(spectrum, found, np.full(len(spectrum.frequency), N**2))
         touched = np.flatnonzero(~clear)
         # One stretch that holds the line, and the bin that it raises most.
         assert (np.diff(touched) == 1).all()
@@ -278,7 +278,7 @@ def test_bins_that_a_line_leaves_as_they_are_are_kept(
 
 def test_a_channel_without_lines_keeps_every_bin(rng) -> None:
     spectrum = spectra([rng.standard_normal(LONG)], LONG, RATE)[0]
-    assert without_lines(spectrum, [], np.full(len(spectrum.frequency), 1 / RATE)).all()
+    assert mask_lines(spectrum, [], np.full(len(spectrum.frequency), 1 / RATE)).all()
 
 
 def test_a_stronger_line_takes_more_bins(rng) -> None:
@@ -287,7 +287,7 @@ def test_a_stronger_line_takes_more_bins(rng) -> None:
 
     def taken(A: float) -> int:
         line = Line(10.0, 9.99, 10.01, A, 0.9 * A, 1.1 * A, 99.0, 0.0, 3 * STEP, STEP, "sinusoid")
-        return int((~without_lines(spectrum, [line], density)).sum())
+        return int((~mask_lines(spectrum, [line], density)).sum())
 
     amounts = [taken(A) for A in (1e-3, 1e-1, 1.0, 10.0)]
     assert amounts == sorted(amounts)

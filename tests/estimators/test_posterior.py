@@ -4,7 +4,7 @@ from scipy import stats
 from scipy.interpolate import PchipInterpolator
 
 from imubench_pipeline.estimators import posterior as posteriors
-from imubench_pipeline.estimators.posterior import DRAWS, sample
+from imubench_pipeline.estimators.posterior import MAX_DRAWS, sample
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
@@ -167,7 +167,7 @@ def test_draws_are_positive_and_as_many_as_asked_for(rng) -> None:
     whittle = whittle_for(NoiseModel(N=1e-3, B=1e-3, T_B=8.0), 4000, rng, SHAPES)
     for terms in (Terms("N"), PAPERS, Terms("QNFK"), Terms("NK", 2), Terms("NK", 1, True)):
         found = whittle.maximum(terms)
-        for draws in (500, DRAWS):
+        for draws in (500, MAX_DRAWS):
             posterior = sample(whittle, found, rng, draws)
             assert posterior.parameters.shape == (draws, len(terms.linear) + terms.gauss_markov)
             assert posterior.times.shape == (draws, terms.gauss_markov)
@@ -217,7 +217,7 @@ def test_quantiles_are_those_of_a_long_chain(monkeypatch, model: NoiseModel, ter
     found = whittle.maximum(terms)
     weighted = sample(whittle, found, np.random.default_rng(1))
     assert weighted.effective > 1000
-    monkeypatch.setattr(posteriors, "_LEAST_WORTH", 0)
+    monkeypatch.setattr(posteriors, "_MAX_DRAWS_PER_POINT", 0)
     chain = sample(whittle, found, np.random.default_rng(2), 300_000)
     assert np.isnan(chain.effective)
     columns = (np.column_stack([one.parameters, one.times, one.ramps]) for one in (weighted, chain))

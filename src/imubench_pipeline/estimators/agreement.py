@@ -1,8 +1,7 @@
-"""Where the methods of a channel contradict the likelihood, whose intervals hold.
+"""Comparison of the methods of a channel with the likelihood, whose intervals are reliable.
 
-A curve that is read, or fitted with the weights of its own variances, knows no low-pass and no
-model but the papers': what it gives is doubtful where the likelihood, which tries the others, rules
-it out.
+Reading or fitting the Allan deviation assumes no low-pass filter, and the papers' model. Its values
+are doubtful where the likelihood, which compares several models, excludes them.
 """
 
 from __future__ import annotations
@@ -13,30 +12,30 @@ from dataclasses import replace
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.tables.findings import Finding
 
-_READ = 1.25
-"""Factor beyond the limits of the likelihood that a value without limits may lie."""
+_MAX_FACTOR_BEYOND_LIMITS = 1.25
+"""Maximum factor by which a value without limits may lie outside the likelihood's limits."""
 
-_TWICE = 1.8
-"""Ratio of two values beyond which they are not the same, whatever their limits."""
+_MAX_VALUE_RATIO = 1.8
+"""Ratio of two values above which they differ, whatever their limits."""
 
 
 def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
-    """Return an estimate with its values doubtful that the likelihood rules out.
+    """Return an estimate in which the values that the likelihood excludes are doubtful.
 
-    ``reference`` is that by the likelihood, of the same channel.
+    ``reference`` is the estimate by the likelihood for the same channel.
     """
     references = dict(reference.parameters)
     if reference.further and "B_curve" in reference.curve:
-        # Of several terms each has its own B; one alone stands for all of them.
+        # With several terms, each has its own B: compare with the B of the curve.
         references["B"] = reference.curve["B_curve"]
     return replace(
         estimate,
-        parameters=_judged(estimate.parameters, references),
-        curve=_judged(estimate.curve, reference.curve),
+        parameters=_doubt_group(estimate.parameters, references),
+        curve=_doubt_group(estimate.curve, reference.curve),
     )
 
 
-def _judged(
+def _doubt_group(
     parameters: Mapping[str, Parameter], references: Mapping[str, Parameter]
 ) -> dict[str, Parameter]:
     judged = dict(parameters)
@@ -44,14 +43,14 @@ def _judged(
         reference = references.get(name)
         if parameter.value is None or parameter.status not in ("ok", "at_bound") or not reference:
             continue
-        reason = _contradiction(name, parameter, reference)
+        reason = _describe_contradiction(name, parameter, reference)
         if reason is not None:
             judged[name] = replace(parameter, status="doubtful", reason=reason)
     return judged
 
 
-def _contradiction(name: str, parameter: Parameter, reference: Parameter) -> str | None:
-    """Return how the likelihood contradicts a value; None where it does not."""
+def _describe_contradiction(name: str, parameter: Parameter, reference: Parameter) -> str | None:
+    """Return a description of how the likelihood contradicts a value, or None."""
     value = parameter.value or 0.0
     if reference.value is None:
         return f"the likelihood gives no {name}: {reference.reason or reference.status}"
@@ -60,16 +59,18 @@ def _contradiction(name: str, parameter: Parameter, reference: Parameter) -> str
         return None
     between = f"the likelihood has {name} between {lower:.3g} and {upper:.3g} (SI)"
     if parameter.lower is None or parameter.upper is None:
-        apart = value < lower / _READ or value > upper * _READ
+        apart = (
+            value < lower / _MAX_FACTOR_BEYOND_LIMITS or value > upper * _MAX_FACTOR_BEYOND_LIMITS
+        )
     else:
         apart = parameter.upper < lower or parameter.lower > upper
-        apart |= value < lower / _TWICE or value > upper * _TWICE
-    apart |= not 1.0 / _TWICE < value / reference.value < _TWICE
+        apart |= value < lower / _MAX_VALUE_RATIO or value > upper * _MAX_VALUE_RATIO
+    apart |= not 1.0 / _MAX_VALUE_RATIO < value / reference.value < _MAX_VALUE_RATIO
     return between if apart else None
 
 
 def disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
-    """Yield a finding where the fit of the curve and the likelihood, by method, disagree on N."""
+    """Yield a finding if N from the curve fit and N from the likelihood disagree."""
     if not {"weighted", "likelihood"} <= estimates.keys():
         return
     weighted, likelihood = (

@@ -1,13 +1,12 @@
-"""The cut-off of a sensor's own low-pass, from the spectrum of its noise at rest.
+"""Estimation of the cut-off of a sensor's low-pass filter from the spectrum of its noise at rest.
 
 White noise of density N behind a filter (`imubench_pipeline.estimators.low_pass`) has the density
-N^2 G(f); an analogue filter may have its cut-off above Nyquist, where the folds leave little of the
-bend, but a long log shows it. N is the density before the filter.
+N^2 G(f). The cut-off of an analogue filter may exceed Nyquist; aliasing then hides most of the
+bend, but a long log can determine it. N is the density before the filter.
 
-White noise behind an analogue filter of first order is a Gauss-Markov process. What tells the one
-from the other is the white noise that stands beside a process up to Nyquist, and not behind a
-filter; where it does not show, a correlation of a few samples is a filter's, and a longer one may
-be either: then nothing is said.
+White noise behind an analogue filter of first order is a Gauss-Markov process. A process has white
+noise in addition, up to Nyquist; a filter has not. Where white noise is not visible, a correlation
+of a few samples is attributed to a filter. A longer one is ambiguous, and no filter is reported.
 """
 
 from __future__ import annotations
@@ -22,103 +21,106 @@ from numpy.typing import NDArray
 from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
-    FEWEST_BINS,
-    PROCESSES,
+    MIN_BINS,
+    MIN_PROCESS_SAMPLES,
     Allowed,
     BinGains,
     FilterFits,
     FilterTrial,
     OfModel,
     Reading,
-    also_after_sampling,
-    density_in_the_log,
+    compute_density_in_log,
     draw_factors,
-    highest_cutoff,
+    get_highest_cutoff,
+    read_as_digital,
 )
 from imubench_pipeline.estimators.low_pass import Filter, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Behind, Terms
 from imubench_pipeline.typing import Array
 
-_SHOWS = 2.0
-"""Log likelihood that white noise beside a process must gain to be there."""
+_MIN_WHITE_GAIN = 2.0
+"""Minimum gain of log likelihood by white noise in addition to a process."""
 
-_ENDS_RULE = 0.01
-"""Part of the density that the ends of the transform may add; beyond, a bin says nothing."""
+_MAX_LEAKAGE_FRACTION = 0.01
+"""Maximum spectral leakage over density in a bin; bins with more are not fitted."""
 
-_STEEP = 0.4
-"""Least over greatest gain in a bin below which its mean is ruled by one end of it."""
+_MIN_GAIN_RATIO = 0.4
+"""Minimum over maximum gain in a bin; below it, one end of the bin dominates its mean."""
 
-_SOMETHING_ELSE = 10.0
-"""Measured over expected density from which it is not those ends: what the two ends of a log leave
-is exponentially distributed, and beyond this in one of 20,000."""
+_MAX_DENSITY_RATIO = 10.0
+"""Measured over expected density above which the excess is not leakage.
 
-_PASSES = 3
-"""Fits, each without the bins in which the ends rule behind the filter found before."""
+Leakage from the two ends of a log is exponentially distributed, and exceeds this in 1 of 20,000.
+"""
 
-_COARSE = 1e-3
-"""Part of a cut-off to which the first of them finds it."""
+_MAX_PASSES = 3
+"""Maximum number of fits; each excludes the bins with leakage under the previous filter."""
 
-_NEAR = 1 / 300
-"""Part of the cut-off from which frequencies count: drift, as with temperature, is not as any noise
-is, and far below the bend it says nothing of it."""
+_COARSE_TOLERANCE = 1e-3
+"""Relative tolerance of the cut-off in the first fit."""
 
-RULED_OUT = 3.0
-"""Log likelihood by which another filter must be the worse not to count: its share is 5 %."""
+_MIN_FREQUENCY_RATIO = 1 / 300
+"""Minimum frequency over cut-off that is fitted. Drift, e.g. with temperature, does not follow the
+noise models, and far below the bend it is not informative."""
 
-_BEYOND_BIC = 6.0
-"""Gain of BIC below which there is no filter: strong evidence, on the scale that is used of it."""
+DELTA_LOG_LIKELIHOOD_EXCLUDED = 3.0
+"""Log likelihood below the best at which another filter is excluded: its weight is 5 %."""
 
-_BEYOND_DOUBT = 20.0
-"""That below which N without a filter is in the interval as well, with the weight `_WITHOUT`."""
+_MIN_DELTA_BIC = 6.0
+"""Minimum gain of BIC by a filter: "strong" evidence (R. E. Kass and A. E. Raftery, J. Am. Stat.
+Assoc. 90, 1995)."""
 
-_WITHOUT = 0.1
+_CERTAIN_DELTA_BIC = 20.0
+"""Gain of BIC below which the interval includes N without a filter (`_NO_FILTER_WEIGHT`)."""
 
-_LEAST_N = 1e-6
-"""N at an end of the interval of a cut-off that stands for none, over that at the best one."""
+_NO_FILTER_WEIGHT = 0.1
 
-WIDEST = 1.2
-"""Ratio of the limits of a cut-off beyond which it is not called known."""
+_MIN_N_RATIO = 1e-6
+"""Minimum N at an end of the interval of the cut-off, over N at the best cut-off."""
 
-_LEAST_WIDTH = 1e-5
-"""Half of an interval of a logarithm."""
+MAX_LIMIT_RATIO = 1.2
+"""Ratio of the limits of a cut-off above which it is not identified."""
 
-ALLOWED = "the log allows cut-offs from {:.4g} to {:.4g} Hz"
-NOT_AS_BEHIND = (
+_MIN_HALF_WIDTH = 1e-5
+"""Minimum half width of the interval of a log cut-off."""
+
+ALLOWED_CUTOFFS_REASON = "the log allows cut-offs from {:.4g} to {:.4g} Hz"
+UNKNOWN_BEND_REASON = (
     f"the spectrum bends, but not as behind any of {len(FAMILY)} filters that were tried"
 )
 
-_AS_STATED = 1.6
-"""Ratio to the stated cut-off up to which a filter is the stated one."""
+_MAX_STATED_RATIO = 1.6
+"""Maximum ratio of a cut-off to the configured one at which both are the same filter."""
 
 
 @dataclass(frozen=True)
 class Cutoff:
-    """The low-pass that a spectrum shows."""
+    """The low-pass filter in a spectrum."""
 
     frequency: Parameter  # f_c (-3 dB), Hz
-    order: int | None  # n; None where no filter shows
+    order: int | None  # n; None without a filter
     N: Parameter  # density of white noise before the filter, SI
-    floor: float  # density of white noise after it, that of rounding and what else shows, SI
+    floor: float  # density of white noise added after the filter, with rounding, SI
     gained: float  # BIC of the noise without a filter, less that with it
     or_quantization: bool = False  # quantization noise would explain the spectrum as well
-    kind: Kind | None = None  # ``analogue``, ``bilinear`` or ``boxcar``; None where no filter shows
+    kind: Kind | None = None  # ``analogue``, ``bilinear`` or ``boxcar``; None without a filter
     or_process: str | None = None
-    """Why what bends the spectrum may be a process or a filter, and is not told."""
-    N_behind: float | None = None  # N before the filter, if it is one, where that is not told; SI
+    """Reason why process and filter are not distinguishable, or None."""
+    N_behind: float | None = None  # N before the filter, if it is one, in this case; SI
     behind: Behind | None = None
-    """What the filter leaves of noise in each bin of the whole spectrum."""
+    """Power gains of the filter in each bin of the whole spectrum."""
     ruled: NDArray[np.bool_] | None = None
-    """(b,): bins in which the ends of the transform rule, and not the noise."""
-    readings: Sequence[Reading] = ()  # of all filters that the log does not rule out
+    """(b,): bins that spectral leakage dominates."""
+    readings: Sequence[Reading] = ()  # for all filters that the log does not exclude
     allowed: Sequence[Allowed] = ()  # those filters, the chosen one first
-    rounded: float = 0.0  # density of rounding, parts of N^2
+    rounded: float = 0.0  # density of rounding over N^2
     models: Mapping[Terms, OfModel] = field(default_factory=dict)
-    """Where the cut-off was fitted together with models of the noise."""
+    """Results of joint fits of the cut-off with noise models."""
 
     @property
     def words(self) -> str:
-        """The filter, in words; empty where none shows."""
+        """Description of the filter; empty without one."""
         cutoff = self.frequency.value or self.frequency.fitted
         if self.kind is None or self.order is None or cutoff is None:
             return ""
@@ -126,7 +128,7 @@ class Cutoff:
 
     @property
     def beside(self) -> float:
-        """Power of the white noise that does not pass the filter, less rounding, over that of N."""
+        """Power of the white noise added after the filter, less rounding, over that of N."""
         N = self.N.in_model
         if self.behind is None or not N:
             return 0.0
@@ -137,7 +139,7 @@ class Cutoff:
     ) -> Array:
         """Return draws of N over its value for the chosen filter in a model, shape (number,).
 
-        Of N before the filter, or of the density in the log.
+        N is the density before the filter, or with ``in_the_log`` the density in the log.
         """
         of_model = self.models.get(replace(terms, ramp=False))
         readings = self.readings if of_model is None else of_model.readings
@@ -153,55 +155,55 @@ def find_cutoff(
     resolution: float = 0.0,
     stated: float | None = None,
 ) -> Cutoff:
-    """Find the low-pass of a sensor from its spectrum, or that there is none.
+    """Estimate the low-pass filter of a sensor from a spectrum, or find that there is none.
 
     Noise alone, with processes of ten sampling intervals and more, and noise behind each filter
-    of the family are fitted up to Nyquist; kind and order, and a floor behind the filter beyond
-    that of rounding, are chosen by BIC. The interval is that of all filters that the log does not
-    rule out: above Nyquist the folds of one may look like those of another.
+    of the family are fitted up to Nyquist. BIC selects kind and order, and a floor of white noise
+    after the filter in addition to rounding. The interval covers all filters that the log does not
+    exclude: above Nyquist the aliases of two filters may look alike.
 
     Parameters
     ----------
     spectrum : Spectrum
         Of a log, up to Nyquist.
     clear : ndarray of bool, shape (b,), optional
-        Bins that no line touches.
+        Bins without spectral lines.
     resolution : float
         Step of the register (LSB), SI, where the samples are rounded: white noise of variance
         LSB^2 / 12 behind the filter.
     stated : float, optional
-        Cut-off of the sensor's filter as its maker states it, Hz: tells a filter from a process
-        where the spectrum does not.
+        Cut-off of the sensor's filter from its data sheet, Hz. It decides between filter and
+        process where the spectrum is ambiguous.
 
     Returns
     -------
     Cutoff
-        With status ``not_identified`` where the interval of the cut-off is wider than a fifth, or
-        the bend is another than that of such a filter; ``absent`` where no filter shows.
+        With status ``not_identified`` if the limits of the cut-off differ by more than a fifth, or
+        if no such filter fits the bend; ``absent`` without a filter.
     """
     used = np.ones(len(spectrum.frequency), dtype=np.bool_) if clear is None else clear
-    if used.sum() < FEWEST_BINS:
+    if used.sum() < MIN_BINS:
         unknown = Parameter(None, "not_shown", f"the spectrum has {used.sum()} bins only")
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
     fits = FilterFits(spectrum.select(used))
     if not fits.may_bend():
-        return _without_filter(fits.unfiltered()[0], 0.0, None)
+        return _describe_no_filter(fits.unfiltered()[0], 0.0, None)
     rounding = resolution**2 / (12.0 * spectrum.rate)
-    settled = _settled(spectrum, used, fits, rounding)
+    settled = _iterate_fits(spectrum, used, fits, rounding)
     fits, tried = settled.fits, settled.tried
     N_alone, without, cost_alone, rising = fits.unfiltered()
     behind = fits.behind(tried[0]) if tried else math.inf
     gained = 2.0 * (without - behind)
     beside_rounding = 2.0 * (rising - behind)
-    doubt = _process_or_filter(fits, tried, cost_alone, gained, stated)
-    if doubt is not None or gained < _BEYOND_BIC or beside_rounding < -_BEYOND_BIC:
-        return _without_filter(N_alone, gained, doubt)
-    return _with_filter(spectrum, settled, rounding, (N_alone, gained, beside_rounding))
+    doubt = _explain_ambiguity(fits, tried, cost_alone, gained, stated)
+    if doubt is not None or gained < _MIN_DELTA_BIC or beside_rounding < -_MIN_DELTA_BIC:
+        return _describe_no_filter(N_alone, gained, doubt)
+    return _describe_filter(spectrum, settled, rounding, (N_alone, gained, beside_rounding))
 
 
 @dataclass(frozen=True)
-class _Settled:
-    """Fits of filters to the bins that tell of them: ``used``, not those ``ruled`` by the ends."""
+class _ConvergedFits:
+    """Fits of filters to the ``used`` bins, without the bins ``ruled`` by leakage."""
 
     fits: FilterFits
     tried: Sequence[FilterTrial]
@@ -209,21 +211,21 @@ class _Settled:
     ruled: NDArray[np.bool_]
 
 
-def _settled(
+def _iterate_fits(
     spectrum: Spectrum,
     usable: NDArray[np.bool_],
     fits: FilterFits,
     rounding: float,
-) -> _Settled:
-    """Fit the filters, and again where the best of them changes which bins tell of it."""
-    tried = fits.try_filters(_COARSE)
+) -> _ConvergedFits:
+    """Fit the filters, repeatedly while the best one changes the set of usable bins."""
+    tried = fits.try_filters(_COARSE_TOLERANCE)
     used, ruled = usable, np.zeros(len(usable), dtype=np.bool_)
-    for passed in range(_PASSES if tried else 0):
-        earlier, ruled = ruled, _ruled_by_ends(spectrum, fits, tried[0], rounding)
+    for passed in range(_MAX_PASSES if tried else 0):
+        earlier, ruled = ruled, _find_leaky_bins(spectrum, fits, tried[0], rounding)
         if passed and bool((ruled == earlier).all()):
             break
-        near = usable & ~ruled & (spectrum.frequency > _NEAR * tried[0].cutoff)
-        if near.sum() >= FEWEST_BINS:
+        near = usable & ~ruled & (spectrum.frequency > _MIN_FREQUENCY_RATIO * tried[0].cutoff)
+        if near.sum() >= MIN_BINS:
             used = near
             fits = FilterFits(spectrum.select(used))
         if rounding > 0.0:
@@ -232,60 +234,62 @@ def _settled(
         tried = fits.try_filters()
         if not tried:
             break
-    return _Settled(fits, tried, used, ruled)
+    return _ConvergedFits(fits, tried, used, ruled)
 
 
-def _with_filter(
+def _describe_filter(
     spectrum: Spectrum,
-    settled: _Settled,
+    settled: _ConvergedFits,
     rounding: float,
     against: tuple[float, float, float],
 ) -> Cutoff:
-    """Describe the best of the filters and the others that the log allows.
+    """Return the result with the best filter and the others that the log allows.
 
-    ``against``: N of the noise alone, and what BIC gains over it, and over that with rounding.
+    ``against``: N without a filter, the gain of BIC over no filter, and over quantization noise.
     """
     fits, tried, used = settled.fits, settled.tried, settled.used
     N_alone, gained, beside_rounding = against
     best = tried[0]
-    # A floor is taken to be there where it shows only: with it a high cut-off is never told.
+    # Trials with a floor count only if the best has one: with a floor no high cut-off is known.
     alike = [
         trial
         for trial in tried
         if trial.floor <= best.floor
-        and trial.cost + trial.floor < best.cost + best.floor + RULED_OUT
+        and trial.cost + trial.floor < best.cost + best.floor + DELTA_LOG_LIKELIHOOD_EXCLUDED
     ]
     limits = [fits.limits(trial) for trial in alike]
     lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
     N, after = fits.density(best)
-    highest = upper >= 0.999 * highest_cutoff(best.kind, best.order, fits.rate)
+    highest = upper >= 0.999 * get_highest_cutoff(best.kind, best.order, fits.rate)
     shown, lower, upper = (
         replace(best, cutoff=cutoff).low_pass.half_power(spectrum.rate)
         for cutoff in (best.cutoff, lower, upper)
     )
-    readings = _readings(fits, alike, limits)
-    if gained < _BEYOND_DOUBT and N_alone > 0.0:
-        # Of so many filters one may be there by chance.
+    readings = _compute_readings(fits, alike, limits)
+    if gained < _CERTAIN_DELTA_BIC and N_alone > 0.0:
+        # With so many filters, one may be selected by chance.
         alone = math.log(N_alone / N)
         beside = fits.rounded * N**2 + after**2
-        shown_alone = math.log(N_alone / density_in_the_log(best.low_pass, N, beside, fits.rate))
-        readings.append(Reading(_WITHOUT, alone, alone, alone, (shown_alone,) * 3))
+        shown_alone = math.log(
+            N_alone / compute_density_in_log(best.low_pass, N, beside, fits.rate)
+        )
+        readings.append(Reading(_NO_FILTER_WEIGHT, alone, alone, alone, (shown_alone,) * 3))
     error = SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
     ends = [end for reading in readings for end in (reading.below, reading.above)]
     density = Parameter(
         N, lower=N * math.exp(min(0.0, *ends) - error), upper=N * math.exp(max(0.0, *ends) + error)
     )
-    or_quantization = beside_rounding < _BEYOND_BIC
+    or_quantization = beside_rounding < _MIN_DELTA_BIC
     reason = None
     if or_quantization:
         reason = (
             "the spectrum rises towards Nyquist, by quantization noise as well as by a low-pass "
             f"with a cut-off from {lower:.4g} to {upper:.4g} Hz"
         )
-    elif upper > WIDEST * lower or highest:
-        reason = ALLOWED.format(lower, upper)
+    elif upper > MAX_LIMIT_RATIO * lower or highest:
+        reason = ALLOWED_CUTOFFS_REASON.format(lower, upper)
     elif not fits.explains(best):
-        reason = NOT_AS_BEHIND
+        reason = UNKNOWN_BEND_REASON
     if reason is not None:
         frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
         density = replace(
@@ -306,15 +310,15 @@ def _with_filter(
         ruled=settled.ruled,
         readings=readings,
         allowed=[
-            Allowed(trial, max(0.5 * math.log(high / low), _LEAST_WIDTH))
+            Allowed(trial, max(0.5 * math.log(high / low), _MIN_HALF_WIDTH))
             for trial, (low, high) in zip(alike, limits, strict=True)
         ],
         rounded=fits.rounded,
     )
 
 
-def _without_filter(N_alone: float, gained: float, doubt: tuple[str, float] | None) -> Cutoff:
-    """Return that no filter shows; or, with a doubt, that one may be there, with another N."""
+def _describe_no_filter(N_alone: float, gained: float, doubt: tuple[str, float] | None) -> Cutoff:
+    """Return a result without a filter, or, with a ``doubt``, with an ambiguous one and its N."""
     absent = Parameter(None, "absent", "the spectrum shows no low-pass")
     if doubt is None:
         return Cutoff(absent, None, Parameter(N_alone), 0.0, gained)
@@ -325,72 +329,74 @@ def _without_filter(N_alone: float, gained: float, doubt: tuple[str, float] | No
     return Cutoff(frequency, None, unknown, 0.0, gained, or_process=reason, N_behind=before)
 
 
-def _readings(
+def _compute_readings(
     fits: FilterFits, alike: Sequence[FilterTrial], limits: Sequence[tuple[float, float]]
 ) -> list[Reading]:
-    """Return N before each filter that the log allows, over that of the best, and how likely."""
+    """Return N before each allowed filter over N of the best one, with the filter's weight."""
     best = alike[0]
 
     def densities(trial: FilterTrial) -> tuple[float, float]:
         N, after = fits.density(trial)
         beside = fits.rounded * N**2 + after**2
-        return N, density_in_the_log(trial.low_pass, N, beside, fits.rate)
+        return N, compute_density_in_log(trial.low_pass, N, beside, fits.rate)
 
     N, shown = densities(best)
     readings = []
     for trial, (low, high) in zip(alike, limits, strict=True):
         at = [densities(replace(trial, cutoff=cutoff)) for cutoff in (low, trial.cutoff, high)]
-        below, middle, above = (math.log(max(density / N, _LEAST_N)) for density, _ in at)
-        first, second, third = (math.log(max(density / shown, _LEAST_N)) for _, density in at)
+        below, middle, above = (math.log(max(density / N, _MIN_N_RATIO)) for density, _ in at)
+        first, second, third = (math.log(max(density / shown, _MIN_N_RATIO)) for _, density in at)
         weight = math.exp(best.cost - trial.cost)
         readings.append(Reading(weight, below, middle, above, (first, second, third)))
     readings += [
-        also_after_sampling(reading, trial, fits.rate)
+        read_as_digital(reading, trial, fits.rate)
         for reading, trial in zip(readings, alike, strict=True)
         if trial.is_first_order_analogue
     ]
     return readings
 
 
-def _ruled_by_ends(
+def _find_leaky_bins(
     spectrum: Spectrum, fits: FilterFits, best: FilterTrial, rounding: float
 ) -> NDArray[np.bool_]:
-    """Return the bins in which the ends of the transform rule, or the filter falls within the bin.
+    """Return the bins that leakage dominates, or in which the gain of the filter varies strongly.
 
-    Those in which something else stands are none of them.
+    Bins with a density far above both noise and leakage are not included.
     """
     N = fits.density(best)[0]
     gains, low_pass = BinGains(spectrum), best.low_pass
     within = gains.white(low_pass) + rounding / N**2
     white, leak = within.mean(axis=0), gains.leakage(low_pass)
-    rules = (leak > _ENDS_RULE * white) | (within.min(axis=0) < _STEEP * within.max(axis=0))
-    return np.asarray(rules & (spectrum.density < _SOMETHING_ELSE * N**2 * (white + leak)))
+    rules = (leak > _MAX_LEAKAGE_FRACTION * white) | (
+        within.min(axis=0) < _MIN_GAIN_RATIO * within.max(axis=0)
+    )
+    return np.asarray(rules & (spectrum.density < _MAX_DENSITY_RATIO * N**2 * (white + leak)))
 
 
-def _process_or_filter(
+def _explain_ambiguity(
     fits: FilterFits,
     tried: Sequence[FilterTrial],
     cost_alone: float,
     gained: float,
     stated: float | None,
 ) -> tuple[str, float] | None:
-    """Return why the log does not tell a process from a filter, and N before that; None if it does.
+    """Return why process and filter are ambiguous, and N before the filter; None if they are not.
 
-    Only a filter of first order looks like a process, and only where no white noise shows beside
-    it up to Nyquist.
+    Only a filter of first order looks like a process, and only without visible white noise up to
+    Nyquist.
     """
     first = next(
         (trial for trial in tried if trial.is_first_order_analogue and not trial.floor), None
     )
-    if first is None or first.correlation(fits.rate) < PROCESSES:
+    if first is None or first.correlation(fits.rate) < MIN_PROCESS_SAMPLES:
         return None
-    if stated is not None and 1.0 / _AS_STATED < first.cutoff / stated < _AS_STATED:
+    if stated is not None and 1.0 / _MAX_STATED_RATIO < first.cutoff / stated < _MAX_STATED_RATIO:
         return None
-    leads = gained >= _BEYOND_BIC and tried[0] == first
-    if not leads and first.cost > cost_alone + _SHOWS:
+    leads = gained >= _MIN_DELTA_BIC and tried[0] == first
+    if not leads and first.cost > cost_alone + _MIN_WHITE_GAIN:
         return None
-    if not leads and gained >= _BEYOND_BIC:
-        return None  # another filter explains it better than both
+    if not leads and gained >= _MIN_DELTA_BIC:
+        return None  # another filter fits better than both
     time = 1.0 / (2.0 * math.pi * first.cutoff)
     reason = (
         f"a Gauss-Markov process of T_B = {time:.3g} s and a low-pass of first order at "

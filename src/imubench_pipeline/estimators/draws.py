@@ -1,9 +1,8 @@
-"""Draws of an estimate: noise models that its log allows, all parameters of each together.
+"""Joint draws of the parameters of an estimate, over the noise models that the log allows.
 
-The interval of a parameter says nothing of the others: where N and K trade off, or B and T_B, or
-where the log allows a model with a random walk as well as one without, what is computed from all of
-them (an error budget, a density, a prediction) is surer, or less sure, than independent parameters
-would make it.
+Intervals of single parameters ignore correlations: N and K, or B and T_B, may be correlated, and
+the log may allow models with and without a random walk. The error of a result of all parameters (an
+error budget, a density, a prediction) then differs from that for independent parameters.
 """
 
 from __future__ import annotations
@@ -24,47 +23,46 @@ from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.typing import Array
 
-NUMBER = 200
-"""Draws that are kept of an estimate."""
+KEPT_DRAWS = 200
+"""Number of draws that are kept for an estimate."""
 
 
-def drawn_share(candidate: Candidate, bins: int) -> float:
-    """Return the share of a model among the draws, of any sum: by AIC, but for T_B by BIC.
+def compute_draw_weight(candidate: Candidate, bins: int) -> float:
+    """Return the weight of a model among the draws, not normalised: by AIC, but for T_B by BIC.
 
-    An amplitude may be anything from 0, and AIC gives a weak one that is there its part; by BIC it
-    is in no draw, and the truth lies above the limits. A correlation time must be looked for over
-    decades, of which a fit takes a small part: that costs what BIC asks, of the bins that were
-    fitted. That a process as slow as a walk counts less than the walk is left to `joint_draws`:
-    counted here as well, a log that shows such a process nearly as well as a walk has none among
-    its draws.
+    Amplitudes start at 0, and AIC keeps a weak term in some draws; by BIC it would be in none, and
+    the true value would lie above the limits. A correlation time is searched over decades, of which
+    a fit covers a small part: BIC, with the number of fitted bins, has the right penalty. The
+    penalty for a process as slow as a walk is applied in `draw_jointly`; applied here as well, it
+    would remove such a process from the draws even if it fits nearly as well as a walk.
     """
     terms = candidate.terms
     of_times = terms.gauss_markov * (0.5 * math.log(bins) - 1.0)
-    of_unlikely = 0.5 * BIC_PENALTY_RARE_TERM * (terms.ramp + ("Q" in terms.linear))
-    return candidate.akaike_weight * math.exp(-of_times - of_unlikely)
+    of_rare_terms = 0.5 * BIC_PENALTY_RARE_TERM * (terms.ramp + ("Q" in terms.linear))
+    return candidate.akaike_weight * math.exp(-of_times - of_rare_terms)
 
 
-def joint_draws(
-    parts: Sequence[tuple[Terms, Posterior, float]], longest: float, number: int = NUMBER
+def draw_jointly(
+    parts: Sequence[tuple[Terms, Posterior, float]], longest: float, number: int = KEPT_DRAWS
 ) -> JointDraws:
-    """Return draws from the posteriors of several models, as many of each as its share asks.
+    """Return draws from the posteriors of several models, in proportion to their weights.
 
-    They are picked at even distances of the weight, from one model after the other: nothing is left
-    to chance, and neighbours in a chain do not stand for each other. A process as slow as a walk
-    counts as in the choice of the model, less than a walk.
+    They are selected at equal distances of the cumulative weight, over one model after the other
+    (systematic resampling without a random start). A process as slow as a walk has the same penalty
+    as in the model choice.
 
-    ``parts`` are the models that the log does not rule out, with shares of any sum; ``longest`` is
-    the longest correlation time that the log can show, s.
+    ``parts`` are the models that the log does not exclude, with unnormalised weights; ``longest``
+    is the longest correlation time that the log can determine, s.
 
     Raises
     ------
     ValueError
-        If there is no model, or no share above 0.
+        If there is no model, or no weight above 0.
     """
     if not sum(share for _, _, share in parts) > 0.0:
         raise ValueError("expected models with shares above 0")
     most = max(terms.gauss_markov for terms, _, _ in parts)
-    drawn = [_of_model(terms, posterior, most) for terms, posterior, _ in parts]
+    drawn = [_convert_draws(terms, posterior, most) for terms, posterior, _ in parts]
     first = np.concatenate([first_components for first_components, _ in drawn])
     further = np.concatenate([processes for _, processes in drawn])
     counts = [len(posterior.parameters) for _, posterior, _ in parts]
@@ -76,7 +74,7 @@ def joint_draws(
     return JointDraws(first[rows], further[rows])
 
 
-def _of_model(terms: Terms, posterior: Posterior, most: int) -> tuple[Array, Array]:
+def _convert_draws(terms: Terms, posterior: Posterior, most: int) -> tuple[Array, Array]:
     """Return the first components and the further processes of the draws of one model."""
     linear, count = len(terms.linear), len(posterior.parameters)
     first = np.zeros((count, len(FAMILY)))
@@ -87,7 +85,7 @@ def _of_model(terms: Terms, posterior: Posterior, most: int) -> tuple[Array, Arr
         first[:, column] = posterior.parameters[:, place]
     pairs = np.stack([posterior.parameters[:, linear:], posterior.times], axis=2)
     if terms.gauss_markov and "F" not in terms.linear:
-        # As everywhere: the first component is flicker noise, or else the fastest process.
+        # By convention the first component is flicker noise, or else the fastest process.
         first[:, FAMILY.index("B")], first[:, FAMILY.index("T_B")] = pairs[:, 0].T
         pairs = pairs[:, 1:]
     further = np.tile([0.0, np.nan], (count, most, 1))

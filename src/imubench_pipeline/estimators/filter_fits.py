@@ -1,4 +1,4 @@
-"""Whittle fits of a spectrum behind filters: which cut-off, how good, and what N before it."""
+"""Whittle fits of a spectrum behind low-pass filters: cut-off, likelihood and N before it."""
 
 from __future__ import annotations
 
@@ -17,19 +17,18 @@ from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle,
 from imubench_pipeline.estimators.whittle_kernels import TOLERANCE, best_powers
 from imubench_pipeline.typing import Array
 
-_POINTS = 6
-"""Frequencies of a bin over which a density is averaged."""
+_POINTS_PER_BIN = 6
+"""Frequencies per bin over which a density is averaged."""
 
-_SCAN, _COARSE_SCAN = 24, 8
-"""Cut-offs tried before the best is polished, and to see whether a filter may be there."""
+_SCAN_CUTOFFS, _COARSE_SCAN_CUTOFFS = 24, 8
+"""Cut-offs of the scan before optimisation, and of the test whether a filter is possible."""
 
-_WHOLE = 20
-"""Samples up to which each mean of a whole number of them is tried: near its nulls another length
-is far off."""
+_MAX_BOXCAR_SAMPLES = 20
+"""Maximum whole number of samples whose mean is tried: near its nulls the likelihood is narrow."""
 
-_LOWEST = 1 / 500
+_MIN_CUTOFF = 1 / 500
 
-_HIGHEST: Mapping[tuple[Kind, int], float] = {
+_MAX_CUTOFFS: Mapping[tuple[Kind, int], float] = {
     ("analogue", 1): 4.0,
     ("analogue", 2): 1.0,
     ("analogue", 3): 1.0,
@@ -40,97 +39,102 @@ _HIGHEST: Mapping[tuple[Kind, int], float] = {
     ("bilinear", 4): 0.42,
     ("boxcar", 1): 0.222,
 }
-"""Filters that are looked for, and their highest cut-off, parts of the rate; the lowest is 1/500.
-An analogue filter of higher order is there to keep noise from folding, and beyond the rate its
-folds are those of a lower one of first order; the shortest mean is one of two samples."""
+"""Filters that are tried, and their highest cut-off over the sampling rate; the lowest is 1/500.
 
-FAMILY: Sequence[tuple[Kind, int]] = tuple(_HIGHEST)
+An analogue filter of higher order is an anti-aliasing filter; above the sampling rate its aliases
+equal those of a first-order filter with a lower cut-off. The shortest boxcar has two samples.
+"""
+
+FAMILY: Sequence[tuple[Kind, int]] = tuple(_MAX_CUTOFFS)
 """Kind and order of the filters that are tried."""
 
-_CORRELATIONS = (1e2, 1e5)
+_CORRELATION_RANGE = (1e2, 1e5)
 """Shortest and longest correlation time of slow noise, sampling intervals."""
 
-_SLOWER = 4.0
-"""Least correlation time of slow noise over that of the filter, 1 / (2 pi f_c)."""
+_MIN_CORRELATION_RATIO = 4.0
+"""Minimum correlation time of slow noise over that of the filter, 1 / (2 pi f_c)."""
 
-_FILTERS, PROCESSES = 2.0, 10.0
-"""Correlation in sampling intervals, 1 / (2 pi f_c T), below which white noise beside it is taken
-for that behind a filter of first order, and above which it is beside a process."""
+_MAX_FILTER_SAMPLES, MIN_PROCESS_SAMPLES = 2.0, 10.0
+"""Limits of the correlation in sampling intervals, 1 / (2 pi f_c T).
 
-_A_DECADE = 6
-"""Correlation times that are tried."""
+Below the first, additional white noise is attributed to a filter of first order; processes are at
+least as long as the second.
+"""
 
-_SAME = 0.01
+_TIMES_PER_DECADE = 6
+"""Correlation times per decade that are tried."""
 
-_WORTH_TRYING = 1.0
-"""Log likelihood that a filter of the coarse scan must gain for more to be tried."""
+_ANALOGUE_PREFERENCE = 0.01
 
-_MOST_SLOW = 4
-"""Terms of slow noise."""
+_MIN_SCAN_GAIN = 1.0
+"""Minimum gain of log likelihood in the coarse scan for a full search."""
 
-UNFOLDED = 0.3
-"""Part of the rate up to which there is one such cut-off only: little is folded."""
+_MAX_SLOW_TERMS = 4
+"""Maximum number of terms of slow noise."""
 
-_BETWEEN = 24
-"""Cut-offs tried on each side, beyond that, for others that the log allows as well."""
+MAX_UNALIASED_CUTOFF = 0.3
+"""Cut-off over the sampling rate below which the likelihood has one maximum: little aliasing."""
+
+_LIMIT_SCAN_CUTOFFS = 24
+"""Cut-offs on each side that are scanned for further maxima within the interval."""
 
 HALF_CHI_SQUARED = 1.9207
-"""Log likelihood below its maximum at the ends of a 95 % interval."""
+"""Decrease of the log likelihood at the ends of a 95 % interval."""
 
-_ALONE = (("N", 0), ("NK", 0), ("NFK", 0), ("NK", 1), ("NFK", 1), ("NK", 2))
-"""Letters and processes of the models of noise that are tried."""
+_UNFILTERED_MODELS = (("N", 0), ("NK", 0), ("NFK", 0), ("NK", 1), ("NFK", 1), ("NK", 2))
+"""Linear terms and number of processes of the unfiltered noise models."""
 
-_WITH_Q = (Terms("N"), Terms("NK"), Terms("NF"), Terms("NFK"), Terms("NK", 1))
+_QUANTIZATION_MODELS = (Terms("N"), Terms("NK"), Terms("NF"), Terms("NFK"), Terms("NK", 1))
 
-_ABOVE_ENDS = 1.01
+_MIN_CUTOFF_RATIO = 1.01
 
-FEWEST_BINS = 24
+MIN_BINS = 24
 
-_TWIN = 0.1
-"""Weight of the same first-order filter applied to the samples: it looks like that before the
-sampling, whose folds are in N."""
+_DIGITAL_TWIN_WEIGHT = 0.1
+"""Weight of the same first-order filter applied after sampling: its spectrum has the same shape as
+before sampling, but N then has no aliases."""
 
 
 class BinGains:
-    """What filters leave of noise in the bins of a spectrum."""
+    """Power gains of filters in the bins of a spectrum."""
 
     def __init__(self, spectrum: Spectrum) -> None:
-        points = (np.arange(_POINTS)[:, None] + 0.5) / _POINTS
+        points = (np.arange(_POINTS_PER_BIN)[:, None] + 0.5) / _POINTS_PER_BIN
         width = spectrum.upper - spectrum.lower
         self._within = Frequencies(spectrum.lower + width * points, spectrum.rate)
         self._mean = Frequencies(spectrum.frequency, spectrum.rate)
         self._length, self._single = spectrum.length, spectrum.block == 1
 
     def __call__(self, trial: FilterTrial) -> tuple[Array, Array, Array]:
-        """Return what is left of white noise, of flicker noise and of slow noise."""
+        """Return the gains for white noise, with leakage, for flicker noise and for slow noise."""
         low_pass = trial.low_pass
         white, flicker, slow = (gain.mean(axis=0) for gain in low_pass.gains(self._within))
         return white + self.leakage(low_pass), flicker, slow
 
     def white(self, low_pass: Filter) -> Array:
-        """Return what is left of white noise at points within each bin, shape (6, b)."""
+        """Return the gain for white noise at points within each bin, shape (6, b)."""
         return low_pass.white(self._within)
 
     def leakage(self, low_pass: Filter) -> Array:
-        """Return what the ends of the transform add, of single samples."""
+        """Return the spectral leakage in bins of single samples, 0 in others."""
         return np.where(self._single, low_pass.leakage(self._mean, self._length), 0.0)
 
 
-def highest_cutoff(kind: Kind, order: int, rate: float) -> float:
-    """Return the highest cut-off of a filter that is looked for at a rate, Hz."""
-    return _HIGHEST[kind, order] * rate
+def get_highest_cutoff(kind: Kind, order: int, rate: float) -> float:
+    """Return the highest cut-off of a filter that is tried at a sampling rate, Hz."""
+    return _MAX_CUTOFFS[kind, order] * rate
 
 
 @dataclass(frozen=True)
 class FilterTrial:
-    """A filter, where its likelihood has a maximum."""
+    """A filter at a maximum of the likelihood."""
 
     score: float  # half its BIC
     cost: float  # -log L
     kind: Kind
     order: int
     cutoff: float  # Hz
-    floor: bool  # white noise stands behind it beside that of rounding
+    floor: bool  # white noise is added after the filter, in addition to rounding
 
     @property
     def low_pass(self) -> Filter:
@@ -148,11 +152,11 @@ class FilterTrial:
 
 
 def explains_bend(spectrum: Spectrum, fitted: Array, trial: FilterTrial) -> bool:
-    """Return whether a fit behind a filter gives the spectrum where that bends it.
+    """Return whether a fit with a filter explains the spectrum where the filter bends it.
 
     ``fitted``, shape (b,), is the density of the fit in each bin.
     """
-    bent = spectrum.frequency > min(0.1 * trial.cutoff, spectrum.frequency[-FEWEST_BINS])
+    bent = spectrum.frequency > min(0.1 * trial.cutoff, spectrum.frequency[-MIN_BINS])
     shown = spectrum.select(bent)
     judged = goodness(
         shown.ordinates, shown.density, fitted[bent], shown.frequency, 2 + trial.floor
@@ -165,37 +169,37 @@ class FilterFits:
 
     def __init__(self, spectrum: Spectrum) -> None:
         self.rate = spectrum.rate
-        self.lowest = _LOWEST * spectrum.rate
+        self.lowest = _MIN_CUTOFF * spectrum.rate
         self.whittle: Whittle = whittle_of(
-            spectrum, 0.5 * spectrum.rate, COARSE, shortest=PROCESSES / spectrum.rate
+            spectrum, 0.5 * spectrum.rate, COARSE, shortest=MIN_PROCESS_SAMPLES / spectrum.rate
         )
         whittle = self.whittle
-        shortest, longest = (end / spectrum.rate for end in _CORRELATIONS)
-        count = 1 + round(_A_DECADE * math.log10(longest / shortest))
+        shortest, longest = (end / spectrum.rate for end in _CORRELATION_RANGE)
+        count = 1 + round(_TIMES_PER_DECADE * math.log10(longest / shortest))
         times = np.geomspace(shortest, longest, count)
         times = times[(times >= whittle.shortest) & (times < whittle.longest)]
         columns = [whittle.column("F"), whittle.column("K")]
         columns += [whittle.gauss_markov(float(time)) for time in times]
         self.everything_slow = np.column_stack(columns)
         self.times = np.concatenate([[np.inf, np.inf], times])
-        self.slow = [0, 1, *range(2, len(columns), _A_DECADE)]  # those that are in the fits
+        self.slow = [0, 1, *range(2, len(columns), _TIMES_PER_DECADE)]  # columns that are fitted
         self.penalty = 0.5 * math.log(len(spectrum.frequency))
-        self.rounded = 0.0  # density of rounding, parts of N^2
+        self.rounded = 0.0  # density of rounding over N^2
         self._left = BinGains(spectrum)
         self._bins = self.whittle.bins()
 
     def choose_slow(self, trial: FilterTrial) -> None:
-        """Keep the terms of slow noise that the spectrum asks for behind a filter, by BIC.
+        """Select the terms of slow noise in a fit with a filter, by BIC (forward selection).
 
-        A term that is not there can only add to a fit: together they would pull the cut-off.
+        Powers are not negative: unnecessary terms would all add power, and bias the cut-off.
         """
         slow: list[int] = []
         self.slow = slow
         left = self.gains(trial)
         best = self.cost(trial)
-        while len(slow) < _MOST_SLOW:
+        while len(slow) < _MAX_SLOW_TERMS:
             wider = [
-                (self._powers(self._behind(trial, left, [*slow, k]))[1], k)
+                (self._fit_powers(self._make_columns(trial, left, [*slow, k]))[1], k)
                 for k in range(self.everything_slow.shape[1])
                 if k not in slow
             ]
@@ -206,80 +210,89 @@ class FilterFits:
             slow.append(place)
 
     def unfiltered(self) -> tuple[float, float, float, float]:
-        """Return of noise without a filter N, half its BIC, -log L, and half the BIC with Q.
+        """Return N, half the BIC and -log L of noise without a filter, and half the BIC with Q.
 
-        The density of quantization noise rises towards Nyquist as that of what a steep filter
-        lets fold.
+        The density of quantization noise rises towards Nyquist, as the aliases of a steep filter
+        do.
         """
 
         def score(terms: Terms) -> tuple[float, float, float]:
             fit = self.whittle.maximum(terms)
             return fit.cost + self.penalty * terms.parameters, fit.cost, fit.parameter("N")
 
-        plain = min(score(Terms(*model)) for model in _ALONE)
-        rounded = min(score(Terms("Q" + terms.linear, terms.gauss_markov)) for terms in _WITH_Q)
+        plain = min(score(Terms(*model)) for model in _UNFILTERED_MODELS)
+        rounded = min(
+            score(Terms("Q" + terms.linear, terms.gauss_markov)) for terms in _QUANTIZATION_MODELS
+        )
         return (plain if plain[0] < rounded[0] else rounded)[2], plain[0], plain[1], rounded[0]
 
     def behind(self, trial: FilterTrial) -> float:
-        """Return half the BIC of the best model behind a filter."""
+        """Return half the BIC of the best model with a filter."""
         white, *slow = self.gains(trial)
         N, after = self.density(trial)
         behind = Behind(white + (after / N) ** 2, *slow)
-        shortest = max(PROCESSES / self.rate, _SLOWER / (2.0 * math.pi * trial.cutoff))
+        shortest = max(
+            MIN_PROCESS_SAMPLES / self.rate, _MIN_CORRELATION_RATIO / (2.0 * math.pi * trial.cutoff)
+        )
         spectrum = self.whittle.spectrum
         whittle = whittle_of(spectrum, 0.5 * self.rate, COARSE, shortest=shortest, behind=behind)
         own = 1 + trial.floor
-        terms = [Terms(*alone) for alone in _ALONE]
+        terms = [Terms(*alone) for alone in _UNFILTERED_MODELS]
         return min(
             whittle.maximum(each).cost + self.penalty * (each.parameters + own) for each in terms
         )
 
     def cost(self, trial: FilterTrial) -> float:
         """Return -log L at a cut-off."""
-        return self._powers(self._columns(trial))[1]
+        return self._fit_powers(self._columns_of(trial))[1]
 
     def density(self, trial: FilterTrial) -> tuple[float, float]:
-        """Return N before the filter, and the density after it."""
-        powers = self._powers(self._columns(trial))[0]
+        """Return N before the filter, and the density of the floor after it."""
+        powers = self._fit_powers(self._columns_of(trial))[0]
         return math.sqrt(powers[0]), math.sqrt(powers[-1]) if trial.floor else 0.0
 
     def may_bend(self) -> bool:
-        """Return whether a filter at any of a few cut-offs is nearly as good as none."""
+        """Return whether a filter at one of a few cut-offs has a better likelihood than none."""
         _, _, alone, _ = self.unfiltered()
         flat = np.column_stack(
             [np.ones(len(self.whittle.spectrum.frequency)), self.everything_slow[:, self.slow]]
         )
-        alone = min(alone, self._powers(flat)[1])
+        alone = min(alone, self._fit_powers(flat)[1])
         least = min(
             self.cost(FilterTrial(0.0, 0.0, kind, order, float(cutoff), False))
             for kind, order in FAMILY
-            for cutoff in self._cutoffs(kind, order, 2.0 * self.lowest, _COARSE_SCAN)
+            for cutoff in self._make_scan(kind, order, 2.0 * self.lowest, _COARSE_SCAN_CUTOFFS)
         )
-        return least < alone - _WORTH_TRYING
+        return least < alone - _MIN_SCAN_GAIN
 
     def try_filters(self, within: float = 1e-5) -> list[FilterTrial]:
-        """Return the maxima of the likelihood over all filters, the best by BIC first.
+        """Return the maxima of the likelihood over all filters, sorted by BIC, best first.
 
-        ``within``: error up to which a cut-off is found, parts of it.
+        ``within`` is the relative tolerance of the cut-off.
         """
-        maxima = [trial for kind, order in FAMILY for trial in self._of(kind, order, within)]
-        # A floor that gains next to nothing is none. Of first order, with a floor, digital and
-        # analogue filters are the same but for N.
+        maxima = [
+            trial for kind, order in FAMILY for trial in self._find_maxima(kind, order, within)
+        ]
+        # Prefer trials without a floor. First-order digital and analogue filters with a floor
+        # differ only in N: prefer the analogue one.
         return sorted(
-            maxima, key=lambda trial: trial.score + trial.floor + _SAME * (trial.kind != "analogue")
+            maxima,
+            key=lambda trial: (
+                trial.score + trial.floor + _ANALOGUE_PREFERENCE * (trial.kind != "analogue")
+            ),
         )
 
-    def _of(self, kind: Kind, order: int, within: float) -> Iterator[FilterTrial]:
+    def _find_maxima(self, kind: Kind, order: int, within: float) -> Iterator[FilterTrial]:
         """Yield the maxima of the likelihood over the cut-off, without and with a floor."""
-        scan = np.log(self._cutoffs(kind, order, self.lowest, _SCAN))
+        scan = np.log(self._make_scan(kind, order, self.lowest, _SCAN_CUTOFFS))
         start = FilterTrial(0.0, 0.0, kind, order, 1.0, True)
 
         def at(x: float, floor: bool) -> FilterTrial:
             return replace(start, cutoff=math.exp(x), floor=floor)
 
-        columns = [self._columns(at(float(x), True)) for x in scan]
+        columns = [self._columns_of(at(float(x), True)) for x in scan]
         for floor in (False, True):
-            costs = np.array([self._powers(c if floor else c[:, :-1])[1] for c in columns])
+            costs = np.array([self._fit_powers(c if floor else c[:, :-1])[1] for c in columns])
             beside = np.pad(costs, 1, constant_values=np.inf)
             for place in np.flatnonzero((costs <= beside[:-2]) & (costs < beside[2:])).tolist():
                 best = minimize_scalar(
@@ -296,32 +309,32 @@ class FilterFits:
                     floor
                     and order == 1
                     and kind != "boxcar"
-                    and trial.correlation(self.rate) > _FILTERS
+                    and trial.correlation(self.rate) > _MAX_FILTER_SAMPLES
                 ):
-                    continue  # white noise beside a process
+                    continue  # white noise plus a process
                 before, after = self.density(trial)
-                # Where what is behind the filter is the greater, it is a process of slow noise.
-                if before > after and trial.cutoff > _ABOVE_ENDS * self.lowest:
+                # If the floor exceeds the filtered noise, the latter is a slow process.
+                if before > after and trial.cutoff > _MIN_CUTOFF_RATIO * self.lowest:
                     yield replace(trial, score=trial.cost + self.penalty * (1 + floor))
 
-    def _cutoffs(self, kind: Kind, order: int, lowest: float, number: int) -> Array:
-        """Return the cut-offs from which a search starts, rising, Hz."""
-        scan = np.geomspace(lowest, highest_cutoff(kind, order, self.rate), number)
+    def _make_scan(self, kind: Kind, order: int, lowest: float, number: int) -> Array:
+        """Return the cut-offs from which a search starts, ascending, Hz."""
+        scan = np.geomspace(lowest, get_highest_cutoff(kind, order, self.rate), number)
         if kind != "boxcar":
             return scan
-        lengths = np.arange(_WHOLE, 2, -1)
+        lengths = np.arange(_MAX_BOXCAR_SAMPLES, 2, -1)
         return np.unique(np.concatenate([scan, BOXCAR_CUTOFF_LENGTH * self.rate / lengths]))
 
     def explains(self, trial: FilterTrial) -> bool:
-        """Return whether the filter gives the spectrum where it bends."""
-        columns = self._columns(trial)
-        fitted = columns @ self._powers(columns)[0]
+        """Return whether the filter explains the spectrum where it bends it."""
+        columns = self._columns_of(trial)
+        fitted = columns @ self._fit_powers(columns)[0]
         return explains_bend(self.whittle.spectrum, fitted, trial)
 
     def limits(self, trial: FilterTrial) -> tuple[float, float]:
-        """Return the ends of the 95 % interval, by the profile of the likelihood.
+        """Return the ends of the 95 % interval from the profile likelihood.
 
-        Above Nyquist the profile may have several hollows: the ends are the outermost.
+        Above Nyquist the profile may have several maxima; the ends are the outermost.
         """
         most = self.cost(trial) + HALF_CHI_SQUARED
 
@@ -340,11 +353,11 @@ class FilterFits:
         ends = []
         for sign, end in (
             (-1.0, self.lowest),
-            (1.0, highest_cutoff(trial.kind, trial.order, self.rate)),
+            (1.0, get_highest_cutoff(trial.kind, trial.order, self.rate)),
         ):
             edge = end_of(sign, math.log(end))
-            first = max(math.log(end), min(edge, math.log(UNFOLDED * self.rate)))
-            number = _BETWEEN if first != edge else 0
+            first = max(math.log(end), min(edge, math.log(MAX_UNALIASED_CUTOFF * self.rate)))
+            number = _LIMIT_SCAN_CUTOFFS if first != edge else 0
             further = np.linspace(first, edge, number, endpoint=False)
             allowed = next((k for k, x in enumerate(further) if beyond(float(x)) < 0.0), None)
             if allowed is not None:
@@ -355,26 +368,28 @@ class FilterFits:
         return ends[0], ends[1]
 
     def gains(self, trial: FilterTrial) -> tuple[Array, Array, Array]:
-        """Return what a filter leaves of white noise, with rounding, of flicker and slow noise."""
+        """Return the gains for white noise, with rounding, for flicker and for slow noise."""
         white, flicker, slow = self._left(trial)
         return white + self.rounded, flicker, slow
 
-    def _columns(self, trial: FilterTrial) -> Array:
-        return self._behind(trial, self.gains(trial), self.slow)
+    def _columns_of(self, trial: FilterTrial) -> Array:
+        return self._make_columns(trial, self.gains(trial), self.slow)
 
-    def _behind(
+    def _make_columns(
         self, trial: FilterTrial, left: tuple[Array, Array, Array], slow: Sequence[int]
     ) -> Array:
-        """Return the terms behind a filter, as columns."""
+        """Return the densities of the filtered terms as columns."""
         white, flicker, gain = left
         indices = np.array(slow, dtype=np.int64)
-        # A process as fast as the filter is the filter.
-        indices = indices[self.times[indices] >= _SLOWER / (2.0 * math.pi * trial.cutoff)]
+        # A process as fast as the filter is indistinguishable from it.
+        indices = indices[
+            self.times[indices] >= _MIN_CORRELATION_RATIO / (2.0 * math.pi * trial.cutoff)
+        ]
         gains = np.where(indices == 0, flicker[:, None], gain[:, None])
         columns = np.column_stack([white, self.everything_slow[:, indices] * gains])
         return np.column_stack([columns, np.ones(len(white))]) if trial.floor else columns
 
-    def _powers(self, columns: Array) -> tuple[Array, float]:
+    def _fit_powers(self, columns: Array) -> tuple[Array, float]:
         norm = columns.mean(axis=0)
         powers, _, cost = best_powers(
             np.ascontiguousarray(columns / norm), self._bins, False, TOLERANCE
@@ -384,50 +399,50 @@ class FilterFits:
 
 @dataclass(frozen=True)
 class Reading:
-    """What a filter that the log allows makes of N."""
+    """N under a filter that the log allows."""
 
-    weight: float  # of the filter, by its likelihood
+    weight: float  # relative likelihood of the filter
     below: float
     at: float
     above: float
-    """Logarithm of N at the lower limit of the cut-off, at its best and at its upper limit, less
-    that of the filter that was chosen."""
+    """Logarithm of N at the lower limit of the cut-off, at its best value and at its upper limit,
+    relative to N with the selected filter."""
     in_the_log: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """The same three of the density in the log, far below the cut-off."""
+    """The same for the density in the log, far below the cut-off."""
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """A filter that the log does not rule out."""
+    """A filter that the log does not exclude."""
 
     filter: FilterTrial  # at its best cut-off
     half_width: float  # half of the 95 % interval of the logarithm of its cut-off
 
     def at(self, x: float) -> FilterTrial:
-        """Return it at a logarithm of the cut-off, Hz."""
+        """Return the filter at a logarithm of the cut-off, Hz."""
         return replace(self.filter, cutoff=math.exp(x))
 
 
 @dataclass(frozen=True)
 class OfModel:
-    """What the filters make of N in a model of the noise, each fitted together with it."""
+    """N under the allowed filters, each fitted jointly with a noise model."""
 
-    readings: Sequence[Reading]  # over N at the cut-off that was chosen, in the same model
+    readings: Sequence[Reading]  # relative to N at the selected cut-off in the same model
     gained: float
-    """Log likelihood of the model with a cut-off of its own, less that with the chosen one."""
+    """Gain of log likelihood by fitting the cut-off to this model."""
 
 
-def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Reading:
-    """Return the reading of the same filter, analogue of first order, applied to the samples.
+def read_as_digital(reading: Reading, trial: FilterTrial, rate: float) -> Reading:
+    """Return the reading of a first-order analogue filter as a digital one, after sampling.
 
-    Its shape is the same, and it folds nothing into N.
+    The shape of the spectrum is the same, but N has no aliases.
     """
     gain = 0.5 * math.log(float(trial.low_pass.white(Frequencies(0.0, rate))))
     before = (reading.below + gain, reading.at + gain, reading.above + gain)
-    return Reading(_TWIN * reading.weight, *before, reading.in_the_log)
+    return Reading(_DIGITAL_TWIN_WEIGHT * reading.weight, *before, reading.in_the_log)
 
 
-def density_in_the_log(low_pass: Filter, N: float, beside: float, rate: float) -> float:
+def compute_density_in_log(low_pass: Filter, N: float, beside: float, rate: float) -> float:
     """Return the density of white noise in a log far below the cut-off of a filter.
 
     Parameters
@@ -436,7 +451,7 @@ def density_in_the_log(low_pass: Filter, N: float, beside: float, rate: float) -
     N : float
         Density before the filter, SI.
     beside : float
-        Squared density of the white noise that does not pass it, SI.
+        Squared density of the white noise added after the filter, SI.
     rate : float
         Hz.
     """
@@ -446,9 +461,9 @@ def density_in_the_log(low_pass: Filter, N: float, beside: float, rate: float) -
 def draw_factors(
     readings: Sequence[Reading], number: int, rng: np.random.Generator, *, in_the_log: bool = False
 ) -> Array:
-    """Return draws of N over its value for the filter that was chosen, shape (number,).
+    """Return draws of N over its value for the selected filter, shape (number,).
 
-    Of N before the filter, or of the density in the log.
+    N is the density before the filter, or with ``in_the_log`` the density in the log.
     """
     weight = np.array([reading.weight for reading in readings])
     which = rng.choice(len(weight), number, p=weight / weight.sum())

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.cutoff import Cutoff, find_cutoff
-from imubench_pipeline.estimators.filter_fits import PROCESSES, UNFOLDED
+from imubench_pipeline.estimators.filter_fits import MAX_UNALIASED_CUTOFF, MIN_PROCESS_SAMPLES
 from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
-from imubench_pipeline.estimators.lines import Line, find, without_lines
+from imubench_pipeline.estimators.lines import Line, find_lines, mask_lines
 from imubench_pipeline.estimators.model_choice import Candidate, rescore
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
@@ -95,7 +95,7 @@ class FitSelection:
             return False
         cutoffs = [allowed.filter.cutoff for allowed in self.low_pass.allowed]
         shared = len(times) > 0 and times.min() < _SEPARATE_BEND_RATIO / (2.0 * np.pi * cutoffs[0])
-        return bool(shared or max(cutoffs) < UNFOLDED * spectrum.rate)
+        return bool(shared or max(cutoffs) < MAX_UNALIASED_CUTOFF * spectrum.rate)
 
     def refine(self, spectrum: Spectrum, candidates: Sequence[Candidate]) -> FitSelection:
         """Return the selection with cut-off and noise model refitted jointly."""
@@ -204,7 +204,7 @@ def select_for_fit(
     if band is not None:
         limit = find_band(spectrum, clear, asked=band)
         used = clear & (spectrum.upper <= limit.highest * (1.0 + 1e-9))
-        return FitSelection(lines, clear, used, limit, shortest=PROCESSES / spectrum.rate)
+        return FitSelection(lines, clear, used, limit, shortest=MIN_PROCESS_SAMPLES / spectrum.rate)
     low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
     if low_pass.or_quantization:
         low_pass = replace(low_pass, behind=None, readings=())
@@ -219,7 +219,7 @@ def select_for_fit(
             f"{source.removesuffix(' up to Nyquist')} up to {highest:.4g} Hz; beyond, the filter "
             "leaves nothing of it"
         )
-    shortest = PROCESSES / spectrum.rate
+    shortest = MIN_PROCESS_SAMPLES / spectrum.rate
     return FitSelection(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
 
 
@@ -235,8 +235,8 @@ def _find_lines(
     maximum = whittle_of(spectrum.select(below), start, COARSE).maximum(Terms("NFK", 1))
     low = spectrum.block > 1
     crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
-    lines = find(line_spectra, model_of(maximum), spectrum.rate, crossover)
+    lines = find_lines(line_spectra, model_of(maximum), spectrum.rate, crossover)
     if not lines:
         return lines, all_bins
     density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
-    return lines, without_lines(spectrum, lines, density)
+    return lines, mask_lines(spectrum, lines, density)

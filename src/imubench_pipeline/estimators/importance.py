@@ -17,21 +17,23 @@ from scipy.stats import qmc
 from imubench_pipeline.estimators.importance_kernels import fit, set_densities
 from imubench_pipeline.typing import Array
 
-_FREEDOM = 5
-_KEPT = 0.15
-"""Part of the first mixture in all that follow: what it covers no later one may leave out."""
+_MIN_DEGREES = 5
+_FIRST_MIXTURE_WEIGHT = 0.15
+"""Weight of the first mixture in all later ones, which keeps its support covered."""
 
-_LEAST_MASS = 0.01
-_LEARNT = 2048
-"""Points from which a mixture is learnt."""
+_MIN_COMPONENT_MASS = 0.01
+_LEARNING_POINTS = 2048
+"""Number of points to which a mixture is fitted."""
 
-_CLIPPED = 8
-"""Points of highest weight that count alike when a mixture is learnt: a few that the first mixtures
-hardly reached must not be all that the next one knows (E. Koblents and J. Míguez, Statistics and
-Computing 25, 2015)."""
+_CLIPPED_POINTS = 8
+"""Number of highest weights that are clipped to one value when a mixture is fitted.
 
-_FITS = 3
-"""Steps of expectation and maximisation between two rounds."""
+Otherwise a few points in the tails of the first mixtures would determine the next one (E. Koblents
+and J. Míguez, Statistics and Computing 25, 2015).
+"""
+
+_EM_STEPS = 3
+"""Expectation-maximisation steps between two rounds."""
 
 
 @dataclass(frozen=True)
@@ -43,41 +45,41 @@ class Mixture:
     scales: Array  # (c, d, d): positive definite
 
     def draw(self, number: int, rng: np.random.Generator) -> Array:
-        """Return a power of 2 of points, shape (number, d)."""
+        """Return points, shape (number, d); ``number`` is a power of 2 (Sobol sequence)."""
         uniform = qmc.Sobol(self.means.shape[1] + 2, seed=rng).random(number)
         uniform = np.clip(uniform, 1e-12, 1.0 - 1e-12)
         ends = np.cumsum(self.weights)
         which = np.minimum(np.searchsorted(ends / ends[-1], uniform[:, 0]), len(ends) - 1)
         normal = ndtri(uniform[:, 2:])
-        freedom = _freedom(self.means.shape[1])
+        freedom = _get_degrees(self.means.shape[1])
         normal /= np.sqrt(chdtri(freedom, uniform[:, 1]) / freedom)[:, None]
         roots = np.linalg.cholesky(self.scales)
         return np.asarray(self.means[which] + np.einsum("nij,nj->ni", roots[which], normal))
 
     def densities(self, points: Array) -> Array:
         """Return weight times density of each component, up to a constant, shape (n, c)."""
-        return self._densities(points, np.linalg.inv(np.linalg.cholesky(self.scales)))
+        return self._evaluate_densities(points, np.linalg.inv(np.linalg.cholesky(self.scales)))
 
-    def _densities(self, points: Array, inverses: Array) -> Array:
+    def _evaluate_densities(self, points: Array, inverses: Array) -> Array:
         densities = np.empty((len(points), len(self.weights)))
-        freedom = _freedom(points.shape[1])
+        freedom = _get_degrees(points.shape[1])
         set_densities(points, self.weights, self.means, inverses, freedom, densities)
         return densities
 
     def fitted(self, points: Array) -> Mixture:
-        """Return the mixture after a step towards points (expectation and maximisation)."""
+        """Return the mixture after one expectation-maximisation step on points."""
         inverses = np.linalg.inv(np.linalg.cholesky(self.scales))
-        parts, freedom = self._densities(points, inverses), _freedom(points.shape[1])
+        parts, freedom = self._evaluate_densities(points, inverses), _get_degrees(points.shape[1])
         weights, means = np.empty_like(self.weights), np.empty_like(self.means)
         scales = np.zeros_like(self.scales)
         new = (weights, means, scales)
-        number = fit(points, parts, self.means, inverses, freedom, _LEAST_MASS, *new)
+        number = fit(points, parts, self.means, inverses, freedom, _MIN_COMPONENT_MASS, *new)
         if not number:
             return self
         return Mixture(weights[:number] / weights[:number].sum(), means[:number], scales[:number])
 
     def beside(self, other: Mixture, part: float) -> Mixture:
-        """Return a mixture of which a part is another."""
+        """Return this mixture combined with another, which has the weight ``part``."""
         return Mixture(
             np.concatenate([(1.0 - part) * self.weights, part * other.weights]),
             np.concatenate([self.means, other.means]),
@@ -94,11 +96,11 @@ class Weighted:
 
     @property
     def effective(self) -> float:
-        """Number of independent points that tell as much."""
+        """Effective sample size, 1 / sum w^2 (L. Kish, "Survey Sampling", 1965)."""
         return float(1.0 / np.sum(self.weights**2))
 
     def clipped(self, number: int) -> Weighted:
-        """Return the points with the highest weights lowered to one that so many have."""
+        """Return the points with the ``number`` highest weights clipped to the lowest of them."""
         most = np.partition(self.weights, -number)[-number]
         if not most > 0.0:
             return self
@@ -106,7 +108,7 @@ class Weighted:
         return Weighted(self.points, lowered / lowered.sum())
 
     def drawn(self, number: int, rng: np.random.Generator) -> NDArray[np.int64]:
-        """Return which points to take for equal weights, in random order (systematically)."""
+        """Return indices of equally weighted points, in random order (systematic resampling)."""
         ends = np.cumsum(self.weights)
         places = (np.arange(number) + rng.random()) / number * ends[-1]
         which = np.minimum(np.searchsorted(ends, places), len(ends) - 1)
@@ -122,20 +124,20 @@ def sample_adaptively(
     wanted: float,
     most: int,
 ) -> Weighted:
-    """Draw weighted points from a density until they are worth enough.
+    """Draw weighted points from a density until their effective sample size suffices.
 
     Parameters
     ----------
     log_density : callable
         Logarithm of the density at points, shape (n, d), up to a constant; -inf where it is 0.
     first : Mixture
-        That of the first round.
+        Proposal of the first round.
     size : int
         Points of a round, a power of 2.
     wanted : float
-        Effective number of points to reach.
+        Effective sample size to reach.
     most : int
-        Points to draw at most; where they are not worth ``wanted``, fewer are returned.
+        Maximum number of points; the effective sample size may then be less than ``wanted``.
 
     References
     ----------
@@ -153,10 +155,10 @@ def sample_adaptively(
         weighted = Weighted(points, weights / weights.sum())
         if weighted.effective >= wanted or len(points) + size > most:
             return weighted
-        learnt = points[weighted.clipped(_CLIPPED).drawn(_LEARNT, rng)]
-        for _ in range(_FITS):
+        learnt = points[weighted.clipped(_CLIPPED_POINTS).drawn(_LEARNING_POINTS, rng)]
+        for _ in range(_EM_STEPS):
             mixture = mixture.fitted(learnt)
-        proposal = mixture.beside(first, _KEPT)
+        proposal = mixture.beside(first, _FIRST_MIXTURE_WEIGHT)
         added = proposal.draw(size, rng)
         proposed = proposed + proposal.densities(points).sum(axis=1)
         mixtures.append(proposal)
@@ -166,6 +168,6 @@ def sample_adaptively(
         proposed = np.concatenate([proposed, np.sum(everywhere, axis=0)])
 
 
-def _freedom(dimensions: int) -> int:
-    """Return degrees of freedom that are even with the dimensions, for a power without a root."""
-    return _FREEDOM + (_FREEDOM + dimensions) % 2
+def _get_degrees(dimensions: int) -> int:
+    """Return degrees of freedom with an even sum with ``dimensions``: the power has no root."""
+    return _MIN_DEGREES + (_MIN_DEGREES + dimensions) % 2

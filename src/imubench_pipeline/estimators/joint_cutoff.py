@@ -1,8 +1,7 @@
-"""The cut-off of a low-pass fitted together with the noise behind it.
+"""Joint fit of the cut-off of a low-pass filter and the parameters of a noise model.
 
-What stands behind a filter bends its spectrum too: how a process or flicker noise falls decides
-what is left for the filter. Each model of the noise has a cut-off of its own, and an N before the
-filter that goes with it.
+The filtered noise bends the spectrum too: the slope of a process or of flicker noise affects the
+fitted cut-off. Each noise model therefore has its own cut-off, and its own N before the filter.
 """
 
 from __future__ import annotations
@@ -15,58 +14,64 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from imubench_pipeline.estimators.cutoff import ALLOWED, NOT_AS_BEHIND, RULED_OUT, WIDEST, Cutoff
+from imubench_pipeline.estimators.cutoff import (
+    ALLOWED_CUTOFFS_REASON,
+    DELTA_LOG_LIKELIHOOD_EXCLUDED,
+    MAX_LIMIT_RATIO,
+    UNKNOWN_BEND_REASON,
+    Cutoff,
+)
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import (
     HALF_CHI_SQUARED,
-    PROCESSES,
+    MIN_PROCESS_SAMPLES,
     Allowed,
     BinGains,
     FilterTrial,
     OfModel,
     Reading,
-    also_after_sampling,
-    density_in_the_log,
+    compute_density_in_log,
     explains_bend,
-    highest_cutoff,
+    get_highest_cutoff,
+    read_as_digital,
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Maximum, Terms, Whittle, whittle_of
 
-_REFINED_WITHIN = math.log(2.0)
-"""Distance in log f_c that a joint fit with the noise may move the cut-off."""
+_MAX_LOG_SHIFT = math.log(2.0)
+"""Maximum change of log f_c by a joint fit."""
 
-_REACH = 6.0
-"""Half widths of the interval of a cut-off within which it is looked for first."""
+_SEARCH_HALF_WIDTHS = 6.0
+"""Range of the first search for a cut-off, in half widths of its interval."""
 
-_FINE = 0.04
-"""Part of that half width to which a cut-off is found."""
+_RELATIVE_TOLERANCE = 0.04
+"""Tolerance of a cut-off over the half width of its interval."""
 
-_WORTH_JOINING = 6.0
-"""BIC over the best up to which a model may be the best with a cut-off of its own."""
+_MAX_DELTA_BIC = 6.0
+"""Maximum BIC above the best model at which a joint fit may make a model the best."""
 
-_LEAST_SHARE = 0.03
-"""Share by AIC from which one enters intervals, and to spare."""
+_MIN_AKAIKE_WEIGHT = 0.03
+"""Akaike weight from which a model is fitted jointly; lower than the one for intervals."""
 
-_LEAST_N = 1e-6
-"""N that stands for none, over the density of the log."""
+_MIN_N_RATIO = 1e-6
+"""Minimum N over the density of the log, instead of 0."""
 
-_SHARE = 0.05
-"""Share by AIC, with its own cut-off, from which a model has a part in the interval of that."""
+_MIN_INTERVAL_WEIGHT = 0.05
+"""Akaike weight of a joint fit from which its limits enter the interval of the cut-off."""
 
 
-def worth_joining(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
-    """Return the models for which the cut-off of a filter is fitted, the best first, as they come.
+def select_joint_models(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
+    """Return the models that are fitted jointly with a cut-off, in the order of ``candidates``.
 
-    ``always`` is one of them in any case.
+    ``always`` is included in any case. The first candidate must be the best.
     """
     best = candidates[0]
     return [
         candidate
         for candidate in candidates
-        if candidate.bic < best.bic + _WORTH_JOINING
-        or candidate.akaike_weight >= _LEAST_SHARE
+        if candidate.bic < best.bic + _MAX_DELTA_BIC
+        or candidate.akaike_weight >= _MIN_AKAIKE_WEIGHT
         or candidate.terms == always
     ]
 
@@ -76,10 +81,10 @@ def refine_cutoff(
 ) -> Cutoff:
     """Return a low-pass whose cut-off is fitted together with all parameters of a model.
 
-    Of the models, that which is the best by BIC with a cut-off of its own; what the others, and
-    other filters that the log allows, make of N is in ``models``. ``clear``, shape (b,), are the
-    bins that no line touches, and in which the ends of the transform do not rule. The candidates
-    come with the cut-off as it is, the best first; of a ramp nothing is taken.
+    The model is the best by BIC after joint fits. N under the other models, and under other allowed
+    filters, is in ``models``. ``clear``, shape (b,), are the bins without lines and without
+    dominant leakage. The candidates are fits with the present cut-off, best first; ramps are
+    ignored.
     """
     if low_pass.kind is None or low_pass.behind is None or not candidates:
         return low_pass
@@ -97,7 +102,7 @@ def refine_cutoff(
     fit = tried[chosen][0]
     models = {terms: joint.of_model(fits, fit) for terms, fits in tried.items()}
     likely = {terms: math.exp(0.5 * (aic[chosen] - aic[terms])) for terms in aic}
-    least = _SHARE * sum(likely.values())
+    least = _MIN_INTERVAL_WEIGHT * sum(likely.values())
     ends = [
         each.allowed.at(x).low_pass.half_power(spectrum.rate)
         for terms, fits in tried.items()
@@ -108,7 +113,9 @@ def refine_cutoff(
     best, state = fit.allowed.at(fit.x), joint.at(fit.allowed, fit.x, chosen)
     return replace(
         low_pass,
-        frequency=_as_parameter(best.low_pass.half_power(spectrum.rate), ends, joint.explains(fit)),
+        frequency=_make_parameter(
+            best.low_pass.half_power(spectrum.rate), ends, joint.explains(fit)
+        ),
         kind=best.kind,
         order=best.order,
         floor=math.sqrt(state.floor + low_pass.rounded * state.N**2),
@@ -121,13 +128,13 @@ def refine_cutoff(
     )
 
 
-def _as_parameter(shown: float, ends: Sequence[float], explains: bool) -> Parameter:
-    """Return a cut-off with its limits, or why it is not told."""
+def _make_parameter(shown: float, ends: Sequence[float], explains: bool) -> Parameter:
+    """Return a cut-off with its limits, or the reason why it is not identified."""
     lower, upper = min(ends), max(ends)
-    if upper > WIDEST * lower:
-        reason = ALLOWED.format(lower, upper)
+    if upper > MAX_LIMIT_RATIO * lower:
+        reason = ALLOWED_CUTOFFS_REASON.format(lower, upper)
     elif not explains:
-        reason = NOT_AS_BEHIND
+        reason = UNKNOWN_BEND_REASON
     else:
         return Parameter(shown, lower=lower, upper=upper)
     return Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
@@ -135,7 +142,7 @@ def _as_parameter(shown: float, ends: Sequence[float], explains: bool) -> Parame
 
 @dataclass(frozen=True)
 class _State:
-    """-log L, N and what of white noise stands behind the filter (SI, squared)."""
+    """-log L, N, and the squared density of white noise added after the filter, SI."""
 
     cost: float
     N: float
@@ -144,7 +151,7 @@ class _State:
 
 @dataclass(frozen=True)
 class _Fit:
-    """The best logarithm of a cut-off for a filter and a model."""
+    """The best log cut-off for a filter and a model."""
 
     allowed: Allowed
     terms: Terms
@@ -159,31 +166,31 @@ class _Joint:
         self._low_pass = low_pass
         self._spectrum = spectrum.select(clear)
         self._gains = BinGains(self._spectrum)
-        shortest = PROCESSES / spectrum.rate
+        shortest = MIN_PROCESS_SAMPLES / spectrum.rate
         self._plain = whittle_of(self._spectrum, 0.5 * spectrum.rate, COARSE, shortest=shortest)
         self._states: dict[tuple[FilterTrial, float, Terms], _State] = {}
 
     def behind(self, gains: BinGains, trial: FilterTrial, floor: float = 0.0) -> Behind:
-        """Return what a filter leaves, with what stands behind it in parts of N^2."""
+        """Return the gains of a filter, with the floor after it over N^2."""
         white, flicker, slow = gains(trial)
         return Behind(white + self._low_pass.rounded + floor, flicker, slow)
 
     def fits(self, terms: Terms) -> list[_Fit]:
-        """Return the fits of a model behind the filters that the log allows, the best first."""
-        fits = [self._best(allowed, terms) for allowed in self._low_pass.allowed]
+        """Return the fits of a model with the allowed filters, best first."""
+        fits = [self._fit_best(allowed, terms) for allowed in self._low_pass.allowed]
         fits.sort(key=lambda fit: fit.cost + fit.allowed.filter.floor)
-        return [fit for fit in fits if fit.cost < fits[0].cost + RULED_OUT]
+        return [fit for fit in fits if fit.cost < fits[0].cost + DELTA_LOG_LIKELIHOOD_EXCLUDED]
 
     def common(self, terms: Terms) -> float:
-        """Return -log L of a model at the cut-off that is common to all so far."""
+        """Return -log L of a model at the present cut-off, common to all models."""
         chosen = self._low_pass.allowed[0]
         return self.at(chosen, math.log(chosen.filter.cutoff), terms).cost
 
     def of_model(self, fits: Sequence[_Fit], chosen: _Fit) -> OfModel:
-        """Return what the filters make of N in a model, over it at a chosen cut-off."""
+        """Return N under the filters in a model, relative to N at the selected cut-off."""
         terms = fits[0].terms
         common = self.at(chosen.allowed, chosen.x, terms)
-        shown = self._in_the_log(chosen.allowed, chosen.x, common)
+        shown = self._compute_density_in_log(chosen.allowed, chosen.x, common)
         readings = []
         for fit in fits:
             low, high = self.limits(fit)
@@ -191,41 +198,41 @@ class _Joint:
             states = [self.at(fit.allowed, x, terms) for x in places]
             below, at, above = (math.log(state.N / common.N) for state in states)
             first, second, third = (
-                math.log(self._in_the_log(fit.allowed, x, state) / shown)
+                math.log(self._compute_density_in_log(fit.allowed, x, state) / shown)
                 for x, state in zip(places, states, strict=True)
             )
             weight = math.exp(fits[0].cost - fit.cost)
             readings.append(Reading(weight, below, at, above, (first, second, third)))
             best = fit.allowed.at(fit.x)
             if best.is_first_order_analogue:
-                readings.append(also_after_sampling(readings[-1], best, self._spectrum.rate))
+                readings.append(read_as_digital(readings[-1], best, self._spectrum.rate))
         return OfModel(readings, common.cost - fits[0].cost)
 
-    def _in_the_log(self, allowed: Allowed, x: float, state: _State) -> float:
+    def _compute_density_in_log(self, allowed: Allowed, x: float, state: _State) -> float:
         """Return the density of white noise in the log, at a logarithm of the cut-off."""
         beside = self._low_pass.rounded * state.N**2 + state.floor
         low_pass = allowed.at(x).low_pass
-        return density_in_the_log(low_pass, state.N, beside, self._spectrum.rate)
+        return compute_density_in_log(low_pass, state.N, beside, self._spectrum.rate)
 
     def explains(self, fit: _Fit) -> bool:
-        """Return whether a fit gives the spectrum where it bends."""
-        whittle, maximum = self._maximum(fit.allowed, fit.x, fit.terms)
+        """Return whether a fit explains the spectrum where the filter bends it."""
+        whittle, maximum = self._fit_maximum(fit.allowed, fit.x, fit.terms)
         return explains_bend(self._spectrum, whittle.density(maximum), fit.allowed.at(fit.x))
 
     def at(self, allowed: Allowed, x: float, terms: Terms) -> _State:
         """Return the best fit of a model at a logarithm of the cut-off."""
         key = allowed.filter, x, terms
         if key not in self._states:
-            maximum = self._maximum(allowed, x, terms)[1]
+            maximum = self._fit_maximum(allowed, x, terms)[1]
             floor = maximum.parameter("Q") ** 2 if allowed.filter.floor else 0.0
-            N = max(maximum.parameter("N"), _LEAST_N * math.sqrt(self._plain.scale))
+            N = max(maximum.parameter("N"), _MIN_N_RATIO * math.sqrt(self._plain.scale))
             self._states[key] = _State(maximum.cost, N, floor)
         return self._states[key]
 
-    def _maximum(self, allowed: Allowed, x: float, terms: Terms) -> tuple[Whittle, Maximum]:
+    def _fit_maximum(self, allowed: Allowed, x: float, terms: Terms) -> tuple[Whittle, Maximum]:
         whittle = self._plain.standing(self.behind(self._gains, allowed.at(x)))
         if allowed.filter.floor:
-            # White noise behind the filter stands where quantization noise would.
+            # The column of quantization noise is used for white noise after the filter.
             whittle = whittle.with_column("Q", np.ones(len(self._spectrum.density)))
             terms = replace(terms, linear="Q" + terms.linear)
         return whittle, whittle.maximum(terms)
@@ -237,33 +244,33 @@ class _Joint:
         def beyond(x: float) -> float:
             return self.at(fit.allowed, x, fit.terms).cost - most
 
-        highest = self._highest(fit.allowed)
+        highest = self._get_highest(fit.allowed)
 
         def end(sign: float) -> float:
             inside, step = fit.x, fit.allowed.half_width
-            while abs(inside - fit.x) < _REFINED_WITHIN:
+            while abs(inside - fit.x) < _MAX_LOG_SHIFT:
                 outside = inside + sign * step
                 if outside >= highest:
                     return highest
                 if beyond(outside) > 0.0:
-                    return float(brentq(beyond, inside, outside, xtol=_FINE * step))
+                    return float(brentq(beyond, inside, outside, xtol=_RELATIVE_TOLERANCE * step))
                 inside, step = outside, 2.0 * step
             return inside
 
         return end(-1.0), end(1.0)
 
-    def _highest(self, allowed: Allowed) -> float:
+    def _get_highest(self, allowed: Allowed) -> float:
         trial = allowed.filter
-        return math.log(highest_cutoff(trial.kind, trial.order, self._spectrum.rate))
+        return math.log(get_highest_cutoff(trial.kind, trial.order, self._spectrum.rate))
 
-    def _best(self, allowed: Allowed, terms: Terms) -> _Fit:
+    def _fit_best(self, allowed: Allowed, terms: Terms) -> _Fit:
         around = math.log(allowed.filter.cutoff)
-        for reach in (_REACH * allowed.half_width, _REFINED_WITHIN):
+        for reach in (_SEARCH_HALF_WIDTHS * allowed.half_width, _MAX_LOG_SHIFT):
             best = minimize_scalar(
                 lambda x: self.at(allowed, x, terms).cost,
-                bounds=(around - reach, min(around + reach, self._highest(allowed))),
+                bounds=(around - reach, min(around + reach, self._get_highest(allowed))),
                 method="bounded",
-                options={"xatol": _FINE * allowed.half_width},
+                options={"xatol": _RELATIVE_TOLERANCE * allowed.half_width},
             )
             if abs(best.x - around) < 0.9 * reach:
                 break

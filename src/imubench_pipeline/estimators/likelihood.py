@@ -19,7 +19,7 @@ from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
-from imubench_pipeline.estimators.draws import drawn_share, joint_draws
+from imubench_pipeline.estimators.draws import compute_draw_weight, draw_jointly
 from imubench_pipeline.estimators.estimate import (
     BROADBAND_TIME,
     CURVE,
@@ -31,8 +31,8 @@ from imubench_pipeline.estimators.estimate import (
 )
 from imubench_pipeline.estimators.frame import MIN_BINS, FitSelection, select_for_fit
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
-from imubench_pipeline.estimators.joint_cutoff import worth_joining
-from imubench_pipeline.estimators.lines import Line, carried_sinusoids
+from imubench_pipeline.estimators.joint_cutoff import select_joint_models
+from imubench_pipeline.estimators.lines import Line, select_sinusoids
 from imubench_pipeline.estimators.missing import (
     block_means,
     divide_at_holes,
@@ -293,13 +293,13 @@ def fit_spectrum(
     )
     drift = describe_drift_alternative(whittle, chosen.maximum)
     estimate, gauss_markov = add_doubts(estimate, gauss_markov, frame, candidates, papers, drift)
-    sinusoids = carried_sinusoids(frame.lines)
-    estimate = replace(estimate, lines=sinusoids, draws=of_data.joint_draws())
+    sinusoids = select_sinusoids(frame.lines)
+    estimate = replace(estimate, lines=sinusoids, draws=of_data.draw_jointly())
     gauss_markov = replace(
         gauss_markov,
         parameters=papers_only(gauss_markov.parameters),
         lines=sinusoids,
-        draws=of_papers.joint_draws(),
+        draws=of_papers.draw_jointly(),
     )
     return Likelihood(
         (estimate, gauss_markov),
@@ -377,16 +377,16 @@ class _InTheLog:
         reason = N.reason or describe_white_level(self._stretch, counted.tolist())
         return replace(estimate, parameters={**estimate.parameters, "N": replace(N, reason=reason)})
 
-    def joint_draws(self) -> JointDraws:
+    def draw_jointly(self) -> JointDraws:
         """Return draws over all models that the log does not rule out."""
         bins = len(self._whittle.spectrum.density)
         # Of one model alone the share, which may be next to nothing, does not matter.
         alone = len(self.alike) == 1
         parts = [
-            (c.terms, self.draws[c.terms], 1.0 if alone else drawn_share(c, bins))
+            (c.terms, self.draws[c.terms], 1.0 if alone else compute_draw_weight(c, bins))
             for c in self.alike
         ]
-        return joint_draws(parts, self._whittle.longest)
+        return draw_jointly(parts, self._whittle.longest)
 
 
 def _too_short(spectrum: Spectrum, frame: FitSelection) -> Likelihood:
@@ -438,7 +438,7 @@ def fit_models(
         flexible = [candidate for candidate in first[2] if candidate.terms == _FLEXIBLE]
         first = fitted(frame.refine(spectrum, flexible))
     if _explains(first) and first[0].needs_cutoff_per_model(spectrum, first[2][0].maximum.times):
-        first = fitted(first[0].refine(spectrum, worth_joining(first[2], PAPERS_MODEL)))
+        first = fitted(first[0].refine(spectrum, select_joint_models(first[2], PAPERS_MODEL)))
     if _explains(first):
         return first
     faster = fitted(frame.with_fast_processes(spectrum.rate))

@@ -1,11 +1,13 @@
 """Draws from the posterior of a model, for the intervals of its parameters.
 
-Flat in the amplitudes Q, N, B and K, in R, and in log T_B up to a fifth of the log. (Flat in log N
-has no lower end: where another term explains the spectrum without N, all of it would go there.)
+The prior is uniform in the amplitudes Q, N, B and K, in R, and in log T_B up to a fifth of the log.
+(A uniform prior in log N is improper towards 0: if another term explains the spectrum without N,
+all the posterior mass would go there.)
 
-Importance sampling: for each of a grid of correlation times the posterior of the amplitudes is
-nearly normal, and its mode is a few steps away. Where the draws are not worth enough, as along thin
-curved ridges between terms that stand for each other, an adaptive Metropolis chain takes over.
+The draws are by importance sampling: for each correlation time of a grid the posterior of the
+amplitudes is nearly normal, and a few Newton steps find its mode. If the effective sample size is
+too small, as along thin curved ridges between terms that can replace each other, an adaptive
+Metropolis chain is used instead.
 """
 
 from __future__ import annotations
@@ -21,41 +23,41 @@ from imubench_pipeline.estimators.whittle import Maximum, Whittle
 from imubench_pipeline.estimators.whittle_kernels import Problem, shape_at
 from imubench_pipeline.typing import Array
 
-DRAWS = 80_000
-"""Draws that are kept, unless fewer are asked for: the 2.5 % of them in a tail are 2,000."""
+MAX_DRAWS = 80_000
+"""Default number of draws; a tail of 2.5 % has 2,000 of them."""
 
-_WORTH = 6
-"""Draws for which one independent point is wanted: limits of two seeds then agree within 3 %."""
+_DRAWS_PER_POINT = 6
+"""Target number of draws per independent point: limits of two seeds then agree within 3 %."""
 
-_LEAST_WORTH = 80
-"""Draws for which one independent point must be had: a chain, worth about as much, takes over."""
+_MAX_DRAWS_PER_POINT = 80
+"""Maximum number of draws per independent point; above it, a chain is about as good."""
 
-_ROUNDS = 4
-_GRID = (0, 20, 9)
-"""Correlation times of the first mixture along each axis, by the number of processes."""
+_MAX_ROUNDS = 4
+_GRID_SIZES = (0, 20, 9)
+"""Correlation times of the first mixture along each axis, for 0, 1 and 2 processes."""
 
-_WIDE = 0.7
-"""Standard deviation of its components in log T_B, distances in the grid."""
+_COMPONENT_SIGMA = 0.7
+"""Standard deviation of its components in log T_B, in grid spacings."""
 
-_WIDEST = 2.0
-"""Largest one about the best fit."""
+_MAX_SIGMA = 2.0
+"""Largest standard deviation in log T_B, about the best fit."""
 
-_AT_BEST_FIT = 0.3
-"""Least weight of the component at the best fit."""
+_MIN_BEST_FIT_WEIGHT = 0.3
+"""Minimum weight of the component at the best fit."""
 
-_LEAST, _FLOOR = 1e-6, 5e-3
-_WEAK = 0.15
-"""Relative standard deviation of a squared amplitude from which it may as well be near 0."""
+_NEGLIGIBLE_WEIGHT, _MIN_WEIGHT = 1e-6, 5e-3
+_WEAK_TERM_ERROR = 0.15
+"""Relative standard deviation of a squared amplitude above which it may be near 0."""
 
-_NEARLY_GONE, _GONE_SPREAD = 0.7, 0.8
-"""Amplitude over its unit, asinh, and standard deviation of its logarithm, in components of such a
-term."""
+_WEAK_AMPLITUDE, _WEAK_LOG_SIGMA = 0.7, 0.8
+"""Asinh of the amplitude over its unit, and standard deviation of its logarithm, in components for
+a term near 0."""
 
-_GONE_WEIGHT = 0.03
-_ALIKE = 1e-4
-"""Terms that are more alike are told apart no better."""
+_MIN_WEAK_WEIGHT = 0.03
+_RIDGE = 1e-4
+"""Ridge on the information matrix, against collinear terms."""
 
-_LEAST_START = 0.3
+_MIN_START_SIGMAS = 0.3
 
 
 @dataclass(frozen=True)
@@ -66,24 +68,24 @@ class Posterior:
     """(draws, p): the linear parameters in their order, then B of each process; SI."""
     times: Array  # (draws, g): T_B of each process, rising, s
     ramps: Array  # (draws,): R; zeros where the model has none
-    effective: float  # number of independent draws that they are worth; NaN of a chain
+    effective: float  # effective sample size; NaN for a chain
 
 
 def sample(
-    whittle: Whittle, maximum: Maximum, rng: np.random.Generator, draws: int = DRAWS
+    whittle: Whittle, maximum: Maximum, rng: np.random.Generator, draws: int = MAX_DRAWS
 ) -> Posterior:
     """Draw from the posterior of a model around its best fit.
 
-    A term that the best fit has at 0 is drawn all the same.
+    Terms that are 0 in the best fit are drawn too.
     """
     target = _Target(whittle, maximum)
-    wanted = draws / _WORTH
+    wanted = draws / _DRAWS_PER_POINT
     size = 1 << max(9, math.ceil(math.log2(wanted)))
     points = sample_adaptively(
-        target.log_density, target.first(), rng, size=size, wanted=wanted, most=_ROUNDS * size
+        target.log_density, target.first(), rng, size=size, wanted=wanted, most=_MAX_ROUNDS * size
     )
     effective = points.effective
-    if effective * _LEAST_WORTH >= draws:
+    if effective * _MAX_DRAWS_PER_POINT >= draws:
         which = points.drawn(draws, rng)
         amplitudes = target.amplitudes(points.points[which])
     else:
@@ -97,7 +99,7 @@ class _Target:
     """The posterior of a model, in coordinates in which it is nearly normal.
 
     They are log T_B, and z with amplitude = unit sinh z > 0: linear where an amplitude may be 0,
-    its logarithm where it is known.
+    and logarithmic where it is well known.
     """
 
     def __init__(self, whittle: Whittle, maximum: Maximum) -> None:
@@ -116,16 +118,16 @@ class _Target:
             terms.ramp,
             whittle.shape_table(whittle.scale),
         )
-        # How well the square of each amplitude is known: alone, and beside the other terms.
+        # Error of each squared amplitude: with the other terms fixed, and with them varying.
         parts = whittle.matrix(terms, maximum.times) / density[:, None]
         parts *= np.sqrt(spectrum.ordinates / 2.0)[:, None]
         size = np.linalg.norm(parts, axis=0)
         parts /= size
-        inverse = np.linalg.inv(parts.T @ parts + _ALIKE * np.eye(self.terms))
+        inverse = np.linalg.inv(parts.T @ parts + _RIDGE * np.eye(self.terms))
         error = np.sqrt(np.diag(inverse)) / size
         self.log_unit = 0.5 * np.log(0.25 * error)
-        self.weak = np.flatnonzero(error > _WEAK * maximum.powers).tolist()
-        self.log_fitted = 0.5 * np.log(np.maximum(maximum.powers, _LEAST_START / size))
+        self.weak = np.flatnonzero(error > _WEAK_TERM_ERROR * maximum.powers).tolist()
+        self.log_fitted = 0.5 * np.log(np.maximum(maximum.powers, _MIN_START_SIGMAS / size))
 
     def log_density(self, points: Array) -> Array:
         """Return the logarithm of the posterior at points, up to a constant."""
@@ -141,15 +143,15 @@ class _Target:
         """Return (log amplitude ..., log T_B ...) of points."""
         result = points.copy()
         z = points[:, : self.terms]
-        # log sinh z, which does not overflow.
+        # log sinh z without overflow.
         result[:, : self.terms] = self.log_unit + z + np.log(-0.5 * np.expm1(-2.0 * z))
         return result
 
     def first(self) -> Mixture:
-        """Return a mixture that covers the posterior: a normal one for each T_B of a grid."""
+        """Return a mixture that covers the posterior, with a component for each T_B of a grid."""
         first, step, logarithms = self.problem.table
         last = first + step * (len(logarithms) - 1)
-        number = _GRID[self.processes]
+        number = _GRID_SIZES[self.processes]
         apart = (last - first) / max(number, 1)
         grid = first + apart * (np.arange(number) + 0.5)
         places = [np.log(self.maximum.times)]
@@ -157,21 +159,23 @@ class _Target:
             places += [np.array([place]) for place in grid]
         elif self.processes == 2:
             places += [np.array([a, b]) for i, a in enumerate(grid) for b in grid[i + 1 :]]
-        widths = [_WIDEST] + [_WIDE * apart] * (len(places) - 1)
-        components = [self._component(at, width) for at, width in zip(places, widths, strict=True)]
+        widths = [_MAX_SIGMA] + [_COMPONENT_SIGMA * apart] * (len(places) - 1)
+        components = [
+            self._make_component(at, width) for at, width in zip(places, widths, strict=True)
+        ]
         if self.terms > 1:
-            components += [self._without(term) for term in self.weak]
+            components += [self._make_weak_component(term) for term in self.weak]
         means, scales = (np.array(part) for part in zip(*components, strict=True))
         values, _, _ = log_posteriors(means, self.problem)
         mass = values + 0.5 * np.linalg.slogdet(scales)[1]
         weights = np.exp(mass - mass.max())
         weights /= weights.sum()
-        heavy = weights > _LEAST
+        heavy = weights > _NEGLIGIBLE_WEIGHT
         heavy[0] = True
         heavy[len(places) :] = True
-        weights = np.maximum(weights, _FLOOR)
-        weights[len(places) :] = np.maximum(weights[len(places) :], _GONE_WEIGHT)
-        weights[0] = max(weights[0], _AT_BEST_FIT)
+        weights = np.maximum(weights, _MIN_WEIGHT)
+        weights[len(places) :] = np.maximum(weights[len(places) :], _MIN_WEAK_WEIGHT)
+        weights[0] = max(weights[0], _MIN_BEST_FIT_WEIGHT)
         # From log amplitudes to z = asinh(amplitude / unit): dz = tanh z d log amplitude.
         slope = np.ones_like(means)
         z = np.arcsinh(np.exp(means[:, : self.terms] - self.log_unit))
@@ -181,14 +185,14 @@ class _Target:
 
     def start(self) -> tuple[Array, Array]:
         """Return the mode of the amplitudes at the best T_B, and the covariance there."""
-        return self._component(np.log(self.maximum.times), 1.0)
+        return self._make_component(np.log(self.maximum.times), 1.0)
 
-    def _component(self, places: Array, width: float) -> tuple[Array, Array]:
-        """Return mean and covariance of a normal one about correlation times."""
-        return self._normal(self.log_fitted, places, width, self.problem)
+    def _make_component(self, places: Array, width: float) -> tuple[Array, Array]:
+        """Return mean and covariance of a normal component about correlation times."""
+        return self._approximate_normal(self.log_fitted, places, width, self.problem)
 
-    def _without(self, term: int) -> tuple[Array, Array]:
-        """Return those of the posterior where one term is nearly gone."""
+    def _make_weak_component(self, term: int) -> tuple[Array, Array]:
+        """Return mean and covariance of a component in which one term is nearly 0."""
         places, problem = np.log(self.maximum.times), self.problem
         new = [term]
         if term < self.linear:
@@ -197,23 +201,25 @@ class _Target:
         else:
             places = np.delete(places, term - self.linear)
             new.append(self.terms + term - self.linear)
-        mean, covariance = self._normal(np.delete(self.log_fitted, term), places, _WIDEST, problem)
+        mean, covariance = self._approximate_normal(
+            np.delete(self.log_fitted, term), places, _MAX_SIGMA, problem
+        )
         old = np.delete(np.arange(self.terms + self.processes), new)
         full_mean, full = np.empty(len(old) + len(new)), np.zeros((len(old) + len(new),) * 2)
         full_mean[old], full[np.ix_(old, old)] = mean, covariance
-        full_mean[term] = self.log_unit[term] + math.log(math.sinh(_NEARLY_GONE))
-        full[term, term] = _GONE_SPREAD**2
+        full_mean[term] = self.log_unit[term] + math.log(math.sinh(_WEAK_AMPLITUDE))
+        full[term, term] = _WEAK_LOG_SIGMA**2
         if term >= self.linear:
-            # Its correlation time may be any.
+            # Its correlation time is arbitrary.
             first, step, logarithms = self.problem.table
             across = step * (len(logarithms) - 1)
             full_mean[new[1]], full[new[1], new[1]] = first + 0.5 * across, (0.3 * across) ** 2
         return full_mean, full
 
-    def _normal(
+    def _approximate_normal(
         self, start: Array, places: Array, width: float, problem: Problem
     ) -> tuple[Array, Array]:
-        """Return mean and covariance of a normal one, of some of the linear terms and processes."""
+        """Return mean and covariance of the normal approximation for some of the terms."""
         log_amplitudes, curvature, parts = mode_at(start, places, problem)
         p, g, linear = len(start), len(places), problem.fixed.shape[1]
         information = np.zeros((p + g, p + g))
@@ -221,7 +227,7 @@ class _Target:
         if g:
             slopes = np.column_stack(
                 [
-                    0.5 * parts[:, linear + k] * self._slope(float(place))
+                    0.5 * parts[:, linear + k] * self._differentiate_shape(float(place))
                     for k, place in enumerate(places)
                 ]
             )
@@ -231,7 +237,7 @@ class _Target:
             information[p:, p:] = slopes.T @ (half * slopes) + np.eye(g) / width**2
         return np.append(log_amplitudes, places), np.asarray(np.linalg.inv(information))
 
-    def _slope(self, place: float) -> Array:
+    def _differentiate_shape(self, place: float) -> Array:
         """Return the change of the logarithm of a shape with log T_B."""
         first, step, logarithms = self.problem.table
         last = first + step * (len(logarithms) - 1)
@@ -246,7 +252,7 @@ class _Target:
         p = self.terms
         ramps = np.zeros(len(amplitudes))
         if self.maximum.terms.ramp:
-            # Given the noise R is normal.
+            # Given the noise, R is normal.
             _, first, again = np.unique(amplitudes[:, 0], return_index=True, return_inverse=True)
             _, best, information = log_posteriors(amplitudes[first], self.problem)
             ramps = best[again] + rng.standard_normal(len(amplitudes)) / np.sqrt(information[again])

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtr
 
 from imubench_pipeline.estimators.frame import FitSelection
-from imubench_pipeline.estimators.lines import MOST, Line, joined_finding
+from imubench_pipeline.estimators.lines import MAX_LINES, Line, describe_grouping
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import Finding
@@ -77,8 +77,8 @@ def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> l
     findings = [Finding("lines", "note", detail, strongest.frequency, channel)]
     strong = _strong(channel, sinusoids, white)
     findings += [strong] if strong else []
-    if number > MOST:
-        findings.append(joined_finding(channel, quantity_of(channel), sinusoids))
+    if number > MAX_LINES:
+        findings.append(describe_grouping(channel, quantity_of(channel), sinusoids))
     return findings
 
 
