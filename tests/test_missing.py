@@ -3,12 +3,12 @@ import pytest
 from scipy.linalg import solveh_banded
 
 from imubench_pipeline.estimators.missing import (
-    BLOCK,
+    BLOCK_SAMPLES,
     BlockMeans,
     block_means,
-    divide_at_holes,
+    draw_slow_part,
     fill_missing,
-    slow_part,
+    split_at_gaps,
 )
 from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import spectra
@@ -26,17 +26,17 @@ def complete(
 ) -> np.ndarray:
     spans = segments or ((0, len(log)),)
     means = block_means([log], spans)
-    path = slow_part(means, divide_at_holes(means, spans), model, RATE, rng)
+    path = draw_slow_part(means, split_at_gaps(means, spans), model, RATE, rng)
     return np.concatenate(list(fill_missing([log], path, model, RATE, rng)))
 
 
 def of_blocks(mean: np.ndarray, count: np.ndarray) -> BlockMeans:
-    begin = np.arange(len(mean)) * BLOCK
-    return BlockMeans(begin, begin + BLOCK, np.where(count > 0, mean, 0.0), count)
+    begin = np.arange(len(mean)) * BLOCK_SAMPLES
+    return BlockMeans(begin, begin + BLOCK_SAMPLES, np.where(count > 0, mean, 0.0), count)
 
 
 def drawn_at_blocks(means: BlockMeans, parts, model: NoiseModel, rng) -> np.ndarray:
-    path = slow_part(means, parts, model, RATE, rng)
+    path = draw_slow_part(means, parts, model, RATE, rng)
     middle = 0.5 * (means.begin + means.end - 1)
     return np.interp(middle, path.sample, path.value)
 
@@ -103,7 +103,7 @@ def test_a_filled_log_does_not_depend_on_how_it_is_cut(rng) -> None:
     cut = block_means(pieces, [(0, 5000)])
     np.testing.assert_array_equal(cut.count, whole.count)
     np.testing.assert_allclose(cut.mean, whole.mean, rtol=1e-9)
-    path = slow_part(whole, [(0, 5000)], MODEL, RATE, np.random.default_rng(1))
+    path = draw_slow_part(whole, [(0, 5000)], MODEL, RATE, np.random.default_rng(1))
     one = fill_missing([log], path, MODEL, RATE, np.random.default_rng(2))
     other = fill_missing(pieces, path, MODEL, RATE, np.random.default_rng(2))
     np.testing.assert_array_equal(np.concatenate(list(one)), np.concatenate(list(other)))
@@ -112,10 +112,12 @@ def test_a_filled_log_does_not_depend_on_how_it_is_cut(rng) -> None:
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_the_unit_of_a_log_does_not_matter(rng, unit: float) -> None:
     mean = 1e-3 * np.cumsum(rng.standard_normal(300))
-    count = np.where(rng.random(300) < 0.3, 0, BLOCK)
+    count = np.where(rng.random(300) < 0.3, 0, BLOCK_SAMPLES)
     other = NoiseModel(N=unit * 1e-3, B=unit * 1.5e-3, T_B=30.0, K=unit * 3e-4)
     one, scaled = (
-        drawn_at_blocks(of_blocks(of, count), [(0, 300 * BLOCK)], model, np.random.default_rng(1))
+        drawn_at_blocks(
+            of_blocks(of, count), [(0, 300 * BLOCK_SAMPLES)], model, np.random.default_rng(1)
+        )
         for of, model in ((mean, MODEL), (unit * mean, other))
     )
     np.testing.assert_allclose(scaled, unit * one, rtol=1e-6, atol=unit * 1e-9)
@@ -124,11 +126,11 @@ def test_the_unit_of_a_log_does_not_matter(rng, unit: float) -> None:
 def test_block_means_are_those_of_the_samples_present(rng) -> None:
     log = rng.standard_normal(1000)
     log[rng.random(1000) < 0.3] = np.nan
-    log[3 * BLOCK : 5 * BLOCK] = np.nan
+    log[3 * BLOCK_SAMPLES : 5 * BLOCK_SAMPLES] = np.nan
     means = block_means([log], [(0, 1000)])
     assert len(means.mean) == 16
     for k in range(16):
-        part = log[k * BLOCK : (k + 1) * BLOCK]
+        part = log[k * BLOCK_SAMPLES : (k + 1) * BLOCK_SAMPLES]
         assert means.count[k] == np.isfinite(part).sum()
         if means.count[k]:
             assert means.mean[k] == pytest.approx(np.nanmean(part))
@@ -141,7 +143,7 @@ def test_a_long_hole_divides_and_a_shorter_one_does_not() -> None:
         log = np.zeros(200_000)
         log[64_000 : 64_000 + hole] = np.nan
         spans = segments or ((0, 200_000),)
-        return divide_at_holes(block_means([log], spans), spans)
+        return split_at_gaps(block_means([log], spans), spans)
 
     assert parts(60_000) == ((0, 200_000),)
     # A hole of more than 1024 whole blocks; the ends go to the ends of blocks.
@@ -159,10 +161,10 @@ def test_a_long_hole_divides_and_a_shorter_one_does_not() -> None:
 def test_the_path_goes_through_means_without_white_noise(rng) -> None:
     model = NoiseModel(N=1e-9, B=1.0, T_B=30.0, K=0.1)
     mean = 5.0 + np.cumsum(rng.standard_normal(300))
-    count = np.full(300, BLOCK)
+    count = np.full(300, BLOCK_SAMPLES)
     count[100:150] = 0
     means = of_blocks(mean, count)
-    path = drawn_at_blocks(means, [(0, 300 * BLOCK)], model, rng)
+    path = drawn_at_blocks(means, [(0, 300 * BLOCK_SAMPLES)], model, rng)
     there = count > 0
     np.testing.assert_allclose(path[there], mean[there], atol=1e-6)
     assert np.abs(path[~there] - mean[~there]).max() > 1e-3
@@ -170,12 +172,12 @@ def test_the_path_goes_through_means_without_white_noise(rng) -> None:
 
 @pytest.mark.release
 def test_the_path_has_the_conditional_distribution(rng) -> None:
-    n, draws, step = 40, 2000, BLOCK / RATE
+    n, draws, step = 40, 2000, BLOCK_SAMPLES / RATE
     model = NoiseModel(N=4e-2, B=6e-2, T_B=12.0, K=8e-3)
     i = np.arange(n)
     slow = model.B**2 * VARIANCE * np.exp(-np.abs(np.subtract.outer(i, i)) * step / 12.0)
     slow += model.K**2 * step * np.minimum.outer(i, i)
-    count = rng.integers(1, BLOCK + 1, n)
+    count = rng.integers(1, BLOCK_SAMPLES + 1, n)
     count[[5, 20, 21, 22, 23, 39]] = 0
     there = count > 0
     white = model.N**2 * RATE / np.maximum(count, 1)
@@ -187,7 +189,9 @@ def test_the_path_has_the_conditional_distribution(rng) -> None:
     gain = prior[:, there] @ np.linalg.inv(prior[np.ix_(there, there)] + np.diag(white[there]))
     middle = 9.81 + gain @ (log[there] - 9.81)
     spread = prior - gain @ prior[there]
-    paths = np.array([drawn_at_blocks(means, [(0, n * BLOCK)], model, rng) for _ in range(draws)])
+    paths = np.array(
+        [drawn_at_blocks(means, [(0, n * BLOCK_SAMPLES)], model, rng) for _ in range(draws)]
+    )
     error = np.sqrt(np.diag(spread) / draws)
     assert (np.abs(paths.mean(axis=0) - middle) < 4.5 * error).all()
     found = np.cov(paths.T)
@@ -199,12 +203,12 @@ def test_the_path_has_the_conditional_distribution(rng) -> None:
 
 def test_windows_of_the_smoother_do_not_show(rng) -> None:
     # A random walk in white noise: the inverse of its covariance is tridiagonal.
-    n, draws, step = 9000, 60, BLOCK / RATE
+    n, draws, step = 9000, 60, BLOCK_SAMPLES / RATE
     model = NoiseModel(N=5e-2, K=2e-2)
-    count = np.full(n, BLOCK)
+    count = np.full(n, BLOCK_SAMPLES)
     count[4080:4110] = 0
     there = count > 0
-    white = model.N**2 * RATE / BLOCK
+    white = model.N**2 * RATE / BLOCK_SAMPLES
     walk = model.K * np.sqrt(step) * np.cumsum(rng.standard_normal(n))
     log = 9.81 + walk + np.sqrt(white) * rng.standard_normal(n)
     inverse = np.zeros((2, n))
@@ -218,7 +222,7 @@ def test_windows_of_the_smoother_do_not_show(rng) -> None:
     spread = solveh_banded(inverse, unit)[places]
     means = of_blocks(log, count)
     paths = np.array(
-        [drawn_at_blocks(means, [(0, n * BLOCK)], model, rng)[places] for _ in range(draws)]
+        [drawn_at_blocks(means, [(0, n * BLOCK_SAMPLES)], model, rng)[places] for _ in range(draws)]
     )
     root = np.linalg.cholesky(spread)
     whitened = np.linalg.solve(root, (paths - middle[places]).T)
@@ -231,10 +235,10 @@ def test_windows_of_the_smoother_do_not_show(rng) -> None:
 
 def test_each_part_has_its_own_level(rng) -> None:
     mean = np.repeat([0.0, 500.0], 200) + rng.standard_normal(400)
-    count = np.full(400, BLOCK)
+    count = np.full(400, BLOCK_SAMPLES)
     count[[3, 150, 250, 390]] = 0
     means = of_blocks(mean, count)
-    parts = [(0, 200 * BLOCK), (200 * BLOCK, 400 * BLOCK)]
+    parts = [(0, 200 * BLOCK_SAMPLES), (200 * BLOCK_SAMPLES, 400 * BLOCK_SAMPLES)]
     path = drawn_at_blocks(means, parts, NoiseModel(N=0.1, B=1.0, T_B=5.0), rng)
     assert np.abs(path[:200]).max() < 8
     assert np.abs(path[200:] - 500).max() < 8
@@ -253,13 +257,13 @@ def test_a_model_without_slow_noise_is_filled_with_its_level(rng) -> None:
 def test_the_ends_of_a_long_hole_stay_at_the_level_of_the_log(rng) -> None:
     log = 9.81 + simulate(MODEL, RATE, 200_000, rng)
     log[50_010:130_030] = np.nan
-    parts = divide_at_holes(block_means([log], [(0, len(log))]), [(0, len(log))])
+    parts = split_at_gaps(block_means([log], [(0, len(log))]), [(0, len(log))])
     result = complete(log, MODEL, rng)
     for start, stop in parts:
         assert np.abs(result[start:stop] - 9.81).max() < 0.5
 
 
-@pytest.mark.parametrize("limit", [5000, 78 * BLOCK])
+@pytest.mark.parametrize("limit", [5000, 78 * BLOCK_SAMPLES])
 def test_missing_samples_beside_a_restart_are_filled_from_their_own_side(rng, limit: int) -> None:
     log = simulate(MODEL, RATE, 10_000, rng)
     log[limit:] += 100.0
@@ -279,9 +283,9 @@ def test_a_ramp_is_followed_through_holes(rng) -> None:
 
 def test_parts_that_touch_have_each_their_own_level(rng) -> None:
     mean = np.where(np.arange(40) < 20, 0.0, 10.0)
-    means = of_blocks(mean, np.full(40, BLOCK))
-    edge, end = 20 * BLOCK, 40 * BLOCK
-    path = slow_part(means, [(0, edge), (edge, end)], NoiseModel(N=1e-6), RATE, rng)
+    means = of_blocks(mean, np.full(40, BLOCK_SAMPLES))
+    edge, end = 20 * BLOCK_SAMPLES, 40 * BLOCK_SAMPLES
+    path = draw_slow_part(means, [(0, edge), (edge, end)], NoiseModel(N=1e-6), RATE, rng)
     assert (np.diff(path.sample) > 0.0).all()
     levels = path.at(np.array([0, edge - 1, edge, end - 1]))
     np.testing.assert_allclose(levels, [0.0, 0.0, 10.0, 10.0], atol=1e-4)

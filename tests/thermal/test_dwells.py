@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
-from imubench_pipeline.estimators.thermal.register import dwells
+from imubench_pipeline.estimators.thermal.register import find_cell_stays
 from tests.conftest import few
 
 Q = 3e-3
@@ -14,7 +14,7 @@ Q = 3e-3
 
 
 def found(inside, level):
-    return list(dwells(np.array(inside), np.array(level, dtype=float), 0.5, Q))
+    return list(find_cell_stays(np.array(inside), np.array(level, dtype=float), 0.5, Q))
 
 
 def test_a_long_stay_is_found_and_its_crossings_say_where_it_is():

@@ -2,7 +2,11 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.thermal.path import temperature_path
-from imubench_pipeline.estimators.thermal.register import cut_at_jumps, readings, step_of
+from imubench_pipeline.estimators.thermal.register import (
+    estimate_resolution,
+    gather_readings,
+    split_at_jumps,
+)
 
 SAMPLES = 120_000
 LEVELS = np.array([21.3, 17.8, 33.1, 24.6, 38.9, 12.2])
@@ -24,8 +28,8 @@ def jumps_of(read):
 def test_the_sample_of_each_jump_is_found(step):
     # On the edge of a block of 15, at its first and last sample, and within it.
     jumps = np.array([15_000, 30_001, 45_014, 70_007, 90_008])
-    read = readings([np.round(stepping(jumps) / step) * step], [(0, SAMPLES)])
-    cut = cut_at_jumps(read)
+    read = gather_readings([np.round(stepping(jumps) / step) * step], [(0, SAMPLES)])
+    cut = split_at_jumps(read)
     assert jumps_of(cut) == jumps.tolist()
     # The blocks still follow each other, and hold as many readings.
     assert np.array_equal(cut.end[:-1], cut.begin[1:])
@@ -37,7 +41,7 @@ def test_the_sample_of_each_jump_is_found(step):
 def test_jumps_belong_to_their_segments():
     segments = [(0, 50_000), (60_000, SAMPLES)]
     truth = stepping(np.array([20_000, 55_000, 80_000]), LEVELS[:4])
-    cut = cut_at_jumps(readings([truth], segments))
+    cut = split_at_jumps(gather_readings([truth], segments))
     assert jumps_of(cut) == [20_000, 60_000, 80_000]
     assert [cut.begin[part.start] for part in cut.parts] == [0, 60_000]
 
@@ -55,8 +59,8 @@ def test_a_temperature_that_does_not_jump_is_left_as_it_is(kind):
         "spike": np.where(np.arange(SAMPLES) == 60_000, 80.0, 20.0 + 0.1 * np.round(t)),
         "end": np.where(np.arange(SAMPLES) < SAMPLES - 20, 20.0, 30.0),
     }[kind]
-    read = readings([np.round(truth * 16.0) / 16.0], [(0, SAMPLES)])
-    assert cut_at_jumps(read) is read
+    read = gather_readings([np.round(truth * 16.0) / 16.0], [(0, SAMPLES)])
+    assert split_at_jumps(read) is read
 
 
 @pytest.mark.release
@@ -100,12 +104,12 @@ def test_a_level_of_whole_degrees_may_lie_anywhere_in_its_cell():
 
 def test_the_bit_of_a_register_is_found_of_few_levels():
     multiples = np.array([310, 317, 402, 388, 519, 700])
-    assert step_of(np.sort(multiples) / 16.0, 10_000) == pytest.approx(1.0 / 16.0)
+    assert estimate_resolution(np.sort(multiples) / 16.0, 10_000) == pytest.approx(1.0 / 16.0)
     levels = np.sort(np.random.default_rng(2).uniform(10.0, 40.0, 8))
-    assert step_of(levels, 10_000) == 0.0
+    assert estimate_resolution(levels, 10_000) == 0.0
     # Two gaps that are measured to hundredths are multiples of something by chance.
-    assert step_of(np.array([20.03, 27.51, 39.77]), 10_000) == 0.0
-    assert step_of(np.array([20.0, 21.0]), 10_000) == pytest.approx(1.0)
+    assert estimate_resolution(np.array([20.03, 27.51, 39.77]), 10_000) == 0.0
+    assert estimate_resolution(np.array([20.0, 21.0]), 10_000) == pytest.approx(1.0)
 
 
 @pytest.mark.release

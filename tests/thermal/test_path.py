@@ -4,7 +4,12 @@ from scipy.special import ndtr
 
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, _Evidence, temperature_path
 from imubench_pipeline.estimators.thermal.path_kernels import cell_moments
-from imubench_pipeline.estimators.thermal.register import KNOTS, Readings, readings, step_of
+from imubench_pipeline.estimators.thermal.register import (
+    MAX_BLOCKS,
+    Readings,
+    estimate_resolution,
+    gather_readings,
+)
 from tests.conftest import few
 
 SAMPLES = 60_000
@@ -135,9 +140,9 @@ def test_knots_are_bounded_and_blocks_do_not_matter():
     values = np.round(DAY, 1)
     values[100:3000] = np.nan
     segments = [(0, 30_001), (35_000, SAMPLES)]
-    whole = readings([values], segments)
-    parts = readings(np.array_split(values, 37), segments)
-    assert len(whole.mean) <= KNOTS + len(segments)
+    whole = gather_readings([values], segments)
+    parts = gather_readings(np.array_split(values, 37), segments)
+    assert len(whole.mean) <= MAX_BLOCKS + len(segments)
     for name in ("count", "low", "high"):
         assert np.array_equal(getattr(whole, name), getattr(parts, name), equal_nan=True)
     assert np.allclose(whole.mean, parts.mean, equal_nan=True, rtol=1e-14)
@@ -147,9 +152,9 @@ def test_knots_are_bounded_and_blocks_do_not_matter():
 
 def test_steps_are_found_through_printed_decimals():
     levels = np.unique(np.round(np.arange(300) / 340.0 + 12.0, 3))
-    assert step_of(levels, 100_000) == pytest.approx(1.0 / 340.0, rel=1e-3)
-    assert step_of(np.sort(np.random.default_rng(1).random(1000)), 1000) == 0.0
-    assert step_of(np.array([21.0]), 1000) == 0.0
+    assert estimate_resolution(levels, 100_000) == pytest.approx(1.0 / 340.0, rel=1e-3)
+    assert estimate_resolution(np.sort(np.random.default_rng(1).random(1000)), 1000) == 0.0
+    assert estimate_resolution(np.array([21.0]), 1000) == 0.0
 
 
 def test_no_reading_is_refused():

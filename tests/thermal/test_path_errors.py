@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.spectrum import spectra
-from imubench_pipeline.estimators.thermal.path_errors import without_errors
+from imubench_pipeline.estimators.thermal.path_errors import subtract_path_errors
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
 
 RATE, N, K = 1.0, 1e-3, 1e-5
@@ -32,7 +32,7 @@ def test_noise_is_found_beside_errors_of_the_path(whittle):
     used = np.ones(len(errors), dtype=bool)
     both = replace(whittle.spectrum, density=whittle.spectrum.density + errors)
     assert whittle.of(both).maximum(terms).parameter("K") > 1.15 * K
-    left = without_errors(both, used, whittle, terms, errors)
+    left = subtract_path_errors(both, used, whittle, terms, errors)
     share = whittle.spectrum.density / both.density
     np.testing.assert_allclose(left.density, whittle.spectrum.density, rtol=0.02)
     np.testing.assert_allclose(left.ordinates, share**2 * both.ordinates, rtol=0.04)
@@ -42,13 +42,16 @@ def test_noise_is_found_beside_errors_of_the_path(whittle):
 def test_errors_far_below_the_noise_leave_it_as_it_is(whittle):
     used = np.ones(len(whittle.spectrum.density), dtype=bool)
     errors = 1e-6 * errors_of(whittle)
-    assert without_errors(whittle.spectrum, used, whittle, Terms("NK"), errors) is whittle.spectrum
+    assert (
+        subtract_path_errors(whittle.spectrum, used, whittle, Terms("NK"), errors)
+        is whittle.spectrum
+    )
 
 
 def test_bins_that_are_not_fitted_are_left_as_they_are(whittle):
     errors, used = errors_of(whittle), whittle.spectrum.frequency < 0.1
     both = replace(whittle.spectrum, density=whittle.spectrum.density + errors)
     below = whittle.select(both, used)
-    left = without_errors(both, used, below, Terms("NK"), errors)
+    left = subtract_path_errors(both, used, below, Terms("NK"), errors)
     np.testing.assert_array_equal(left.density[~used], both.density[~used])
     assert (left.density[:3] < both.density[:3]).all()

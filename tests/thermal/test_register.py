@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.thermal.register import (
-    KNOTS,
+    MAX_BLOCKS,
     Readings,
-    cut_at_jumps,
-    dwells,
-    readings,
-    step_of,
+    estimate_resolution,
+    find_cell_stays,
+    gather_readings,
+    split_at_jumps,
 )
 
 
 def test_each_block_has_count_mean_and_range_of_its_own_readings(rng):
-    samples = 2 * KNOTS + 500  # blocks of three
+    samples = 2 * MAX_BLOCKS + 500  # blocks of three
     values = rng.integers(0, 40, samples) * 0.5
     values[rng.integers(0, samples, 4_000)] = np.nan
     values[3_000:3_010] = np.nan
     segments = [(2, 9_001), (9_010, samples)]
-    read = readings(np.array_split(values, 29), segments)
+    read = gather_readings(np.array_split(values, 29), segments)
     edges = [(a, min(a + 3, stop)) for start, stop in segments for a in range(start, stop, 3)]
     assert list(zip(read.begin.tolist(), read.end.tolist(), strict=True)) == edges
     assert read.parts == (slice(0, 3_000), slice(3_000, len(edges)))
@@ -34,15 +34,20 @@ def test_each_block_has_count_mean_and_range_of_its_own_readings(rng):
 
 
 def test_a_log_of_few_samples_has_blocks_of_one():
-    assert len(readings([np.arange(100.0)], [(0, 100)]).mean) == 100
-    assert len(readings([np.arange(float(KNOTS))], [(0, KNOTS)]).mean) == KNOTS
-    assert len(readings([np.arange(KNOTS + 1.0)], [(0, KNOTS + 1)]).mean) == (KNOTS + 2) // 2
+    assert len(gather_readings([np.arange(100.0)], [(0, 100)]).mean) == 100
+    assert (
+        len(gather_readings([np.arange(float(MAX_BLOCKS))], [(0, MAX_BLOCKS)]).mean) == MAX_BLOCKS
+    )
+    assert (
+        len(gather_readings([np.arange(MAX_BLOCKS + 1.0)], [(0, MAX_BLOCKS + 1)]).mean)
+        == (MAX_BLOCKS + 2) // 2
+    )
 
 
 def test_a_register_is_one_whose_readings_repeat():
     levels = np.arange(50) * 0.25
-    assert step_of(levels, 8 * 50) == pytest.approx(0.25)
-    assert step_of(levels, 8 * 50 - 1) == 0.0
+    assert estimate_resolution(levels, 8 * 50) == pytest.approx(0.25)
+    assert estimate_resolution(levels, 8 * 50 - 1) == 0.0
 
 
 def test_levels_that_miss_the_multiples_of_a_step_have_none(rng):
@@ -50,13 +55,13 @@ def test_levels_that_miss_the_multiples_of_a_step_have_none(rng):
     # Rounded by up to a tenth of the step either way, and by up to a third.
     for part, found in ((0.1, 1.0), (0.33, 0.0)):
         off = part * (2.0 * rng.random(len(steps)) - 1.0)
-        assert step_of(np.sort(steps + off), 10_000) == pytest.approx(found, rel=0.01)
+        assert estimate_resolution(np.sort(steps + off), 10_000) == pytest.approx(found, rel=0.01)
 
 
 def test_a_step_in_gaps_that_are_no_multiples_of_the_smallest_is_found():
     # Gaps of 4, 6 and 9 steps: the smallest is no divisor, its quarter is.
     levels = np.cumsum([0, 4, 6, 9, 6, 9, 4, 6, 9, 6, 4, 9]) * 0.1 + 20.0
-    assert step_of(levels, 10_000) == pytest.approx(0.1)
+    assert estimate_resolution(levels, 10_000) == pytest.approx(0.1)
 
 
 def stepping(blocks, jump_at, size, samples=4_000, slope=0.0):
@@ -74,19 +79,19 @@ def stepping(blocks, jump_at, size, samples=4_000, slope=0.0):
 @pytest.mark.parametrize(("size", "jumps"), [(0.76, 1), (0.74, 0)])
 def test_a_jump_is_one_and_a_half_bits_at_least(size, jumps):
     read = stepping(100, 50, size)
-    assert len(cut_at_jumps(read).pieces) == 1 + jumps
+    assert len(split_at_jumps(read).pieces) == 1 + jumps
 
 
 @pytest.mark.parametrize(("slope", "jumps"), [(0.115, 1), (0.13, 0)])
 def test_a_jump_is_eight_times_the_changes_around_it(slope, jumps):
     # Over two blocks the level changes by twice the slope.
     read = stepping(100, 50, 2.0 - 2.0 * slope, slope=slope)
-    assert len(cut_at_jumps(read).pieces) == 1 + jumps
+    assert len(split_at_jumps(read).pieces) == 1 + jumps
 
 
 @pytest.mark.parametrize(("at", "jumps"), [(4, 0), (5, 1), (95, 1), (96, 0)])
 def test_a_level_between_jumps_has_five_blocks(at, jumps):
-    assert len(cut_at_jumps(stepping(100, at, 4.0)).pieces) == 1 + jumps
+    assert len(split_at_jumps(stepping(100, at, 4.0)).pieces) == 1 + jumps
 
 
 @pytest.mark.parametrize(("away", "jumps"), [(-4, 0), (4, 0), (20, 2)])
@@ -95,7 +100,7 @@ def test_what_changes_beside_a_jump_counts_and_what_is_far_away_does_not(away, j
     mean = read.mean.copy()
     mean[50 + away :] += 2.0
     beside = Readings(**{**vars(read), "mean": mean, "low": mean, "high": mean})
-    assert len(cut_at_jumps(beside).pieces) == 1 + jumps
+    assert len(split_at_jumps(beside).pieces) == 1 + jumps
 
 
 def test_a_spike_hides_no_jump_after_it():
@@ -103,7 +108,7 @@ def test_a_spike_hides_no_jump_after_it():
     mean = read.mean.copy()
     mean[50] += 30.0
     spiked = Readings(**{**vars(read), "mean": mean, "low": mean, "high": mean})
-    cut = cut_at_jumps(spiked)
+    cut = split_at_jumps(spiked)
     assert [int(cut.begin[piece.start]) for piece in cut.pieces] == [0, 1_500]
 
 
@@ -113,14 +118,14 @@ def test_sixty_four_jumps_are_told_and_more_are_none():
         read = stepping(blocks, blocks, 0.0)
         mean = 20.0 + 4.0 * ((np.arange(blocks) // 20) % 2)
         many = Readings(**{**vars(read), "mean": mean, "low": mean, "high": mean})
-        assert len(cut_at_jumps(many).pieces) == (65 if number == 64 else 1)
+        assert len(split_at_jumps(many).pieces) == (65 if number == 64 else 1)
 
 
 def test_a_jump_within_a_block_is_placed_by_its_mean():
     read = stepping(100, 50, 4.0)
     mean = read.mean.copy()
     mean[49] = 20.0 + 4.0 * 0.3  # three of ten samples are beyond
-    cut = cut_at_jumps(Readings(**{**vars(read), "mean": mean, "low": mean, "high": mean}))
+    cut = split_at_jumps(Readings(**{**vars(read), "mean": mean, "low": mean, "high": mean}))
     assert [int(cut.begin[piece.start]) for piece in cut.pieces] == [0, 497]
     around = (cut.begin >= 480) & (cut.begin < 510)
     assert cut.begin[around].tolist() == [480, 496, 497, 498]
@@ -135,11 +140,11 @@ def test_a_stay_is_long_from_three_crossing_times_on():
     q = 3.0 / 10.0**3
     for blocks, number in ((30, 1), (29, 0)):
         level = np.concatenate([np.arange(5), np.full(blocks, 9.0), np.arange(20, 25)])
-        stays = list(dwells(np.ones(len(level), dtype=bool), level, 0.5, q * (1.0 + 1e-9)))
+        stays = list(find_cell_stays(np.ones(len(level), dtype=bool), level, 0.5, q * (1.0 + 1e-9)))
         assert len(stays) == number
     outside = np.ones(120, dtype=bool)
     outside[60] = False
-    first, last = dwells(outside, np.zeros(120), 0.5, q)
+    first, last = find_cell_stays(outside, np.zeros(120), 0.5, q)
     assert (first.blocks, last.blocks) == (slice(0, 60), slice(61, 120))
     np.testing.assert_allclose(first.taper[-10:], 0.1 * np.arange(10)[::-1] + 0.05)
     np.testing.assert_allclose(last.taper[:10], 0.1 * np.arange(10) + 0.05)

@@ -8,15 +8,15 @@ from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged
-from imubench_pipeline.estimators.thermal.path_errors import path_errors
+from imubench_pipeline.estimators.thermal.path_errors import compute_path_errors
 from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.estimators.thermal.regression import Regressors
 from imubench_pipeline.estimators.thermal.uncertainty import (
-    _explained,
-    judge,
+    _compute_explained_fraction,
+    assess_fit,
+    compute_mean_error,
     lag_parameter,
-    mean_error,
-    shares,
+    weigh_models,
 )
 from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
@@ -149,7 +149,7 @@ def test_errors_of_the_path_move_the_fit_and_stay_in_the_log():
     draws = SWING + 0.1 * rng.standard_normal((5, SAMPLES))
     log = Log(0.2 * (lagged(TIMES, SWING, 1.0) - REFERENCE), path_of(SWING, draws))
     found = log.regressors.at(1.0, WEIGHTS)
-    errors = path_errors(log.regressors, found, WEIGHTS)
+    errors = compute_path_errors(log.regressors, found, WEIGHTS)
     step = 0.25  # half of the distance of two knots
     by_lag = found.beta[0] * (lagged(TIMES, SWING, 1.0 + step) - lagged(TIMES, SWING, 1.0)) / step
     columns = [lagged(TIMES, SWING, 1.0) - REFERENCE, by_lag]
@@ -182,7 +182,7 @@ def judged(temperature, s=0.2, gained=30.0, noise=1.0, seed=1, slope=0.0, quadra
     left = regressors.without(log.spectrum, found, flat)
     whittle = whittle_of(left, RATE / 2.0, 4)
     lags = np.array([0.0])
-    verdict = judge(
+    verdict = assess_fit(
         regressors, found, whittle, [candidate(Terms("N"))], lags, gained=gained,
         rng=np.random.default_rng(2),
     )  # fmt: skip
@@ -266,24 +266,26 @@ def test_the_mean_of_a_log_is_known_as_its_noise_lets_it():
         (NoiseModel(N=N, R=0.2), N**2 / D + (0.2 * D / 2.0) ** 2),
         (NoiseModel(N=N, B=B, T_B=T_B), N**2 / D + process),
     ):
-        assert mean_error([(model, 1.0)], spectrum) == pytest.approx(np.sqrt(expected), rel=0.02)
+        assert compute_mean_error([(model, 1.0)], spectrum) == pytest.approx(
+            np.sqrt(expected), rel=0.02
+        )
     both = [(NoiseModel(N=N), 0.75), (NoiseModel(N=3.0 * N), 0.25)]
-    assert mean_error(both, spectrum) == pytest.approx(N * np.sqrt(3.0 / D))
+    assert compute_mean_error(both, spectrum) == pytest.approx(N * np.sqrt(3.0 / D))
 
 
 def test_a_walk_has_three_tenths_of_the_models_at_least():
     plain, walk = candidate(Terms("N"), share=0.9), candidate(Terms("NK"), share=0.01)
     slow = candidate(Terms("N", 1), share=0.06)
     weak, ramp = candidate(Terms("NF"), share=0.04), candidate(Terms("N", 0, True), share=0.5)
-    found = shares([plain, ramp, slow, weak, walk])
+    found = weigh_models([plain, ramp, slow, weak, walk])
     assert [one.terms for one, _ in found] == [plain.terms, slow.terms, walk.terms]
     least = 0.3 * (0.9 + 0.06 + 0.01)
     total = 0.9 + 0.06 + least
     assert [share for _, share in found] == pytest.approx(
         [0.9 / total, 0.06 / total, least / total]
     )
-    assert shares([walk, plain])[0][1] == pytest.approx(0.3 * 0.91 / (0.9 + 0.3 * 0.91))
-    assert [share for _, share in shares([plain])] == [1.0]
+    assert weigh_models([walk, plain])[0][1] == pytest.approx(0.3 * 0.91 / (0.9 + 0.3 * 0.91))
+    assert [share for _, share in weigh_models([plain])] == [1.0]
 
 
 def test_what_temperature_follows_is_its_squared_correlation(log):
@@ -293,7 +295,7 @@ def test_what_temperature_follows_is_its_squared_correlation(log):
     assert np.sum(x[:8] ** 2) > 0.95 * np.sum(x**2)
     x, y = x[:8], y[:8]
     expected = (x @ y) ** 2 / (x @ x) / (y @ y)
-    assert _explained(log.regressors, found) == pytest.approx(expected)
+    assert _compute_explained_fraction(log.regressors, found) == pytest.approx(expected)
 
 
 def test_what_a_fast_temperature_explains_is_where_most_of_it_is():
@@ -306,7 +308,7 @@ def test_what_a_fast_temperature_explains_is_where_most_of_it_is():
     assert 12 < upto < 40
     x, y = x[:upto], y[:upto]
     expected = (x @ y) ** 2 / (x @ x) / (y @ y)
-    assert _explained(made.regressors, found) == pytest.approx(expected)
+    assert _compute_explained_fraction(made.regressors, found) == pytest.approx(expected)
 
 
 def test_lags_are_drawn_by_their_likelihood(log):
@@ -316,7 +318,7 @@ def test_lags_are_drawn_by_their_likelihood(log):
     left = log.regressors.without(log.spectrum, found, flat)
     models = [candidate(Terms("N"))]
     whittle = whittle_of(left, RATE / 2.0, 4)
-    told = judge(
+    told = assess_fit(
         log.regressors, found, whittle, models, lags, gained=30.0, rng=np.random.default_rng(2)
     ).lag
     fine = np.linspace(0.0, 4.0, 400)

@@ -30,25 +30,25 @@ from imubench_pipeline.typing import Array
 
 Method = Literal["weighted", "paper"]
 
-_FEWEST_POINTS = 4
-_BEYOND_FILTERS = 16
-"""Cluster size beyond which the sensor's own filter hardly matters."""
+_MIN_POINTS = 4
+_UNFILTERED_CLUSTER = 16
+"""Cluster size above which the effect of the sensor's filter is small."""
 
-_BENT_SIGMAS = 4.0
-_MOST_REFITS = 5
-_FADED = 0.1
-_SAMPLING_SIGMAS = 0.02
-_SCAN = 160
-"""Correlation times tried before the search is refined."""
+_MIN_BEND_SIGMAS = 4.0
+_MAX_REFITS = 5
+_MAX_FADED_BEND = 0.1
+_MAX_SAMPLING_SIGMAS = 0.02
+_SCAN_TIMES = 160
+"""Number of correlation times of the scan before optimisation."""
 
-_CHOICES = [list(chosen) for p in (1, 2, 3) for chosen in combinations(range(3), p)]
-"""Of the columns of N, B and K, those that are not 0."""
+_ACTIVE_SETS = [list(chosen) for p in (1, 2, 3) for chosen in combinations(range(3), p)]
+"""Sets of nonzero columns among N, B and K."""
 
-_RIDGE, _NOTHING = 1e-13, 1e-300
-"""Of columns that are 1 long: two that look alike, and one that is 0, must divide by something."""
+_RIDGE, _MIN_NORM = 1e-13, 1e-300
+"""Ridge for collinear columns of unit norm, and minimum norm of a column."""
 
-_ABSENT = 1e-9
-"""A term below this part of the variance at every tau is not there."""
+_MIN_VARIANCE_FRACTION = 1e-9
+"""A term below this fraction of the variance at every tau is absent."""
 
 
 class UnfitCurveError(ValueError):
@@ -120,17 +120,17 @@ def _solved(
 ) -> tuple[Estimate, AllanCurve, NDArray[np.bool_]]:
     """Return the estimate without limits, the curve, and the tau that it is of."""
     used = curve.cluster_size <= longest * curve.samples
-    if used.sum() < _FEWEST_POINTS:
+    if used.sum() < _MIN_POINTS:
         raise UnfitCurveError(
             f"the curve has {used.sum()} points up to {longest:.3g} of the log, expected "
-            f"{_FEWEST_POINTS} or more"
+            f"{_MIN_POINTS} or more"
         )
     if not (curve.variance[used] > 0).all():
         raise UnfitCurveError("the Allan variance is 0 at some tau: the samples repeat exactly")
     if method not in ("weighted", "paper"):
         raise ValueError(f"method {method!r} is not known, expected 'weighted' or 'paper'")
-    used &= curve.cluster_size >= _first_unbent(curve, used, method)
-    parameters = dict(_fit(curve, used, method).parameters)
+    used &= curve.cluster_size >= _find_first_unbent(curve, used, method)
+    parameters = dict(_fit_curve(curve, used, method).parameters)
     first = int(np.flatnonzero(used)[0])
     if first > 0 and parameters["N"].value is not None:
         parameters["N"] = replace(
@@ -141,7 +141,7 @@ def _solved(
     return Estimate(method, parameters), curve, used
 
 
-def _first_unbent(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> int:
+def _find_first_unbent(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> int:
     """Return the smallest cluster size from which the curve follows a model of its longer tau.
 
     The sensor's own low-pass filter, and coarse steps of its output, bend the curve at the
@@ -150,34 +150,32 @@ def _first_unbent(curve: AllanCurve, used: NDArray[np.bool_], method: Method) ->
     """
     n = curve.cluster_size
     error = np.sqrt(2.0 / curve.edf)
-    start = _BEYOND_FILTERS
-    for _ in range(_MOST_REFITS):
+    start = _UNFILTERED_CLUSTER
+    for _ in range(_MAX_REFITS):
         certain = used & (n >= start)
-        if certain.sum() < _FEWEST_POINTS:
+        if certain.sum() < _MIN_POINTS:
             break
         first = int(np.flatnonzero(certain)[0])
-        expected, unsure = _predicted(curve, certain, _fit(curve, certain, method).model)
+        expected, unsure = _predict(curve, certain, _fit_curve(curve, certain, method).model)
         off = np.abs(curve.variance / expected - 1.0)[:first]
-        bent = off > _BENT_SIGMAS * np.hypot(error, unsure)[:first]
+        bent = off > _MIN_BEND_SIGMAS * np.hypot(error, unsure)[:first]
         if not bent.any():
             break
-        if start > _BEYOND_FILTERS and off[-1] > _FADED:
+        if start > _UNFILTERED_CLUSTER and off[-1] > _MAX_FADED_BEND:
             # No bend that fades: the curve has something else here, such as a sinusoid.
             return start
         fading = float((off * n[:first])[bent].max()) / n
         unbent = used & (fading <= error)
         unbent[: np.flatnonzero(bent)[-1] + 1] = False
-        if unbent.sum() < _FEWEST_POINTS or n[unbent][0] <= start:
+        if unbent.sum() < _MIN_POINTS or n[unbent][0] <= start:
             return int(n[unbent][0]) if unbent.any() else start
         start = int(n[unbent][0])
     else:
         return start
-    return int(n[0]) if start == _BEYOND_FILTERS else start
+    return int(n[0]) if start == _UNFILTERED_CLUSTER else start
 
 
-def _predicted(
-    curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
-) -> tuple[Array, Array]:
+def _predict(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> tuple[Array, Array]:
     """Return what a model fitted to some tau says of all, and the relative error of that."""
     rate = curve.rate
     expected = model.allan_variance(curve.tau, rate)
@@ -195,14 +193,14 @@ def _predicted(
     return expected, unsure
 
 
-def _fit(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> Estimate:
+def _fit_curve(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> Estimate:
     continuous = _Search(curve, used, method, sampled=False).estimate()
-    if not _sampling_shows(curve, used, continuous.model):
+    if not _is_sampling_visible(curve, used, continuous.model):
         return continuous
     return _Search(curve, used, method, sampled=True).estimate()
 
 
-def _sampling_shows(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> bool:
+def _is_sampling_visible(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> bool:
     """Tell whether the sampled model differs from the continuous one by what the log can tell.
 
     Sampling adds (S_B + S_K) T^2 / (6 tau), which has the shape of white noise: left out, it
@@ -212,7 +210,7 @@ def _sampling_shows(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseMode
     continuous = model.allan_variance(tau)
     difference = model.allan_variance(tau, curve.rate) - continuous
     error = 2.0 * np.sqrt(curve.cluster_size[used] / (2.0 * curve.samples)) * continuous
-    return bool((np.abs(difference) > _SAMPLING_SIGMAS * error).any())
+    return bool((np.abs(difference) > _MAX_SAMPLING_SIGMAS * error).any())
 
 
 class _Search:
@@ -273,11 +271,11 @@ class _Search:
         columns = np.empty((len(shapes), 3, len(self._tau)))
         columns[:, 0], columns[:, 1], columns[:, 2] = self._white, shapes, self._walk
         columns *= self._root_weight
-        columns /= np.maximum(np.linalg.norm(columns, axis=2, keepdims=True), _NOTHING)
+        columns /= np.maximum(np.linalg.norm(columns, axis=2, keepdims=True), _MIN_NORM)
         products = columns @ columns.transpose(0, 2, 1)
         target = columns @ self._target
         cost = np.full(len(shapes), self._target @ self._target)
-        for chosen in _CHOICES:
+        for chosen in _ACTIVE_SETS:
             part = products[:, chosen][:, :, chosen] + _RIDGE * np.eye(len(chosen))
             solution = np.linalg.solve(part, target[:, chosen, None])[..., 0]
             left = self._target @ self._target - (solution * target[:, chosen]).sum(axis=1)
@@ -286,10 +284,10 @@ class _Search:
 
     def estimate(self) -> Estimate:
         """Return the estimate at the best T_B."""
-        scan = np.geomspace(self.shortest, self.longest, _SCAN)
+        scan = np.geomspace(self.shortest, self.longest, _SCAN_TIMES)
         best = int(np.argmin(self._costs(self._shapes(scan))))
         cost = self._solved(self._shape(float(scan[best])))[1]
-        low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN - 1)]
+        low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN_TIMES - 1)]
         minimum = minimize_scalar(
             lambda u: self.densities(math.exp(u))[1],
             bounds=(math.log(low), math.log(high)),
@@ -297,16 +295,17 @@ class _Search:
             options={"xatol": 1e-10},
         )
         T_B = math.exp(minimum.x) if minimum.fun < cost else float(scan[best])
-        return self._described(T_B)
+        return self._describe(T_B)
 
-    def _described(self, T_B: float) -> Estimate:
+    def _describe(self, T_B: float) -> Estimate:
         (white, drive, walk), _ = self.densities(T_B)
         parts = {"N": white * self._white, "B": drive * self._shape(T_B), "K": walk * self._walk}
         present = {
-            name: bool((part > _ABSENT * self._variance).any()) for name, part in parts.items()
+            name: bool((part > _MIN_VARIANCE_FRACTION * self._variance).any())
+            for name, part in parts.items()
         }
         absent = Parameter(None, "absent", "the fit is best without this term")
-        at_end = self._at_end(T_B)
+        at_end = self._describe_bound(T_B)
         bias = Parameter(bias_instability(drive, T_B)) if present["B"] else absent
         time = Parameter(T_B) if present["B"] else absent
         if present["B"] and at_end:
@@ -322,7 +321,7 @@ class _Search:
             },
         )
 
-    def _at_end(self, T_B: float) -> str | None:
+    def _describe_bound(self, T_B: float) -> str | None:
         if T_B > self.longest * 0.99:
             return (
                 f"T_B runs to the end of its search at {self.longest:.4g} s: the curve does not "

@@ -35,9 +35,9 @@ from imubench_pipeline.estimators.joint_cutoff import select_joint_models
 from imubench_pipeline.estimators.lines import Line, select_sinusoids
 from imubench_pipeline.estimators.missing import (
     block_means,
-    divide_at_holes,
+    draw_slow_part,
     fill_missing,
-    slow_part,
+    split_at_gaps,
 )
 from imubench_pipeline.estimators.model_choice import (
     MIN_AKAIKE_WEIGHT,
@@ -212,14 +212,14 @@ def fit_blocks(
         )
         return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
     means = block_means(blocks(), spans)
-    parts = divide_at_holes(means, spans)
+    parts = split_at_gaps(means, spans)
     if not parts:
         raise ValueError(f"none of the {samples} samples is present")
     present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
     model = _first_model(blocks, samples, rate, spans)
     rounds = _rounds(1.0 - present)
     for number in range(1, rounds + 1):
-        path = slow_part(means, parts, model, rate, rng)
+        path = draw_slow_part(means, parts, model, rate, rng)
         complete = fill_missing(blocks(), path, model, rate, rng)
         spectrum, lines = spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)

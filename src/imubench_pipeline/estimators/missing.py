@@ -1,8 +1,8 @@
 """Missing samples drawn from their distribution, given the samples present and a noise model.
 
 A spectrum needs a complete log. Each missing sample is replaced by a draw: the slow part of the
-noise, which a Kalman smoother carries through the hole from the block means on both sides, and
-white noise of its own. The result is distributed as a complete log, if the model is right, so
+noise, which a Kalman smoother interpolates from the block means on both sides, and
+white noise. The result is distributed as a complete log, if the model is right, so
 that a fit and the filling are done in turn (data augmentation).
 
 References
@@ -27,19 +27,19 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.typing import Array
 
-BLOCK = 64
+BLOCK_SAMPLES = 64
 """Samples whose mean is one measurement of the slow part."""
 
-_WINDOW = 4096
-_AHEAD = 1024
-"""Blocks: a hole that is longer divides the log, for the two sides know nothing of each other."""
+_WINDOW_BLOCKS = 4096
+_MAX_GAP_BLOCKS = 1024
+"""Longest gap, in blocks; a longer one splits the log, because both sides are independent."""
 
-_DIFFUSE = 1e4
+_DIFFUSE_RATIO = 1e4
 
 
 @dataclass(frozen=True)
 class BlockMeans:
-    """Means over the samples present in blocks of `BLOCK`, no block over two segments."""
+    """Means over the samples present in blocks of `BLOCK_SAMPLES`, no block over two segments."""
 
     begin: NDArray[np.int64]
     end: NDArray[np.int64]
@@ -72,11 +72,11 @@ def block_means(blocks: Iterable[Array], segments: Sequence[Span]) -> BlockMeans
 
     ``segments`` are first and one-past-last sample of each, in order.
     """
-    begin = np.concatenate([np.arange(start, stop, BLOCK) for start, stop in segments])
-    ends = np.concatenate([np.full(-(-(b - a) // BLOCK), b) for a, b in segments])
-    end = np.minimum(begin + BLOCK, ends)
+    begin = np.concatenate([np.arange(start, stop, BLOCK_SAMPLES) for start, stop in segments])
+    ends = np.concatenate([np.full(-(-(b - a) // BLOCK_SAMPLES), b) for a, b in segments])
+    end = np.minimum(begin + BLOCK_SAMPLES, ends)
     total, count = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.int64)
-    for place, present in samples_present(blocks, begin, end):
+    for place, present in yield_present_samples(blocks, begin, end):
         first, width = place[0], place[-1] + 1 - place[0]
         part = slice(first, first + width)
         total[part] += np.bincount(place - first, weights=present, minlength=width)
@@ -84,7 +84,7 @@ def block_means(blocks: Iterable[Array], segments: Sequence[Span]) -> BlockMeans
     return BlockMeans(begin, end, total / np.maximum(count, 1), count)
 
 
-def samples_present(
+def yield_present_samples(
     parts: Iterable[Array], begin: NDArray[np.int64], end: NDArray[np.int64]
 ) -> Iterator[tuple[NDArray[np.int64], Array]]:
     """Yield the samples of a log that are present, and the blocks that they belong to.
@@ -103,7 +103,7 @@ def samples_present(
         reached += len(values)
 
 
-def divide_at_holes(means: BlockMeans, segments: Sequence[Span]) -> tuple[Span, ...]:
+def split_at_gaps(means: BlockMeans, segments: Sequence[Span]) -> tuple[Span, ...]:
     """Divide segments at the holes that are too long to be filled, and trim their ends.
 
     They are as `block_means` had them. In each part every hole can be filled; it goes from the
@@ -115,25 +115,25 @@ def divide_at_holes(means: BlockMeans, segments: Sequence[Span]) -> tuple[Span, 
         occupied = np.flatnonzero(means.count[chosen] > 0) + chosen.start
         if len(occupied) == 0:
             continue
-        cuts = np.flatnonzero(np.diff(occupied) > _AHEAD)
+        cuts = np.flatnonzero(np.diff(occupied) > _MAX_GAP_BLOCKS)
         begins = means.begin[occupied[np.concatenate(([0], cuts + 1))]]
         ends = means.end[occupied[np.append(cuts, len(occupied) - 1)]]
         parts += zip(begins.tolist(), ends.tolist(), strict=True)
     return tuple(parts)
 
 
-def slow_part(
+def draw_slow_part(
     means: BlockMeans,
     parts: Sequence[Span],
     model: NoiseModel,
     rate: float,
     rng: np.random.Generator,
 ) -> SlowPath:
-    """Draw the slow part of the noise, given the means of blocks in parts (`divide_at_holes`).
+    """Draw the slow part of the noise, given the means of blocks in parts (`split_at_gaps`).
 
     Its jumps lie between the parts.
     """
-    interval = BLOCK / rate
+    interval = BLOCK_SAMPLES / rate
     white = max(model.N**2 * rate, 1e-300)
     places, values = [], []
     for start, stop in parts:
@@ -149,7 +149,7 @@ def slow_part(
             if term.drive is not None and term.drive.process is not None
         ]
         # The level itself is not known, but does not change.
-        terms.append(StateSpace.scalar(1.0, 0.0, _DIFFUSE * spread**2))
+        terms.append(StateSpace.scalar(1.0, 0.0, _DIFFUSE_RATIO * spread**2))
         decay = np.array([space.transition[0, 0] for space in terms])
         drive = np.array([space.process_noise[0, 0] for space in terms])
         begin = np.array([space.initial_variance[0, 0] for space in terms])
@@ -157,7 +157,7 @@ def slow_part(
         normals = rng.standard_normal((len(mean), len(terms) + 1))
         state = np.sqrt(np.append(begin[:-1], 0.0)) * rng.standard_normal(len(terms))
         error = white / np.maximum(count, 1)
-        path = level + _smoothed(
+        path = level + _draw_state_sum(
             mean - level, count > 0, error, decay, drive, begin, state, normals
         )
         # The path is level from the last middle to the end of the part, which lies before a
@@ -192,7 +192,7 @@ def fill_missing(
 
 
 @njit(cache=True)
-def _smoothed(
+def _draw_state_sum(
     mean: Array,
     present: NDArray[np.bool_],
     error: Array,
@@ -218,15 +218,15 @@ def _smoothed(
             difference[k] = mean[k] - simulated[k] - math.sqrt(error[k]) * normals[k, s]
         for a in range(s):
             state[a] = decay[a] * state[a] + math.sqrt(drive[a]) * normals[k, a]
-    size = min(n, _WINDOW + _AHEAD)
+    size = min(n, _WINDOW_BLOCKS + _MAX_GAP_BLOCKS)
     means, gains = np.zeros((size + 1, s)), np.zeros((size, s))
     spreads = np.zeros((size + 1, s, s))
     innovations = np.empty(size)
     total, back = np.empty(s), np.empty(s)
     for a in range(s):
         spreads[0, a, a] = begin[a]
-    for first in range(0, n, _WINDOW):
-        last = min(n, first + _WINDOW + _AHEAD)
+    for first in range(0, n, _WINDOW_BLOCKS):
+        last = min(n, first + _WINDOW_BLOCKS + _MAX_GAP_BLOCKS)
         for k in range(first, last):
             i = k - first
             wrong, variance = difference[k], error[k]
@@ -256,13 +256,13 @@ def _smoothed(
                 # L = Phi (I - gain H): its transpose, and H / F times the innovation.
                 for a in range(s):
                     back[a] += innovations[i] - along
-            if k < first + _WINDOW:
+            if k < first + _WINDOW_BLOCKS:
                 path[k] = simulated[k]
                 for a in range(s):
                     path[k] += means[i, a]
                     for b in range(s):
                         path[k] += spreads[i, a, b] * back[b]
         # The next window begins with what was known where this one ends.
-        if first + _WINDOW < last:
-            means[0], spreads[0] = means[_WINDOW], spreads[_WINDOW]
+        if first + _WINDOW_BLOCKS < last:
+            means[0], spreads[0] = means[_WINDOW_BLOCKS], spreads[_WINDOW_BLOCKS]
     return path

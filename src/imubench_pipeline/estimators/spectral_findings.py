@@ -15,25 +15,25 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-_STRONG = 0.5
+_MIN_SINUSOID_RATIO = 0.5
 """Part of what white noise integrates to in a second from which a sinusoid counts in budgets."""
 
-_HIGHEST = 0.05
+_MAX_SLOW_FREQUENCY = 0.05
 """Part of the rate up to which slow noise is looked for that is missing."""
 
-_FLAT = 0.95
+_MIN_FLAT_RATIO = 0.95
 """Part of N^2 that the fitted density has at least, before a low-pass takes from it."""
 
-_FEWEST = 4.0
+_MIN_ORDINATES = 4.0
 """Ordinates that tell."""
 
-_LESS = 0.7
+_MAX_DENSITY_RATIO = 0.7
 """Part of N^2 below which it matters."""
 
-_CHANCE = 1e-4
+_MAX_CHANCE = 1e-4
 """Chance, of all sums of a channel together, below which it is none."""
 
-_APART = 1.4
+_SPACING_RATIO = 1.4
 """Ratio of the ordinates in one sum and in the next that is looked at."""
 
 
@@ -95,7 +95,7 @@ def _strong(channel: str, sinusoids: Iterable[Line], white: float | None) -> Fin
         for line in sinusoids
     }
     most = max(parts, default=0.0)
-    if most < _STRONG:
+    if most < _MIN_SINUSOID_RATIO:
         return None
     frequency = parts[most].frequency
     detail = (
@@ -132,18 +132,18 @@ def slow_noise_missing(
         return None
     order = np.argsort(spectrum.frequency)
     level = white**2
-    low = spectrum.frequency[order] <= _HIGHEST * spectrum.rate
-    order = order[low & ~np.logical_or.accumulate(fitted[order] < _FLAT * level)]
+    low = spectrum.frequency[order] <= _MAX_SLOW_FREQUENCY * spectrum.rate
+    order = order[low & ~np.logical_or.accumulate(fitted[order] < _MIN_FLAT_RATIO * level)]
     degrees = np.cumsum(spectrum.ordinates[order])
     power = np.cumsum(spectrum.ordinates[order] * spectrum.density[order]) / level
-    sums = np.floor(np.log(np.maximum(degrees, 1.0)) / np.log(_APART))
-    looked = (degrees >= _FEWEST) & (np.diff(sums, prepend=-1.0) > 0.0)
-    lacking = looked & (power < _LESS * degrees)
+    sums = np.floor(np.log(np.maximum(degrees, 1.0)) / np.log(_SPACING_RATIO))
+    looked = (degrees >= _MIN_ORDINATES) & (np.diff(sums, prepend=-1.0) > 0.0)
+    lacking = looked & (power < _MAX_DENSITY_RATIO * degrees)
     if not lacking.any():
         return None
     chance = np.where(lacking, chdtr(degrees, power), 1.0) * looked.sum()
     worst = int(np.argmin(chance))
-    if chance[worst] > _CHANCE:
+    if chance[worst] > _MAX_CHANCE:
         return None
     ratio = float(power[worst] / degrees[worst])
     highest = float(spectrum.upper[order[worst]])

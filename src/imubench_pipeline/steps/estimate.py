@@ -31,8 +31,8 @@ from imubench_pipeline.estimators.rows import allan_rows, draw_rows, limit_rows,
 from imubench_pipeline.estimators.spectral_findings import slow_noise_missing, spectral_findings
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
-from imubench_pipeline.estimators.thermal.register import step_of
-from imubench_pipeline.estimators.thermal.result import ThermalFit, shift_by_effect
+from imubench_pipeline.estimators.thermal.register import estimate_resolution
+from imubench_pipeline.estimators.thermal.result import ThermalFit, add_temperature_effect
 from imubench_pipeline.estimators.white_level import find_white_stretch
 from imubench_pipeline.model.estimates import (
     AllanRow,
@@ -184,7 +184,7 @@ class _Channel:
             left = self._curve_of(warm.compensate(log.blocks()))
             nothing = (np.zeros(len(values)) for values in log.blocks())
             added = self._curve_of(
-                shift_by_effect(nothing, warm.path, warm.effect, 1.0), whole=True
+                add_temperature_effect(nothing, warm.path, warm.effect), whole=True
             )
 
         limited = partial(with_fitted_limits, segments=log.segments, presence=self._presence)
@@ -394,7 +394,7 @@ def resolution_of(log: ChannelLog) -> float:
     """Return the step of the register that a log shows at its beginning, SI; 0 where none shows."""
     values = next((block for block in log.blocks() if np.isfinite(block).any()), np.empty(0))
     present = values[np.isfinite(values)][:_ENOUGH]
-    return step_of(np.unique(present), len(present))
+    return estimate_resolution(np.unique(present), len(present))
 
 
 def estimation(

@@ -1,9 +1,9 @@
-"""Temperature and noise of a log, estimated together: sensitivity, lag, bias, and what is left.
+"""Joint estimation of the temperature effect and the noise of a log: sensitivity, lag, bias.
 
 y(t) = bias + s (T_L(t) - T_0) + q (T_L(t) - T_0)^2 + noise, with T_L behind a first-order lag L and
-T_0 the mean temperature of the log (a convention: it sets what `bias` means). For given noise the
-rest is generalised least squares on the DCT coefficients; for given s, q and L the noise is a
-Whittle fit of what they leave; in turn until they settle.
+T_0 the mean temperature of the log (a convention, which defines `bias`). For given noise the
+effect is fitted by generalised least squares on the DCT coefficients. For given s, q and L the
+noise is a Whittle fit to the residual. Both are iterated until they converge.
 """
 
 from __future__ import annotations
@@ -20,40 +20,44 @@ from imubench_pipeline.estimators import likelihood
 from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.frame import FitSelection, select_for_fit
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.missing import block_means, divide_at_holes
+from imubench_pipeline.estimators.missing import block_means, split_at_gaps
 from imubench_pipeline.estimators.model_choice import Candidate, compare_models
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, block_of, spectra
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
-from imubench_pipeline.estimators.thermal.path_errors import without_errors
+from imubench_pipeline.estimators.thermal.path_errors import subtract_path_errors
 from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
-from imubench_pipeline.estimators.thermal.result import ThermalFit, complete_log, shift_by_effect
+from imubench_pipeline.estimators.thermal.result import (
+    ThermalFit,
+    complete_log,
+    remove_temperature_effect,
+)
 from imubench_pipeline.estimators.thermal.uncertainty import (
     Verdict,
-    judge,
-    mean_error,
-    shares,
-    with_likely_walk,
+    add_likely_walk,
+    assess_fit,
+    compute_mean_error,
+    weigh_models,
 )
 from imubench_pipeline.estimators.whittle import Maximum, Whittle, model_of
 from imubench_pipeline.typing import Array
 
-_MOST_ROUNDS = 10
-_SETTLED = 0.02
-_SETTLING = (1 / 64, 1 / 32, 1 / 16)
-"""Parts of the log at its beginning in which a sensor may settle."""
+_MAX_ROUNDS = 10
+_TOLERANCE = 0.02
+_SETTLING_FRACTIONS = (1 / 64, 1 / 32, 1 / 16)
+"""Durations of settling that are tried, as fractions of the log."""
 
-_BEYOND = 6.0
-"""Log likelihood by which the square, or a beginning apart, must be the better beyond BIC."""
+_MIN_EXTRA_GAIN = 6.0
+"""Minimum gain of log likelihood, in addition to BIC, by the square or by settling."""
 
-_WORTH_TRYING = 2.0
-_MOST_LOST = 2.5
-"""Growth of the error of s beyond which the beginning holds what the log says of it."""
+_MIN_TRIAL_GAIN = 2.0
+_MAX_ERROR_GROWTH = 2.5
+"""Increase of the error of s above which the settling time has most information on s."""
 
-_MOVED = 0.3
-"""Part of the standard error of a bin that temperature adds to it, from which that matters."""
+_MIN_ADDED_ERROR = 0.3
+"""Effect of temperature on a bin, in its standard errors, above which it matters."""
 
-_FEWEST_BINS = 24
+_MIN_BINS = 24
 
 
 def fit_temperature(
@@ -118,7 +122,7 @@ def fit_temperature(
     varies = path.range > 0.0 and path.range >= 2.0 * float(np.median(path.deviation))
     if holes:
         means = block_means(blocks(), spans)
-        spans = divide_at_holes(means, spans)
+        spans = split_at_gaps(means, spans)
         plain = plain or likelihood.fit_blocks(
             blocks,
             samples,
@@ -158,7 +162,7 @@ def fit_temperature(
         effect, log = settled.regressors.effect(settled.regression), blocks()
         if holes:
             log = complete_log(blocks, spans, model_of(settled.noise), path, effect, rate, rng)
-        return spectra(shift_by_effect(log, path, effect, -1.0), samples, rate, spans)
+        return spectra(remove_temperature_effect(log, path, effect), samples, rate, spans)
 
     lines = fit.lines
     if verdict.compensated:
@@ -207,7 +211,7 @@ class _Fit:
         self.series = series
         self.frame = frame(self.spectrum, self.lines)
         self.used = self.frame.used
-        self.possible = bool(self.used.sum() >= _FEWEST_BINS)
+        self.possible = bool(self.used.sum() >= _MIN_BINS)
         if not self.possible:
             return
         self.chosen = self.spectrum.select(self.used)
@@ -227,7 +231,7 @@ class _Fit:
         fast = self.spectrum.block != self.series.block
         before, after = self.spectrum.density[fast], left.density[fast]
         moved = np.abs(after / before - 1.0) * np.sqrt(self.spectrum.ordinates[fast])
-        if not (moved > _MOVED).any():
+        if not (moved > _MIN_ADDED_ERROR).any():
             return False
         density = self.spectrum.density.copy()
         density[fast] = after
@@ -242,11 +246,13 @@ class _Fit:
 
         So is another sensitivity at the beginning, where a sensor settles.
         """
-        needed = 0.5 * math.log(len(self.chosen.density)) + _WORTH_TRYING
+        needed = 0.5 * math.log(len(self.chosen.density)) + _MIN_TRIAL_GAIN
         settled = self._best(self.regressors.also(quadratic=bool(quadratic)))
         duration = self.spectrum.duration
         for _ in range(2):
-            extended = [settled.regressors.also(settling=part * duration) for part in _SETTLING]
+            extended = [
+                settled.regressors.also(settling=part * duration) for part in _SETTLING_FRACTIONS
+            ]
             extended = [] if settled.regressors.settling else extended
             if quadratic is None and not settled.regressors.quadratic:
                 extended.append(settled.regressors.also(quadratic=True))
@@ -254,9 +260,9 @@ class _Fit:
             if not gains or max(gains) < needed:
                 break
             wider = self._best(extended[int(np.argmax(gains))])
-            if wider.cost > settled.cost - _BEYOND:
+            if wider.cost > settled.cost - _MIN_EXTRA_GAIN:
                 break
-            if wider.regression.error > _MOST_LOST * settled.regression.error:
+            if wider.regression.error > _MAX_ERROR_GROWTH * settled.regression.error:
                 break
             settled = wider
         return settled
@@ -286,7 +292,7 @@ class _Fit:
 
     def _settle(self, regressors: Regressors, weights: Array) -> _Settled:
         before: Regression | None = None
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(_MAX_ROUNDS):
             regression = regressors.best(weights, self.lags)
             left = regressors.without(self.chosen, regression, weights)
             whittle = self.whittle.of(left)
@@ -299,7 +305,7 @@ class _Fit:
                 continue
             if before is not None:
                 moved = abs(regression.beta[0] - before.beta[0])
-                if moved < _SETTLED * regression.error:
+                if moved < _TOLERANCE * regression.error:
                     break
             before = regression
         free = candidates[0].terms.parameters + len(regression.beta) - ramp + (regression.lag > 0.0)
@@ -320,7 +326,7 @@ class _Fit:
 
     def judged(self, settled: _Settled, rng: np.random.Generator) -> Verdict:
         """Return what a settled fit tells."""
-        return judge(
+        return assess_fit(
             settled.regressors,
             settled.regression,
             settled.whittle,
@@ -363,7 +369,9 @@ def _described(
         best = settled.noise
         weights[fit.used] = fit.chosen.ordinates / settled.whittle.density(best)
         left = regressors.without(fit.spectrum, settled.regression, weights)
-        left = without_errors(left, fit.used, settled.whittle, best.terms, verdict.path_errors)
+        left = subtract_path_errors(
+            left, fit.used, settled.whittle, best.terms, verdict.path_errors
+        )
         effect = regressors.effect(settled.regression)
         without = likelihood.fit_spectrum(
             left, find_frame(left, lines), rng=rng, stretch=plain.stretch
@@ -400,11 +408,11 @@ def _mean_error(candidates: Sequence[Candidate], fitted: Likelihood, spectrum: S
     """Return the standard deviation of the mean of a log, whichever its noise may be."""
     (estimate, _), K = fitted.estimates, fitted.estimates[0].parameters["K"]
     noises = [
-        (with_likely_walk(model, K) if "K" in candidate.terms.linear else model, share)
-        for candidate, share in (shares(candidates) if candidates else [])
+        (add_likely_walk(model, K) if "K" in candidate.terms.linear else model, share)
+        for candidate, share in (weigh_models(candidates) if candidates else [])
         for model in [model_of(candidate.maximum)]
     ]
-    return mean_error(noises or [(estimate.model, 1.0)], spectrum)
+    return compute_mean_error(noises or [(estimate.model, 1.0)], spectrum)
 
 
 def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -> ThermalFit:

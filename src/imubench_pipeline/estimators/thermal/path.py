@@ -29,13 +29,13 @@ from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.thermal.path_kernels import draw_paths, propagate
 from imubench_pipeline.estimators.thermal.register import (
     Readings,
-    cut_at_jumps,
-    dwells,
-    readings,
+    find_cell_stays,
+    gather_readings,
+    split_at_jumps,
 )
 from imubench_pipeline.typing import Array
 
-DRAWS = 24
+DRAWN_PATHS = 24
 """Paths drawn from the distribution of what the register leaves open."""
 
 _SCAN = range(-14, 5, 2)
@@ -144,28 +144,28 @@ def temperature_path(
     ValueError
         If no reading is present.
     """
-    read = readings(blocks, segments)
+    read = gather_readings(blocks, segments)
     level = float(np.nanmedian(read.mean))
     spread = max(float(np.nanmax(read.high) - np.nanmin(read.low)), read.step, 1e-6)
     evidence = _Evidence(read, level, spread)
     q, noise, height = evidence.best()
-    cut = cut_at_jumps(read)
+    cut = split_at_jumps(read)
     if cut is not read:
         jumping = _Evidence(cut, level, spread)
         *best, higher = jumping.best()
         if higher > height:
             read, evidence, (q, noise) = cut, jumping, best
     value, variance = np.empty(len(read.begin)), np.empty(len(read.begin))
-    draws = np.empty((DRAWS, len(read.begin)))
+    draws = np.empty((DRAWN_PATHS, len(read.begin)))
     for part in read.pieces:
         if evidence.stays_in_a_cell(part):
             # Anywhere in the cell, all the time: as errors of a level go, the most that it may be.
             value[part], variance[part] = read.mean[part] - level, read.step**2 / 12.0
-            off = read.step * (rng.random((DRAWS, 1)) - 0.5)
+            off = read.step * (rng.random((DRAWN_PATHS, 1)) - 0.5)
             draws[:, part] = value[part] + off
             continue
         value[part], variance[part], _, precision, shift = evidence.part(part, q, noise)
-        normals = rng.standard_normal((DRAWS, part.stop - part.start, 2))
+        normals = rng.standard_normal((DRAWN_PATHS, part.stop - part.start, 2))
         draws[:, part] = draw_paths(evidence.steps(part), q, spread, precision, shift, normals)
         draws[:, part] += evidence.dwelling(part, q, noise, variance[part], rng)
     value, draws = value + level, draws + level
@@ -267,12 +267,12 @@ class _Evidence:
         With the variance of the wandering path it has that of a level anywhere in the cell.
         """
         inside, mean, half = self._cell[part], self._read.mean[part], self._half(part, noise)
-        off = np.zeros((DRAWS, len(inside)))
+        off = np.zeros((DRAWN_PATHS, len(inside)))
         if not inside.any():
             return off
-        for dwell in dwells(inside, mean, float(np.median(half[inside])), q):
+        for dwell in find_cell_stays(inside, mean, float(np.median(half[inside])), q):
             missing = np.maximum(half**2 / 3.0 - variance, 0.0)[dwell.blocks]
-            level = math.sqrt(3.0) * (2.0 * rng.random((DRAWS, 1)) - 1.0)
+            level = math.sqrt(3.0) * (2.0 * rng.random((DRAWN_PATHS, 1)) - 1.0)
             off[:, dwell.blocks] = level * dwell.taper * np.sqrt(missing)
         return off
 

@@ -1,7 +1,7 @@
-"""What the errors of a temperature's path do: they move the estimate, and add to what it leaves.
+"""Effect of errors of the temperature path: on the estimate, and on the residual.
 
-A register leaves the path open. What of that looks like the temperature moves s, q and the lag; the
-rest stays in the log, times s, as noise that the sensor does not have.
+A register determines the path only within its resolution. Errors that correlate with the
+temperature move s, q and the lag; the rest, times s, remains in the log as additional noise.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from imubench_pipeline.estimators.thermal.regression import Regression, Regresso
 from imubench_pipeline.estimators.whittle import Terms, Whittle
 from imubench_pipeline.typing import Array
 
-_NEGLIGIBLE = 0.02
-"""Part of the standard error of a bin that the errors add to it, up to which they are left."""
+_MAX_NEGLIGIBLE_ERROR = 0.02
+"""Contribution of path errors to a bin, in its standard errors, below which it is ignored."""
 
-_MOST_ROUNDS = 40
-_SETTLED = 1e-3
-_LEAST_KNOWN = 0.1
-"""Part of the power of a bin that is noise, at least: no bin loses all its weight."""
+_MAX_ROUNDS = 40
+_TOLERANCE = 1e-3
+_MIN_NOISE_FRACTION = 0.1
+"""Minimum fraction of the power of a bin that is noise, so that each bin keeps some weight."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,9 @@ class PathErrors:
     (m/s²)²/Hz."""
 
 
-def path_errors(regressors: Regressors, regression: Regression, weights: Array) -> PathErrors:
+def compute_path_errors(
+    regressors: Regressors, regression: Regression, weights: Array
+) -> PathErrors:
     """Return what the drawn paths do to an estimate, to first order.
 
     ``weights``, shape (b,), are nu / S of the bins used, as `Regressors.at` takes them.
@@ -75,7 +77,7 @@ def path_errors(regressors: Regressors, regression: Regression, weights: Array) 
     )
 
 
-def without_errors(
+def subtract_path_errors(
     left: Spectrum, used: NDArray[np.bool_], whittle: Whittle, terms: Terms, errors: Array
 ) -> Spectrum:
     """Return the spectrum that tells of the noise alone, not of what errors of the path leave.
@@ -101,12 +103,15 @@ def without_errors(
     """
     fitted, added = left.select(used), errors[used]
     density = whittle.density(whittle.of(fitted).maximum(terms))
-    if not (added * np.sqrt(fitted.ordinates) > _NEGLIGIBLE * density).any():
+    if not (added * np.sqrt(fitted.ordinates) > _MAX_NEGLIGIBLE_ERROR * density).any():
         return left
     part_of_noise = np.ones(len(added))
-    for _ in range(_MOST_ROUNDS):
-        before, part_of_noise = part_of_noise, np.maximum(density / (density + added), _LEAST_KNOWN)
-        if np.abs(part_of_noise - before).max() < _SETTLED:
+    for _ in range(_MAX_ROUNDS):
+        before, part_of_noise = (
+            part_of_noise,
+            np.maximum(density / (density + added), _MIN_NOISE_FRACTION),
+        )
+        if np.abs(part_of_noise - before).max() < _TOLERANCE:
             break
         own = whittle.of(_of_noise(fitted, part_of_noise))
         density = own.density(own.maximum(terms))

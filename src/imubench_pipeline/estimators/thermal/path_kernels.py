@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.typing import Array
 
-_MOST_SWEEPS = 40
-_SETTLED = 1e-4
+_MAX_SWEEPS = 40
+_TOLERANCE = 1e-4
 _VAGUE = 1e3
 _SQRT_HALF = math.sqrt(0.5)
 _ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
@@ -227,7 +227,7 @@ def propagate(
             width = (high[i] - low[i]) ** 2 / 12.0 + noise[i]
             precision[i], shift[i] = 1.0 / width, 0.5 * (low[i] + high[i]) / width
     settled = not any_cell
-    for _ in range(_MOST_SWEEPS):
+    for _ in range(_MAX_SWEEPS):
         if settled:
             break
         _messages(steps, q, precision, shift, future)
@@ -248,7 +248,7 @@ def propagate(
                 precision[i], shift[i] = wanted, wanted_shift
             if precision[i] > 0.0:
                 x, s, a, b, c = _measured(x, s, a, b, c, precision[i], shift[i])
-        settled = moved < _SETTLED
+        settled = moved < _TOLERANCE
     evidence = _filtered(steps, q, spread, precision, shift, means, covs)
     _smoothed(steps, q, means, covs, path, variance)
     for i in range(n):

@@ -1,17 +1,16 @@
-"""What a temperature register leaves of a temperature: the means of blocks of its readings.
+"""Block means of a temperature register, its resolution, and jumps of the temperature.
 
-A temperature varies slowly. It is kept in blocks, at most `KNOTS` in a log: blocks of one sample
-where the log is no longer, else of ceil(L / KNOTS) samples.
+A temperature varies slowly. It is stored in at most `MAX_BLOCKS` blocks of ceil(L / MAX_BLOCKS)
+samples, of one sample in a short log.
 
-Where a temperature jumps the smooth path of its readings begins anew (`cut_at_jumps`). A chamber
-that is set to another temperature, or a sensor that is carried out, changes within a few samples by
-far more than in the minutes around. One smooth path through that would have to be rough everywhere,
-and would say of the levels between the jumps that they are known all too well.
+The smooth path of a temperature is restarted where the temperature jumps (`split_at_jumps`). If a
+chamber is set to another temperature, or a sensor is carried outside, the temperature changes in a
+few samples far more than in the minutes around. One smooth path through a jump would be too rough
+everywhere, and the errors of the levels between jumps too small.
 
-Long times in one cell of the register leave more open than others (`dwells`). A path that wanders
-as it does elsewhere would have left the cell: while it stays there, it moves less, and may as well
-be near an edge all the time. What such a path may be off by does not average out, while the
-wandering one's error does.
+Long stays in one cell of the register have larger errors (`find_cell_stays`). A path that varies as
+elsewhere would have left the cell. During such a stay it varies less, and may be near an edge
+throughout. This error does not average out, unlike that of a varying path.
 """
 
 from __future__ import annotations
@@ -25,44 +24,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan.phase import Span
-from imubench_pipeline.estimators.missing import samples_present
+from imubench_pipeline.estimators.missing import yield_present_samples
 from imubench_pipeline.typing import Array
 
-KNOTS = 8192
-"""Blocks that a log is divided into, at most (and one more a segment)."""
+MAX_BLOCKS = 8192
+"""Maximum number of blocks of a log (plus one per segment)."""
 
-_LEVELS = 1 << 16
-"""Different readings that are looked at for the steps of a register."""
+_MAX_LEVELS = 1 << 16
+"""Maximum number of distinct readings from which the resolution is estimated."""
 
-_FEWEST_REPEATS = 8.0
-"""Readings a level: rarer repeats may be by chance."""
+_MIN_READINGS_PER_LEVEL = 8.0
+"""Minimum readings per level; fewer repetitions may be chance."""
 
-_MOST_PARTS = 256
-"""Steps in the smallest gap, at most, where few levels were read."""
+_MAX_DIVISOR = 256
+"""Maximum number of steps in the smallest gap, where few levels were read."""
 
-_BY_CHANCE = 1e-3
-"""Chance above which levels that are multiples of a step say nothing of it."""
+_MAX_CHANCE = 1e-3
+"""Maximum probability that levels are multiples of a step by chance."""
 
-_ROUNDED = 0.2
-"""Part of a step by which readings in decimals may miss its multiples."""
+_MAX_ROUNDING = 0.2
+"""Maximum deviation of decimal readings from multiples of a step, in steps."""
 
-_STEPS = 1.5
-"""Least significant bits that a jump is at least."""
+_MIN_JUMP_BITS = 1.5
+"""Minimum size of a jump in least significant bits."""
 
-_BEYOND = 8.0
-"""A jump over the greatest change around it, at least."""
+_MIN_JUMP_RATIO = 8.0
+"""Minimum ratio of a jump and the greatest change around it."""
 
-_AROUND = 16
-"""Blocks on each side that are around."""
+_NEIGHBOUR_BLOCKS = 16
+"""Blocks on each side of a jump that are compared with it."""
 
-_FEWEST = 5
-"""Blocks on each side that a level between jumps has at least."""
+_MIN_LEVEL_BLOCKS = 5
+"""Minimum number of blocks of a level between jumps."""
 
-_MOST = 64
-"""More in a segment are no jumps but how this temperature varies."""
+_MAX_JUMPS = 64
+"""Maximum number of jumps in a segment; more are the normal variation of the temperature."""
 
-_LONG = 3.0
-"""Times that a path takes to cross a cell, from which its stay there is long."""
+_MIN_STAY_CROSSINGS = 3.0
+"""Duration of a long stay in a cell, in times that the path takes to cross it."""
 
 
 @dataclass(frozen=True)
@@ -77,10 +76,10 @@ class Readings:
     low: Array
     high: Array
     """(k,): °C; NaN where none is present."""
-    step: float  # least significant bit of the register, °C; 0: none shows
+    step: float  # least significant bit of the register, °C; 0: unknown
     parts: tuple[slice, ...]  # blocks of each segment
     pieces: tuple[slice, ...]
-    """Blocks between which the temperature jumps: the parts, where it does not."""
+    """Blocks between jumps of the temperature; equal to ``parts`` without jumps."""
 
     @property
     def centre(self) -> Array:
@@ -88,19 +87,19 @@ class Readings:
         return np.asarray((self.begin + self.end - 1) / 2.0)
 
 
-def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
-    """Gather the readings of a temperature in one pass, in bounded memory.
+def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
+    """Return the block means of temperature readings, in one pass and bounded memory.
 
     The blocks are the readings in order on the grid of the log, °C, of any shape (n,), NaN where
-    missing; ``segments`` first and one-past-last sample of each part that no time relates to the
-    others.
+    missing; ``segments`` are the first and one-past-last sample of each segment; the time between
+    segments is unknown.
 
     Raises
     ------
     ValueError
         If no reading is present.
     """
-    width = max(1, -(-sum(stop - start for start, stop in segments) // KNOTS))
+    width = max(1, -(-sum(stop - start for start, stop in segments) // MAX_BLOCKS))
     begins = [np.arange(start, stop, width) for start, stop in segments]
     begin = np.concatenate(begins)
     end = np.concatenate(
@@ -110,7 +109,7 @@ def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
     low, high = np.full(len(begin), np.inf), np.full(len(begin), -np.inf)
     levels: Array = np.empty(0)
     present = 0
-    for place, chosen in samples_present(blocks, begin, end):
+    for place, chosen in yield_present_samples(blocks, begin, end):
         edges = np.flatnonzero(np.diff(place, prepend=-1))
         block = place[edges]
         total[block] += np.add.reduceat(chosen, edges)
@@ -118,7 +117,7 @@ def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
         low[block] = np.minimum(low[block], np.minimum.reduceat(chosen, edges))
         high[block] = np.maximum(high[block], np.maximum.reduceat(chosen, edges))
         present += len(chosen)
-        if len(levels) <= _LEVELS:
+        if len(levels) <= _MAX_LEVELS:
             levels = np.union1d(levels, chosen)
     if present == 0:
         raise ValueError("no temperature is present")
@@ -132,24 +131,24 @@ def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
         np.where(empty, np.nan, total / np.maximum(count, 1)),
         np.where(empty, np.nan, low),
         np.where(empty, np.nan, high),
-        step_of(levels, present),
+        estimate_resolution(levels, present),
         parts,
         parts,
     )
 
 
-def step_of(levels: Array, present: int) -> float:
-    """Return the least significant bit of a register from the different values that it gave, °C.
+def estimate_resolution(levels: Array, present: int) -> float:
+    """Return the least significant bit of a register from its distinct readings, °C.
 
-    The smallest gap between the levels, shape (n,), rising, of which all gaps are multiples, as
-    closely as decimals may have rounded them; 0 where there is none, or where only one value was
-    read (no step is known then) or hardly any of the readings ``present`` was read twice.
+    It is the smallest gap between the levels, shape (n,), ascending, if all gaps are multiples of
+    it within decimal rounding. It is 0 if there is none, if only one value was read, or if hardly
+    any of the readings ``present`` is repeated.
     """
-    if len(levels) < 2 or present < _FEWEST_REPEATS * len(levels):
+    if len(levels) < 2 or present < _MIN_READINGS_PER_LEVEL * len(levels):
         return 0.0
     gaps = np.diff(levels)
     smallest = float(gaps.min())
-    # Readings printed in few decimals make gaps of one step differ; their mean does not.
+    # Decimal rounding makes gaps of one step differ; their mean is unaffected.
     step = float(np.mean(gaps[gaps < 1.75 * smallest]))
     first = float(levels[0])
     for _ in range(2):
@@ -159,13 +158,16 @@ def step_of(levels: Array, present: int) -> float:
     if not math.isfinite(step):
         return 0.0
     missed = np.abs((levels - first) / step - multiples)
-    if float(np.quantile(missed, 0.99)) <= _ROUNDED and _chance(gaps, step) < _BY_CHANCE:
+    if (
+        float(np.quantile(missed, 0.99)) <= _MAX_ROUNDING
+        and _compute_chance(gaps, step) < _MAX_CHANCE
+    ):
         return step
-    return _common_divisor(gaps)
+    return _find_common_divisor(gaps)
 
 
-def _chance(gaps: Array, step: float) -> float:
-    """Return how likely gaps beside the smallest would be as near to multiples by chance."""
+def _compute_chance(gaps: Array, step: float) -> float:
+    """Return the probability that the other gaps are as near to multiples of a step by chance."""
     others = np.delete(gaps, int(gaps.argmin())) / step
     if not len(others):
         return 0.0
@@ -173,28 +175,28 @@ def _chance(gaps: Array, step: float) -> float:
     return min(2.0 * missed, 1.0) ** len(others)
 
 
-def _common_divisor(gaps: Array) -> float:
-    """Return the greatest step of which a few gaps are multiples; 0 where chance would find one."""
+def _find_common_divisor(gaps: Array) -> float:
+    """Return the greatest step of which a few gaps are multiples; 0 if it may be chance."""
     smallest = float(gaps.min())
-    steps = smallest / np.arange(2, _MOST_PARTS + 1)
+    steps = smallest / np.arange(2, _MAX_DIVISOR + 1)
     return next(
         (
             float(step)
             for step in steps
-            if len(gaps) > 1 and smallest / step * _chance(gaps, float(step)) < _BY_CHANCE
+            if len(gaps) > 1 and smallest / step * _compute_chance(gaps, float(step)) < _MAX_CHANCE
         ),
         0.0,
     )
 
 
-def cut_at_jumps(read: Readings) -> Readings:
-    """Return readings with the blocks cut where the temperature jumps, and a piece between jumps.
+def split_at_jumps(read: Readings) -> Readings:
+    """Return readings with blocks split at jumps of the temperature, and the pieces between jumps.
 
-    The sample of a jump follows from the mean of the block that it falls into. A single sample
-    stands on each side, so that a path that is linear between the middles of blocks jumps there.
-    Readings without a jump stay as they are.
+    The sample of a jump follows from the mean of its block. A block of a single sample is made on
+    each side, so that a path that is linear between the centres of blocks jumps there. Readings
+    without jumps are returned unchanged.
     """
-    parts = [_of_part(read, part) for part in read.parts]
+    parts = [_find_jumps(read, part) for part in read.parts]
     if not any(jumps for jumps in parts):
         return read
     columns: list[Array] = []
@@ -202,7 +204,7 @@ def cut_at_jumps(read: Readings) -> Readings:
     places: list[slice] = []
     blocks_before = 0
     for part, jumps in zip(read.parts, parts, strict=True):
-        blocks, cuts = _cut(read, part, jumps)
+        blocks, cuts = _cut_blocks(read, part, jumps)
         columns.append(blocks)
         ends = [0, *cuts, blocks.shape[1]]
         places.append(slice(blocks_before, blocks_before + blocks.shape[1]))
@@ -222,43 +224,50 @@ def cut_at_jumps(read: Readings) -> Readings:
     )
 
 
-def _of_part(read: Readings, part: slice) -> list[tuple[int, int]]:
+def _find_jumps(read: Readings, part: slice) -> list[tuple[int, int]]:
     """Return block (from the first of the part) and sample of each jump: the first one beyond."""
     mean = read.mean[part]
     n = len(mean)
-    if n < 2 * _FEWEST + 1:
+    if n < 2 * _MIN_LEVEL_BLOCKS + 1:
         return []
     change = np.zeros(n)
     change[1:-1] = np.abs(mean[2:] - mean[:-2])
     change[~np.isfinite(change)] = 0.0
-    padded = np.pad(change, _AROUND)
-    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * _AROUND + 1).copy()
-    around[:, _AROUND - 2 : _AROUND + 3] = 0.0
-    least = np.maximum(_BEYOND * around.max(axis=1), _STEPS * read.step)
+    padded = np.pad(change, _NEIGHBOUR_BLOCKS)
+    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOUR_BLOCKS + 1).copy()
+    around[:, _NEIGHBOUR_BLOCKS - 2 : _NEIGHBOUR_BLOCKS + 3] = 0.0
+    least = np.maximum(_MIN_JUMP_RATIO * around.max(axis=1), _MIN_JUMP_BITS * read.step)
     jumps: list[tuple[int, int]] = []
     for i in np.flatnonzero((change > least) & (change > 0.0)).tolist():
-        if change[i] < change[max(i - 2, 0) : i + 3].max() or not _FEWEST <= i < n - _FEWEST:
+        if (
+            change[i] < change[max(i - 2, 0) : i + 3].max()
+            or not _MIN_LEVEL_BLOCKS <= i < n - _MIN_LEVEL_BLOCKS
+        ):
             continue  # a block beside the jump, or too near to the end
-        if jumps and i - jumps[-1][0] < _FEWEST:
+        if jumps and i - jumps[-1][0] < _MIN_LEVEL_BLOCKS:
             continue  # on the edge of two blocks
-        level = np.median(mean[i + 2 : i + _FEWEST]) - np.median(mean[i - _FEWEST + 1 : i - 1])
+        level = np.median(mean[i + 2 : i + _MIN_LEVEL_BLOCKS]) - np.median(
+            mean[i - _MIN_LEVEL_BLOCKS + 1 : i - 1]
+        )
         if not abs(level) > least[i]:
             continue  # a reading that stands out, or a gap
         before, here, after = mean[i - 1], mean[i], mean[i + 1]
         share = min(max((after - here) / (after - before), 0.0), 1.0)
         first, last = int(read.begin[part][i]), int(read.end[part][i])
         jumps.append((i, first + round(share * (last - first))))
-    return jumps if len(jumps) <= _MOST else []
+    return jumps if len(jumps) <= _MAX_JUMPS else []
 
 
-def _cut(read: Readings, part: slice, jumps: Sequence[tuple[int, int]]) -> tuple[Array, list[int]]:
+def _cut_blocks(
+    read: Readings, part: slice, jumps: Sequence[tuple[int, int]]
+) -> tuple[Array, list[int]]:
     """Return the columns of a part's blocks, cut at its jumps, and the first block after each."""
     names = ("begin", "end", "count", "mean", "low", "high")
     blocks = np.array([getattr(read, name)[part] for name in names], dtype=np.float64)
     cuts: list[int] = []
     for i, sample in reversed(jumps):
         before, after = blocks[:, i - 1], blocks[:, i + 1]
-        # Three blocks stand around a jump, which may fall on an edge of the middle one.
+        # Replace three blocks around a jump, which may be at an edge of the middle one.
         edges = sorted({before[0], sample - 1.0, float(sample), sample + 1.0, after[1]})
         made = []
         for first, last in pairwise(edges):
@@ -274,16 +283,18 @@ def _cut(read: Readings, part: slice, jumps: Sequence[tuple[int, int]]) -> tuple
 
 @dataclass(frozen=True)
 class CellStay:
-    """A long time in one cell."""
+    """A long stay in one cell of the register."""
 
     blocks: slice  # of a segment
     taper: Array
-    """(b,): from 0 at the moments when the path crosses an edge of the cell, which say where it is,
-    to 1 a crossing time away from them."""
+    """(b,): from 0 where the path crosses an edge of the cell, and is therefore known, to 1 at a
+    distance of one crossing time."""
 
 
-def dwells(inside: NDArray[np.bool_], level: Array, half: float, q: float) -> Iterator[CellStay]:
-    """Find the long times in one cell.
+def find_cell_stays(
+    inside: NDArray[np.bool_], level: Array, half: float, q: float
+) -> Iterator[CellStay]:
+    """Yield the long stays in one cell of the register.
 
     Parameters
     ----------
@@ -303,7 +314,7 @@ def dwells(inside: NDArray[np.bool_], level: Array, half: float, q: float) -> It
     other = (inside[1:] != inside[:-1]) | (np.abs(np.diff(level)) > half)
     edges = np.concatenate(([0], np.flatnonzero(other) + 1, [len(inside)]))
     for begin, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        if not inside[begin] or end - begin < _LONG * crossing:
+        if not inside[begin] or end - begin < _MIN_STAY_CROSSINGS * crossing:
             continue
         place = np.arange(end - begin) + 0.5
         before = place if begin > 0 else math.inf

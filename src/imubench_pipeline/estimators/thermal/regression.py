@@ -16,14 +16,14 @@ from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged_pa
 from imubench_pipeline.estimators.thermal.products import Coefficients, Products
 from imubench_pipeline.typing import Array
 
-_LAGS = 16
-_LONGEST = 1 / 20
-"""Part of the log: a longer lag is a drift of its own."""
+_LAG_GRID_SIZE = 16
+_MAX_LAG_FRACTION = 1 / 20
+"""Maximum lag over the duration of the log; a longer lag looks like drift."""
 
-_LONGEST_LAG = 1800.0
-_LEAST_ORDINATES = 0.02
-_TOGETHER = 8
-"""Lags whose regressors are in memory together."""
+_MAX_LAG = 1800.0
+_MIN_ORDINATES = 0.02
+_LAGS_PER_BATCH = 8
+"""Lags whose regressors are in memory at the same time."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Regression:
     """A fit for given noise."""
 
     beta: Array
-    """(p,): s, then q and what the beginning adds to s where they are in the model, then R where
-    there is a ramp; SI per K, K², K and s."""
+    """(p,): s; q and the change of s while settling, if they are in the model; R, if there is a
+    ramp. SI per K, K², K and s."""
     information: Array  # (p, p): inverse of their covariance
     lag: float  # s
     log_likelihood_gain: float  # log likelihood over that of beta = 0
@@ -111,66 +111,66 @@ class Regressors:
         return lagged_path(self.path, self.path.value, self.rate, lag) - self.reference
 
     def effect(self, regression: Regression) -> Array:
-        """Return what temperature adds to the log, at the knots of the path, shape (k,), SI."""
-        of_knots = self._of(self.knots(regression.lag))
+        """Return the effect of temperature at the knots of the path, shape (k,), SI."""
+        of_knots = self._make_terms(self.knots(regression.lag))
         return np.asarray(np.einsum("i,ik->k", regression.beta[: self.thermal], np.array(of_knots)))
 
-    def _of(self, knots: Array) -> list[Array]:
+    def _make_terms(self, knots: Array) -> list[Array]:
         """Return the regressors of temperature at the knots."""
         terms = [knots, knots**2] if self.quadratic else [knots]
         if self.settling > 0.0:
-            end = self._settled_from()
+            end = self._get_first_settled()
             settled = knots[min(end, len(knots) - 1)]
             terms.append(np.where(np.arange(len(knots)) < end, knots - settled, 0.0))
         return terms
 
     def slope(self, regression: Regression) -> Array:
-        """Return how what temperature adds changes with it, at the knots, shape (k,), SI per K."""
+        """Return the derivative of the effect by temperature at the knots, shape (k,), SI per K."""
         knots = self.knots(regression.lag)
         slope = np.full(len(knots), regression.beta[0])
         if self.quadratic:
             slope += 2.0 * regression.beta[1] * knots
         if self.settling > 0.0:
-            slope[: self._settled_from()] += regression.beta[self.thermal - 1]
+            slope[: self._get_first_settled()] += regression.beta[self.thermal - 1]
         return slope
 
-    def _settled_from(self) -> int:
+    def _get_first_settled(self) -> int:
         """Return the first knot at which the sensor has settled."""
         begin = self.path.sample[0] + self.settling * self.rate
         return int(np.searchsorted(self.path.sample, begin))
 
     def means(self, lag: float) -> Array:
         """Return the mean over the log of each regressor of temperature, K, or K² of the square."""
-        return np.array([float(term.mean()) for term in self._of(self.knots(lag))])
+        return np.array([float(term.mean()) for term in self._make_terms(self.knots(lag))])
 
     def columns(self, lag: float) -> list[Array]:
         """Return the coefficients of the regressors in the order of `Regression.beta`.
 
         Of shape (n,) each, in K, or K² of the square; s of the ramp.
         """
-        columns = self.coefficients.of_knots(self.path, self._of(self.knots(lag)))
+        columns = self.coefficients.of_knots(self.path, self._make_terms(self.knots(lag)))
         return [*columns] + [self._time] * self.ramp
 
     def prepare(self, lags: Sequence[float] | Array) -> None:
         """Compute the products for several lags together, which takes less time."""
-        lags_to_do = [float(lag) for lag in lags if self._key(float(lag)) not in self._full]
-        for first in range(0, len(lags_to_do), _TOGETHER):
-            batch = lags_to_do[first : first + _TOGETHER]
-            terms = [term for lag in batch for term in self._of(self.knots(lag))]
+        lags_to_do = [float(lag) for lag in lags if self._make_key(float(lag)) not in self._full]
+        for first in range(0, len(lags_to_do), _LAGS_PER_BATCH):
+            batch = lags_to_do[first : first + _LAGS_PER_BATCH]
+            terms = [term for lag in batch for term in self._make_terms(self.knots(lag))]
             columns = self.coefficients.of_knots(self.path, terms).reshape(
                 len(batch), self.thermal, -1
             )
             for lag, own in zip(batch, columns, strict=True):
-                self._full[self._key(lag)] = self.coefficients.products([*own, self._time])
+                self._full[self._make_key(lag)] = self.coefficients.products([*own, self._time])
 
-    def _key(self, lag: float) -> tuple[float, bool, float]:
+    def _make_key(self, lag: float) -> tuple[float, bool, float]:
         return lag, self.quadratic, self.settling
 
     def products(self, lag: float) -> Products:
         """Return the products of log and regressors at a lag in the bins used."""
         if lag not in self._products:
             self.prepare([lag])
-            full, own = self._full[self._key(lag)], slice(None if self.ramp else self.thermal)
+            full, own = self._full[self._make_key(lag)], slice(None if self.ramp else self.thermal)
             cross, gram = full.cross[self.used, own], full.gram[self.used, own, own]
             self._products[lag] = Products(cross, gram)
         return self._products[lag]
@@ -189,20 +189,20 @@ class Regressors:
         return Regression(beta, information, lag, 0.5 * float(target @ beta))
 
     def lags(self, longest: float | None = None) -> Array:
-        """Return the lags to scan, s: 0, then rising; 0 alone where the knots lie too far apart.
+        """Return the lags to scan, s: 0, then ascending; only 0 if the knots are too far apart.
 
         The longest is by default a twentieth of the longest segment, at most half an hour.
         """
         duration = max(stop - start for start, stop in self.path.segments) / self.rate
         knot = float(np.median(np.diff(self.path.sample))) / self.rate
-        last = longest if longest is not None else min(_LONGEST * duration, _LONGEST_LAG)
+        last = longest if longest is not None else min(_MAX_LAG_FRACTION * duration, _MAX_LAG)
         first = max(0.5 * knot, last / 1000.0)
         if first >= last:
             return np.array([0.0])
-        return np.concatenate(([0.0], np.geomspace(first, last, _LAGS)))
+        return np.concatenate(([0.0], np.geomspace(first, last, _LAG_GRID_SIZE)))
 
     def best(self, weights: Array, lags: Array) -> Regression:
-        """Return the fit of the greatest log likelihood: scan the lags, rising, then polish.
+        """Return the fit with the maximum log likelihood, by a scan of the lags and optimisation.
 
         ``weights``: as for `at`.
         """
@@ -223,10 +223,10 @@ class Regressors:
         return other if other.log_likelihood_gain > best.log_likelihood_gain + 1e-9 else best
 
     def without(self, spectrum: Spectrum, regression: Regression, weights: Array) -> Spectrum:
-        """Return the spectrum (of the bins used) less what temperature explains.
+        """Return the spectrum (of the bins used) less the effect of temperature.
 
-        The degrees of freedom that the fit takes from a bin are taken from its ordinates, so that
-        the density keeps its mean. ``weights``: as for `at`, those that the fit was made with.
+        The degrees of freedom of the fit are subtracted from the ordinates of each bin, so that the
+        density stays unbiased. ``weights``: as for `at`, those of the fit.
         """
         products = self.products(regression.lag)
         p = self.thermal
@@ -236,7 +236,7 @@ class Regressors:
             "bij,ij->b", gram, np.linalg.inv(regression.information[:p, :p])
         )
         ordinates = np.maximum(
-            spectrum.ordinates - np.minimum(degrees, 1.0), _LEAST_ORDINATES * spectrum.ordinates
+            spectrum.ordinates - np.minimum(degrees, 1.0), _MIN_ORDINATES * spectrum.ordinates
         )
         with_time = self.also(ramp=True).products(regression.lag) if not self.ramp else products
         return replace(

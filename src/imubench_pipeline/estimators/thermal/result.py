@@ -1,4 +1,4 @@
-"""What temperature does to a channel: as it is told, and as it is put into a log or taken out."""
+"""Result of a thermal fit, and the temperature effect added to or removed from a log."""
 
 from __future__ import annotations
 
@@ -10,24 +10,31 @@ import numpy as np
 from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.missing import block_means, fill_missing, slow_part
+from imubench_pipeline.estimators.missing import block_means, draw_slow_part, fill_missing
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 
-def shift_by_effect(
-    blocks: Iterable[Array], path: TemperaturePath, effect: Array, sign: float
+def add_temperature_effect(
+    blocks: Iterable[Array], path: TemperaturePath, effect: Array
 ) -> Iterator[Array]:
-    """Yield the blocks of a log with what temperature adds to it, put in (1) or taken out (-1).
+    """Yield the blocks of a log plus the effect of temperature.
 
-    ``effect``, shape (k,), is what temperature adds at the knots of the path, SI as the log.
+    ``effect``, shape (k,), is the effect at the knots of the path, SI as the log.
     """
     reached = 0
     for values in blocks:
         points = np.arange(reached, reached + len(values))
-        yield values + sign * path.at(points, effect)
+        yield values + path.at(points, effect)
         reached += len(values)
+
+
+def remove_temperature_effect(
+    blocks: Iterable[Array], path: TemperaturePath, effect: Array
+) -> Iterator[Array]:
+    """Yield the blocks of a log less the effect of temperature (see `add_temperature_effect`)."""
+    return add_temperature_effect(blocks, path, -effect)
 
 
 def complete_log(
@@ -39,21 +46,21 @@ def complete_log(
     rate: float,
     rng: np.random.Generator,
 ) -> Iterator[Array]:
-    """Return the blocks of a log with its missing samples drawn: temperature's effect, and noise.
+    """Return the blocks of a log with missing samples drawn: temperature effect plus noise.
 
     The blocks come in order, SI, NaN where a sample is missing; ``spans`` are the parts whose holes
-    can be filled (`imubench_pipeline.estimators.missing.divide_at_holes`), the model is that of
-    what temperature leaves, and ``effect``, shape (k,), as of `shift_by_effect`.
+    can be filled (`imubench_pipeline.estimators.missing.split_at_gaps`), the model is that of
+    what temperature leaves, and ``effect``, shape (k,), as in `add_temperature_effect`.
     """
-    means = block_means(shift_by_effect(blocks(), path, effect, -1.0), spans)
-    slow = slow_part(means, spans, model, rate, rng)
-    without = shift_by_effect(blocks(), path, effect, -1.0)
-    return shift_by_effect(fill_missing(without, slow, model, rate, rng), path, effect, 1.0)
+    means = block_means(remove_temperature_effect(blocks(), path, effect), spans)
+    slow = draw_slow_part(means, spans, model, rate, rng)
+    without = remove_temperature_effect(blocks(), path, effect)
+    return add_temperature_effect(fill_missing(without, slow, model, rate, rng), path, effect)
 
 
 @dataclass(frozen=True)
 class ThermalFit:
-    """What temperature does to a channel.
+    """Temperature dependence of a channel.
 
     Attributes
     ----------
@@ -66,16 +73,14 @@ class ThermalFit:
     bias : Parameter
         Mean of the log, at T_0, SI.
     compensated : bool
-        Temperature is taken out of the noise: the interval of s (or q) excludes 0, and BIC
+        Temperature is removed from the noise: the interval of s (or q) excludes 0, and BIC
         favours it.
     reason : str
-        Why it is, or is not.
+        Reason for ``compensated``.
     plain, without_temperature : Likelihood
-        The noise of the log as it is, and of what temperature leaves of it; the same where
-        nothing is taken out.
+        The noise of the log before and after compensation; the same without compensation.
     effect : ndarray, shape (k,)
-        What temperature adds to the log at the knots of the path, SI; zeros where nothing is
-        taken out.
+        Effect of temperature at the knots of the path, SI; zeros without compensation.
     path : TemperaturePath
         Temperature of the log.
     """
@@ -93,5 +98,5 @@ class ThermalFit:
     path: TemperaturePath
 
     def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Return the blocks of the log, in order, SI, less what temperature adds to it."""
-        return shift_by_effect(blocks, self.path, self.effect, -1.0)
+        """Return the blocks of the log, in order, SI, less the effect of temperature."""
+        return remove_temperature_effect(blocks, self.path, self.effect)

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.missing import samples_present
+from imubench_pipeline.estimators.missing import yield_present_samples
 from imubench_pipeline.typing import Array
 
 Integers = NDArray[np.int64]
@@ -252,7 +252,7 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
             length += len(part)
             yield part
 
-    for place, present in samples_present(counted(), whole.start, whole.stop):
+    for place, present in yield_present_samples(counted(), whole.start, whole.stop):
         total += np.bincount(place, weights=present, minlength=len(whole))
         count += np.bincount(place, minlength=len(whole))
     if length < whole.stop[-1]:
