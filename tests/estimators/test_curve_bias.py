@@ -6,13 +6,13 @@ import pytest
 
 from imubench_pipeline.estimators.curve_bias import (
     Models,
+    add_curve_figures,
     allan_variance,
     averaging_times,
     bias_of_curve,
     lowest_point,
     models_of,
     of_model,
-    with_curve,
 )
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.goodness import Goodness
@@ -144,7 +144,7 @@ def of(chosen: Candidate) -> Estimate:
 
 def test_limits_are_those_of_the_draws() -> None:
     chosen = candidate("NK", [1e-4, 3e-6, 7e-5], [100.0], 0.0)
-    found = with_curve(of(chosen), [chosen], [], draws_of(chosen), TAU).curve
+    found = add_curve_figures(of(chosen), [chosen], [], draws_of(chosen), TAU).curve
     B = found["B_curve"]
     assert (B.value, B.status) == (pytest.approx(7e-5), "ok")
     assert B.lower == pytest.approx(7e-5 * math.exp(-1.96 * 0.05), rel=0.01)
@@ -160,7 +160,7 @@ def test_limits_are_those_of_the_draws() -> None:
 def test_models_that_are_as_good_share_limits_and_the_value_is_of_the_chosen_one() -> None:
     one = candidate("NK", [1e-4, 3e-6, 6e-5], [100.0], 0.0)
     other = candidate("NFK", [1e-4, 8e-5, 3e-6], [], 0.0)
-    found = with_curve(of(one), [one, other], [], draws_of(one, other), TAU).curve["B_curve"]
+    found = add_curve_figures(of(one), [one, other], [], draws_of(one, other), TAU).curve["B_curve"]
     assert found.value == pytest.approx(6e-5)
     assert found.lower is not None and found.lower < 6e-5
     assert found.upper is not None and found.upper > 8e-5
@@ -171,7 +171,9 @@ def test_weak_bias_is_told_from_none() -> None:
     for bic, status in ((1.0, "not_identified"), (5.0, "absent")):
         having = candidate("NFK", [1e-4, 1e-5, 3e-6], [], bic)
         draws = draws_of(chosen, having)
-        found = with_curve(of(chosen), [chosen, having], [having], draws, TAU).curve["B_curve"]
+        found = add_curve_figures(of(chosen), [chosen, having], [having], draws, TAU).curve[
+            "B_curve"
+        ]
         assert (found.value, found.status, found.lower) == (None, status, 0.0)
         assert found.upper == pytest.approx(1e-5 * math.exp(1.96 * 0.05), rel=0.01)
 
@@ -179,14 +181,16 @@ def test_weak_bias_is_told_from_none() -> None:
 def test_flicker_that_is_fitted_at_nothing_is_absent_down_to_nothing() -> None:
     chosen = candidate("NFK", [1e-4, 0.0, 3e-6], [], 0.0)
     draws = draws_of(candidate("NFK", [1e-4, 1e-5, 3e-6], [], 0.0))
-    found = with_curve(of(chosen), [chosen], [], draws, TAU).curve["B_curve"]
+    found = add_curve_figures(of(chosen), [chosen], [], draws, TAU).curve["B_curve"]
     assert (found.value, found.status, found.lower) == (None, "absent", 0.0)
     assert found.upper is not None and 1e-5 < found.upper < 2e-5
 
 
 def test_what_is_known_to_a_factor_is_an_interval() -> None:
     chosen = candidate("NK", [1e-4, 3e-6, 7e-5], [100.0], 0.0)
-    found = with_curve(of(chosen), [chosen], [], draws_of(chosen, spread=0.7), TAU).curve["B_curve"]
+    found = add_curve_figures(of(chosen), [chosen], [], draws_of(chosen, spread=0.7), TAU).curve[
+        "B_curve"
+    ]
     assert (found.value, found.status, found.fitted) == (
         None,
         "not_identified",
@@ -197,7 +201,7 @@ def test_what_is_known_to_a_factor_is_an_interval() -> None:
 
 def test_a_process_that_still_rises_at_the_end_is_no_bias_instability() -> None:
     chosen = candidate("N", [1e-4, 3e-4], [5000.0], 0.0)
-    found = with_curve(of(chosen), [chosen], [], draws_of(chosen), TAU).curve["B_curve"]
+    found = add_curve_figures(of(chosen), [chosen], [], draws_of(chosen), TAU).curve["B_curve"]
     assert (found.value, found.status) == (None, "not_identified")
     assert "still rise" in (found.reason or "")
 
@@ -205,7 +209,7 @@ def test_a_process_that_still_rises_at_the_end_is_no_bias_instability() -> None:
 def test_a_process_faster_than_a_second_is_no_bias_instability() -> None:
     for T_B, status in ((0.99, "not_identified"), (1.01, "ok")):
         chosen = candidate("N", [1e-5, 3e-4], [T_B], 0.0)
-        found = with_curve(of(chosen), [chosen], [], draws_of(chosen), TAU).curve["B_curve"]
+        found = add_curve_figures(of(chosen), [chosen], [], draws_of(chosen), TAU).curve["B_curve"]
         assert found.status == status
 
 
@@ -214,7 +218,7 @@ def test_a_time_at_the_bound_of_its_search_leaves_no_bias_instability() -> None:
     known = of(chosen)
     at_bound = Parameter(100.0, "at_bound", "the longest is 100 s")
     given = replace(known, parameters={**known.parameters, "T_B": at_bound})
-    found = with_curve(given, [chosen], [], draws_of(chosen), TAU).curve["B_curve"]
+    found = add_curve_figures(given, [chosen], [], draws_of(chosen), TAU).curve["B_curve"]
     assert (found.value, found.status) == (None, "not_identified")
     assert "the longest is 100 s" in (found.reason or "")
 

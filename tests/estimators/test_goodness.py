@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from imubench_pipeline.estimators.goodness import DOUBT, Goodness, goodness
+from imubench_pipeline.estimators.goodness import MIN_FIT_CHANCE, Goodness, goodness
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
@@ -68,7 +68,7 @@ def test_the_chance_of_the_right_model_is_uniform(rng, nu: np.ndarray, logs: int
         error = np.sqrt(expected * (1 - expected) / logs)
         assert np.mean(chance <= limit) == pytest.approx(expected, abs=4 * error + 0.1 * expected)
     # The sums are skew, so that a doubt is raised a few times as often as is said, not more.
-    assert np.mean(chance < DOUBT) < 5 * DOUBT
+    assert np.mean(chance < MIN_FIT_CHANCE) < 5 * MIN_FIT_CHANCE
     assert np.mean(chance < 0.01) < 2 * 0.01
 
 

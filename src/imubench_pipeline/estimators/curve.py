@@ -1,6 +1,6 @@
-"""Reading the curve: N, K, B and T_B from the slopes that it shows (000 section 2.2, 003 eq. 2-5).
+"""Reading of N, K, B and T_B from the slopes of an Allan deviation (000 section 2.2, 003 eq. 2-5).
 
-A slope that the log does not show gives no value, with the reason.
+A parameter whose slope is not visible has no value, but a reason.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter, not_shown
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 from imubench_pipeline.typing import Array
 
-_WINDOW = 0.5
-"""Decades of tau over which a local slope is taken."""
+_SLOPE_WINDOW = 0.5
+"""Width of the window for a local slope, decades of tau."""
 
 _OCTAVE = math.log10(2.0)
-"""Estimates closer than an octave of tau are hardly independent."""
+"""Distance of tau, in decades, below which estimates are correlated."""
 
 _WHITE_TOLERANCE = 0.06
 _WALK_TOLERANCE = 0.06
-_WALK_MOST_TOLERANCE = 0.2
+_WALK_MAX_TOLERANCE = 0.2
 _WALK_SPANS = np.arange(0.4, 2.01, 0.1)
-_WALK_LEAST_SLOPE = 0.2
+_WALK_MIN_SLOPE = 0.2
 _RISE_SIGMAS = 3.0
 
 
@@ -88,28 +88,33 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     if used.sum() < 4:
         reason = f"the curve has {used.sum()} points up to {longest:.3g} of the log"
         return not_shown("curve", reason)
-    bias, correlation_time = _minimum(points)
+    bias, correlation_time = _read_minimum(points)
     return Estimate(
         "curve",
-        {"N": _white(points, thinned), "B": bias, "T_B": correlation_time, "K": _walk(points)},
+        {
+            "N": _read_white(points, thinned),
+            "B": bias,
+            "T_B": correlation_time,
+            "K": _read_walk(points),
+        },
         curve={
             "B_curve": bias,
-            "sigma_min": _times(bias, FLOOR),
-            "tau_min": _times(correlation_time, PEAK_TAU),
+            "sigma_min": _scale(bias, FLOOR),
+            "tau_min": _scale(correlation_time, PEAK_TAU),
         },
     )
 
 
-def _times(parameter: Parameter, factor: float) -> Parameter:
+def _scale(parameter: Parameter, factor: float) -> Parameter:
     if parameter.value is None:
         return parameter
     return Parameter(parameter.value * factor)
 
 
-def _white(points: _Curve, thinned: Array) -> Parameter:
+def _read_white(points: _Curve, thinned: Array) -> Parameter:
     slopes = np.full(len(points.tau), np.nan)
     for i, centre in enumerate(points.tau):
-        inside = np.abs(points.tau - centre) <= _WINDOW / 2 + 1e-9
+        inside = np.abs(points.tau - centre) <= _SLOPE_WINDOW / 2 + 1e-9
         if inside.sum() >= 3:
             slope, error = points.slope(inside)
             if error < 0.25:
@@ -118,7 +123,7 @@ def _white(points: _Curve, thinned: Array) -> Parameter:
         return Parameter(None, "not_shown", "the curve is too short to show a slope")
     # The ends have one-sided windows; the first runs of the right slope is the white noise.
     close = np.abs(slopes + 0.5) <= _WHITE_TOLERANCE
-    run = _first_run(close)
+    run = _find_first_run(close)
     if run is None:
         low, high = np.nanmin(slopes), np.nanmax(slopes)
         return Parameter(
@@ -130,7 +135,7 @@ def _white(points: _Curve, thinned: Array) -> Parameter:
     return Parameter(points.level(run, -0.5, 1.0) / excess)
 
 
-def _first_run(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+def _find_first_run(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     """Return the first run of three and more points, as a mask."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
@@ -141,7 +146,7 @@ def _first_run(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     return None
 
 
-def _minimum(points: _Curve) -> tuple[Parameter, Parameter]:
+def _read_minimum(points: _Curve) -> tuple[Parameter, Parameter]:
     lowest = int(np.argmin(points.deviation))
     later = slice(lowest + 1, None)
     rise = points.deviation[later] - points.deviation[lowest]
@@ -168,7 +173,7 @@ def _minimum(points: _Curve) -> tuple[Parameter, Parameter]:
     )
 
 
-def _walk(points: _Curve) -> Parameter:
+def _read_walk(points: _Curve) -> Parameter:
     """Read K from the longest stretch at the end of the curve that has the slope +1/2."""
     lowest = int(np.argmin(points.deviation))
     best: NDArray[np.bool_] | None = None
@@ -180,8 +185,8 @@ def _walk(points: _Curve) -> Parameter:
             continue
         slope, error = points.slope(inside)
         steepest = max(steepest, slope)
-        allowed = max(_WALK_TOLERANCE, min(error, _WALK_MOST_TOLERANCE))
-        if abs(slope - 0.5) <= allowed and slope - 2 * error > _WALK_LEAST_SLOPE:
+        allowed = max(_WALK_TOLERANCE, min(error, _WALK_MAX_TOLERANCE))
+        if abs(slope - 0.5) <= allowed and slope - 2 * error > _WALK_MIN_SLOPE:
             best = inside
     if best is None:
         shown = f"the steepest end has {steepest:+.2f}" if np.isfinite(steepest) else "it ends low"

@@ -1,14 +1,14 @@
 """The bias instability of the curve: one quantity of every model, whatever its terms.
 
-B of flicker noise, of a Gauss-Markov process and of the first of two are different things, and
-which of them a log gets hangs on a choice that the log hardly makes. Their sum does not:
+B of flicker noise, of a Gauss-Markov process and of the first of two are different quantities, and
+the selection between them is poorly determined by a log. Their sum is better determined:
 
 - ``B_curve``: the largest Allan deviation of all flicker and Gauss-Markov terms together, over
   0.664; of a single one it is its B;
 - ``sigma_min``, ``tau_min``: the lowest point of the Allan deviation of the whole noise, which is
   what datasheets print, and its averaging time.
 
-Both are looked for up to a ninth of the log: beyond, no curve shows anything.
+Both are evaluated up to a ninth of the log; at longer tau the curve is too uncertain.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from imubench_pipeline.noise import FLOOR, PEAK_TAU, GaussMarkov, NoiseModel
 from imubench_pipeline.noise.terms import gauss_markov_shape
 from imubench_pipeline.typing import Array
 
-LONGEST = 1 / 9
-"""Part of the log up to which a curve is taken to be shown."""
+MAX_TAU_FRACTION = 1 / 9
+"""Maximum tau over the duration of the log."""
 
-_POINTS = 16
-"""Averaging times a decade at which the lowest point is looked for, before it is refined."""
+_POINTS_PER_DECADE = 16
+"""Averaging times per decade for the search of the lowest point, before interpolation."""
 
-_BETWEEN = 49
+_POINTS_BETWEEN_PEAKS = 49
 """Averaging times between the peaks of several processes."""
 
-_DRAWS = 16_000
-"""Draws of each model that are used where each takes many averaging times."""
+_MAX_DRAWS = 16_000
+"""Maximum number of draws of a model if each is evaluated at many averaging times."""
 
 _PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
@@ -65,8 +65,8 @@ class Models:
         return self.parameters[:, len(self.terms.linear) :]
 
     def fewer(self) -> Models:
-        """Return every n-th of them, some `_DRAWS`."""
-        every = max(1, len(self.parameters) // _DRAWS)
+        """Return every n-th of them, some `_MAX_DRAWS`."""
+        every = max(1, len(self.parameters) // _MAX_DRAWS)
         return replace(self, parameters=self.parameters[::every], times=self.times[::every])
 
     @property
@@ -108,7 +108,7 @@ def bias_of_curve(models: Models, longest: float) -> tuple[Array, Array]:
         tau = peaks
     else:
         ends = np.log(peaks.min(axis=1)), np.log(peaks.max(axis=1))
-        tau = np.exp(np.linspace(*ends, _BETWEEN, axis=1))
+        tau = np.exp(np.linspace(*ends, _POINTS_BETWEEN_PEAKS, axis=1))
     squared = flicker[:, None] ** 2 + np.zeros_like(tau)
     for B, T_B in zip(models.biases.T, models.times.T, strict=True):
         shape = gauss_markov_shape(tau / T_B[:, None], 1.0)
@@ -154,12 +154,12 @@ def lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.b
 
 
 def averaging_times(rate: float, duration: float) -> Array:
-    """Return where the lowest point of the curve of a log is looked for, s: up to `LONGEST`."""
-    first, last = 1.0 / rate, max(duration * LONGEST, 4.0 / rate)
-    return np.geomspace(first, last, 2 + math.ceil(math.log10(last / first) * _POINTS))
+    """Return the averaging times for the search of the lowest point, s, up to `MAX_TAU_FRACTION`."""
+    first, last = 1.0 / rate, max(duration * MAX_TAU_FRACTION, 4.0 / rate)
+    return np.geomspace(first, last, 2 + math.ceil(math.log10(last / first) * _POINTS_PER_DECADE))
 
 
-def with_curve(
+def add_curve_figures(
     estimate: Estimate,
     alike: Sequence[Candidate],
     wider: Sequence[Candidate],
@@ -185,21 +185,23 @@ def with_curve(
     """
     chosen = alike[0]
     model = models_of(estimate.model)
-    drawn = [_drawn(candidate, draws) for candidate in alike]
+    drawn = [_select_draws(candidate, draws) for candidate in alike]
     if not any(chosen.terms.biases):
         having = [c for c in alike if as_good(c, chosen) and any(c.terms.biases)]
         every = [c for c in wider if any(c.terms.biases)] + having
-        bias = _weak_bias([_drawn(c, draws) for c in every], bool(having), float(tau[-1]))
+        bias = _describe_weak_bias(
+            [_select_draws(c, draws) for c in every], bool(having), float(tau[-1])
+        )
     else:
-        bias = _bias(model, drawn, float(tau[-1]))
+        bias = _estimate_bias(model, drawn, float(tau[-1]))
         bias = unless_at_bound(bias, estimate)
     return replace(estimate, curve={"B_curve": bias} | lowest_parameters(model, drawn, tau))
 
 
-def _bias(model: Models, drawn: Sequence[Models], longest: float) -> Parameter:
+def _estimate_bias(model: Models, drawn: Sequence[Models], longest: float) -> Parameter:
     parts = [(bias_of_curve(each, longest)[0], each.weight) for each in drawn if each.has_bias]
     value, at = (float(of_one[0]) for of_one in bias_of_curve(model, longest))
-    lower, upper = _limits(parts, value)
+    lower, upper = _compute_limits(parts, value)
     if value == 0.0:
         return Parameter(None, "absent", "the data do not ask for it", 0.0, upper)
     reason = None
@@ -230,7 +232,7 @@ def unless_at_bound(bias: Parameter, estimate: Estimate) -> Parameter:
     return replace(bias, value=None, status="not_identified", reason=reason, fitted=bias.in_model)
 
 
-def _weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parameter:
+def _describe_weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parameter:
     """Return what is said where the chosen model has no bias instability."""
     if not drawn:
         return Parameter(None, "absent", "the data do not ask for it")
@@ -267,7 +269,7 @@ def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dic
         sizes = [models.weight for models in drawn]
         lows = list(zip([point[0] for point in drawn_points], sizes, strict=True))
         times = list(zip([point[1] for point in drawn_points], sizes, strict=True))
-        limits = [_limits(lows, float(sigma)), _limits(times, float(time))]
+        limits = [_compute_limits(lows, float(sigma)), _compute_limits(times, float(time))]
     if not inside:
         falls = time > tau[0]
         reason = (
@@ -281,11 +283,11 @@ def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dic
         }
     return {
         "sigma_min": Parameter(float(sigma), "ok", None, *limits[0]),
-        "tau_min": _time_of_lowest(float(time), limits[1], drawn_points, drawn),
+        "tau_min": _estimate_lowest_time(float(time), limits[1], drawn_points, drawn),
     }
 
 
-def _time_of_lowest(
+def _estimate_lowest_time(
     value: float,
     limits: tuple[float | None, float | None],
     points: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
@@ -302,13 +304,13 @@ def _time_of_lowest(
     return Parameter(value, "ok", None, *limits)
 
 
-def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
+def _compute_limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; those of the first lie inside."""
     lower, upper = mixture_limits(parts, [(parts[0][0], 1.0)])
     return min(lower, value), max(upper, value)
 
 
-def _drawn(candidate: Candidate, draws: Mapping[Terms, Posterior]) -> Models:
+def _select_draws(candidate: Candidate, draws: Mapping[Terms, Posterior]) -> Models:
     posterior, terms = draws[candidate.terms], candidate.terms
     models = Models(terms, posterior.parameters, posterior.times, candidate.weight)
     # Of several processes the highest point is looked for at many tau.

@@ -25,10 +25,10 @@ from imubench_pipeline.estimators.whittle import model_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.spectral_degrees import Degrees, degrees_of_model
 
-_FEW_CLUSTERS = 100
+_MIN_CLUSTERS = 100
 
-_BEYOND_BAND = 1.0
-"""Tau times the end of the band below which the curve shows what was not fitted."""
+_MIN_TAU_TIMES_BAND = 1.0
+"""Tau times the highest fitted frequency; below it the curve contains noise that was not fitted."""
 
 
 def with_fitted_limits(
@@ -64,16 +64,16 @@ def with_fitted_limits(
     degrees = degrees_at(model, np.ones(len(curve.tau), dtype=np.bool_))
     upper = degrees.upper
     walking = _with_more_walk(model, likelihood)
-    few = curve.cluster_size * _FEW_CLUSTERS > curve.samples
+    few = curve.cluster_size * _MIN_CLUSTERS > curve.samples
     if walking is not None and few.any():
         upper[few] = np.minimum(upper[few], degrees_at(walking, few).upper)
     doubtful = np.full(len(curve.tau), chosen.goodness.verdict != "explained")
     if likelihood.band.highest < 0.5 * rate * (1.0 - 1e-9):
-        doubtful |= curve.tau * likelihood.band.highest < _BEYOND_BAND
+        doubtful |= curve.tau * likelihood.band.highest < _MIN_TAU_TIMES_BAND
     filtered = likelihood.low_pass
     if filtered is not None and filtered.behind is not None:
         # The model has the noise before the sensor's low-pass.
-        doubtful |= curve.tau * (filtered.frequency.in_model or np.inf) < _BEYOND_BAND
+        doubtful |= curve.tau * (filtered.frequency.in_model or np.inf) < _MIN_TAU_TIMES_BAND
     fitted = ~doubtful | (degrees.edf < curve.edf)
     return replace(
         curve,

@@ -1,4 +1,4 @@
-"""What every estimator gives: parameters with their status, and the model they make."""
+"""Result of every estimator: parameters with their status, and the noise model of them."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ PARAMETERS = ("N", "B", "T_B", "K")
 """The parameters of the papers' model."""
 
 FAMILY = ("Q", "N", "B", "T_B", "K", "R")
-"""Those of the whole family of terms; lines have an amplitude and a frequency."""
+"""The parameters of all terms; lines have an amplitude and a frequency in addition."""
 
 CURVE = ("B_curve", "sigma_min", "tau_min")
-"""Figures of the curve, which every model has: see `imubench_pipeline.estimators.curve_bias`."""
+"""Figures of the Allan deviation of any model (`imubench_pipeline.estimators.curve_bias`)."""
 
 SENSOR = "N_sensor"
-"""Density of the white noise before a low-pass or an interpolation that the spectrum shows, and
-before folding. N is the density in the log; N_sensor never replaces it."""
+"""Density of the white noise before a low-pass filter or interpolation found in the spectrum, and
+before aliasing. N is the density in the log; N_sensor never replaces it."""
 
 SHOWN = ("Q", "N", SENSOR, "B_curve", "sigma_min", "tau_min", "B", "T_B", "K", "R")
-"""The order in which parameters are shown."""
+"""Display order of the parameters."""
 
 COMPARED = ("N", "B_curve", "sigma_min", "K")
-"""What is the same quantity of all models, and compared between sensors."""
+"""Parameters that are the same quantity in all models, and are compared between sensors."""
 
 MAX_LIMIT_RATIO = 4.0
-"""Upper over lower 95 % limit of a value, beyond which only its interval is given."""
+"""Upper over lower 95 % limit of a value, above which only its interval is given."""
 
-_A_DECADE = 10.0
-"""Ratio of the limits of a parameter without a value, beyond which the lower one is 0."""
+_MAX_OPEN_RATIO = 10.0
+"""Ratio of the limits of a parameter without a value, above which the lower one is set to 0."""
 
 BROADBAND_TIME = 1.0
 """Correlation time below which a Gauss-Markov process is broadband noise, no bias instability, s.
@@ -103,7 +103,9 @@ class Parameter:
             where = "the 95 % interval contains 0" if signs < 0 else "the lower 95 % limit is 0"
         reason = f"{where}; only the interval is given"
         # The prior, and not the data, decides how far down such draws reach.
-        lower = 0.0 if signs > 0 and self.lower > 0.0 and far > _A_DECADE * near else self.lower
+        lower = (
+            0.0 if signs > 0 and self.lower > 0.0 and far > _MAX_OPEN_RATIO * near else self.lower
+        )
         return replace(
             self,
             value=None,

@@ -1,4 +1,4 @@
-"""How well a model explains a spectrum: do the standardised residuals look like it says."""
+"""Goodness-of-fit tests of a model, on the standardised residuals of a spectrum."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from scipy.special import erfc, polygamma, psi
 
 from imubench_pipeline.typing import Array
 
-DOUBT = 1e-3
-"""Chance below which a fit is called poor."""
+MIN_FIT_CHANCE = 1e-3
+"""Probability below which a fit is rejected."""
 
 
 @dataclass(frozen=True)
 class Goodness:
-    """How well a model explains a spectrum."""
+    """Result of the goodness-of-fit tests of a model."""
 
     deviance: float  # mean deviance of a bin; about 1.0 where the model is right
     chance: float
@@ -26,7 +26,7 @@ class Goodness:
 
 
 def goodness(nu: Array, data: Array, density: Array, frequency: Array, parameters: int) -> Goodness:
-    """Judge the standardised residuals of a binned spectrum, its columns of shape (b,).
+    """Test the standardised residuals of a binned spectrum, its columns of shape (b,).
 
     Two tests, each at half the chance: the deviance sum nu (r - 1 - log r) with r = I / S, measured
     over fitted density, whose mean and variance are those of chi-squared variates; and the
@@ -47,21 +47,21 @@ def goodness(nu: Array, data: Array, density: Array, frequency: Array, parameter
     residual = residual - residual.mean()
     spread = max(float(residual @ residual), 1e-300)
     correlation = float(residual[1:] @ residual[:-1]) / spread * math.sqrt(bins)
-    chance = min(1.0, 2.0 * min(_upper(far), _upper(correlation)))
+    chance = min(1.0, 2.0 * min(_compute_upper_tail(far), _compute_upper_tail(correlation)))
     return Goodness(
         deviance=float(deviance.sum() / expected.sum() * bins / free),
         chance=chance,
-        verdict="explained" if chance >= DOUBT else "not explained",
-        where=_where(residual, frequency),
+        verdict="explained" if chance >= MIN_FIT_CHANCE else "not explained",
+        where=_describe_worst_band(residual, frequency),
     )
 
 
-def _upper(z: float) -> float:
+def _compute_upper_tail(z: float) -> float:
     return 0.5 * float(erfc(z / math.sqrt(2.0)))
 
 
-def _where(residual: Array, frequency: Array) -> str:
-    """Name the sixth of a decade in which the residuals go furthest to one side."""
+def _describe_worst_band(residual: Array, frequency: Array) -> str:
+    """Return a description of the sixth of a decade with the largest mean residual."""
     group = np.floor(np.log10(frequency) * 6.0)
     best, text = -1.0, ""
     for number in np.unique(group):

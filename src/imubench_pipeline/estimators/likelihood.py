@@ -1,6 +1,6 @@
-"""The DCT-Whittle likelihood of a log: the model that the data favour, and the papers' model.
+"""The DCT-Whittle likelihood of a log: estimates by the best model, and by the papers' model.
 
-It is as sure as the Cramér-Rao bound allows, to a few per cent, and says how sure it is.
+Their errors reach the Cramér-Rao bound within a few per cent, and have intervals.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.allan.phase import Span, gaps_of, spans_of
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
+from imubench_pipeline.estimators.curve_bias import add_curve_figures, averaging_times
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
 from imubench_pipeline.estimators.draws import compute_draw_weight, draw_jointly
@@ -60,16 +60,16 @@ from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_FLEXIBLE = Terms("NFK", 1)
-"""Model with which the cut-off is fitted where none explains the spectrum."""
+_FLEXIBLE_TERMS = Terms("NFK", 1)
+"""Model for the joint fit of the cut-off where no candidate explains the spectrum."""
 
-_FORGOTTEN = 1e-3
-_MOST_ROUNDS = 12
+_MAX_REMAINING_MEMORY = 1e-3
+_MAX_ROUNDS = 12
 
 
 @dataclass(frozen=True)
 class Likelihood:
-    """What the likelihood says of a channel.
+    """Result of the likelihood estimation for a channel.
 
     Attributes
     ----------
@@ -235,8 +235,8 @@ def fit_blocks(
 
 def _rounds(missing: float) -> int:
     """Return how often to fill and fit: what is left of the first error shrinks as missing^n."""
-    needed = math.log(_FORGOTTEN) / math.log(min(max(missing, 1e-6), 0.9))
-    return min(max(2, math.ceil(needed)), _MOST_ROUNDS)
+    needed = math.log(_MAX_REMAINING_MEMORY) / math.log(min(max(missing, 1e-6), 0.9))
+    return min(max(2, math.ceil(needed)), _MAX_ROUNDS)
 
 
 def _first_model(
@@ -372,7 +372,7 @@ class _InTheLog:
         estimate = describe(method, self._whittle, chosen, self.alike, self.draws, self._frame)
         estimate = with_upper_limits(estimate, self.alike, self.wider, self.draws)
         tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
-        estimate = with_curve(estimate, self.alike, self.wider, self.draws, tau)
+        estimate = add_curve_figures(estimate, self.alike, self.wider, self.draws, tau)
         N, counted = estimate.parameters["N"], self._fastest[: self._number]
         reason = N.reason or describe_white_level(self._stretch, counted.tolist())
         return replace(estimate, parameters={**estimate.parameters, "N": replace(N, reason=reason)})
@@ -435,7 +435,7 @@ def fit_models(
     if frame.low_pass is None:
         return first
     if not _explains(first):
-        flexible = [candidate for candidate in first[2] if candidate.terms == _FLEXIBLE]
+        flexible = [candidate for candidate in first[2] if candidate.terms == _FLEXIBLE_TERMS]
         first = fitted(frame.refine(spectrum, flexible))
     if _explains(first) and first[0].needs_cutoff_per_model(spectrum, first[2][0].maximum.times):
         first = fitted(first[0].refine(spectrum, select_joint_models(first[2], PAPERS_MODEL)))

@@ -1,7 +1,7 @@
 """N_sensor: the density of a sensor's white noise before its low-pass, or an interpolation.
 
-N is what the log shows, folds included. What stood before the filter is another quantity, of use to
-whoever compares sensors at other settings of their filters.
+N is the density in the log, aliases included. The density before the filter is another quantity,
+for comparisons of sensors at other settings of their filters.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Maximum
 from imubench_pipeline.typing import Array
 
-_AS_FAST = 10.0
-"""Sampling intervals: a process as fast may be the sensor's filter."""
+_MAX_FILTER_SAMPLES = 10.0
+"""Correlation, in samples, up to which a process may be the sensor's filter."""
 
-_SOME_FLOOR = 0.03
-"""White noise beside a low-pass, parts of the power of that behind it, from which it matters."""
+_MIN_FLOOR_RATIO = 0.03
+"""Power of unfiltered over filtered white noise above which the former matters."""
 
 
 def sensor_density(
@@ -37,9 +37,9 @@ def sensor_density(
     ----------
     frame : FitSelection
     maximum : Maximum
-        The best fit behind the filter of the frame.
+        The best fit with the filter of ``frame``.
     posterior : Posterior
-        Its draws, behind that filter.
+        Its draws, with that filter.
     spectrum : Spectrum
         The whole spectrum of the log.
     rng : numpy.random.Generator
@@ -57,9 +57,9 @@ def sensor_density(
     N, column = maximum.parameter("N"), terms.linear.index("N")
     if low_pass.or_process is not None and low_pass.N_behind is not None:
         drawn = posterior.parameters[:, column]
-        return _between(low_pass.or_process, drawn, low_pass.N_behind)
+        return _describe_interval(low_pass.or_process, drawn, low_pass.N_behind)
     if low_pass.behind is None:
-        fast = maximum.times < _AS_FAST / spectrum.rate
+        fast = maximum.times < _MAX_FILTER_SAMPLES / spectrum.rate
         if not fast.any():
             return None
         whole = frame.likelihood_of_all_bins(spectrum)
@@ -69,11 +69,11 @@ def sensor_density(
             f"a process with a correlation time of {maximum.times[fast].max():.3g} s, a few "
             "samples, may be the low-pass of the sensor; bandwidth in the sensor file would tell"
         )
-        return _between(reason, posterior.parameters[:, column], before)
+        return _describe_interval(reason, posterior.parameters[:, column], before)
     draws = frame.before_the_filter(posterior, terms, rng).parameters[:, column]
     lower, upper = np.quantile(draws, (0.025, 0.975)).tolist()
     lower, upper, share = min(lower, N), max(upper, N), low_pass.beside
-    if share < _SOME_FLOOR:
+    if share < _MIN_FLOOR_RATIO:
         return Parameter(N, lower=lower, upper=upper)
     times = math.sqrt(1.0 + share)
     reason = (
@@ -83,7 +83,7 @@ def sensor_density(
     return Parameter(N, "doubtful", reason, lower, upper * times)
 
 
-def _between(reason: str, drawn: Array, other: float) -> Parameter:
+def _describe_interval(reason: str, drawn: Array, other: float) -> Parameter:
     """Return that N_sensor lies between the limits of draws of N and another density, SI."""
     lower, upper = np.quantile(drawn, (0.025, 0.975)).tolist()
     return Parameter(None, "not_identified", reason, min(lower, other), max(upper, other))

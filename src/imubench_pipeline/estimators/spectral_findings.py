@@ -1,4 +1,4 @@
-"""What the spectrum of a channel tells of its quality: lines, a filter, slow noise taken off."""
+"""Findings on the spectrum of a channel: lines, a low-pass filter, missing slow noise."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
 _MIN_SINUSOID_RATIO = 0.5
-"""Part of what white noise integrates to in a second from which a sinusoid counts in budgets."""
+"""Integral of a sinusoid over that of white noise after 1 s, above which it is reported."""
 
 _MAX_SLOW_FREQUENCY = 0.05
-"""Part of the rate up to which slow noise is looked for that is missing."""
+"""Frequency over sampling rate up to which the test for missing slow noise extends."""
 
 _MIN_FLAT_RATIO = 0.95
-"""Part of N^2 that the fitted density has at least, before a low-pass takes from it."""
+"""Minimum fitted density over N^2, below the effect of a low-pass filter."""
 
 _MIN_ORDINATES = 4.0
-"""Ordinates that tell."""
+"""Minimum number of ordinates of the test."""
 
 _MAX_DENSITY_RATIO = 0.7
-"""Part of N^2 below which it matters."""
+"""Density over N^2 below which slow noise is missing."""
 
 _MAX_CHANCE = 1e-4
-"""Chance, of all sums of a channel together, below which it is none."""
+"""Maximum false-alarm probability over all sums of a channel."""
 
 _SPACING_RATIO = 1.4
-"""Ratio of the ordinates in one sum and in the next that is looked at."""
+"""Ratio of the numbers of ordinates in successive sums."""
 
 
 def spectral_findings(channel: str, frame: FitSelection, white: float | None) -> list[Finding]:
-    """Return what the spectrum of a channel shows: lines, and where its band ends.
+    """Return the findings on the spectrum of a channel: its lines, and the limit of its band.
 
     Parameters
     ----------
     channel : str
     frame : FitSelection
-        What of the spectrum was fitted.
+        The part of the spectrum that was fitted.
     white : float or None
-        N that the estimate of the channel has, SI; None: it has none.
+        N of the channel, SI; None if it is not known.
     """
     band = frame.band
     findings = line_findings(channel, frame.lines, white)
@@ -59,9 +59,8 @@ def spectral_findings(channel: str, frame: FitSelection, white: float | None) ->
 def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> list[Finding]:
     """Return a note on a channel with lines.
 
-    There is a warning where they are too many for a noise model to carry each on, and where one is
-    so strong beside N that it is a good part of an error budget: a sensor seldom makes such a line
-    itself.
+    A warning is added if there are too many lines for the noise model, and if a line contributes
+    much to an error budget, relative to N: the sensor itself seldom causes such a line.
     """
     group = [line for line in lines if line.kind != "alias"]
     if not group:
@@ -75,15 +74,17 @@ def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> l
         "noise there; they are left out of the likelihood"
     )
     findings = [Finding("lines", "note", detail, strongest.frequency, channel)]
-    strong = _strong(channel, sinusoids, white)
+    strong = _describe_strong_line(channel, sinusoids, white)
     findings += [strong] if strong else []
     if number > MAX_LINES:
         findings.append(describe_grouping(channel, quantity_of(channel), sinusoids))
     return findings
 
 
-def _strong(channel: str, sinusoids: Iterable[Line], white: float | None) -> Finding | None:
-    """Return a warning of the sinusoid that integrates to most in a second.
+def _describe_strong_line(
+    channel: str, sinusoids: Iterable[Line], white: float | None
+) -> Finding | None:
+    """Return a warning on the sinusoid with the largest integral over a second.
 
     Its integral A / (2 pi f) differs by A sin(pi f t) / (pi f sqrt(2)) rms after t; the sine is
     at most 1, or its argument.

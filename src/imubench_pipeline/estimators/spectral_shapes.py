@@ -1,4 +1,4 @@
-"""What the noise terms look like in a binned spectrum: their mean density in each bin.
+"""Mean densities of the noise terms in the bins of a spectrum.
 
 The low frequencies of a spectrum come from block means, whose spectrum is that of the samples
 folded: exact closed forms for white noise, quantization, random walk and Gauss-Markov process,
@@ -16,11 +16,11 @@ from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum
 from imubench_pipeline.noise.terms import driving_density
 from imubench_pipeline.typing import Array
 
-_POINTS = 6
-"""Frequencies at which a bin is sampled."""
+_POINTS_PER_BIN = 6
+"""Frequencies per bin at which a density is evaluated."""
 
-_SLOW = 1e-3
-"""Blocks shorter than this part of T_B see a Gauss-Markov process as a random walk."""
+_MAX_BLOCK_OVER_TIME = 1e-3
+"""Block duration over T_B below which a Gauss-Markov process looks like a random walk."""
 
 
 class Shapes:
@@ -30,7 +30,7 @@ class Shapes:
         self._interval = 1.0 / spectrum.rate
         self._block = m = spectrum.block.astype(np.float64)
         self._length = spectrum.length
-        inside = (np.arange(_POINTS)[:, None] + 0.5) / _POINTS
+        inside = (np.arange(_POINTS_PER_BIN)[:, None] + 0.5) / _POINTS_PER_BIN
         width = spectrum.upper - spectrum.lower
         # A bin of one ordinate is its frequency, not the surroundings.
         single = width < 0.75 / spectrum.length
@@ -97,7 +97,7 @@ class Shapes:
         shape = covariance_0 + covariance_1 * (2.0 * (self._cosine - P)) / spread
         # That cancels for T_B far longer than a block; then averaging acts as on a random walk.
         slow = -variance * np.expm1(-2.0 * m * h) / spread * self._averaged
-        shape = np.where(m * h < _SLOW, slow, shape)
+        shape = np.where(m * h < _MAX_BLOCK_OVER_TIME, slow, shape)
         shape = (shape * m * self._interval).mean(axis=0)
         i = self._single
         n = np.rint(self._length[i] / (m[i] * self._interval))

@@ -21,25 +21,25 @@ from imubench_pipeline.allan.phase import Span, spans_of, split
 from imubench_pipeline.typing import Array
 
 SINGLE = 64
-"""Lowest ordinates that stay single."""
+"""Number of lowest ordinates that are not binned."""
 
 WIDTH = 1.05
-"""Upper over lower frequency of a bin, beyond."""
+"""Upper over lower frequency of the other bins."""
 
-_WHOLE = 1 << 18
-"""Samples up to which the transform of the whole log is taken."""
+_MAX_WHOLE_SAMPLES = 1 << 18
+"""Maximum number of samples of a log that is transformed as a whole."""
 
-_LONGEST_SEGMENT = 1 << 15
-_SHORTEST_SEGMENT = 1 << 9
+_MAX_SEGMENT = 1 << 15
+_MIN_SEGMENT = 1 << 9
 _SEGMENT_OVER_BLOCK = 512
 _ENOUGH_SEGMENTS = 0.75
 BLOCK_BAND = 0.25
 """Highest frequency taken from block means, rad a block."""
 
-_AVERAGED = 8
-"""Segments that a spectrum for lines averages, at least."""
+_MIN_AVERAGED_SEGMENTS = 8
+"""Minimum number of segments that a spectrum for lines averages."""
 
-_SHORTEST_LINES = 256
+_MIN_LINE_SEGMENT = 256
 
 
 @dataclass(frozen=True)
@@ -250,10 +250,10 @@ class _Sums:
 def _resolution(lengths: NDArray[np.int64]) -> tuple[int, int]:
     """Return samples in a segment of high frequencies and in a block of low ones."""
     total = int(lengths.sum())
-    if total <= _WHOLE:
-        return _LONGEST_SEGMENT, 1
-    segment = _LONGEST_SEGMENT
-    while segment > _SHORTEST_SEGMENT:
+    if total <= _MAX_WHOLE_SAMPLES:
+        return _MAX_SEGMENT, 1
+    segment = _MAX_SEGMENT
+    while segment > _MIN_SEGMENT:
         covered = int((lengths // segment).sum()) * segment
         # A million samples and more lose little at their end; fewer take shorter segments.
         if covered >= (1.0 - 1.0 / 32.0 if len(lengths) == 1 else _ENOUGH_SEGMENTS) * total:
@@ -346,10 +346,10 @@ def _high_bins(
 def _lines_of_means(series: Sequence[Array], interval: float, block: int) -> LineSpectrum | None:
     """Return the spectrum for lines of block means, or None where there are too few."""
     total = sum(len(values) for values in series)
-    points = min(_LONGEST_SEGMENT, 1 << max(0, int(math.log2(max(total / _AVERAGED, 1)))))
-    while points >= _SHORTEST_LINES:
+    points = min(_MAX_SEGMENT, 1 << max(0, int(math.log2(max(total / _MIN_AVERAGED_SEGMENTS, 1)))))
+    while points >= _MIN_LINE_SEGMENT:
         number = sum(len(values) // points for values in series)
-        if number >= _AVERAGED // 2:
+        if number >= _MIN_AVERAGED_SEGMENTS // 2:
             break
         points //= 2
     else:

@@ -1,7 +1,7 @@
-"""The correlation times that fit a spectrum best.
+"""Search for the correlation times that fit a spectrum best.
 
-One kernel is called some hundred times, from here: numba takes all that a kernel calls into it, and
-would compile each level of the search for seconds when it is first used.
+The search calls one compiled kernel some hundred times. It is not compiled itself: numba inlines
+all that a kernel calls, and would compile each level of the search for seconds at first use.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from imubench_pipeline.typing import Array
 
 _SCAN_STEP = 4
 _PAIR_STEP = 12
-_CLOSEST_PAIR = 2.5
-"""Least ratio of two correlation times that are told apart."""
+_MIN_TIME_RATIO = 2.5
+"""Minimum ratio of two correlation times of one model."""
 
 _SCAN_TOLERANCE = 1e-2
-"""Of the cost, where correlation times are compared only."""
+"""Tolerance of the cost when correlation times are only compared."""
 
 _POLISH_TOLERANCE = 1e-6
-_CLOSE_ENOUGH = 5e-4
-"""Of the logarithm of a correlation time."""
+_LOG_TIME_TOLERANCE = 5e-4
+"""Tolerance of the logarithm of a correlation time."""
 
-_MOST_TURNS = 8
+_MAX_TURNS = 8
 
 
 def _polish(
@@ -40,7 +40,7 @@ def _polish(
         return cost_at(tried, problem, _POLISH_TOLERANCE)
 
     best = minimize_scalar(
-        cost, bounds=(low, high), method="bounded", options={"xatol": _CLOSE_ENOUGH}
+        cost, bounds=(low, high), method="bounded", options={"xatol": _LOG_TIME_TOLERANCE}
     )
     return float(best.x), float(best.fun)
 
@@ -82,14 +82,14 @@ def two_processes(problem: Problem) -> Array:
     """
     begun = [_descend(pair, cost, problem, turns=1) for pair, cost in _pairs(problem)]
     pair, cost = min(begun, key=lambda one: one[1])
-    return _descend(pair, cost, problem, turns=_MOST_TURNS)[0]
+    return _descend(pair, cost, problem, turns=_MAX_TURNS)[0]
 
 
 def _pairs(problem: Problem) -> Iterator[tuple[Array, float]]:
     """Yield pairs of correlation times to begin with, and their costs."""
     first, step, logarithms = problem.table
     last = first + step * (logarithms.shape[0] - 1)
-    apart = np.log(_CLOSEST_PAIR)
+    apart = np.log(_MIN_TIME_RATIO)
     lowest = np.inf
     pair = np.array([first, last])
     places = np.empty(2)
@@ -118,7 +118,7 @@ def _descend(pair: Array, lowest: float, problem: Problem, *, turns: int) -> tup
     """Polish each of two correlation times in turn."""
     first, step, logarithms = problem.table
     last = first + step * (logarithms.shape[0] - 1)
-    apart = np.log(_CLOSEST_PAIR)
+    apart = np.log(_MIN_TIME_RATIO)
     best = pair.copy()
     reach = _PAIR_STEP * step
     for _ in range(turns):

@@ -36,16 +36,16 @@ from imubench_pipeline.estimators.thermal.register import (
 from imubench_pipeline.typing import Array
 
 DRAWN_PATHS = 24
-"""Paths drawn from the distribution of what the register leaves open."""
+"""Number of paths drawn from the distribution of the temperature, given the register."""
 
-_SCAN = range(-14, 5, 2)
-_NOISES = (0.01, 0.1, 0.4)
-_QUIETEST = 1e-4
-_MOST_TRIES = 40
-_NEVER = 1e300
+_LOG_DENSITY_GRID = range(-14, 5, 2)
+_NOISE_GRID = (0.01, 0.1, 0.4)
+_MIN_NOISE = 1e-4
+_MAX_ITERATIONS = 40
+_IMPOSSIBLE_COST = 1e300
 _FLOOR = 1e-3
-_COARSE = 0.25
-"""Noise over step below which a reading bounds the temperature."""
+_MAX_BOUNDING_NOISE = 0.25
+"""Ratio of noise and step below which a reading bounds the temperature."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def temperature_path(
         draws[:, part] = draw_paths(evidence.steps(part), q, spread, precision, shift, normals)
         draws[:, part] += evidence.dwelling(part, q, noise, variance[part], rng)
     value, draws = value + level, draws + level
-    if noise < _COARSE * read.step:
+    if noise < _MAX_BOUNDING_NOISE * read.step:
         inside = read.high == read.low
         half = 0.5 * read.step
         value[inside] = np.clip(value, read.mean - half, read.mean + half)[inside]
@@ -281,8 +281,8 @@ class _Evidence:
         read = self._read
         present = read.mean[read.count > 0]
         rough = float(np.median(np.abs(np.diff(present)))) if len(present) > 1 else 0.0
-        least = _QUIETEST * self._spread
-        noises = {max(part * read.step, least) for part in _NOISES} | {max(rough, least)}
+        least = _MIN_NOISE * self._spread
+        noises = {max(part * read.step, least) for part in _NOISE_GRID} | {max(rough, least)}
         moving = [part for part in read.pieces if not self.stays_in_a_cell(part)]
         # A level is anywhere in the spread of all of them.
         level_pieces = len(read.pieces) - len(moving)
@@ -291,18 +291,20 @@ class _Evidence:
         def cost(at: Array) -> float:
             q, noise = self._spread**2 * 10.0 ** float(at[0]), 10.0 ** float(at[1])
             if not (-16.0 < at[0] < 6.0 and 0.99 * least < noise < 10.0 * self._spread):
-                return _NEVER
+                return _IMPOSSIBLE_COST
             evidence = sum(self.part(part, q, noise)[2] for part in moving)
-            return min(-(evidence + constant), _NEVER)
+            return min(-(evidence + constant), _IMPOSSIBLE_COST)
 
-        starts = [np.array([k, math.log10(noise)]) for k in _SCAN for noise in sorted(noises)]
+        starts = [
+            np.array([k, math.log10(noise)]) for k in _LOG_DENSITY_GRID for noise in sorted(noises)
+        ]
         first = min(starts, key=cost)
         minimum = minimize(
             cost,
             first,
             method="Nelder-Mead",
             options={
-                "maxfev": _MOST_TRIES,
+                "maxfev": _MAX_ITERATIONS,
                 "initial_simplex": np.array([first, first, first])
                 + np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 0.3]]),
                 "xatol": 0.05,
