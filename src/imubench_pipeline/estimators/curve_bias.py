@@ -154,7 +154,7 @@ def lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.b
 
 
 def averaging_times(rate: float, duration: float) -> Array:
-    """Return the averaging times for the search of the lowest point, s, up to `MAX_TAU_FRACTION`."""
+    """Return averaging times, s, for the search of the lowest point, up to `MAX_TAU_FRACTION`."""
     first, last = 1.0 / rate, max(duration * MAX_TAU_FRACTION, 4.0 / rate)
     return np.geomspace(first, last, 2 + math.ceil(math.log10(last / first) * _POINTS_PER_DECADE))
 
