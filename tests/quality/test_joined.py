@@ -10,11 +10,11 @@ from imubench_pipeline.recordings.quality.joined import interleaved
 from imubench_pipeline.recordings.quality.levels import quantisation
 from imubench_pipeline.recordings.quality.register import hidden_step
 from imubench_pipeline.recordings.quality.summary import (
-    MOST,
-    PIECE,
+    MAX_PIECES,
+    PIECE_SIZE,
     ColumnSummary,
     Excerpts,
-    together,
+    common_samples,
 )
 from tests.conftest import few
 from tests.quality.real import Log, adis16405, findings, warnings
@@ -132,13 +132,13 @@ def pieces(log: np.ndarray):
     return kept.pieces()
 
 
-@pytest.mark.parametrize("samples", [10, PIECE, 5 * PIECE + 7, 200 * PIECE + 1])
+@pytest.mark.parametrize("samples", [10, PIECE_SIZE, 5 * PIECE_SIZE + 7, 200 * PIECE_SIZE + 1])
 def test_excerpts_are_evenly_over_the_log(samples: int) -> None:
     log = np.arange(float(samples))
     log[::10] = np.nan
     kept = pieces(log)
-    assert len(kept) <= MOST
-    assert [len(piece.values) for piece in kept[:-1]] == [PIECE] * (len(kept) - 1)
+    assert len(kept) <= MAX_PIECES
+    assert [len(piece.values) for piece in kept[:-1]] == [PIECE_SIZE] * (len(kept) - 1)
     distances = np.diff([piece.first for piece in kept])
     assert len(set(distances.tolist())) <= 1 and kept[0].first == 0
     assert samples - kept[-1].first <= (distances[0] if len(distances) else samples)
@@ -147,7 +147,7 @@ def test_excerpts_are_evenly_over_the_log(samples: int) -> None:
             piece.values, log[piece.first : piece.first + len(piece.values)]
         )
     shifted = pieces(np.where(np.arange(samples) % 7 == 0, np.nan, log))
-    for one, other in together(kept, shifted):
+    for one, other in common_samples(kept, shifted):
         np.testing.assert_array_equal(one, other)
         assert np.isfinite(one).all()
 

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.recordings.quality.columns import _parts, repeats_beyond_chance
+from imubench_pipeline.recordings.quality.columns import (
+    _expect_rounded_changes,
+    repeats_beyond_chance,
+)
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 
 
@@ -20,7 +23,7 @@ def test_equal_neighbours_and_single_steps_of_rounded_noise(
 ) -> None:
     place = rng.uniform(size=400_000)
     change = np.round(place + deviation * rng.standard_normal(400_000)) - np.round(place)
-    equal, single = _parts(deviation)
+    equal, single = _expect_rounded_changes(deviation)
     assert np.mean(change == 0) == pytest.approx(equal, abs=5e-3)
     assert np.mean(np.abs(change[change != 0]) == 1) == pytest.approx(single, abs=5e-3)
 

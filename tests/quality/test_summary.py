@@ -5,7 +5,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from imubench_pipeline.recordings.quality import summary
-from imubench_pipeline.recordings.quality.summary import FIRST_SIZE, LARGEST, ColumnSummary
+from imubench_pipeline.recordings.quality.summary import (
+    MAX_MEASUREMENT,
+    MIN_BLOCK_SIZE,
+    ColumnSummary,
+)
 
 VALUES = st.sampled_from([-1.0, 0.0, 0.5, 2.0, np.nan, np.inf, -np.inf, 1e300, -1e76])
 
@@ -14,7 +18,7 @@ VALUES = st.sampled_from([-1.0, 0.0, 0.5, 2.0, np.nan, np.inf, -np.inf, 1e300, -
 def test_counts_are_those_of_the_whole_column(log: np.ndarray, pieces: int) -> None:
     column = ColumnSummary()
     back = [column.add(piece) for piece in np.array_split(log, pieces)]
-    beyond = np.abs(log) > LARGEST
+    beyond = np.abs(log) > MAX_MEASUREMENT
     finite = log[~np.isnan(log) & ~beyond]
     np.testing.assert_array_equal(np.concatenate(back), np.where(beyond, np.nan, log))
     assert column.present == len(finite)
@@ -45,15 +49,15 @@ def test_blocks_are_those_of_the_records(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch, many: int, size: int
 ) -> None:
     """However many there are: then blocks are made of several."""
-    monkeypatch.setattr(summary, "_MANY", many)
-    log = 9.81 + 1e-6 * rng.standard_normal(10 * FIRST_SIZE + 17)
+    monkeypatch.setattr(summary, "_MAX_BLOCKS", many)
+    log = 9.81 + 1e-6 * rng.standard_normal(10 * MIN_BLOCK_SIZE + 17)
     log[rng.random(len(log)) < 0.2] = np.nan
-    log[3 * FIRST_SIZE : 4 * FIRST_SIZE] = np.nan
+    log[3 * MIN_BLOCK_SIZE : 4 * MIN_BLOCK_SIZE] = np.nan
     column = ColumnSummary()
     for piece in np.array_split(log, 13):
         column.add(piece)
     blocks = column.blocks()
-    assert blocks.size == size * FIRST_SIZE
+    assert blocks.size == size * MIN_BLOCK_SIZE
     assert len(blocks.mean) == -(-len(log) // blocks.size) <= max(2 * many, 2)
     for k in range(len(blocks.mean)):
         part = log[k * blocks.size : (k + 1) * blocks.size]

@@ -1,4 +1,4 @@
-"""Samples that repeat the one before at a regular distance: every third, every hundredth."""
+"""Find samples that repeat their predecessor periodically: every third, every hundredth."""
 
 from __future__ import annotations
 
@@ -9,41 +9,43 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.summary import PIECE, ColumnSummary, Excerpt
+from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding
 
-_LONGEST = 256
-"""Records between two repeats, at most."""
+_MAX_PERIOD = 256
+"""Longest period of repeats that is tested, records."""
 
-_PIECES = 8
-"""Pieces that are looked at: they are looked at for every distance."""
+_MAX_PIECES = 8
+"""Pieces that are tested; each is tested for every period."""
 
-_ALWAYS = 0.98
-"""Share of the samples of a phase that repeat; of all others not one phase may reach `_OTHERS`."""
-_OTHERS = 0.9
+_MIN_REPEATS_OF_PHASE = 0.98
+"""Least share of repeats in the fullest phase of a period."""
 
-_SURE = -12.0
-"""Decimal logarithm of the chance of so many repeats, below which they are none."""
+_MAX_REPEATS_OF_OTHERS = 0.9
+"""Largest share of repeats in any other phase."""
+
+_MAX_LOG10_CHANCE = -12.0
+"""Largest decimal logarithm of the probability that the repeats are random."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """Samples that repeat at a regular distance."""
+    """Samples that repeat periodically."""
 
     every: int
-    """Records from one to the next."""
+    """Period, records."""
     share: float
-    """Part of the other samples that repeat."""
+    """Share of repeats among the other samples."""
 
 
 def regular_repeats(pieces: list[Excerpt]) -> Held | None:
-    """Return at which distance samples repeat the one before; None where by chance alone."""
-    whole = [piece.values for piece in pieces if len(piece.values) >= PIECE // 4]
-    whole = whole[:: max(1, len(whole) // _PIECES)][:_PIECES]
+    """Return the period at which samples repeat their predecessor; None if there is none."""
+    whole = [piece.values for piece in pieces if len(piece.values) >= PIECE_SIZE // 4]
+    whole = whole[:: max(1, len(whole) // _MAX_PIECES)][:_MAX_PIECES]
     regular: list[Held] = []
     for values in whole:
         repeats = np.flatnonzero(values[1:] == values[:-1])
-        of_piece = _regular(repeats, len(values) - 1)
+        of_piece = _find_period(repeats, len(values) - 1)
         if of_piece is not None:
             regular.append(of_piece)
     if not regular or 2 * len(regular) <= len(whole):
@@ -52,16 +54,20 @@ def regular_repeats(pieces: list[Excerpt]) -> Held | None:
     return Held(every, float(np.median([of_piece.share for of_piece in regular])))
 
 
-def _regular(repeats: NDArray[np.int64], records: int) -> Held | None:
-    counts = np.zeros((_LONGEST + 1, 2), dtype=np.int64)
-    _fold(repeats, counts)
-    every = np.arange(3, _LONGEST + 1)
+def _find_period(repeats: NDArray[np.int64], records: int) -> Held | None:
+    counts = np.zeros((_MAX_PERIOD + 1, 2), dtype=np.int64)
+    _count_phases(repeats, counts)
+    every = np.arange(3, _MAX_PERIOD + 1)
     turns = records // every
     most, second = counts[3:].T
     share = (len(repeats) - most) / (records - turns)
-    # All phases of all distances could have been the one.
-    chance = most * np.log10(share + 1.0 / records) + np.log10(every * _LONGEST)
-    regular = (most >= _ALWAYS * turns) & (second <= _OTHERS * turns) & (chance < _SURE)
+    # Corrected for the number of phases and periods that are tested.
+    chance = most * np.log10(share + 1.0 / records) + np.log10(every * _MAX_PERIOD)
+    regular = (
+        (most >= _MIN_REPEATS_OF_PHASE * turns)
+        & (second <= _MAX_REPEATS_OF_OTHERS * turns)
+        & (chance < _MAX_LOG10_CHANCE)
+    )
     if not regular.any():
         return None
     first = int(np.argmax(regular))
@@ -69,8 +75,8 @@ def _regular(repeats: NDArray[np.int64], records: int) -> Held | None:
 
 
 @njit(cache=True, nogil=True)
-def _fold(repeats: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
-    """Count the repeats in the fullest phase, and in the next, of each distance."""
+def _count_phases(repeats: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
+    """Count the repeats in the fullest and the second fullest phase of each period."""
     phases = np.zeros(counts.shape[0], dtype=np.int64)
     for every in range(3, counts.shape[0]):
         phases[:every] = 0
@@ -86,8 +92,8 @@ def _fold(repeats: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
 
 
 def held_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
-    """Yield whether every n-th sample of a channel repeats the one before."""
-    if column.repeats < column.present / (2 * _LONGEST):
+    """Yield a finding if every n-th sample of a channel repeats its predecessor."""
+    if column.repeats < column.present / (2 * _MAX_PERIOD):
         return
     regular = regular_repeats(column.excerpts())
     if regular is None:

@@ -1,8 +1,8 @@
-"""Logs of two sensors in one: halves of different sensors, or samples of two in turn.
+"""Find logs of two sensors in one: one after the other, or with alternating samples.
 
-Level, noise and register are three witnesses. A sensor that is moved changes its level, one that is
-shaken its noise; a place where two of the three change at once is where another sensor begins, or
-another range of the same one.
+Level, noise and register step are compared. Motion changes the level, and vibration the noise.
+Where two of the three change at once, the data of another sensor begin, or of another range of the
+same sensor.
 """
 
 from __future__ import annotations
@@ -14,65 +14,73 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.quality.register import hidden_step
-from imubench_pipeline.recordings.quality.summary import PIECE, ColumnSummary, Excerpt
+from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-_SURE = 8.0
-"""Standard deviations of a change that count."""
+_CHANGE_SIGMAS = 8.0
+"""Least change of level or noise, in standard deviations."""
 
-_NOISE = math.log(1.2)
-"""Change of the noise that counts: a real log has one of 1.12 with a small step of its level."""
+_MIN_LOG_NOISE_CHANGE = math.log(1.2)
+"""Least change of the log of the noise: one log of one sensor has a ratio of 1.12 with a small step
+of its level."""
 
-_ALTERNATING = math.log(1.05)
-"""That of noise that alternates, which nothing but a line at a quarter of the rate does."""
+_MIN_LOG_NOISE_ALTERNATION = math.log(1.05)
+"""Least log ratio of alternating noise; only a spectral line at a quarter of the rate makes the
+noise of one sensor alternate."""
 
-_NEAR, _FAR = 8, 64
-"""Blocks on either side whose noise is compared."""
+_MIN_NOISE_WIDTH, _MAX_NOISE_WIDTH = 8, 64
+"""Range of the number of blocks on either side whose noise is compared."""
 
-_LEVEL = 4
-"""Blocks on either side whose mean is compared."""
+_LEVEL_WIDTH = 4
+"""Number of blocks on either side whose mean is compared."""
 
-_STEP = 1.2
-"""Ratio of two steps that are of different registers."""
+_MIN_STEP_RATIO = 1.2
+"""Least ratio of the steps of two different registers."""
 
-_APART = 5.0
-"""Standard deviations of the noise by which two sensors in turn differ if only their levels do."""
+_MIN_LEVEL_ALTERNATION = 5.0
+"""Least difference of alternating levels, in standard deviations of the noise, if nothing else
+alternates."""
 
-_PART = 128
-"""Pairs of samples of a part."""
+_PAIRS_PER_PART = 128
+"""Pairs of samples in a part."""
 
-_MEDIAN = 1.2533
-"""Standard deviation of a median over that of a mean."""
+_MEDIAN_SD_OVER_MEAN_SD = 1.2533
+"""Standard deviation of a median over the standard deviation of a mean, for normal noise."""
 
-_MAD = 1.4826
+_SD_OVER_MAD = 1.4826
+"""Standard deviation over the median absolute deviation, of normal noise."""
 
 
 def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
-    """Yield where the samples of another sensor seem to begin.
+    """Yield a finding if the data of another sensor seem to begin in the log.
 
     ``rate``: Hz.
     """
     blocks = column.blocks()
     filled = np.flatnonzero(blocks.spread > 0.0)
-    if len(filled) < 4 * _NEAR:
+    if len(filled) < 4 * _MIN_NOISE_WIDTH:
         return
     mean, logs = blocks.mean[filled], np.log(blocks.spread[filled])
-    level, noise = _level_changes(mean), _noise_changes(logs)
+    level, noise = _scale_level_changes(mean), _scale_noise_changes(logs)
     for place in dict.fromkeys(int(np.argmax(np.abs(series))) for series in (noise, level)):
         near = slice(max(0, place - 2), place + 3)
-        if np.abs(level[near]).max() > _SURE:
-            around = np.arange(max(1, place - _LEVEL), min(len(mean) - 1, place + _LEVEL + 1))
+        if np.abs(level[near]).max() > _CHANGE_SIGMAS:
+            around = np.arange(
+                max(1, place - _LEVEL_WIDTH), min(len(mean) - 1, place + _LEVEL_WIDTH + 1)
+            )
             place = int(around[np.argmax(np.abs(mean[around + 1] - mean[around - 1]))])
         record = int(filled[place]) * blocks.size + blocks.size // 2
         changes = {
-            "level": bool(np.abs(level[near]).max() > _SURE),
-            "noise": bool(np.abs(noise[near]).max() > _SURE)
-            and _stays(logs, place)
-            and abs(np.median(logs[place:]) - np.median(logs[:place])) > _NOISE,
+            "level": bool(np.abs(level[near]).max() > _CHANGE_SIGMAS),
+            "noise": bool(np.abs(noise[near]).max() > _CHANGE_SIGMAS)
+            and _is_lasting(logs, place)
+            and abs(np.median(logs[place:]) - np.median(logs[:place])) > _MIN_LOG_NOISE_CHANGE,
         }
         if any(changes.values()):
-            changes["steps"] = _differ(*_registers(column.excerpts(), record, 3 * blocks.size))
+            changes["steps"] = _has_different_steps(
+                *_find_registers(column.excerpts(), record, 3 * blocks.size)
+            )
         changed = [name for name, differs in changes.items() if differs]
         if len(changed) < 2:
             continue
@@ -87,23 +95,23 @@ def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding
         return
 
 
-def _level_changes(mean: Array) -> Array:
+def _scale_level_changes(mean: Array) -> Array:
     """Return the change of the level at each block, in standard deviations of such changes."""
     changes = np.zeros(len(mean))
     sums = np.concatenate(([0.0], np.cumsum(mean - mean[0])))
-    inner = np.arange(_LEVEL, len(mean) - _LEVEL)
-    # Without the block in which it may be.
-    after = sums[inner + _LEVEL + 1] - sums[inner + 1]
-    before = sums[inner] - sums[inner - _LEVEL]
-    changes[inner] = (after - before) / _LEVEL
-    scale = _MAD * float(np.median(np.abs(changes[inner] - np.median(changes[inner]))))
+    inner = np.arange(_LEVEL_WIDTH, len(mean) - _LEVEL_WIDTH)
+    # The block with the change itself is left out.
+    after = sums[inner + _LEVEL_WIDTH + 1] - sums[inner + 1]
+    before = sums[inner] - sums[inner - _LEVEL_WIDTH]
+    changes[inner] = (after - before) / _LEVEL_WIDTH
+    scale = _SD_OVER_MAD * float(np.median(np.abs(changes[inner] - np.median(changes[inner]))))
     return changes / scale if scale > 0.0 else np.zeros(len(mean))
 
 
-def _noise_changes(logs: Array) -> Array:
+def _scale_noise_changes(logs: Array) -> Array:
     """Return the change of the noise at each block, in standard deviations of such changes."""
-    width = min(max(len(logs) // 16, _NEAR), _FAR)
-    scatter = _MAD * float(np.median(np.abs(np.diff(logs)))) / math.sqrt(2.0)
+    width = min(max(len(logs) // 16, _MIN_NOISE_WIDTH), _MAX_NOISE_WIDTH)
+    scatter = _SD_OVER_MAD * float(np.median(np.abs(np.diff(logs)))) / math.sqrt(2.0)
     changes = np.zeros(len(logs))
     if scatter == 0.0 or len(logs) < 3 * width:
         return changes
@@ -115,10 +123,10 @@ def _noise_changes(logs: Array) -> Array:
     return changes
 
 
-def _stays(logs: Array, place: int) -> bool:
-    """Tell whether all that is after a place is unlike all that is before it."""
+def _is_lasting(logs: Array, place: int) -> bool:
+    """Return whether the noise differs over all blocks before and after a place."""
     before, after = logs[: max(place - 1, 1)], logs[place + 2 :]
-    if min(len(before), len(after)) < _NEAR:
+    if min(len(before), len(after)) < _MIN_NOISE_WIDTH:
         return False
     low, high = (before, after) if np.median(before) < np.median(after) else (after, before)
     return bool(np.quantile(low, 0.9) < np.quantile(high, 0.5)) and bool(
@@ -126,29 +134,29 @@ def _stays(logs: Array, place: int) -> bool:
     )
 
 
-def _registers(
+def _find_registers(
     pieces: Sequence[Excerpt], record: int, margin: int
 ) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
-    """Return step and least step that could be seen, before and after a record."""
+    """Return the results of `register_of` before and after a record."""
     before, after = [], []
     for piece in pieces:
         inside = record - piece.first
-        # Where exactly the other begins is not known.
+        # The margin allows for the unknown record of the change.
         before.append(Excerpt(piece.first, piece.values[: max(inside - margin, 0)]))
         after.append(Excerpt(piece.first, piece.values[max(inside + margin, 0) :]))
     return register_of(before), register_of(after)
 
 
 def register_of(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
-    """Return the step of a register, and what it would be by chance without one; None: untold.
+    """Return the step of a register and the finest detectable step; None if there are no data.
 
     Returns
     -------
     (step, seen) or None
-        SI. ``step`` is infinite where no step shows; ``seen`` is the finest that would.
+        SI. ``step`` is infinite where no step is detected; ``seen`` is the finest detectable step.
     """
-    whole = [piece for piece in pieces if len(piece.values) >= PIECE // 4]
-    values = [piece.present for piece in whole if len(piece.present) >= PIECE // 8]
+    whole = [piece for piece in pieces if len(piece.values) >= PIECE_SIZE // 4]
+    values = [piece.present for piece in whole if len(piece.present) >= PIECE_SIZE // 8]
     if not values:
         return None
     joint = np.concatenate(values[:: max(1, len(values) // 4)][:4])
@@ -162,43 +170,47 @@ def register_of(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
     return (step if step > seen else math.inf), seen
 
 
-def _differ(first: tuple[float, float] | None, other: tuple[float, float] | None) -> bool:
-    """Tell whether two registers are different ones."""
+def _has_different_steps(
+    first: tuple[float, float] | None, other: tuple[float, float] | None
+) -> bool:
+    """Return whether two registers have different steps."""
     if first is None or other is None:
         return False
     (fine, _), (coarse, seen) = sorted((first, other))
     if math.isinf(coarse):
-        # No step shows in one part: told if that of the other would show well.
-        return math.isfinite(fine) and fine > _APART * seen
-    return coarse > _STEP * fine
+        # One part has no detected step: a difference only if the other step were detectable there.
+        return math.isfinite(fine) and fine > _MIN_LEVEL_ALTERNATION * seen
+    return coarse > _MIN_STEP_RATIO * fine
 
 
 def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
-    """Yield whether every other sample is of another sensor."""
+    """Yield a finding if every other sample seems to be of another sensor."""
     levels, noises, units, sizes = [], [], [], []
-    pieces = [piece for piece in column.excerpts() if len(piece.values) >= PIECE // 4]
+    pieces = [piece for piece in column.excerpts() if len(piece.values) >= PIECE_SIZE // 4]
     for piece in pieces:
-        turns = _of_turns(piece.values)
+        turns = _compare_even_and_odd(piece.values)
         if turns is None:
             continue
         level, noise, samples = turns
         levels.append(level)
         noises.append(noise)
-        # Of white noise, and of a median; the differences make that of the noise 3/2 times as
-        # large.
-        units.append(_MEDIAN * 2.0 / math.sqrt(samples))
-        sizes.append(_MEDIAN * math.sqrt(3.0 / samples))
+        # Standard deviations for white noise and a median; differences of neighbours make the
+        # variance of the noise estimate 3/2 times as large.
+        units.append(_MEDIAN_SD_OVER_MEAN_SD * 2.0 / math.sqrt(samples))
+        sizes.append(_MEDIAN_SD_OVER_MEAN_SD * math.sqrt(3.0 / samples))
     if not levels:
         return
     level, noise = float(np.median(levels)), float(np.median(noises))
     changes = {
-        "level": level > _SURE * float(np.median(units)),
-        "noise": noise > max(_SURE * float(np.median(sizes)), _ALTERNATING),
+        "level": level > _CHANGE_SIGMAS * float(np.median(units)),
+        "noise": noise > max(_CHANGE_SIGMAS * float(np.median(sizes)), _MIN_LOG_NOISE_ALTERNATION),
     }
     if any(changes.values()):
-        changes["steps"] = _differ(*(register_of(_every_other(pieces, first)) for first in (0, 1)))
+        changes["steps"] = _has_different_steps(
+            *(register_of(_take_every_other(pieces, first)) for first in (0, 1))
+        )
     changed = [name for name, differs in changes.items() if differs]
-    if len(changed) < 2 and not (changed == ["level"] and level > _APART):
+    if len(changed) < 2 and not (changed == ["level"] and level > _MIN_LEVEL_ALTERNATION):
         return
     detail = (
         f"{' and '.join(changed)} of {channel} alternate from sample to sample (levels "
@@ -208,18 +220,18 @@ def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     yield Finding("interleaved", "warning", detail, level, channel)
 
 
-def _of_turns(values: Array) -> tuple[float, float, int] | None:
-    """Return how even and odd samples differ: level over noise, log of the noises, and of how many.
+def _compare_even_and_odd(values: Array) -> tuple[float, float, int] | None:
+    """Return level difference over noise, log ratio of the noises, and number of samples.
 
-    Medians over parts of the piece, so that a knock decides nothing.
+    Compares even and odd samples. Medians over parts of the piece suppress knocks.
     """
-    whole = len(values) // (2 * _PART) * 2 * _PART
-    pairs = values[:whole].reshape(-1, _PART, 2)
+    whole = len(values) // (2 * _PAIRS_PER_PART) * 2 * _PAIRS_PER_PART
+    pairs = values[:whole].reshape(-1, _PAIRS_PER_PART, 2)
     present: NDArray[np.bool_] = np.isfinite(pairs[:, :, 0]) & np.isfinite(pairs[:, :, 1])
-    # Differences between samples of one sensor: neither drift nor the other's level.
+    # Differences between samples of one sensor: free of drift and of the other sensor's level.
     steps = np.diff(pairs, axis=1)
     compared = present[:, 1:] & present[:, :-1]
-    enough = compared.sum(axis=1) >= _PART // 4
+    enough = compared.sum(axis=1) >= _PAIRS_PER_PART // 4
     if not enough.any():
         return None
     present, compared = present[enough], compared[enough]
@@ -234,5 +246,5 @@ def _of_turns(values: Array) -> tuple[float, float, int] | None:
     return abs(level) / usual, abs(noise), 2 * int(present.sum())
 
 
-def _every_other(pieces: Sequence[Excerpt], first: int) -> list[Excerpt]:
+def _take_every_other(pieces: Sequence[Excerpt], first: int) -> list[Excerpt]:
     return [Excerpt(piece.first, piece.values[first::2]) for piece in pieces]

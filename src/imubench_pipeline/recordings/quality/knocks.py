@@ -1,4 +1,4 @@
-"""Knocks: isolated outliers, found, counted, and left out with the samples around them."""
+"""Find knocks (isolated outliers) with the samples around them that are left out."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ from numpy.typing import NDArray
 from imubench_pipeline.recordings.quality.summary import BlockStatistics
 from imubench_pipeline.typing import Array
 
-_NEIGHBOURS = 16
-"""Blocks on either side whose median tells what a block would be without a knock."""
+_BLOCKS_ON_EACH_SIDE = 16
+"""Blocks on either side whose median is the reference for a block without a knock."""
 
-_FEWEST_AROUND = 2
-"""Blocks that must be there to compare with."""
+_MIN_BLOCKS_AROUND = 2
+"""Least number of blocks with samples for the comparison."""
 
-_SETTLED = 4.0
-"""Standard deviations within which the samples after a knock are as before."""
+_SETTLED_SIGMAS = 4.0
+"""Standard deviations from the level within which the sensor has settled after a knock."""
 
-_CALM = 5
-"""So many samples in a row must be settled before a knock is over."""
+_SETTLED_SAMPLES = 5
+"""Consecutive settled samples that end a knock."""
 
-_STEPS = 2.0
-"""Steps of a register that an outlier must be away. By one it always may be, and its level lies
-between two where it drifts: 1.5 left one knock in 60 clean logs with registers of up to 6 sigma."""
+_MIN_OUTLIER_STEPS = 2.0
+"""Least distance of an outlier from the level, in steps of the register. Clean samples can be one
+step away, and a drifting level lies between two steps. With 1.5, one knock was found in 60 clean
+logs with steps of up to 6 sigma."""
 
-_AROUND = 5
+_MARGIN_SAMPLES = 5
 """Samples on either side that are left out with a knock."""
 
 
@@ -39,40 +40,39 @@ class Knock:
     last: int
     """First and one-past-last record to leave out."""
     size: float
-    """Largest distance from the level, in standard deviations, or in what `suspects` takes for
-    them."""
+    """Largest distance from the level, in units of the noise that `suspects` returns."""
 
 
 def suspects(
     blocks: BlockStatistics, sigmas: float, step: float | None = None
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return the blocks that hold an outlier, with the level and the noise around them.
+    """Return the blocks with an outlier, and the level and the noise around them.
 
     Parameters
     ----------
     sigmas : float
-        Distance from the level that counts, in standard deviations of the samples.
+        Least distance of an outlier from the level, in standard deviations of the samples.
     step : float or None
-        Least significant bit, SI; a change by one is no outlier. None: of no register.
+        Least significant bit, SI; a change by one is no outlier. None: not quantised.
 
     Returns
     -------
     number : ndarray of int, shape (n,)
     level, noise : ndarray, shape (n,)
-        Median of the means of the blocks around, and what counts as their noise, SI: the median
-        of their spreads, or more where that is small against the step.
+        Median of the means of the nearest blocks, and the noise, SI: the median of the standard
+        deviations of the blocks around, with a lower bound from the step.
     """
-    least = _STEPS * (step or 0.0) / sigmas
+    least = _MIN_OUTLIER_STEPS * (step or 0.0) / sigmas
     filled = np.isfinite(blocks.spread)
     usual = np.median(blocks.spread[filled]) if filled.any() else np.inf
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
     quick = np.flatnonzero(reach > 0.5 * sigmas * usual)
     number, levels, noises = [], [], []
     for k in quick:
-        around = np.r_[max(0, k - _NEIGHBOURS) : k, k + 1 : k + _NEIGHBOURS + 1]
+        around = np.r_[max(0, k - _BLOCKS_ON_EACH_SIDE) : k, k + 1 : k + _BLOCKS_ON_EACH_SIDE + 1]
         around = around[(around < len(blocks.mean))]
         around = around[np.isfinite(blocks.mean[around])]
-        if len(around) < _FEWEST_AROUND:
+        if len(around) < _MIN_BLOCKS_AROUND:
             continue
         near = around[np.argsort(np.abs(around - k))[:4]]
         level = float(np.median(blocks.mean[near]))
@@ -99,11 +99,11 @@ def knocks(
     pieces : iterable of ndarray
         The column in order, SI; NaN where a sample is missing.
     blocks : BlockStatistics
-        Of the same column.
+        Statistics of the same column.
     sigmas : float
         As `suspects` takes it.
     longest : int
-        Records: what lasts longer is motion, and not a knock.
+        Longest knock, records; a longer event is motion.
     step : float or None
         As `suspects` takes it.
     """
@@ -112,19 +112,21 @@ def knocks(
         return
     wanted = {int(k): i for i, k in enumerate(number)}
     reached = 0
-    for k, values in enumerate(_cut(pieces, blocks.size)):
+    for k, values in enumerate(_split_into_blocks(pieces, blocks.size)):
         if k in wanted:
             i = wanted[k]
             away = np.abs(values - level[i]) / noise[i]
-            for first, last in _events(away, sigmas):
+            for first, last in _find_events(away, sigmas):
                 if last - first <= longest:
                     size = float(np.nanmax(away[first:last]))
-                    yield Knock(reached + first - _AROUND, reached + last + _AROUND, size)
+                    yield Knock(
+                        reached + first - _MARGIN_SAMPLES, reached + last + _MARGIN_SAMPLES, size
+                    )
         reached += len(values)
 
 
-def _cut(pieces: Iterable[Array], size: int) -> Iterator[Array]:
-    """Cut a column into blocks of so many records."""
+def _split_into_blocks(pieces: Iterable[Array], size: int) -> Iterator[Array]:
+    """Split a column into blocks of ``size`` records."""
     rest = np.empty(0)
     for piece in pieces:
         joined = np.concatenate((rest, piece)) if len(rest) else piece
@@ -135,18 +137,18 @@ def _cut(pieces: Iterable[Array], size: int) -> Iterator[Array]:
         yield rest
 
 
-def _events(away: Array, sigmas: float) -> Iterator[tuple[int, int]]:
-    """Yield first and one-past-last sample of each stretch about an outlier."""
+def _find_events(away: Array, sigmas: float) -> Iterator[tuple[int, int]]:
+    """Yield first and one-past-last sample of each event around an outlier."""
     out = np.flatnonzero(away > sigmas)
-    calm = ~(away > _SETTLED)
+    calm = ~(away > _SETTLED_SIGMAS)
     reached = 0
     for peak in out:
         if peak < reached:
             continue
         first, last = int(peak), int(peak) + 1
-        while first > reached and not calm[max(reached, first - _CALM) : first].all():
+        while first > reached and not calm[max(reached, first - _SETTLED_SAMPLES) : first].all():
             first -= 1
-        while last < len(away) and not calm[last : last + _CALM].all():
+        while last < len(away) and not calm[last : last + _SETTLED_SAMPLES].all():
             last += 1
         reached = last
         yield first, last

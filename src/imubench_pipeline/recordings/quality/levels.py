@@ -1,4 +1,4 @@
-"""What the values of a column tell by themselves: stuck, saturated, repeated, coarse; how noisy."""
+"""Examine the values of a column: quantisation, saturation, repeats, level and noise."""
 
 from __future__ import annotations
 
@@ -13,59 +13,60 @@ from imubench_pipeline.recordings.quality.register import hidden_step
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, present_median
 from imubench_pipeline.typing import Array
 
-_SURE = 1e-9
-"""Chance of a run by accident below which it is none."""
+_MAX_RUN_PROBABILITY = 1e-9
+"""Probability that a longer run of one value occurs by chance."""
 
-_FEWEST_STEPS = 8
-"""Steps between block means that tell an Allan deviation to a third."""
+_MIN_BLOCK_STEPS = 8
+"""Least number of steps between block means; they determine an Allan deviation to a third."""
 
 _NORMAL_MEDIAN = 0.4549
 """Median of the square of a standard normal variable."""
 
 
-_COARSE = 1.0
-"""Step over noise up to which neighbouring levels are about as frequent: one has 1.65 times the
-samples of the next where the mean lies on it."""
+_MAX_STEP_FOR_PILING = 1.0
+"""Largest ratio of step to noise at which neighbouring levels are about equally frequent: a level
+at the mean has 1.65 times the samples of the next one."""
 
-_BESIDE = 4
-"""Levels on either side that a level is compared with."""
+_COMPARED_LEVELS = 4
+"""Number of levels on either side that a level is compared with."""
 
-_TIMES = 2.5
-"""Times the fullest of them from which samples pile up: where figures are rounded to digits
-somewhat coarser than the register, some digits have two of its steps."""
+_MIN_PILING_RATIO = 2.5
+"""Least ratio to the most frequent of the compared levels. A ratio of 2 is normal if values are
+rounded to digits somewhat coarser than the register: some digits then have two of its steps."""
 
-_PILED = 0.005
-"""Part of the samples from which it matters."""
+_MIN_PILED_SHARE = 0.005
+"""Least share of the samples at a piled-up level."""
 
-_BY_CHANCE = 10
+_MIN_COMPARED_COUNT = 10
+"""Least count that a level is compared with, so that few samples do not pile up by chance."""
 
-_BEYOND = 12.0
-"""Samples that noise would have beyond its last level, of which one is there but for a chance of
-exp(-12)."""
+_MIN_MISSING_SAMPLES = 12.0
+"""Expected samples beyond the last level above which their absence means saturation. Noise has none
+of them with a probability of exp(-12)."""
 
 
 @dataclass(frozen=True)
 class Quantisation:
-    """The steps of a quantised column."""
+    """Quantisation of a column."""
 
     step: float
     """Least significant bit, SI."""
     levels: float
-    """Steps between the lowest and the highest sample, and one."""
+    """Number of levels from the lowest to the highest sample."""
     over_noise: float
-    """Step over the standard deviation of the samples; infinite where they seldom change."""
+    """Ratio of the step to the standard deviation; infinite if most blocks have one value."""
     hidden: bool = False
-    """The figures were rounded again, so that their differences are no multiples of it."""
+    """The values were rounded again, so their differences are no multiples of the step."""
 
 
 def quantisation(column: ColumnSummary) -> Quantisation | None:
-    """Return the steps of a column, or None where none show."""
+    """Return the quantisation of a column, or None if no steps are found."""
     spread = noise_of(column)
     if not (0.0 < column.step < np.inf):
         return None
     hidden = hidden_step(column.excerpts())
     step = column.step if hidden is None else hidden
-    # Two neighbours of n continuous samples come as close as spread / n.
+    # The least difference between n continuous samples is about spread / n.
     if step < 20.0 * spread / column.present:
         return None
     over_noise = step / spread if spread > 0.0 else math.inf  # most blocks have one value
@@ -75,43 +76,48 @@ def quantisation(column: ColumnSummary) -> Quantisation | None:
 
 
 def noise_of(column: ColumnSummary) -> float:
-    """Return the usual standard deviation of the samples of a block, SI."""
+    """Return the median standard deviation of the samples of a block, SI."""
     return present_median(column.blocks().spread)
 
 
 def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, float] | None:
-    """Return a value within the noise that samples pile up at, where no register is so coarse.
+    """Return a value that is far more frequent than its neighbours; None if there is none.
 
-    Neighbouring levels of a register are about as frequent as each other. Samples that were lost
-    and filled in by one value, or rates that a dead band reports as 0, are not.
+    Neighbouring levels of a fine register are about equally frequent. A constant that replaces lost
+    samples, or the 0 of a dead band, is more frequent. Coarse registers are not tested.
 
     Parameters
     ----------
     steps : Quantisation or None
-        Of the column.
+        Quantisation of the column.
 
     Returns
     -------
     (value, share) or None
-        SI, and the part of the samples that are there.
+        Value, SI, and its share of the samples in the excerpts.
     """
-    if steps is not None and steps.over_noise > _COARSE:
+    if steps is not None and steps.over_noise > _MAX_STEP_FOR_PILING:
         return None
-    at, counts = _counts(column)
+    at, counts = _count_values(column)
     if len(at) == 0:
         return None
     most = int(np.argmax(counts))
-    around = np.delete(counts[max(0, most - _BESIDE) : most + _BESIDE + 1], min(most, _BESIDE))
-    if at[most] in (column.low, column.high) or len(around) < 2 * _BESIDE:
+    around = np.delete(
+        counts[max(0, most - _COMPARED_LEVELS) : most + _COMPARED_LEVELS + 1],
+        min(most, _COMPARED_LEVELS),
+    )
+    if at[most] in (column.low, column.high) or len(around) < 2 * _COMPARED_LEVELS:
         return None  # saturated, or too few levels
     share = counts[most] / counts.sum()
-    if share < _PILED or counts[most] < _TIMES * max(around.max(), _BY_CHANCE):
+    if share < _MIN_PILED_SHARE or counts[most] < _MIN_PILING_RATIO * max(
+        around.max(), _MIN_COMPARED_COUNT
+    ):
         return None
     return float(at[most]), float(share)
 
 
-def _counts(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:
-    """Return the values that a column has in its excerpts, and how often each."""
+def _count_values(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:
+    """Return the distinct values in the excerpts of a column, and their counts."""
     pieces = [piece.present for piece in column.excerpts()]
     return np.unique(np.concatenate([np.empty(0), *pieces]), return_counts=True)
 
@@ -119,21 +125,21 @@ def _counts(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:
 def kept_level(
     column: ColumnSummary, rate: float, unit: str, *, timed: bool = True
 ) -> dict[str, Any]:
-    """Return what is kept of the level of a channel, to be judged beside its datasheet.
+    """Return the level and noise of a channel, to be compared with its datasheet.
 
     Parameters
     ----------
     rate : float
         Hz.
     unit : str
-        In which the log is said to be written.
+        Unit of the channel, as stated in the sensor file.
     timed : bool
-        It has stamps; else the rate is as it is stated.
+        The log has stamps; otherwise the rate is the stated one.
 
     Returns
     -------
     dict
-        ``mean``, SI, the usual one of a block, which a knock does not move; ``density``, see
+        ``mean``, SI, the median of the block means, which is robust to knocks; ``density``, see
         `density_of`; ``unit``; ``rate``; ``timed``.
     """
     level, density = present_median(column.blocks().mean), density_of(column, rate)
@@ -141,23 +147,24 @@ def kept_level(
 
 
 def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
-    """Return between which limits the white noise density of a column lies, roughly.
+    """Return approximate bounds of the white noise density of a column.
 
-    The spread within blocks over √rate is too small behind a low-pass, the Allan deviation of the
-    block means times √τ too large where slow noise reaches τ, and both where it is of a register.
+    Two estimates are used. The standard deviation within blocks over √rate is too small behind a
+    low-pass. The Allan deviation of the block means times √τ is too large if slow noise dominates
+    at τ. The upper bound is at least the quantisation noise of the register.
 
-    `column` and `rate`: as of `kept_level`.
+    ``column``, ``rate``: see `kept_level`.
 
     Returns
     -------
     (least, most) : float, float or None
-        SI/√Hz, two-sided: N. None: there are too few blocks to tell how large it may be.
+        Bounds of N, SI/√Hz, two-sided. ``most`` is None if there are too few blocks.
     """
     blocks = column.blocks()
     spread = noise_of(column) / math.sqrt(rate)
     steps = np.diff(np.where(blocks.count > 0.9 * blocks.size, blocks.mean, np.nan))
     steps = steps[np.isfinite(steps)]
-    if len(steps) < _FEWEST_STEPS:
+    if len(steps) < _MIN_BLOCK_STEPS:
         return spread, None
     variance = float(np.median(steps**2)) / (2.0 * _NORMAL_MEDIAN)
     slow = math.sqrt(variance * blocks.size / rate)
@@ -166,50 +173,51 @@ def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]
 
 
 def longest_by_chance(column: ColumnSummary) -> float:
-    """Return how long a run of one value may be by chance, in samples."""
+    """Return the longest run of one value that may occur by chance, in samples."""
     share = min(column.repeats / max(column.present - 1, 1), 0.999)
     if share == 0.0:
         return 1.0
-    return 1.0 + math.log(_SURE / column.present) / math.log(share)
+    return 1.0 + math.log(_MAX_RUN_PROBABILITY / column.present) / math.log(share)
 
 
 def saturated(
     column: ColumnSummary, steps: Quantisation | None, share: float
 ) -> tuple[str, int] | None:
-    """Tell whether samples pile up at an extreme.
+    """Return the extreme where a column is saturated; None if it is not.
 
     Parameters
     ----------
     steps : Quantisation or None
-        Of the column.
+        Quantisation of the column.
     share : float
-        Part of the samples at an extreme that counts.
+        Least share of the samples at a saturated extreme.
 
     Returns
     -------
     (side, number) or None
-        ``lowest`` or ``highest``, and the samples there.
+        ``lowest`` or ``highest``, and the number of samples there.
     """
     if steps is not None and steps.levels < 10:
-        return None  # so few levels that an extreme is nothing special
+        return None  # with so few levels an extreme is frequent in any case
     for side, number in zip(("lowest", "highest"), column.at_extremes, strict=True):
-        # A Gaussian leaves a few samples at its last level, whatever the step.
-        if number > max(share * column.present, 10) and _cut_off(column, steps, side, number):
+        # Normal noise has a few samples at its last level with any step.
+        if number > max(share * column.present, 10) and _is_cut_off(column, steps, side, number):
             return side, number
     return None
 
 
-def _cut_off(column: ColumnSummary, steps: Quantisation | None, side: str, number: int) -> bool:
-    """Tell whether samples at an extreme ask for others beyond it, which are not there.
+def _is_cut_off(column: ColumnSummary, steps: Quantisation | None, side: str, number: int) -> bool:
+    """Return whether samples beyond an extreme are missing from the distribution.
 
-    Counts n of neighbouring levels fall faster and faster in the tail of noise: the level beyond
-    the last one has n_last^2 / n_next exp(-q^2), with q the step over the noise.
+    In the tail of normal noise the ratio of the counts of neighbouring levels falls by exp(-q^2)
+    from one level to the next, with q the step over the noise. The expected count of the level
+    beyond the last one is therefore n_last^2 / n_next exp(-q^2).
     """
     if steps is None:
         return True
-    at, counts = _counts(column)
+    at, counts = _count_values(column)
     last, following = (0, 1) if side == "lowest" else (-1, -2)
     if len(at) < 2 or at[last] != (column.low if side == "lowest" else column.high):
         return True
     beyond = number * counts[last] / counts[following] * math.exp(-(steps.over_noise**2))
-    return bool(beyond > _BEYOND)
+    return bool(beyond > _MIN_MISSING_SAMPLES)

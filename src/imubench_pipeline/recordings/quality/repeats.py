@@ -1,17 +1,18 @@
-"""Stretches of a column that occur again, bit for bit, while it streams past in bounded memory.
+"""Find stretches of a streamed column that repeat bit for bit, in bounded memory.
 
-A window reaches over a number of changes, and not of records: a coarse register stays at one value
-for long, and its changes are what tells one stretch from another. Each window has a hash that rolls
-along (cyclic polynomials, Cohen 1997). Of all windows those with the lowest hashes are remembered,
-as many as the memory holds: which ones depends on their content alone, so that a copy at any offset
-meets the same ones. A window that comes again tells the distance of the copy; windows that come one
-after the other at the same distance are one stretch.
+A window spans a fixed number of changes of value, not of records: a coarse register stays at one
+value for long, and only its changes distinguish stretches. Each window has a rolling hash (cyclic
+polynomials, Cohen 1997). Only the windows with the lowest hashes are stored. The selection depends
+on their content alone, so that a copy at any offset selects the same windows (Broder 1997). A
+window that repeats gives the lag of the copy, and successive windows with the same lag form one
+stretch.
 
 References
 ----------
 J. D. Cohen, "Recursive hashing functions for n-grams", ACM Trans. Inf. Syst. 15, 1997; A. Z.
 Broder, "On the resemblance and containment of documents", Proc. Compression and Complexity of
-Sequences, 1997 (the lowest hashes as a sample).
+Sequences, 1997 (sampling by the lowest hashes); G. L. Steele, D. Lea and C. H. Flood, "Fast
+splittable pseudorandom number generators", OOPSLA 2014 (SplitMix64, the mixing of bits).
 """
 
 from __future__ import annotations
@@ -28,64 +29,69 @@ Words = NDArray[np.uint64]
 Numbers = NDArray[np.int64]
 
 WINDOW = 64
-"""Changes of value in a window: the bits of a word, by which the hash turns."""
+"""Changes of value in a window: equal to the bits of a word, by which the hash is rotated."""
 
 _SLOTS = 1 << 16
-_MOST = _SLOTS // 2
-"""Windows that are remembered: all up to there, then the half of them with the lowest hashes."""
+_MAX_WINDOWS = _SLOTS // 2
+"""Largest number of stored windows; beyond it, the half with the lowest hashes is kept."""
 
-_STRETCHES = 64
-"""Stretches that are listed, at most."""
+_MAX_STRETCHES = 64
+"""Largest number of stretches that are listed."""
 
-_PATIENCE = 12
-"""Mean distances between remembered windows after which a stretch is over."""
+_MAX_MISSED_WINDOWS = 12
+"""Longest interruption of a stretch, in mean distances between stored windows."""
 
-_NAN = np.uint64(0x7FF8000000000000)
-_MINUS_ZERO = np.uint64(0x8000000000000000)
-_BASE = np.uint64(0x9E3779B97F4A7C15)
-_FIRST = np.uint64(0xBF58476D1CE4E5B9)
-_SECOND = np.uint64(0x94D049BB133111EB)
+# Bit patterns of float64, and the constants of SplitMix64
 
-_BITS, _HASH, _LIMIT = range(3)
-_TAKEN, _BEGUN, _CHANGES, _HELD, _FOUND, _SHIFT = range(6)
-_LAG, _COPY, _END, _FROM, _TO = range(5)
+_NAN_BITS = np.uint64(0x7FF8000000000000)
+_MINUS_ZERO_BITS = np.uint64(0x8000000000000000)
+_GOLDEN_GAMMA = np.uint64(0x9E3779B97F4A7C15)
+_MIX_FACTOR_1 = np.uint64(0xBF58476D1CE4E5B9)
+_MIX_FACTOR_2 = np.uint64(0x94D049BB133111EB)
+
+# Indices of the state: words, numbers, and the columns of a stretch
+_LAST_BITS, _ROLLING_HASH, _HASH_LIMIT = range(3)
+_RECORDS, _RUN_BEGIN, _CHANGE_COUNT, _WINDOW_COUNT, _STRETCH_COUNT, _HASH_SHIFT = range(6)
+_LAG, _COPY_BEGIN, _COPY_END, _FIRST_CHANGE, _LAST_CHANGE = range(5)
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a column that occurred before."""
+    """A part of a column that repeats an earlier part."""
 
     first: int
     last: int
-    """First and one-past-last record of the second occurrence, as far as windows tell: it may begin
-    a little before and end a little after."""
+    """First and one-past-last record of the copy, to the resolution of the windows: it may begin a
+    little earlier and end a little later."""
     lag: int
-    """Records from the first occurrence to the second."""
+    """Records from the original to the copy."""
     changes: int
     """Changes of value within it."""
 
 
-def _words() -> Words:
+def _create_words() -> Words:
     state = np.zeros(3, dtype=np.uint64)
-    state[_LIMIT] = np.uint64(0xFFFFFFFFFFFFFFFF)
+    state[_HASH_LIMIT] = np.uint64(0xFFFFFFFFFFFFFFFF)
     return state
 
 
 @dataclass
 class Repeats:
-    """Windows of a column that were seen, and the stretches that occurred again."""
+    """Stored windows of a column, and the stretches that repeat."""
 
-    _words: Words = field(default_factory=_words)
+    _words: Words = field(default_factory=_create_words)
     _numbers: Numbers = field(default_factory=lambda: np.zeros(6, dtype=np.int64))
     _tokens: Words = field(default_factory=lambda: np.zeros(WINDOW, dtype=np.uint64))
     _begins: Numbers = field(default_factory=lambda: np.zeros(WINDOW, dtype=np.int64))
     _keys: Words = field(default_factory=lambda: np.zeros(_SLOTS, dtype=np.uint64))
     _places: Numbers = field(default_factory=lambda: np.zeros((_SLOTS, 2), dtype=np.int64))
-    _stretches: Numbers = field(default_factory=lambda: np.zeros((_STRETCHES, 5), dtype=np.int64))
+    _stretches: Numbers = field(
+        default_factory=lambda: np.zeros((_MAX_STRETCHES, 5), dtype=np.int64)
+    )
 
     def add(self, values: Array) -> None:
-        """Take the next records of the column; NaN is a missing sample."""
-        _take(
+        """Add the next records of the column; NaN is a missing sample."""
+        _add_samples(
             np.ascontiguousarray(values).view(np.uint64),
             self._words,
             self._numbers,
@@ -97,26 +103,29 @@ class Repeats:
         )
 
     def stretches(self) -> list[Stretch]:
-        """Return what occurred before, in the order of the column, at most 64 of them."""
-        rows = self._stretches[: self._numbers[_FOUND]]
+        """Return the repeated stretches in the order of the column, at most 64 of them."""
+        rows = self._stretches[: self._numbers[_STRETCH_COUNT]]
         return [
             Stretch(
-                int(row[_COPY]), int(row[_END]), int(row[_LAG]), int(row[_TO] - row[_FROM]) + WINDOW
+                int(row[_COPY_BEGIN]),
+                int(row[_COPY_END]),
+                int(row[_LAG]),
+                int(row[_LAST_CHANGE] - row[_FIRST_CHANGE]) + WINDOW,
             )
             for row in rows
         ]
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _mixed(word: np.uint64) -> np.uint64:
-    """Return a word whose every bit depends on every bit of another (the finish of splitmix64)."""
-    word = (word ^ (word >> np.uint64(30))) * _FIRST
-    word = (word ^ (word >> np.uint64(27))) * _SECOND
+def _mix_bits(word: np.uint64) -> np.uint64:
+    """Return a word whose bits each depend on all bits of the input (finaliser of SplitMix64)."""
+    word = (word ^ (word >> np.uint64(30))) * _MIX_FACTOR_1
+    word = (word ^ (word >> np.uint64(27))) * _MIX_FACTOR_2
     return word ^ (word >> np.uint64(31))
 
 
 @njit(cache=True, nogil=True)
-def _take(
+def _add_samples(
     values: Words,
     words: Words,
     numbers: Numbers,
@@ -126,21 +135,21 @@ def _take(
     places: Numbers,
     stretches: Numbers,
 ) -> None:
-    """Take the bits of samples: each run of one value is a token of the rolling hash."""
-    bits, rolled, limit = words[_BITS], words[_HASH], words[_LIMIT]
-    position, begun, changes = numbers[_TAKEN], numbers[_BEGUN], numbers[_CHANGES]
+    """Add samples as bits; each run of one value is a token of the rolling hash."""
+    bits, rolled, limit = words[_LAST_BITS], words[_ROLLING_HASH], words[_HASH_LIMIT]
+    position, begun, changes = numbers[_RECORDS], numbers[_RUN_BEGIN], numbers[_CHANGE_COUNT]
     for i in range(values.size):
         value = values[i]
-        if value == _MINUS_ZERO:
+        if value == _MINUS_ZERO_BITS:
             value = np.uint64(0)
         elif (value & np.uint64(0x7FFFFFFFFFFFFFFF)) > np.uint64(0x7FF0000000000000):
-            value = _NAN
+            value = _NAN_BITS
         if value == bits:
             continue
         here = position + i
-        token = _mixed(bits ^ np.uint64(here - begun) * _BASE)
+        token = _mix_bits(bits ^ np.uint64(here - begun) * _GOLDEN_GAMMA)
         slot = changes & (WINDOW - 1)
-        # After as many turns as a word has bits, the token that leaves is as it was.
+        # After `WINDOW` rotations the oldest token is unrotated again, and XOR removes it.
         rolled = (rolled << np.uint64(1) | rolled >> np.uint64(63)) ^ token ^ tokens[slot]
         tokens[slot] = token
         begins[slot] = begun
@@ -149,16 +158,20 @@ def _take(
         changes += 1
         if changes >= WINDOW and rolled <= limit:
             begin = begins[changes & (WINDOW - 1)]
-            _meet(rolled, begin, here, changes, keys, places, stretches, numbers)
-            if numbers[_HELD] > _MOST:
+            _match_window(rolled, begin, here, changes, keys, places, stretches, numbers)
+            if numbers[_WINDOW_COUNT] > _MAX_WINDOWS:
                 limit = limit >> np.uint64(1)
-                _thin(limit, keys, places, numbers)
-    words[_BITS], words[_HASH], words[_LIMIT] = bits, rolled, limit
-    numbers[_TAKEN], numbers[_BEGUN], numbers[_CHANGES] = position + values.size, begun, changes
+                _drop_windows(limit, keys, places, numbers)
+    words[_LAST_BITS], words[_ROLLING_HASH], words[_HASH_LIMIT] = bits, rolled, limit
+    numbers[_RECORDS], numbers[_RUN_BEGIN], numbers[_CHANGE_COUNT] = (
+        position + values.size,
+        begun,
+        changes,
+    )
 
 
 @njit(cache=True, nogil=True)
-def _meet(
+def _match_window(
     key: np.uint64,
     begin: int,
     end: int,
@@ -168,7 +181,7 @@ def _meet(
     stretches: Numbers,
     numbers: Numbers,
 ) -> None:
-    """Remember a window, or tell where it was before."""
+    """Store a window, or extend the stretch in which a known window repeats."""
     mask = np.uint64(_SLOTS - 1)
     slot = key & mask
     while keys[slot] != np.uint64(0) and keys[slot] != key:
@@ -177,35 +190,35 @@ def _meet(
         keys[slot] = key
         places[slot, 0] = end
         places[slot, 1] = end
-        numbers[_HELD] += 1
+        numbers[_WINDOW_COUNT] += 1
         return
     if places[slot, 0] < 0:
         return
     if begin < places[slot, 1]:
-        # A pattern shorter than the window, such as 0, 1, 0, 1: that it repeats tells nothing.
+        # A pattern shorter than the window, such as 0, 1, 0, 1, is not evidence of a copy.
         places[slot, 0] = -1
         return
     places[slot, 1] = end
     lag = end - places[slot, 0]
-    count = numbers[_FOUND]
+    count = numbers[_STRETCH_COUNT]
     if count > 0 and stretches[count - 1, _LAG] == lag:
-        patience = WINDOW + (_PATIENCE << numbers[_SHIFT])
-        if changes - stretches[count - 1, _TO] <= patience:
-            stretches[count - 1, _END] = end
-            stretches[count - 1, _TO] = changes
+        patience = WINDOW + (_MAX_MISSED_WINDOWS << numbers[_HASH_SHIFT])
+        if changes - stretches[count - 1, _LAST_CHANGE] <= patience:
+            stretches[count - 1, _COPY_END] = end
+            stretches[count - 1, _LAST_CHANGE] = changes
             return
-    if count < _STRETCHES:
+    if count < _MAX_STRETCHES:
         stretches[count, _LAG] = lag
-        stretches[count, _COPY] = begin
-        stretches[count, _END] = end
-        stretches[count, _FROM] = changes
-        stretches[count, _TO] = changes
-        numbers[_FOUND] = count + 1
+        stretches[count, _COPY_BEGIN] = begin
+        stretches[count, _COPY_END] = end
+        stretches[count, _FIRST_CHANGE] = changes
+        stretches[count, _LAST_CHANGE] = changes
+        numbers[_STRETCH_COUNT] = count + 1
 
 
 @njit(cache=True, nogil=True)
-def _thin(limit: np.uint64, keys: Words, places: Numbers, numbers: Numbers) -> None:
-    """Forget the windows with a hash above the limit."""
+def _drop_windows(limit: np.uint64, keys: Words, places: Numbers, numbers: Numbers) -> None:
+    """Remove the windows with a hash above the limit."""
     kept_keys, kept_places = np.empty_like(keys), np.empty_like(places)
     number = 0
     for slot in range(keys.size):
@@ -221,5 +234,5 @@ def _thin(limit: np.uint64, keys: Words, places: Numbers, numbers: Numbers) -> N
             place = (place + np.uint64(1)) & mask
         keys[place] = kept_keys[k]
         places[place, 0], places[place, 1] = kept_places[k, 0], kept_places[k, 1]
-    numbers[_HELD] = number
-    numbers[_SHIFT] += 1
+    numbers[_WINDOW_COUNT] = number
+    numbers[_HASH_SHIFT] += 1

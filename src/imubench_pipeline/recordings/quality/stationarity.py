@@ -1,8 +1,8 @@
-"""Is the noise the same from beginning to end? Moved sensors, warm-up, changing variance.
+"""Test the stationarity of a column: steps of the mean, warm-up, changing variance, motion.
 
-All of it is told from block means and spreads. A static sensor's bias walks and flickers, which
-is what the benchmark measures; a finding is only what is far out of that: a step that no other
-step of the log comes near, a beginning that drifts as no later part does.
+All tests use block means and standard deviations. The bias of a static sensor has random walk and
+flicker noise, which the benchmark measures. Only clear deviations from it are reported: a step far
+larger than the other steps of the log, or a drift at the beginning far above any later drift.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ import numpy as np
 from imubench_pipeline.recordings.quality.summary import BlockStatistics, present_median
 from imubench_pipeline.typing import Array
 
-_PARTS = 20
-_FEWEST_BLOCKS = 8
-"""Blocks in a part: a shorter recording says nothing about its parts."""
+_NUMBER_OF_PARTS = 20
+_MIN_BLOCKS_PER_PART = 8
+"""Least number of blocks in a part; a shorter recording is not tested."""
 
-_SPIKY = 6.0
-"""Standard deviations of a block that a knock in it reaches, and motion does not."""
+_MAX_MOTION_CREST_FACTOR = 6.0
+"""Largest crest factor of motion: distance of the extremes from the mean, in standard deviations of
+the block. A knock exceeds it."""
 
-_MAD = 1.4826
+_SD_OVER_MAD = 1.4826
 """Standard deviation over the median absolute deviation, of normal noise."""
 
 
@@ -30,11 +31,11 @@ class Step:
     """A sudden change of the mean."""
 
     sample: int
-    """Record at which it happens, to half a window."""
+    """Record of the step, to half a window."""
     size: float
     """SI."""
     sigmas: float
-    """Its size over the spread of the other steps."""
+    """Size over the robust standard deviation of all steps."""
     window: int
     """Records of a window."""
 
@@ -44,9 +45,9 @@ class WarmUp:
     """A beginning that drifts."""
 
     end: int
-    """Record at which the drift is like that of the rest."""
+    """Record from which the drift is as small as in the rest."""
     drift: float
-    """Change of the mean over it, SI."""
+    """Change of the mean during the warm-up, SI."""
     usual: float
     """Median change over a part of the rest, SI."""
 
@@ -54,15 +55,15 @@ class WarmUp:
 def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     """Find sudden changes of the mean.
 
-    ``sigmas``: how far a step lies out of the others, in their robust standard deviations.
+    ``sigmas``: least size of a step, in robust standard deviations of all steps.
     """
     size = max(1, len(blocks.mean) // 400)
-    means = _means(blocks, size)
+    means = _take_median_means(blocks, size)
     if len(means) < 16:
         return []
-    # Over two windows, so that a step inside a window shows whole.
+    # Difference over two windows, so that a step inside a window counts in full.
     away = means[2:] - means[:-2]
-    scale = _MAD * present_median(np.abs(away - present_median(away)))
+    scale = _SD_OVER_MAD * present_median(np.abs(away - present_median(away)))
     if not scale > 0.0:
         return []
     far = np.flatnonzero(np.abs(away) > sigmas * scale)
@@ -71,7 +72,7 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     moves = []
     for group in np.split(far, np.flatnonzero(np.diff(far) > 3) + 1):
         peak = group[np.argmax(np.abs(away[group]))]
-        # A step stays; what comes back at once is a knock.
+        # A step lasts; a change that reverses at once is a knock.
         before = present_median(means[max(0, group[0] - 4) : group[0] + 1])
         after = present_median(means[group[-1] + 2 : group[-1] + 7])
         change = after - before
@@ -84,41 +85,44 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
 def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
     """Find a beginning that drifts more than the rest.
 
-    ``times``: how many times the median drift of a part counts.
+    ``times``: least ratio of the first drift to the median drift of the later parts.
     """
-    size = len(blocks.mean) // _PARTS
-    if size < _FEWEST_BLOCKS:
+    size = len(blocks.mean) // _NUMBER_OF_PARTS
+    if size < _MIN_BLOCKS_PER_PART:
         return None
-    drifts = np.empty(_PARTS)
-    for k in range(_PARTS):
+    drifts = np.empty(_NUMBER_OF_PARTS)
+    for k in range(_NUMBER_OF_PARTS):
         part = blocks.mean[k * size : (k + 1) * size]
         third = size // 3
         drifts[k] = present_median(part[-third:]) - present_median(part[:third])
-    rest = np.abs(drifts[_PARTS // 2 :])
+    rest = np.abs(drifts[_NUMBER_OF_PARTS // 2 :])
     usual, first = present_median(rest), float(drifts[0])
     most = float(np.max(rest[np.isfinite(rest)], initial=0.0))
-    # Parts that do not drift at all are those of a coarse register: nothing to compare with.
+    # Later parts of a coarse register may not drift at all; then there is no reference.
     if not (usual > 0.0 and abs(first) > times * usual and abs(first) > 2.0 * most):
         return None
     calm = np.flatnonzero(np.abs(drifts) < 3.0 * usual)
-    end = int(calm[0]) if len(calm) else _PARTS
+    end = int(calm[0]) if len(calm) else _NUMBER_OF_PARTS
     drift = float(np.nansum(drifts[:end]))
     return WarmUp(end * size * blocks.size, drift, usual)
 
 
 def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
-    """Return how many times the spread of the noisiest part is that of the calmest, and where.
+    """Return the ratio of the largest to the smallest noise of a part, and the noisiest part.
 
     Returns
     -------
     (ratio, first, last) or None
         ``first`` and ``last`` record of the noisiest part; None for a short recording.
     """
-    size = len(blocks.spread) // _PARTS
-    if size < _FEWEST_BLOCKS:
+    size = len(blocks.spread) // _NUMBER_OF_PARTS
+    if size < _MIN_BLOCKS_PER_PART:
         return None
     spreads = np.array(
-        [present_median(part) for part in blocks.spread[: size * _PARTS].reshape(_PARTS, size)]
+        [
+            present_median(part)
+            for part in blocks.spread[: size * _NUMBER_OF_PARTS].reshape(_NUMBER_OF_PARTS, size)
+        ]
     )
     calm = float(np.min(spreads[spreads > 0.0], initial=np.inf))
     noisy = int(np.argmax(np.nan_to_num(spreads)))
@@ -132,14 +136,14 @@ def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
 
 
 def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[tuple[int, int]]:
-    """Return where the spread is many times the usual, and not for a knock.
+    """Return the parts with motion: a large standard deviation that no knock explains.
 
     Parameters
     ----------
     times : float
-        Times the median spread that count as motion.
+        Least ratio of the standard deviation to its median during motion.
     least : float
-        Spread below which nothing does, SI.
+        Least standard deviation during motion, SI.
 
     Returns
     -------
@@ -151,7 +155,8 @@ def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[t
         return []
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
     shaken = np.flatnonzero(
-        (blocks.spread > max(times * usual, least)) & (reach < _SPIKY * blocks.spread)
+        (blocks.spread > max(times * usual, least))
+        & (reach < _MAX_MOTION_CREST_FACTOR * blocks.spread)
     )
     if len(shaken) == 0:
         return []
@@ -159,10 +164,10 @@ def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[t
     return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
 
 
-def _means(blocks: BlockStatistics, size: int) -> Array:
-    """Return medians of the means of ``size`` blocks: one knock does not move them.
+def _take_median_means(blocks: BlockStatistics, size: int) -> Array:
+    """Return medians of the means of ``size`` blocks, which are robust to knocks.
 
-    The mean of a block of a few samples, such as the last one, is far off without any step.
+    Blocks with few samples, such as the last one, are left out: their means scatter too much.
     """
     whole = len(blocks.mean) // size
     mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)

@@ -1,7 +1,7 @@
-"""What is counted of one column while it streams past: extremes, repeats, steps, block statistics.
+"""Collect statistics of a streamed column: extremes, repeats, steps, block statistics.
 
-One pass, a few nanoseconds a sample. What it means is decided afterwards, by the other modules of
-this package, when the whole column is known.
+One pass, a few nanoseconds a sample. The other modules of this package evaluate the statistics when
+the whole column is known.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from numba import njit
 from imubench_pipeline.recordings.quality.repeats import Repeats
 from imubench_pipeline.typing import Array
 
-FIRST_SIZE = 256
-"""Records of a block, until there are many blocks."""
+MIN_BLOCK_SIZE = 256
+"""Records of a block, until there are `2 * _MAX_BLOCKS` blocks."""
 
-_MANY = 1 << 15
-"""Two blocks are made one where there are twice as many as this."""
+_MAX_BLOCKS = 1 << 15
+"""Pairs of blocks are merged when there are twice this number."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class BlockStatistics:
     size: int
     """Records of a block; the last one may have fewer."""
     count: Array
-    """Samples present, shape (b,)."""
+    """Number of samples present, shape (b,)."""
     mean: Array
     spread: Array
     low: Array
@@ -37,43 +37,43 @@ class BlockStatistics:
     are none."""
 
 
-def _no_rows() -> Array:
+def _create_empty_rows() -> Array:
     return np.empty((0, 5))
 
 
 @dataclass
-class Gathering:
-    """Blocks as they come; each a row of count, mean, spread, lowest and highest sample."""
+class BlockAccumulator:
+    """Accumulates blocks: rows of count, mean, standard deviation, lowest and highest sample."""
 
-    _size: int = FIRST_SIZE
+    _size: int = MIN_BLOCK_SIZE
     _rows: list[Array] = field(default_factory=list)
     _number: int = 0
-    _waiting: Array = field(default_factory=_no_rows)
+    _waiting: Array = field(default_factory=_create_empty_rows)
 
     def add(self, rows: Array) -> None:
-        """Take consecutive blocks of `FIRST_SIZE` records, shape (n, 5)."""
+        """Add consecutive blocks of `MIN_BLOCK_SIZE` records, shape (n, 5)."""
         fresh = np.concatenate([self._waiting, rows])
         while True:
-            together = self._size // FIRST_SIZE
-            whole = min(len(fresh) // together, 2 * _MANY - self._number)
-            self._rows.append(_united(fresh[: whole * together], together))
+            together = self._size // MIN_BLOCK_SIZE
+            whole = min(len(fresh) // together, 2 * _MAX_BLOCKS - self._number)
+            self._rows.append(_merge_blocks(fresh[: whole * together], together))
             self._number += whole
             fresh = fresh[whole * together :]
-            if self._number < 2 * _MANY:
+            if self._number < 2 * _MAX_BLOCKS:
                 break
-            self._rows = [_united(np.concatenate(self._rows), 2)]
-            self._number, self._size = _MANY, 2 * self._size
+            self._rows = [_merge_blocks(np.concatenate(self._rows), 2)]
+            self._number, self._size = _MAX_BLOCKS, 2 * self._size
         self._waiting = fresh.copy()
 
     def blocks(self, last: Array) -> BlockStatistics:
-        """Return all blocks; ``last``, shape (n, 5), are those that were not added yet."""
+        """Return all blocks, followed by the blocks ``last``, shape (n, 5), that were not added."""
         fresh = np.concatenate([self._waiting, last])
-        rows = np.concatenate([*self._rows, _united(fresh, self._size // FIRST_SIZE)])
+        rows = np.concatenate([*self._rows, _merge_blocks(fresh, self._size // MIN_BLOCK_SIZE)])
         return BlockStatistics(self._size, *(np.ascontiguousarray(column) for column in rows.T))
 
 
-def _united(rows: Array, together: int) -> Array:
-    """Make one block of so many; the last one may be of fewer."""
+def _merge_blocks(rows: Array, together: int) -> Array:
+    """Merge groups of ``together`` blocks; the last group may be smaller."""
     if together == 1 or len(rows) == 0:
         return rows.copy()
     begins = np.arange(0, len(rows), together)
@@ -82,7 +82,7 @@ def _united(rows: Array, together: int) -> Array:
     total = np.add.reduceat(count, begins)
     weight = np.maximum(total, 1.0)
     united = np.add.reduceat(np.where(present, count * mean, 0.0), begins) / weight
-    # About the mean of the new block: no digit is lost to a large bias.
+    # About the mean of the new block, so that a large bias costs no digits.
     away = mean - np.repeat(united, together)[: len(rows)]
     squares = np.add.reduceat(np.where(present, count * (spread**2 + away**2), 0.0), begins)
     empty = total == 0
@@ -98,16 +98,16 @@ def _united(rows: Array, together: int) -> Array:
 
 
 def present_median(values: Array) -> float:
-    """Return the median of the values that are there, shape (n,); NaN where none is."""
+    """Return the median of the finite values, shape (n,); NaN if there are none."""
     present = values[np.isfinite(values)]
     return float(np.median(present)) if len(present) else float("nan")
 
 
-PIECE = 4096
+PIECE_SIZE = 4096
 """Records of a piece."""
 
-MOST = 16
-"""Every second piece is forgotten when there are so many; a shorter log is kept whole."""
+MAX_PIECES = 16
+"""Number of pieces at which every second one is dropped; a shorter log is stored completely."""
 
 
 @dataclass(frozen=True)
@@ -121,16 +121,16 @@ class Excerpt:
 
     @property
     def present(self) -> Array:
-        """The samples that are there."""
+        """Samples that are not missing."""
         return self.values[np.isfinite(self.values)]
 
 
 @dataclass
 class Excerpts:
-    """Pieces as the column streams past: every one, every second, every fourth and so on.
+    """Collects pieces of a streamed column: every one, every second, every fourth and so on.
 
-    Block statistics do not tell which samples are multiples of what, or which repeat every third
-    one. Some ten thousand samples do, however long the log is.
+    Block statistics cannot show multiples of a step or periodic repeats. A few ten thousand samples
+    can, for a log of any length.
     """
 
     _stride: int = 1
@@ -139,40 +139,40 @@ class Excerpts:
     _open: list[Array] = field(default_factory=list)
 
     def add(self, values: Array) -> None:
-        """Take the next records of the column."""
+        """Add the next records of the column."""
         start = 0
         while start < len(values):
-            number, inside = divmod(self._reached, PIECE)
-            stop = min(len(values), start + PIECE - inside)
+            number, inside = divmod(self._reached, PIECE_SIZE)
+            stop = min(len(values), start + PIECE_SIZE - inside)
             if number % self._stride == 0:
                 self._open.append(values[start:stop].copy())
             self._reached += stop - start
             start = stop
-            if self._reached % PIECE == 0 and self._open:
+            if self._reached % PIECE_SIZE == 0 and self._open:
                 self._pieces.append(np.concatenate(self._open))
                 self._open = []
-                if len(self._pieces) == MOST:
+                if len(self._pieces) == MAX_PIECES:
                     self._pieces = self._pieces[::2]
                     self._stride *= 2
 
     def pieces(self) -> list[Excerpt]:
-        """Return the pieces in order; the last one as far as it goes."""
+        """Return the pieces in order; the last one may be incomplete."""
         pieces = [*self._pieces, np.concatenate(self._open)] if self._open else self._pieces
-        return [Excerpt(k * self._stride * PIECE, values) for k, values in enumerate(pieces)]
+        return [Excerpt(k * self._stride * PIECE_SIZE, values) for k, values in enumerate(pieces)]
 
 
-def together(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
+def common_samples(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
     """Return the samples of two columns at the same records, those present in both.
 
     Parameters
     ----------
     first, other : list of Excerpt
-        Of columns that advance together.
+        Excerpts of columns of the same table.
 
     Returns
     -------
     list of (ndarray, ndarray)
-        A pair for each piece that both have, of equal shapes.
+        Two arrays of equal shape for each piece that both columns have.
     """
     places = {piece.first: piece.values for piece in other}
     pairs = []
@@ -184,33 +184,60 @@ def together(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Ar
     return pairs
 
 
-LARGEST = 1e30
-"""Largest figure, SI, that is taken for a measurement. Larger ones count as infinite."""
+MAX_MEASUREMENT = 1e30
+"""Largest magnitude of a measurement, SI. Larger values count as infinite."""
 
-_PRESENT, _MISSING, _INFINITE, _LOW, _HIGH, _AT_LOW, _AT_HIGH = range(7)
-_LAST, _RUN, _LONGEST, _LONGEST_END, _REPEATS, _STEP, _TAKEN = range(7, 14)
-_FILLED, _COUNT, _SUM, _SQUARES, _LEAST, _MOST, _SHIFT = range(14, 21)
-_PAIRS, _FAR_PAIRS, _FAR_REPEATS, _CHANGES, _SINGLE = range(21, 26)
-_GAP, _LONGEST_GAP, _GAP_END = range(26, 29)
-_SIZE = 29
+# Indices of the state of a column
 
-FAR = 64
-"""Samples between two that no usual low-pass makes alike."""
+(
+    _PRESENT_SAMPLES,
+    _MISSING_SAMPLES,
+    _INFINITE_SAMPLES,
+    _LOWEST_SAMPLE,
+    _HIGHEST_SAMPLE,
+    _COUNT_AT_LOWEST,
+    _COUNT_AT_HIGHEST,
+) = range(7)
+(
+    _LAST_SAMPLE,
+    _RUN_LENGTH,
+    _LONGEST_RUN,
+    _LONGEST_RUN_END,
+    _REPEAT_COUNT,
+    _SMALLEST_STEP,
+    _RECORDS,
+) = range(7, 14)
+(
+    _BLOCK_RECORDS,
+    _BLOCK_COUNT,
+    _BLOCK_SUM,
+    _BLOCK_SQUARES,
+    _BLOCK_LOWEST,
+    _BLOCK_HIGHEST,
+    _BLOCK_SHIFT,
+) = range(14, 21)
+_PAIR_COUNT, _FAR_PAIRS, _FAR_REPEATS, _CHANGE_COUNT, _SINGLE_STEPS = range(21, 26)
+_GAP_LENGTH, _LONGEST_GAP, _GAP_END = range(26, 29)
+_STATE_SIZE = 29
 
-_ONE_STEP = 1.5
-"""Least steps that are not one: the steps of printed figures may differ by a digit."""
+FAR_LAG = 64
+"""Lag, samples, at which low-passed noise is uncorrelated for all usual low-passes."""
+
+_MAX_RATIO_OF_ONE_STEP = 1.5
+"""Largest ratio of a change to the smallest step that counts as one step: steps of rounded values
+may differ by a digit."""
 
 
-def _start() -> Array:
-    state = np.zeros(_SIZE)
-    state[[_LOW, _LEAST, _STEP]] = np.inf
-    state[[_HIGH, _MOST]] = -np.inf
-    state[[_LAST, _SHIFT]] = np.nan
+def _create_state() -> Array:
+    state = np.zeros(_STATE_SIZE)
+    state[[_LOWEST_SAMPLE, _BLOCK_LOWEST, _SMALLEST_STEP]] = np.inf
+    state[[_HIGHEST_SAMPLE, _BLOCK_HIGHEST]] = -np.inf
+    state[[_LAST_SAMPLE, _BLOCK_SHIFT]] = np.nan
     return state
 
 
-class _Count:
-    """A count in the state of a column."""
+class _StateCount:
+    """Descriptor of a count in the state of a column."""
 
     def __init__(self, place: int) -> None:
         self._place = place
@@ -221,39 +248,39 @@ class _Count:
 
 @dataclass
 class ColumnSummary:
-    """A column as it streams past; NaN is a missing sample."""
+    """Statistics of a streamed column; NaN is a missing sample."""
 
-    _state: Array = field(default_factory=_start)
-    _blocks: Gathering = field(default_factory=Gathering)
+    _state: Array = field(default_factory=_create_state)
+    _blocks: BlockAccumulator = field(default_factory=BlockAccumulator)
     _excerpts: Excerpts = field(default_factory=Excerpts)
     repeated: Repeats = field(default_factory=Repeats)
 
-    present = _Count(_PRESENT)
+    present = _StateCount(_PRESENT_SAMPLES)
     """Samples that are finite numbers."""
-    missing = _Count(_MISSING)
+    missing = _StateCount(_MISSING_SAMPLES)
     """Records without a number."""
-    not_finite = _Count(_INFINITE)
-    """Infinities, and figures beyond `LARGEST`."""
-    repeats = _Count(_REPEATS)
-    """Samples that equal the one before."""
-    pairs = _Count(_PAIRS)
-    """Neighbours that were compared: in all pieces in which any are equal."""
-    far_pairs = _Count(_FAR_PAIRS)
-    """Samples that were compared with that `FAR` before, where neighbours were."""
-    far_repeats = _Count(_FAR_REPEATS)
-    """Samples among them that equal that."""
-    steps = _Count(_CHANGES)
-    """Neighbours that differ, as far as they were compared since the smallest step."""
-    single_steps = _Count(_SINGLE)
-    """Neighbours among them that differ by the smallest step."""
+    not_finite = _StateCount(_INFINITE_SAMPLES)
+    """Infinities, and values beyond `MAX_MEASUREMENT`."""
+    repeats = _StateCount(_REPEAT_COUNT)
+    """Samples that equal their predecessor."""
+    pairs = _StateCount(_PAIR_COUNT)
+    """Pairs of neighbours that were compared. Pieces without equal neighbours may be left out."""
+    far_pairs = _StateCount(_FAR_PAIRS)
+    """Pairs at the distance `FAR_LAG` in the pieces where neighbours were compared."""
+    far_repeats = _StateCount(_FAR_REPEATS)
+    """Pairs among them of equal samples."""
+    steps = _StateCount(_CHANGE_COUNT)
+    """Unequal neighbours that were compared since the smallest step was found."""
+    single_steps = _StateCount(_SINGLE_STEPS)
+    """Neighbours among them that differ by the smallest step only."""
 
     def add(self, values: Array) -> Array:
-        """Count a piece of the column and return it with what is not finite made missing."""
-        rows = np.empty((len(values) // FIRST_SIZE + 2, 5))
-        number, infinite = _take(np.ascontiguousarray(values), self._state, rows)
+        """Add a piece of the column; return it with non-finite values replaced by NaN."""
+        rows = np.empty((len(values) // MIN_BLOCK_SIZE + 2, 5))
+        number, infinite = _count_samples(np.ascontiguousarray(values), self._state, rows)
         if number:
             self._blocks.add(rows[:number])
-        finite = np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
+        finite = np.where(np.abs(values) <= MAX_MEASUREMENT, values, np.nan) if infinite else values
         self._excerpts.add(finite)
         self.repeated.add(finite)
         return finite
@@ -266,118 +293,118 @@ class ColumnSummary:
     @property
     def low(self) -> float:
         """Lowest sample, SI."""
-        return float(self._state[_LOW])
+        return float(self._state[_LOWEST_SAMPLE])
 
     @property
     def high(self) -> float:
         """Highest sample, SI."""
-        return float(self._state[_HIGH])
+        return float(self._state[_HIGHEST_SAMPLE])
 
     @property
     def at_extremes(self) -> tuple[int, int]:
         """Samples at the lowest and at the highest value."""
-        return int(self._state[_AT_LOW]), int(self._state[_AT_HIGH])
+        return int(self._state[_COUNT_AT_LOWEST]), int(self._state[_COUNT_AT_HIGHEST])
 
     @property
     def longest_run(self) -> tuple[int, int]:
         """Length of the longest run of one value, and the record one past its end."""
-        return int(self._state[_LONGEST]), int(self._state[_LONGEST_END])
+        return int(self._state[_LONGEST_RUN]), int(self._state[_LONGEST_RUN_END])
 
     @property
     def step(self) -> float:
         """Smallest difference between neighbours that differ, SI; infinite if none do."""
-        return float(self._state[_STEP])
+        return float(self._state[_SMALLEST_STEP])
 
     def excerpts(self) -> list[Excerpt]:
-        """Return pieces of the column, evenly over all of it."""
+        """Return pieces of the column, spread evenly over its length."""
         return self._excerpts.pieces()
 
     def blocks(self) -> BlockStatistics:
-        """Return the statistics of the blocks, the last one as far as it goes."""
-        return self._blocks.blocks(_closed(self._state))
+        """Return the statistics of the blocks; the last one may be incomplete."""
+        return self._blocks.blocks(_close_open_block(self._state))
 
 
-def _closed(state: Array) -> Array:
-    """Return the block that is being filled as a row, or no row, shape (n, 5)."""
-    rows = np.empty((int(state[_FILLED] > 0), 5))
+def _close_open_block(state: Array) -> Array:
+    """Return the incomplete block as a row, or no row, shape (n, 5)."""
+    rows = np.empty((int(state[_BLOCK_RECORDS] > 0), 5))
     for row in rows:
-        _close(state.copy(), row)
+        _close_block(state.copy(), row)
     return rows
 
 
 @njit(cache=True, nogil=True)
-def _close(state: Array, row: Array) -> None:
-    """Write the statistics of a block and begin the next."""
-    count = state[_COUNT]
+def _close_block(state: Array, row: Array) -> None:
+    """Write the statistics of a block to a row and begin the next."""
+    count = state[_BLOCK_COUNT]
     row[0] = count
     if count > 0:
-        mean = state[_SUM] / count
-        row[1] = state[_SHIFT] + mean
-        row[2] = np.sqrt(max(state[_SQUARES] / count - mean * mean, 0.0))
-        row[3] = state[_LEAST]
-        row[4] = state[_MOST]
+        mean = state[_BLOCK_SUM] / count
+        row[1] = state[_BLOCK_SHIFT] + mean
+        row[2] = np.sqrt(max(state[_BLOCK_SQUARES] / count - mean * mean, 0.0))
+        row[3] = state[_BLOCK_LOWEST]
+        row[4] = state[_BLOCK_HIGHEST]
     else:
         row[1:] = np.nan
-    state[_SHIFT] = np.nan
-    state[_FILLED] = 0
-    state[_COUNT] = 0
-    state[_SUM] = 0.0
-    state[_SQUARES] = 0.0
-    state[_LEAST] = np.inf
-    state[_MOST] = -np.inf
+    state[_BLOCK_SHIFT] = np.nan
+    state[_BLOCK_RECORDS] = 0
+    state[_BLOCK_COUNT] = 0
+    state[_BLOCK_SUM] = 0.0
+    state[_BLOCK_SQUARES] = 0.0
+    state[_BLOCK_LOWEST] = np.inf
+    state[_BLOCK_HIGHEST] = -np.inf
 
 
 @njit(cache=True, nogil=True)
-def _take(values: Array, state: Array, rows: Array) -> tuple[int, bool]:
-    """Count samples; return the number of blocks that were completed, and if one is infinite."""
+def _count_samples(values: Array, state: Array, rows: Array) -> tuple[int, bool]:
+    """Add samples; return the number of completed blocks, and whether a sample is infinite."""
     number = 0
-    before = state[_INFINITE]
+    before = state[_INFINITE_SAMPLES]
     start = 0
     while start < values.size:
-        stop = min(values.size, start + FIRST_SIZE - int(state[_FILLED]))
+        stop = min(values.size, start + MIN_BLOCK_SIZE - int(state[_BLOCK_RECORDS]))
         piece = values[start:stop]
-        begun = state[_PRESENT] > 0.0 and abs(piece[0]) <= LARGEST
-        if begun and np.isnan(state[_SHIFT]):
-            # A block is summed about its first sample: no digit is lost to a large bias, nor to
-            # an outlier in another block.
-            state[_SHIFT] = piece[0]
-        if not (begun and _nothing(piece) == 0.0 and _take_plain(piece, state)):
-            _take_each(piece, state)
-        state[_TAKEN] += stop - start
-        state[_FILLED] += stop - start
-        if state[_FILLED] == FIRST_SIZE:
-            _close(state, rows[number])
+        begun = state[_PRESENT_SAMPLES] > 0.0 and abs(piece[0]) <= MAX_MEASUREMENT
+        if begun and np.isnan(state[_BLOCK_SHIFT]):
+            # Sums are about the first sample of a block, so that neither a large bias nor an
+            # outlier in another block costs digits.
+            state[_BLOCK_SHIFT] = piece[0]
+        if not (begun and _detect_non_finite(piece) == 0.0 and _count_plain_samples(piece, state)):
+            _count_each_sample(piece, state)
+        state[_RECORDS] += stop - start
+        state[_BLOCK_RECORDS] += stop - start
+        if state[_BLOCK_RECORDS] == MIN_BLOCK_SIZE:
+            _close_block(state, rows[number])
             number += 1
         start = stop
-    return number, state[_INFINITE] > before
+    return number, state[_INFINITE_SAMPLES] > before
 
 
 @njit(cache=True, nogil=True)
-def _take_plain(piece: Array, state: Array) -> bool:
-    """Count finite samples that are no new extremes and repeat nothing; else tell so."""
-    least, most, step = _extremes(piece, state[_LAST])
-    if step == 0.0 or least <= state[_LOW] or most >= state[_HIGH]:
+def _count_plain_samples(piece: Array, state: Array) -> bool:
+    """Add finite samples without new extremes or repeats; return False if there are any."""
+    least, most, step = _find_extremes(piece, state[_LAST_SAMPLE])
+    if step == 0.0 or least <= state[_LOWEST_SAMPLE] or most >= state[_HIGHEST_SAMPLE]:
         return False
-    total, squares = _sums(piece, state[_SHIFT])
-    state[_PRESENT] += piece.size
-    state[_COUNT] += piece.size
-    state[_SUM] += total
-    state[_SQUARES] += squares
-    state[_LEAST] = min(state[_LEAST], least)
-    state[_MOST] = max(state[_MOST], most)
-    state[_STEP] = min(state[_STEP], step)
-    state[_LAST], state[_RUN] = piece[-1], 1.0
-    state[_GAP] = 0.0
+    total, squares = _sum_about(piece, state[_BLOCK_SHIFT])
+    state[_PRESENT_SAMPLES] += piece.size
+    state[_BLOCK_COUNT] += piece.size
+    state[_BLOCK_SUM] += total
+    state[_BLOCK_SQUARES] += squares
+    state[_BLOCK_LOWEST] = min(state[_BLOCK_LOWEST], least)
+    state[_BLOCK_HIGHEST] = max(state[_BLOCK_HIGHEST], most)
+    state[_SMALLEST_STEP] = min(state[_SMALLEST_STEP], step)
+    state[_LAST_SAMPLE], state[_RUN_LENGTH] = piece[-1], 1.0
+    state[_GAP_LENGTH] = 0.0
     return True
 
 
-# The order of sums is free here, which makes wide instructions of them; comparisons need no care
-# for NaN in `_extremes` alone, where there is none.
+# `reassoc` allows vector instructions for the sums. `nnan` is safe in `_find_extremes` only, since
+# it never receives NaN.
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc"})
-def _nothing(piece: Array) -> float:
-    """Return 0, or NaN where a sample is not finite."""
+def _detect_non_finite(piece: Array) -> float:
+    """Return 0 if all samples are finite, else NaN."""
     total = 0.0
     for i in range(piece.size):
         total += 0.0 * piece[i]
@@ -385,8 +412,8 @@ def _nothing(piece: Array) -> float:
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
-def _sums(piece: Array, shift: float) -> tuple[float, float]:
-    """Return the sum, and that of the squares, about a value."""
+def _sum_about(piece: Array, shift: float) -> tuple[float, float]:
+    """Return the sum and the sum of squares of the deviations from a value."""
     total, squares = 0.0, 0.0
     for i in range(piece.size):
         away = piece[i] - shift
@@ -396,7 +423,7 @@ def _sums(piece: Array, shift: float) -> tuple[float, float]:
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "nnan", "nsz"})
-def _extremes(piece: Array, last: float) -> tuple[float, float, float]:
+def _find_extremes(piece: Array, last: float) -> tuple[float, float, float]:
     """Return the lowest and the highest sample, and the smallest step between neighbours."""
     least, most, step = piece[0], piece[0], abs(piece[0] - last)
     for i in range(1, piece.size):
@@ -407,27 +434,32 @@ def _extremes(piece: Array, last: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True, nogil=True)
-def _take_each(piece: Array, state: Array) -> None:
-    """Count samples one by one."""
-    last, run, step = state[_LAST], state[_RUN], state[_STEP]
-    low, high, at_low, at_high = state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH]
-    shift, total, squares = state[_SHIFT], state[_SUM], state[_SQUARES]
-    least, most = state[_LEAST], state[_MOST]
-    changes, single = state[_CHANGES], state[_SINGLE]
-    gap = state[_GAP]
+def _count_each_sample(piece: Array, state: Array) -> None:
+    """Add samples one by one."""
+    last, run, step = state[_LAST_SAMPLE], state[_RUN_LENGTH], state[_SMALLEST_STEP]
+    low, high, at_low, at_high = (
+        state[_LOWEST_SAMPLE],
+        state[_HIGHEST_SAMPLE],
+        state[_COUNT_AT_LOWEST],
+        state[_COUNT_AT_HIGHEST],
+    )
+    shift, total, squares = state[_BLOCK_SHIFT], state[_BLOCK_SUM], state[_BLOCK_SQUARES]
+    least, most = state[_BLOCK_LOWEST], state[_BLOCK_HIGHEST]
+    changes, single = state[_CHANGE_COUNT], state[_SINGLE_STEPS]
+    gap = state[_GAP_LENGTH]
     count, repeats = 0, 0
-    for i in range(FAR, piece.size):
-        if abs(piece[i]) <= LARGEST and abs(piece[i - FAR]) <= LARGEST:
+    for i in range(FAR_LAG, piece.size):
+        if abs(piece[i]) <= MAX_MEASUREMENT and abs(piece[i - FAR_LAG]) <= MAX_MEASUREMENT:
             state[_FAR_PAIRS] += 1
-            state[_FAR_REPEATS] += piece[i] == piece[i - FAR]
+            state[_FAR_REPEATS] += piece[i] == piece[i - FAR_LAG]
     for i in range(piece.size):
         x = piece[i]
-        if not abs(x) <= LARGEST:
-            state[_MISSING if np.isnan(x) else _INFINITE] += 1
+        if not abs(x) <= MAX_MEASUREMENT:
+            state[_MISSING_SAMPLES if np.isnan(x) else _INFINITE_SAMPLES] += 1
             gap += 1.0
             if gap > state[_LONGEST_GAP]:
                 state[_LONGEST_GAP] = gap
-                state[_GAP_END] = state[_TAKEN] + i + 1
+                state[_GAP_END] = state[_RECORDS] + i + 1
             continue
         gap = 0.0
         count += 1
@@ -452,23 +484,28 @@ def _take_each(piece: Array, state: Array) -> None:
         else:
             away = abs(x - last)
             if away < step:
-                if _ONE_STEP * away < step:
-                    changes, single = 0.0, 0.0  # what was counted were several of these steps
+                if _MAX_RATIO_OF_ONE_STEP * away < step:
+                    changes, single = 0.0, 0.0  # earlier changes were several of these steps
                 step = away
             changes += 1
-            single += away < _ONE_STEP * step
+            single += away < _MAX_RATIO_OF_ONE_STEP * step
             run = 1.0
             last = x
-        if run > state[_LONGEST]:
-            state[_LONGEST] = run
-            state[_LONGEST_END] = state[_TAKEN] + i + 1
-    state[_PRESENT] += count
-    state[_COUNT] += count
-    state[_REPEATS] += repeats
-    state[_PAIRS] += count
-    state[_CHANGES], state[_SINGLE] = changes, single
-    state[_LAST], state[_RUN], state[_STEP] = last, run, step
-    state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH] = low, high, at_low, at_high
-    state[_SHIFT], state[_SUM], state[_SQUARES] = shift, total, squares
-    state[_LEAST], state[_MOST] = least, most
-    state[_GAP] = gap
+        if run > state[_LONGEST_RUN]:
+            state[_LONGEST_RUN] = run
+            state[_LONGEST_RUN_END] = state[_RECORDS] + i + 1
+    state[_PRESENT_SAMPLES] += count
+    state[_BLOCK_COUNT] += count
+    state[_REPEAT_COUNT] += repeats
+    state[_PAIR_COUNT] += count
+    state[_CHANGE_COUNT], state[_SINGLE_STEPS] = changes, single
+    state[_LAST_SAMPLE], state[_RUN_LENGTH], state[_SMALLEST_STEP] = last, run, step
+    (
+        state[_LOWEST_SAMPLE],
+        state[_HIGHEST_SAMPLE],
+        state[_COUNT_AT_LOWEST],
+        state[_COUNT_AT_HIGHEST],
+    ) = low, high, at_low, at_high
+    state[_BLOCK_SHIFT], state[_BLOCK_SUM], state[_BLOCK_SQUARES] = shift, total, squares
+    state[_BLOCK_LOWEST], state[_BLOCK_HIGHEST] = least, most
+    state[_GAP_LENGTH] = gap
