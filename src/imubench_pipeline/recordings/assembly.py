@@ -1,4 +1,4 @@
-"""The files of a recording put together: one Parquet file a clock, and no sample lost."""
+"""Combine the files of a recording into one Parquet file per clock, and account for all samples."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from imubench_pipeline.tables import checked_parquet, checked_row_group
 
 
 def names_of(parts: list[Part], groups: list[list[int]]) -> list[str]:
-    """Name the Parquet file of each clock after the quantity or the channels it holds."""
+    """Return the name of the Parquet file of each clock, from its quantity or its channels."""
     if len(groups) == 1:
         return ["log.parquet"]
     contents = []
@@ -42,22 +42,22 @@ def assemble(
     metadata: dict[str, Any],
     path: Path,
 ) -> tuple[Path, dict[str, int]]:
-    """Close the columns of files that share a clock into one Parquet file.
+    """Write the columns of the files that share a clock to one Parquet file.
 
     Parameters
     ----------
     base : TimeBase
-        Their clock.
+        Time base of the parts.
     metadata : dict
-        Goes into the file.
+        Metadata of the file.
     path : Path
-        Of the file, unless one of the parts is it already.
+        Path of the file, unless the file of a part can be used unchanged.
 
     Returns
     -------
     path : Path
     repeated : dict of str to int
-        Samples of each column that repeat a stamp, and are left out.
+        Number of samples of each column that are left out because they repeat a stamp.
     """
     for part in parts:
         part.writer.finish(metadata)
@@ -71,7 +71,7 @@ def assemble(
         columns["sample"] = pa.int64()
     for part in parts:
         columns |= dict.fromkeys(part.columns, pa.float64())
-    blocks = _columns_of(parts)
+    blocks = _read_columns(parts)
     with LogWriter(path, columns) as writer:
         if base.uniform:
             for block in blocks:
@@ -93,7 +93,7 @@ def assemble(
     return path, repeated
 
 
-def _columns_of(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
+def _read_columns(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
     """Yield the columns of several files side by side, a row group at a time."""
     files = [checked_parquet(part.data) for part in parts]
     try:
@@ -111,21 +111,21 @@ def _columns_of(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
 def counted(
     path: Path, parts: list[Part], repeated: Mapping[str, int]
 ) -> dict[str, dict[str, int]]:
-    """Return what became of the samples of each column; every one must be accounted for.
+    """Return the number of samples of each column that were used and left out, by reason.
 
     Parameters
     ----------
     path : Path
-        The file that was assembled.
+        The assembled file.
     parts : list of Part
-        What it was assembled from.
+        The parts of the file.
     repeated : mapping of str to int
-        Samples of each column that repeat a stamp.
+        Number of samples of each column that repeat a stamp.
 
     Raises
     ------
     RuntimeError
-        If a sample was lost or invented: a fault of this program.
+        If the numbers do not add up, which is an error of this program.
     """
     file = pq.read_metadata(path)
     used = dict.fromkeys(file.schema.names, 0)

@@ -1,4 +1,4 @@
-"""One file of a recording on its way into Parquet: read, counted, freed of knocks."""
+"""Convert one file of a recording to Parquet: read it, collect statistics, remove knocks."""
 
 from __future__ import annotations
 
@@ -24,41 +24,42 @@ from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 STAMP_BLOCK = ROW_GROUP
-"""Records of a block of stamps: as many as of a row group."""
+"""Records of a block of stamps, equal to the records of a row group."""
 
 
 @dataclass
 class Part:
-    """The columns of one file of a recording that share a clock, with their stamps on the disk."""
+    """The columns of one file of a recording that share a clock, and their stamps in a file."""
 
     source: LogFile
     data: Path
     stamps_path: Path
     present_path: Path
-    """Scratch files: the columns as Parquet, the stamps as they come, and which columns have a
-    number, a bit each."""
+    """Scratch files: the columns as Parquet, the stamps, and a bit mask per record of the columns
+    with a number."""
     writer: LogWriter
-    """Of ``data``; open until it is known what belongs into the metadata."""
+    """Writer of ``data``; open until the metadata are known."""
     rows: int = 0
     not_used: int = 0
-    """Records kept, and those outside the part to use."""
+    """Number of records that are used, and of records outside the part to use."""
     columns: dict[str, ColumnSummary] = field(default_factory=dict)
-    """What was counted of each column."""
+    """Statistics of each column."""
     patterns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    """Records by the columns that have a number in them: entry 5 of the first and the third."""
+    """Number of records for each bit mask of columns with a number: entry 5 counts the records with
+    the first and the third column."""
     knocks: dict[str, int] = field(default_factory=dict)
-    """Samples left out of each column, as part of a knock."""
+    """Number of samples of each column that are left out as part of a knock."""
     stamped: bool = False
     """Records have stamps."""
     base: TimeBase | None = None
-    """The time base, where it was found when the columns of a file were separated."""
+    """Time base, if it was set when the columns of a file were separated."""
     findings: list[Finding] = field(default_factory=list)
-    """Of its columns, where they do not have the rate of its records throughout."""
+    """Findings about columns whose rate changes within the log."""
     left_out: dict[str, ColumnSummary] = field(default_factory=dict)
-    """Columns of the file that were then not written: they have too few samples to be used."""
+    """Columns that were not written in the separation, since they have too few samples."""
 
     def stamps(self) -> Iterator[NDArray[np.float64]]:
-        """Yield the stamps in s, from the disk."""
+        """Yield the stamps in s, read from the scratch file."""
         for start in range(0, self.rows, STAMP_BLOCK):
             yield np.fromfile(self.stamps_path, np.float64, STAMP_BLOCK, offset=8 * start)
 
@@ -68,7 +69,7 @@ class Part:
             yield np.fromfile(self.present_path, np.uint16, STAMP_BLOCK, offset=2 * start)
 
     def digest(self) -> str:
-        """Return a digest of the stamps: files with the same ones share a clock."""
+        """Return a digest of the stamps; files with the same digest share a clock."""
         digest = hashlib.blake2b()
         for block in self.stamps():
             digest.update(block.data)
@@ -79,7 +80,7 @@ class Part:
 def new_part(
     source: LogFile, columns: Iterable[str], scratch: Path, name: str
 ) -> Iterator[tuple[Part, PartWriter]]:
-    """Begin a part, and give what writes its records.
+    """Begin a part; yield it with the writer of its records.
 
     ``scratch``, ``name``: folder and stem of the scratch files.
     """
@@ -96,7 +97,7 @@ def new_part(
 
 @dataclass
 class PartWriter:
-    """Takes the records of a part."""
+    """Writes the records of a part and collects their statistics."""
 
     _part: Part
     _stamps: BinaryIO
@@ -105,7 +106,7 @@ class PartWriter:
     def add(
         self, time: NDArray[np.float64] | None, columns: Mapping[str, NDArray[np.float64]]
     ) -> None:
-        """Count and write consecutive records: their stamps, s, and their samples, SI."""
+        """Write consecutive records and add them to the statistics: stamps, s, and samples, SI."""
         part = self._part
         # Not `tofile`: it does not report a failed write when the C library closes the file.
         if time is not None:
@@ -126,18 +127,18 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     """Read one file of a recording, in bounded memory.
 
     ``scratch``: folder for the scratch files.
-    ``number``: of the file, for their names.
+    ``number``: number of the file, for the names of the scratch files.
 
     Raises
     ------
     RecordingError
-        If the file cannot be used, or no sample lies in the part to use.
+        If the file cannot be read, or no sample lies in the part to use.
     """
     rate = file.log.rate_hz
     read_rows = 0
     with new_part(file, file.sources, scratch, f"part{number}") as (part, writer):
         for batch in file.batches():
-            keep = _used(batch, use, read_rows, rate)
+            keep = _select_used(batch, use, read_rows, rate)
             read_rows += len(batch)
             writer.add(
                 None if batch.time is None else batch.time[keep],
@@ -155,13 +156,13 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     return part
 
 
-def _used(
+def _select_used(
     batch: Batch, use: UsedPart, before: int, rate: float | None
 ) -> slice | NDArray[np.bool_]:
-    """Return which records of a batch lie in the part to use.
+    """Return a selection of the records of a batch in the part to use.
 
-    ``before``: records before the batch.
-    ``rate``: the stated one, Hz; needed where there are no stamps.
+    ``before``: number of records before the batch.
+    ``rate``: stated rate, Hz; needed if there are no stamps.
     """
     if use.start == 0.0 and use.end is None:
         return slice(None)
@@ -169,7 +170,7 @@ def _used(
     if clock is None:
         assert rate is not None  # checked with the sensor file
         clock = np.arange(before, before + len(batch)) / rate
-    # A record without a stamp is not known to lie outside.
+    # Records without a stamp are used: they are not known to lie outside.
     keep = ~(clock < use.start)
     if use.end is not None:
         keep &= ~(clock > use.end)
@@ -179,16 +180,16 @@ def _used(
 def leave_out_knocks(
     part: Part, sigmas: float, longest: int, scratch: Path
 ) -> dict[str, list[Knock]]:
-    """Make the samples of knocks missing; return the knocks by column.
+    """Replace the samples of knocks by NaN; return the knocks by column.
 
     Parameters
     ----------
     part : Part
-        Its scratch file is written again where there is a knock.
+        Its scratch file is written again if there is a knock.
     sigmas : float
-        Distance from the level that counts, in standard deviations.
+        Least distance of a knock from the level, in standard deviations.
     longest : int
-        Records: what lasts longer is motion.
+        Longest knock, records; a longer event is motion.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(suspects(b, sigmas)[0])]
@@ -200,14 +201,16 @@ def leave_out_knocks(
     part.writer.finish({})
     knocks_of = {}
     for name in doubtful:
-        here = list(knocks(_pieces(part.data, name), blocks[name], sigmas, longest, step[name]))
+        here = list(
+            knocks(_read_row_groups(part.data, name), blocks[name], sigmas, longest, step[name])
+        )
         if here:
             knocks_of[name] = here
-    _write_again(part, knocks_of, scratch)
+    _rewrite_without_knocks(part, knocks_of, scratch)
     return knocks_of
 
 
-def _write_again(part: Part, knocks_of: dict[str, list[Knock]], scratch: Path) -> None:
+def _rewrite_without_knocks(part: Part, knocks_of: dict[str, list[Knock]], scratch: Path) -> None:
     """Write the columns again without the samples of knocks; the new writer stays open."""
     old = part.data
     part.data = scratch / f"{old.stem}.calm.parquet"
@@ -231,7 +234,7 @@ def _write_again(part: Part, knocks_of: dict[str, list[Knock]], scratch: Path) -
     old.unlink()
 
 
-def _pieces(path: Path, name: str) -> Iterator[NDArray[np.float64]]:
+def _read_row_groups(path: Path, name: str) -> Iterator[NDArray[np.float64]]:
     with checked_parquet(path) as file:
         for number in range(file.num_row_groups):
             table = checked_row_group(file, number, [name])

@@ -1,11 +1,11 @@
-"""Columns of one table that have rates of their own, taken apart: each clock becomes a part.
+"""Separate the columns of one table by their sampling rates: each clock becomes a part.
 
-Phones and programs that merge logs write a row for each stamp and leave the cell of a sensor empty
-that has no new sample. A channel has a clock of its own where the records with a number lie on a
-uniform grid that is slower than the grid of all records, or where all records together
-lie on no grid. Numbers that are missing at random do not lie on a slower grid: such a channel
-stays on the common one. The axes of a gyro, or of an accelerometer, are sampled together: an axis
-with fewer numbers than another one has lost them.
+Phones and programs that merge logs write a row for each stamp, and leave cells empty for sensors
+without a new sample. A channel has a clock of its own in two cases: its records with a number lie
+on a uniform grid that is slower than the grid of all records, or all records together lie on no
+grid. Randomly missing numbers do not lie on a slower grid: such a channel stays on the common grid.
+The axes of a gyro, or of an accelerometer, are sampled together: an axis with fewer numbers than
+another one has missing samples.
 """
 
 from __future__ import annotations
@@ -28,34 +28,35 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
-_SAME_CLOCK = 0.5
+_MIN_COMMON_RECORDS = 0.5
 """Least share of common records, of the sparser channel, for two channels of one clock."""
 
-_WITHIN = 0.95
+_MIN_CONTAINED_RECORDS = 0.95
 """Least share of the records of a channel that are also records of the channel it joins."""
 
-_APART = 0.05
-"""Share of the records of a channel below which it is not read together with another one."""
+_MAX_COMMON_IF_SEPARATE = 0.05
+"""Largest share of common records of two channels that are not sampled together; also the least
+relative difference of two numbers of records, or rates, that counts."""
 
 _MAX_STRIDE, _MIN_ON_STRIDE = 50, 0.98
-"""Records between two samples of a slower clock, at most; share of the samples that lie on it."""
+"""Largest period of a slower clock, records, and least share of the samples that are on it."""
 
-EVERY = -1
-"""In the place of the bits of columns: all records, also those without a number."""
+ALL_RECORDS = -1
+"""Used instead of a bit mask of columns: all records, also those without a number."""
 
 
 @dataclass
 class _Clock:
-    """Channels that have their samples in the same records."""
+    """Channels with samples in the same records."""
 
     base: TimeBase
     channels: list[str]
     bits: int
-    """Those of the channels in `Part.present`."""
+    """Bit mask of the channels in `Part.present`."""
 
 
 class _Records:
-    """The records of a part: in which of them the columns have a number."""
+    """The records of a part, and the columns with a number in each of them."""
 
     def __init__(self, part: Part, stated: float | None, settings: QualitySettings) -> None:
         self._part, self._stated, self._settings = part, stated, settings
@@ -68,13 +69,13 @@ class _Records:
         }
 
     def count(self, channel: str) -> int:
-        """Return how many records have a number of a channel."""
+        """Return the number of records with a number of a channel."""
         return self.common[channel, channel]
 
     def times(self, *, numbered: bool = False) -> Iterator[NDArray[np.float64]]:
-        """Yield the stamps of all records, s; without stamps, or if asked for, their numbers.
+        """Yield the stamps of all records, s; without stamps, or if ``numbered``, their indices.
 
-        Numbers are divided by the stated rate, where there is one.
+        Indices are divided by the stated rate, if there is one.
         """
         part = self._part
         if part.stamped and not numbered:
@@ -84,10 +85,10 @@ class _Records:
             yield np.arange(start, min(start + STAMP_BLOCK, part.rows)) / (self._stated or 1.0)
 
     def base(self, bits: int, *, numbered: bool = False, known: float | None = None) -> TimeBase:
-        """Return the time base of the records that have a number in one of some columns.
+        """Return the time base of the records with a number in any of the columns of a bit mask.
 
-        The stated rate belongs to all records: it decides only whether steps of one and two are
-        samples lost. ``known``: the interval, s, if it is known.
+        The stated rate belongs to all records. It only decides whether double steps are lost
+        samples. ``known``: the interval, s, if it is known.
 
         Raises
         ------
@@ -111,17 +112,17 @@ class _Records:
         return replace(base, source="stated", rate_error=None) if by_number else base
 
     def points(self, base: TimeBase, bits: int) -> Iterator[NDArray[np.int64]]:
-        """Yield the grid points, in the time base of all records, of those with a number."""
+        """Yield the grid points of the records with a number, in the time base of all records."""
         places = timebase.positions(base, self.times, self._settings)
         for points, present in zip(places, self._part.present(), strict=True):
             chosen = points[has_one(present, bits)]
             yield chosen[chosen >= 0]
 
     def stride(self, base: TimeBase, bits: int) -> int:
-        """Return the distance of the samples of a channel, in intervals of all records.
+        """Return the sampling interval of a channel, in intervals of all records.
 
-        It is found however many samples are missing. 1: the samples lie on no slower clock of
-        which the interval is a multiple of that of all records.
+        It is found with any number of missing samples. 1: the samples are not on a slower clock
+        with a multiple of the interval of all records.
         """
         hits = np.zeros(_MAX_STRIDE + 1)
         total = 0
@@ -134,8 +135,10 @@ class _Records:
 
 
 def has_one(present: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
-    """Return which records have a number in one of some columns (`EVERY`: all records)."""
-    return np.ones(len(present), np.bool_) if bits == EVERY else present & np.uint16(bits) != 0
+    """Return a mask of the records with a number in any of these columns, or of `ALL_RECORDS`."""
+    return (
+        np.ones(len(present), np.bool_) if bits == ALL_RECORDS else present & np.uint16(bits) != 0
+    )
 
 
 def separate_clocks(
@@ -145,14 +148,14 @@ def separate_clocks(
     settings: QualitySettings,
     scratch: Path,
 ) -> list[Part]:
-    """Return the parts of a file whose channels have clocks of their own; else the part alone.
+    """Return one part for each clock of a file; the part itself if there is only one clock.
 
     Parameters
     ----------
     part : Part
-        Its scratch file is read once more where it is taken apart.
+        Its scratch file is read again if it is separated.
     stated : float or None
-        The rate of its records, Hz, as it is stated.
+        Stated rate of its records, Hz.
     whole : callable
         Returns the time base of all records.
     scratch : Path
@@ -161,7 +164,7 @@ def separate_clocks(
     Raises
     ------
     RecordingError
-        If channels without a clock of their own are left, and all records together have none.
+        If channels have no clock of their own, and all records together have none either.
     """
     records = _Records(part, stated, settings)
     channels = [
@@ -180,33 +183,33 @@ def separate_clocks(
     limit = (1.0 - settings.rate_tolerance) * (base.rate if base is not None else math.inf)
     own = {}
     for name in channels:
-        found = _own_clock(name, channels, part, records, grid)
+        found = _find_own_clock(name, channels, part, records, grid)
         if found is not None:
             own[name] = found
-    leaders = {name: _complete_sibling(name, own, records) for name in own}
+    leaders = {name: _find_complete_sibling(name, own, records) for name in own}
     own = {name: found for name, found in own.items() if leaders[name] is None}
     if grid is not None and all(found.rate >= limit for found in own.values()):
-        part.findings = _rate_changes(channels, grid, records, part)
+        part.findings = _find_rate_changes(channels, grid, records, part)
         return [part]
-    clocks = _grouped(own, records, settings)
-    rest = _place(channels, own, clocks, records, leaders)
+    clocks = _group_by_clock(own, records, settings)
+    rest = _assign_to_clocks(channels, own, clocks, records, leaders)
     if not clocks:
         return [part]
-    if grid is None:  # each in the order of its records
-        clocks += _grouped(
+    if grid is None:  # each channel by its own records
+        clocks += _group_by_clock(
             {name: records.base(records.bit[name]) for name in rest}, records, settings
         )
         rest = []
     if rest:
-        clocks.append(_Clock(base or whole(), rest, EVERY))
+        clocks.append(_Clock(base or whole(), rest, ALL_RECORDS))
     for clock in clocks:
-        if clock.bits != EVERY:
-            clock.base = _base_of_group(clock, records, settings)
-    return _written(part, clocks, records, scratch)
+        if clock.bits != ALL_RECORDS:
+            clock.base = _find_base_of_group(clock, records, settings)
+    return _write_parts(part, clocks, records, scratch)
 
 
-def _complete_sibling(name: str, own: Mapping[str, TimeBase], records: _Records) -> str | None:
-    """Return the axis of the same sensor that has the numbers of this one, and the most others.
+def _find_complete_sibling(name: str, own: Mapping[str, TimeBase], records: _Records) -> str | None:
+    """Return the most complete axis of the same sensor with the records of this one, or None.
 
     ``own``: time bases of the channels with a clock of their own.
     """
@@ -214,17 +217,17 @@ def _complete_sibling(name: str, own: Mapping[str, TimeBase], records: _Records)
         other
         for other in records.bit
         if quantity_of(other) == quantity_of(name)
-        and records.count(other) > (1.0 + _APART) * records.count(name)
-        and records.common[name, other] >= _WITHIN * records.count(name)
-        and (other not in own or own[other].rate > (1.0 + _APART) * own[name].rate)
+        and records.count(other) > (1.0 + _MAX_COMMON_IF_SEPARATE) * records.count(name)
+        and records.common[name, other] >= _MIN_CONTAINED_RECORDS * records.count(name)
+        and (other not in own or own[other].rate > (1.0 + _MAX_COMMON_IF_SEPARATE) * own[name].rate)
     ]
     return max(siblings, key=records.count, default=None)
 
 
-def _rate_changes(
+def _find_rate_changes(
     channels: list[str], grid: TimeBase, records: _Records, part: Part
 ) -> list[Finding]:
-    """Return a finding for each channel that has a lower rate in a part of the log."""
+    """Return a finding for each channel with a lower rate in a part of the log."""
     if not grid.stamped and part.stamped:  # stamps of arrival: losses cannot be located
         return []
     findings = []
@@ -235,17 +238,17 @@ def _rate_changes(
     return findings
 
 
-def _own_clock(
+def _find_own_clock(
     name: str, channels: list[str], part: Part, records: _Records, grid: TimeBase | None
 ) -> TimeBase | None:
-    """Return the time base of the records of a channel; None where they have none of their own.
+    """Return the time base of the records of a channel; None if it has no clock of its own.
 
-    ``grid``: that of all records, if they lie on a grid.
+    ``grid``: time base of all records, if they lie on a grid.
     """
     number = records.count(name)
     bits = records.bit[name]
     try:
-        if grid is not None and number < (1.0 - _APART) * part.rows:
+        if grid is not None and number < (1.0 - _MAX_COMMON_IF_SEPARATE) * part.rows:
             stride = records.stride(grid, bits)
             if stride > 1:
                 return records.base(bits, known=stride / grid.rate)
@@ -254,28 +257,28 @@ def _own_clock(
             return base
         if grid is not None or number == part.rows:
             return None
-        # Stamps of arrival: that a channel is in every second record, the numbers of these tell.
+        # Stamps of arrival: the indices of the records show a channel in every second record.
         if records.base(bits, numbered=True).stamped:
             return base
     except RecordingError:
         return None
     alone = any(
-        records.common[name, other] <= _APART * min(number, records.count(other))
+        records.common[name, other] <= _MAX_COMMON_IF_SEPARATE * min(number, records.count(other))
         for other in channels
     )
     return base if alone else None
 
 
-def _grouped(
+def _group_by_clock(
     own: dict[str, TimeBase], records: _Records, settings: QualitySettings
 ) -> list[_Clock]:
-    """Group channels that have one rate and most of their records in common."""
+    """Group channels with the same rate and most records in common."""
     clocks: list[_Clock] = []
     for name in sorted(own, key=records.count, reverse=True):
         for clock in clocks:
             first = clock.channels[0]
             alike = abs(own[name].rate / clock.base.rate - 1.0) <= settings.rate_tolerance
-            if alike and records.common[name, first] >= _SAME_CLOCK * records.count(name):
+            if alike and records.common[name, first] >= _MIN_COMMON_RECORDS * records.count(name):
                 clock.channels.append(name)
                 clock.bits |= records.bit[name]
                 break
@@ -284,24 +287,24 @@ def _grouped(
     return clocks
 
 
-def _base_of_group(clock: _Clock, records: _Records, settings: QualitySettings) -> TimeBase:
-    """Return the time base of the records in which any channel of a clock has a number."""
+def _find_base_of_group(clock: _Clock, records: _Records, settings: QualitySettings) -> TimeBase:
+    """Return the time base of the records with a number in any channel of a clock."""
     rate = clock.base.rate
     base = records.base(clock.bits)
     same = base.stamped and abs(base.rate / rate - 1.0) <= settings.rate_tolerance
     return base if same or not clock.base.stamped else records.base(clock.bits, known=1.0 / rate)
 
 
-def _place(
+def _assign_to_clocks(
     channels: list[str],
     own: dict[str, TimeBase],
     clocks: list[_Clock],
     records: _Records,
     leaders: Mapping[str, str | None],
 ) -> list[str]:
-    """Add channels with samples lost to the clock they are read with; return the others.
+    """Add channels with missing samples to the clock of their records; return the others.
 
-    ``leaders``: axes of the same sensor whose clock a channel has.
+    ``leaders``: for each channel, the axis of the same sensor that gives its clock, or None.
     """
     rest = []
     for name in channels:
@@ -314,7 +317,8 @@ def _place(
             if (
                 leader in clock.channels
                 if leader
-                else records.common[name, clock.channels[0]] >= _WITHIN * records.count(name)
+                else records.common[name, clock.channels[0]]
+                >= _MIN_CONTAINED_RECORDS * records.count(name)
             )
         ]
         if within:
@@ -326,11 +330,11 @@ def _place(
     return rest
 
 
-def _written(part: Part, clocks: list[_Clock], records: _Records, scratch: Path) -> list[Part]:
+def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: Path) -> list[Part]:
     """Write the records of each clock to a part of its own.
 
-    What is beside the channels, such as the temperature, goes with each clock: a reading with the
-    next record.
+    Additional columns, such as the temperature, are written to each part: a reading goes into the
+    next record of the part.
     """
     part.writer.finish({})
     beside = [name for name in part.columns if name in BESIDE]
@@ -387,10 +391,10 @@ def _describe(of_clock: Part, clock: _Clock, part: Part) -> None:
 def _carry(
     values: NDArray[np.float64], chosen: NDArray[np.bool_], waiting: float
 ) -> tuple[NDArray[np.float64], float]:
-    """Return the readings for the chosen records: the latest since the chosen one before.
+    """Return the latest reading since the previous chosen record, for each chosen record.
 
-    ``waiting``: that since the last chosen record of the records before; it is returned, too, of
-    these.
+    ``waiting``: reading after the last chosen record of the previous block. The same for this block
+    is returned as the second value.
     """
     there = np.where(np.isfinite(values), np.arange(len(values)), -1)
     latest = np.maximum.accumulate(there)

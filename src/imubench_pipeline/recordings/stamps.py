@@ -1,4 +1,4 @@
-"""Time stamps put on a uniform grid, block by block."""
+"""Put time stamps on a uniform grid, block by block."""
 
 from __future__ import annotations
 
@@ -10,98 +10,105 @@ from numba import njit
 from numpy.typing import NDArray
 
 Stamps = Callable[[], Iterator[NDArray[np.float64]]]
-"""Gives the stamps of a file in s, block by block, afresh at each call; NaN where missing."""
+"""Returns a new iterator over the stamps of a file in s, block by block; NaN where missing."""
 
-_OFF_GRID = 0.48
-"""Part of a sampling interval beyond which a stamp does not say which grid point it means."""
+_MAX_GRID_DISTANCE = 0.48
+"""Largest distance of a stamp from its grid point, in sampling intervals; beyond it the grid point
+is ambiguous."""
 
-_TRACKING = 0.02
-"""Gain with which the grid follows the stamps; its interval, with a quarter of
-the square."""
+_TRACKING_GAIN = 0.02
+"""Gain of the loop by which the grid follows the stamps. The gain for its interval is a quarter of
+the square (critical damping)."""
 
-_LONG, _TWO = 1.75, 2.2
-"""Steps, over their median, that are more than one, and no more than two."""
+_MIN_DOUBLE_STEP, _MAX_DOUBLE_STEP = 1.75, 2.2
+"""Range of a double step, over the median step."""
 
-SHARED = 0.2
-"""Share of the records that repeat a stamp above which each stamp belongs to a group of samples."""
+MIN_SHARED_STAMPS = 0.2
+"""Share of repeated stamps above which each stamp belongs to a group of samples."""
 
-_MAX_ROUNDED = 1.05 * SHARED
-"""Share of repeated stamps up to which they are tested for being rounded."""
+_MAX_ROUNDED_REPEATS = 1.05 * MIN_SHARED_STAMPS
+"""Largest share of repeated stamps that may be due to rounding."""
 
-_NEGLIGIBLE = 0.02
-"""Share of repeated stamps below which it makes 1 % of N whether they are rounded or copies."""
+_MIN_ROUNDED_REPEATS = 0.02
+"""Least share of repeated stamps that is tested: below it, rounding or copies change N by 1 %
+only."""
 
-_MIDDLE = 0.45
-"""Level of the quantile that stands for the median: of as many short and long steps the short."""
+_MEDIAN_LEVEL = 0.45
+"""Level of the quantile used as the median, so that of equal numbers of short and long steps the
+short one is chosen."""
 
-SET_BACK = 0.45
-"""s; a step back that may be a clock that was set back, as by a leap second. Shorter ones are
-records that were written twice, or in another order."""
+MIN_SET_BACK = 0.45
+"""Least step back, s, of a clock that was set back, as by a leap second. Shorter steps back are
+from records that were written twice or out of order."""
 
-_AROUND = 16
-"""Records on each side of a step that tell whether the clock was set back, or one stamp is late."""
+_RECORDS_ON_EACH_SIDE = 16
+"""Records on each side of a step that distinguish a clock that was set back from a late stamp."""
 
-_ENOUGH = 1 << 17
-"""Stamps of a block that tell its typical interval; all are then followed."""
+_MAX_EXAMINED_STAMPS = 1 << 17
+"""Stamps of a block that are used for its typical interval."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """The interval between samples that stamps show at first sight."""
+    """First estimate of the interval between samples."""
 
     mean: float
-    """Mean of the intervals between which no sample is missing, s."""
+    """Mean of the intervals without missing samples, s."""
     other: float | None = None
-    """The mean, s, if double steps at regular distances are lost samples, or repeated stamps at
-    regular distances are records written twice; None where there are none. Rounded stamps look the
-    same, and are assumed."""
+    """Mean, s, if double steps at regular distances are lost samples, or if repeated stamps at
+    regular distances are records written twice; None if there are none. Rounded stamps cause the
+    same pattern, and ``mean`` assumes rounding."""
 
     @property
     def has_repeats(self) -> bool:
-        """Whether stamps repeat at regular distances: the rate exceeds their resolution."""
+        """Whether stamps repeat at regular distances, since the rate exceeds their resolution."""
         return self.other is not None and self.other > self.mean
 
 
 def typical_interval(stamps: Stamps) -> Interval | None:
-    """Return the interval between samples; None where the stamps do not advance."""
+    """Return the interval between samples; None if the stamps do not advance."""
     medians, rounded, repeated = [], [], []
     for block in stamps():
-        steps = _advances(block)
+        steps = _take_forward_steps(block)
         if len(steps):
-            medians.append(float(np.quantile(steps, _MIDDLE, method="lower")))
-            long = (steps > _LONG * medians[-1]) & (steps < _TWO * medians[-1])
+            medians.append(float(np.quantile(steps, _MEDIAN_LEVEL, method="lower")))
+            long = (steps > _MIN_DOUBLE_STEP * medians[-1]) & (
+                steps < _MAX_DOUBLE_STEP * medians[-1]
+            )
             rounded.append(_are_regular(long))
-            zero = np.diff(block[:_ENOUGH]) == 0.0
-            repeated.append(_NEGLIGIBLE <= np.mean(zero) <= _MAX_ROUNDED and _are_regular(zero))
+            zero = np.diff(block[:_MAX_EXAMINED_STAMPS]) == 0.0
+            repeated.append(
+                _MIN_ROUNDED_REPEATS <= np.mean(zero) <= _MAX_ROUNDED_REPEATS and _are_regular(zero)
+            )
     if not medians:
         return None
     median = float(np.median(medians))
-    # Two steps for one are a missing sample.
-    total, count = _steps_up_to(stamps, _LONG * median)
+    # Double steps are missing samples, and are left out.
+    total, count = _sum_steps_up_to(stamps, _MIN_DOUBLE_STEP * median)
     single = total / count
     if np.mean(repeated) > 0.5:
         count += sum(int(np.count_nonzero(np.diff(block) == 0.0)) for block in stamps())
         return Interval(total / count, single)
     if np.mean(rounded) <= 0.5:
         return Interval(single)
-    total, count = _steps_up_to(stamps, _TWO * median)
+    total, count = _sum_steps_up_to(stamps, _MAX_DOUBLE_STEP * median)
     return Interval(total / count, single)
 
 
-def _steps_up_to(stamps: Stamps, limit: float) -> tuple[float, int]:
+def _sum_steps_up_to(stamps: Stamps, limit: float) -> tuple[float, int]:
     """Return the sum of the steps up to a limit, s, and their number."""
     total, count = 0.0, 0
     for block in stamps():
-        steps = _advances(block)
+        steps = _take_forward_steps(block)
         steps = steps[steps <= limit]
         total += float(steps.sum())
         count += len(steps)
     return total, count
 
 
-def _advances(block: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the steps forward in a block, from its first stamps if they have any."""
-    for part in (block[:_ENOUGH], block):
+def _take_forward_steps(block: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the positive steps of the first stamps of a block, or else of the whole block."""
+    for part in (block[:_MAX_EXAMINED_STAMPS], block):
         steps = np.diff(part)
         steps = steps[steps > 0]
         if len(steps):
@@ -110,10 +117,10 @@ def _advances(block: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _are_regular(chosen: NDArray[np.bool_]) -> bool:
-    """Return whether some steps come at regular distances in the whole block.
+    """Return whether the chosen steps have regular distances throughout a block.
 
-    Rounded stamps have them at two neighbouring distances. Losses have them at any distance, a
-    lower rate in a part of the block at one distance but in that part alone.
+    Rounding gives two neighbouring distances. Losses give random distances. A lower rate in a part
+    of the block gives one distance in that part only.
     """
     places = np.flatnonzero(chosen)
     if len(places) < 10:
@@ -124,38 +131,38 @@ def _are_regular(chosen: NDArray[np.bool_]) -> bool:
     return bool(throughout and np.mean(np.abs(distances - median) <= 1) > 0.9)
 
 
-_MARK = 1 << 10
-"""Records between two marks."""
+_RECORDS_PER_MARK = 1 << 10
+"""Records from one mark to the next."""
 
 
 @dataclass
 class Track:
-    """Follows stamps along a grid, and counts what it meets."""
+    """Follows stamps along a grid and counts holes, repeats, jumps and missing stamps."""
 
     interval: float
-    """Of the grid at its beginning, s."""
+    """Initial interval of the grid, s."""
     longest_hole: float
-    """A longer step forward begins a segment, s."""
+    """Longest hole within a segment, s; a longer step begins a new segment."""
     rows: int = 0
     grid: int = 0
-    """Records, and points of the grid up to the last one."""
+    """Number of records, and of grid points up to the last record."""
     off_grid: int = 0
     duplicates: int = 0
     unstamped: int = 0
-    """Records whose stamp lies between two points, repeats a point, or is missing."""
+    """Number of records with a stamp between two points, at a used point, or without a stamp."""
     holes: int = 0
     longest: int = 0
     longest_at: int = 0
-    """Number of holes, the points of the longest, and the first of them."""
+    """Number of holes; length of the longest hole, and its first grid point."""
     elapsed: float = 0.0
     steps: int = 0
-    """s, and grid points, between stamped records of the same segment."""
+    """Time, s, and number of grid points between stamped records of the same segment."""
     starts: list[int] = field(default_factory=list)
     """First grid point of each segment."""
     jumps: list[float] = field(default_factory=list)
-    """Step of the stamps at each of them, s; NaN at the first."""
+    """Step of the stamps at the start of each segment, s; NaN at the first."""
     marks: list[tuple[int, float]] = field(default_factory=list)
-    """Grid point and stamp of a record now and then, to see the rate drift."""
+    """Grid point and stamp of every 1024th record, to detect a drift of the rate."""
     _state: NDArray[np.float64] = field(
         default_factory=lambda: np.array([np.nan, np.nan, np.nan, np.nan, 0.0])
     )
@@ -172,18 +179,18 @@ class Track:
 
     @property
     def mean_interval(self) -> float | None:
-        """Mean interval of the grid, s; None where no two stamps are in one segment."""
+        """Mean interval of the grid, s; None if no segment has two stamps."""
         return self.elapsed / self.steps if self.steps else None
 
     def follow(self, block: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the grid point of each record of a block; -1 for a repeated one."""
+        """Return the grid point of each record of a block; -1 for a repeated stamp."""
         points = np.empty(len(block), dtype=np.int64)
         breaks = np.empty(len(block), dtype=np.int64)
         jumps = np.empty(len(block))
         counts = np.zeros(8, dtype=np.int64)
         if np.isnan(self._state[2]):
             self._state[2] = self.interval
-        self.elapsed += _follow(
+        self.elapsed += _assign_grid_points(
             block, self.longest_hole, self.grid, self._state, points, breaks, jumps, counts
         )
         self.starts += breaks[: counts[0]].tolist()
@@ -195,7 +202,7 @@ class Track:
             self.longest, self.longest_at = int(counts[4]), int(counts[7])
         self.unstamped += int(counts[5])
         self.steps += int(counts[6])
-        for start in range(0, len(block), _MARK):
+        for start in range(0, len(block), _RECORDS_PER_MARK):
             if points[start] >= 0 and np.isfinite(block[start]):
                 self.marks.append((int(points[start]), float(block[start])))
         self.rows += len(block)
@@ -215,23 +222,23 @@ def tracked(stamps: Stamps, interval: float, longest_hole: float) -> Track:
 def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: float) -> bool:
     """Return whether the clock was set back before a record.
 
-    The stamps on both sides increase, but their median decreases. Scattered stamps and late
-    records do not behave so.
+    In that case the stamps on both sides increase, but their median decreases. Scattered stamps and
+    late records do not behave so.
 
     Parameters
     ----------
     stamps : ndarray
         s, shape (n,); NaN where missing.
     i : int
-        Place of the record.
+        Index of the record.
     step : float
         From the previous stamp to this one, s.
     interval : float
-        Between samples, s.
+        Sampling interval, s.
     """
-    if not step < -max(SET_BACK, 1.5 * interval):
+    if not step < -max(MIN_SET_BACK, 1.5 * interval):
         return False
-    count = min(_AROUND, i, stamps.size - i)
+    count = min(_RECORDS_ON_EACH_SIDE, i, stamps.size - i)
     if count < 1:
         return False
     for k in range(i - count + 1, i + count):
@@ -242,7 +249,7 @@ def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: floa
 
 
 @njit(cache=True, nogil=True)
-def _follow(
+def _assign_grid_points(
     block: NDArray[np.float64],
     longest_hole: float,
     grid: int,
@@ -252,7 +259,7 @@ def _follow(
     jumps: NDArray[np.float64],
     counts: NDArray[np.int64],
 ) -> float:
-    """Give each stamp its grid point; return the seconds between stamps.
+    """Assign a grid point to each stamp; return the time between stamps within segments, s.
 
     ``state``: time of the last grid point, last stamp, interval, last stamped grid point, sum of
     the squared distances from the grid.
@@ -263,13 +270,13 @@ def _follow(
     late = after_hole = False
     for i in range(block.size):
         stamp = block[i]
-        # One stamp far from where the next ones go on is no jump of the clock.
-        astray = (
+        # A single wrong stamp, after which the next one continues the series, is no jump.
+        wrong = (
             i + 1 < block.size
             and abs(stamp - last) > 10.0 * interval
             and abs(block[i + 1] - last - 2.0 * interval) < interval
         )
-        if np.isnan(stamp) or astray:
+        if np.isnan(stamp) or wrong:
             counts[5] += 1
             late = after_hole = False
             point += 1
@@ -292,13 +299,17 @@ def _follow(
         else:
             whole = int(np.round((stamp - origin) / interval))
             error = stamp - origin - whole * interval
-            # Records that were written twice advance as all others do.
+            # A series of records that was written twice advances at the normal interval.
             twice = whole < 1 and i > 0 and abs(stamp - block[i - 1] - interval) < 0.1 * interval
-            if step != 0.0 and not twice and (abs(error) > _OFF_GRID * interval or whole < 1):
+            if (
+                step != 0.0
+                and not twice
+                and (abs(error) > _MAX_GRID_DISTANCE * interval or whole < 1)
+            ):
                 counts[1] += 1
             if whole == 0 and ((step > 0.0 and late) or (step == 0.0 and after_hole)):
-                # The sample before came late by half an interval, or its stamp is rounded up to
-                # this one's: it belongs into the hole.
+                # The previous sample was late by half an interval, or its stamp was rounded up to
+                # this one: it fills the hole before it.
                 points[i - 1] -= 1
                 points[i] = point
                 counts[3] -= 1
@@ -312,7 +323,8 @@ def _follow(
                 and i + 1 < block.size
                 and np.round((block[i + 1] - origin) / interval) == 2
             ):
-                # This one came early, or its stamp is rounded down: the next leaves a hole for it.
+                # This sample was early, or its stamp was rounded down: the next step has a hole
+                # for it.
                 whole = 1
                 error = stamp - origin - interval
             if whole < 1:
@@ -327,8 +339,8 @@ def _follow(
                 if whole - 1 > counts[4]:
                     counts[4], counts[7] = whole - 1, point + 1
             point += whole
-            origin += whole * interval + _TRACKING * error
-            interval += _TRACKING**2 / 4.0 * error
+            origin += whole * interval + _TRACKING_GAIN * error
+            interval += _TRACKING_GAIN**2 / 4.0 * error
             elapsed += step
             state[4] += error * error
             counts[6] += point - int(stamped)

@@ -1,9 +1,9 @@
 """The time base of a recording: its rate, its missing samples and its segments.
 
-Samples are put on a uniform grid. Stamps that lie on a grid give every sample its position,
-and the positions without a sample are holes. Stamps that scatter by more than half a sampling
-interval (stamped at arrival in a host, for instance) say only how long the recording was: then
-the samples are taken as consecutive, and that is a finding.
+Samples are put on a uniform grid. Stamps on a grid give the position of every sample, and positions
+without a sample are holes. Stamps that scatter by more than half a sampling interval (for instance,
+stamps of arrival in a host) give only the length of the recording. The samples are then treated as
+consecutive, which is reported as a finding.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.stamps import (
-    SET_BACK,
-    SHARED,
+    MIN_SET_BACK,
+    MIN_SHARED_STAMPS,
     Interval,
     Stamps,
     Track,
@@ -29,60 +29,63 @@ from imubench_pipeline.recordings.stamps import (
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
 
-_SAME = 1e-5
-"""Relative difference of two intervals at which stamps are put on the same grid points."""
+_MAX_INTERVAL_ERROR = 1e-5
+"""Largest relative error of the interval at which stamps get the same grid points."""
 
-_SHORTEST, _LONGEST = 1e-18, 1e8
-"""s; between two samples, also where their unit is taken for another one."""
+_MIN_INTERVAL, _MAX_INTERVAL = 1e-18, 1e8
+"""Range of the interval between samples, s, wide enough for a wrong unit of time."""
 
-_MOST_HOLES, _MOST_POINTS = 100, 10_000_000
-"""Samples that may be missing for each that is there, and beside them: each takes memory."""
+_MAX_MISSING_PER_SAMPLE, _MAX_EXTRA_POINTS = 100, 10_000_000
+"""The grid has at most 100 points per record plus 10 million: each point takes memory."""
 
 MIN_MISSING = 0.01
-"""Share of missing samples from which it is tested whether the sampling rate changed."""
+"""Least share of missing samples for the test of a change of the sampling rate."""
 
-_COMPLETE = 0.05
-"""Difference of stated and mean rate up to which no sample is missing; a last burst may be cut."""
+_MAX_RATE_ERROR_WITHOUT_LOSSES = 0.05
+"""Largest relative difference of stated and mean rate if no sample is missing; the last burst may
+be incomplete."""
 
-_WINDOW, _MIN_REGULAR, _MIN_STRETCH = 32, 0.9, 0.05
-"""Samples of a window, share of them at one distance, and share of such windows, from which a part
-of a log has a lower rate."""
+_RATE_WINDOW, _MIN_REGULAR_STEPS, _MIN_SLOW_WINDOWS = 32, 0.9, 0.05
+"""Test for a lower rate in a part of the log: samples of a window, least share of equal steps in a
+regular window, and least share of such windows."""
 
-_MOST_PAIRS = 10_000
-_FEWEST_OF_GROUP, _FEWEST_GROUPS, _REGULAR = 5, 5, 0.8
+_MAX_PAIRS = 10_000
+"""Largest number of distinct pairs of size and duration of groups; above it there is no regular
+one."""
+
+_MIN_GROUP_SIZE, _MIN_GROUPS, _MIN_REGULAR_GROUPS = 5, 5, 0.8
 """Least samples per stamp, number of stamps, and share of equal groups, for which the rate is taken
 from the equal groups alone."""
 
-_MOST_SEGMENTS = 10_000
-"""Each takes 0.1 ms in a step, however short it is."""
+_MAX_SEGMENTS = 10_000
+"""Largest number of segments; each takes 0.1 ms in a step of the pipeline."""
 
 
 @dataclass(frozen=True)
 class TimeBase:
-    """The uniform grid that the samples of a file lie on."""
+    """The uniform grid of the samples of a file."""
 
     rate: float
     """Hz."""
     source: str
-    """Where the rate is from: ``stated`` or ``stamps``."""
+    """Source of the rate: ``stated`` or ``stamps``."""
     rows: int
     """Records in the file."""
     grid: int
     """Grid points from the first to the last sample, all segments together."""
     segments: tuple[tuple[int, int], ...]
-    """First and one-past-last grid point of each; no difference may span two segments."""
+    """First and one-past-last grid point of each; differences must not span two segments."""
     uniform: bool
-    """The samples are the grid points: stamps need not be kept."""
+    """Every grid point has one sample, so that stamps need not be stored."""
     stamped: bool
-    """The stamps say which grid point each sample is."""
+    """The stamps give the grid point of each sample."""
     findings: tuple[Finding, ...] = ()
     tracking_interval: float | None = None
-    """Interval with which the stamps were put on the grid, s."""
+    """Initial interval of the grid that follows the stamps, s."""
     repeated: int = 0
-    """Records left out, since an earlier one has their grid point."""
+    """Records left out because an earlier one has the same grid point."""
     rate_error: float | None = None
-    """Standard deviation of the rate, as far as the scatter of the stamps tells, Hz; None for a
-    stated rate."""
+    """Standard deviation of the rate from the scatter of the stamps, Hz; None for a stated rate."""
 
     @property
     def missing(self) -> int:
@@ -91,12 +94,12 @@ class TimeBase:
 
     @property
     def samples(self) -> int:
-        """Records that have a grid point of their own."""
+        """Number of records with a grid point of their own."""
         return self.rows - self.repeated
 
 
 def without_stamps(rows: int, rate: float) -> TimeBase:
-    """Return the time base of a file that has no stamps: the rate is the one stated."""
+    """Return the time base of a file without stamps, at the stated rate."""
     return TimeBase(rate, "stated", rows, rows, ((0, rows),), uniform=True, stamped=False)
 
 
@@ -107,7 +110,7 @@ def from_stamps(
     *,
     known: float | None = None,
 ) -> TimeBase:
-    """Find the time base of stamps.
+    """Return the time base of a file from its stamps.
 
     Parameters
     ----------
@@ -117,59 +120,63 @@ def from_stamps(
         The rate in the sensor file, Hz.
     settings : QualitySettings
     known : float or None
-        The sampling interval, s, if it is known although most samples are missing.
+        The sampling interval, s, if known; needed if most samples are missing.
 
     Raises
     ------
     RecordingError
-        If the stamps do not advance, or jump too often.
+        If the stamps do not advance, or jump or stop too often.
     """
     typical = typical_interval(stamps) if known is None else Interval(known)
     if typical is None:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     interval = typical.mean
-    if not _SHORTEST <= interval <= _LONGEST:
+    if not _MIN_INTERVAL <= interval <= _MAX_INTERVAL:
         raise RecordingError(
             f"the time stamps are {interval:.3g} s apart; is 'unit' of 'time' the right one of s, "
             "ms, us, ns?"
         )
-    if typical.other is not None and _is(stated, typical.other, settings):
+    if typical.other is not None and _is_rate_of(stated, typical.other, settings):
         interval = typical.other
     track = tracked(stamps, interval, settings.longest_hole)
     mean = track.mean_interval or interval
-    if abs(mean / interval - 1.0) > _SAME:
-        # The mean over the recording is far better known than the typical interval: once more.
+    if abs(mean / interval - 1.0) > _MAX_INTERVAL_ERROR:
+        # The mean interval is more accurate than the typical one: track again.
         track = tracked(stamps, mean, settings.longest_hole)
-    if track.grid > _MOST_POINTS + _MOST_HOLES * track.rows:
+    if track.grid > _MAX_EXTRA_POINTS + _MAX_MISSING_PER_SAMPLE * track.rows:
         raise RecordingError(
             f"of {track.grid} samples at {1.0 / interval:.6g} Hz {track.rows} are there; expected "
-            f"one of {_MOST_HOLES}: is 'unit' of 'time' the right one? Else cut the log at its "
-            "holes"
+            f"one of {_MAX_MISSING_PER_SAMPLE}: is 'unit' of 'time' the right one? Else cut the "
+            "log at its holes"
         )
-    # Many holes that are together longer than the log are pauses of the host, not losses.
+    # Many holes with more points than the log has records are pauses of the host, not losses.
     bursts = known is None and track.grid > 2 * track.rows and track.holes > 0.05 * track.rows
-    mean = _span(stamps) / max(track.rows - 1, 1)
-    complete = stated is not None and abs(mean * stated - 1.0) <= _COMPLETE
+    mean = _measure_span(stamps) / max(track.rows - 1, 1)
+    complete = stated is not None and abs(mean * stated - 1.0) <= _MAX_RATE_ERROR_WITHOUT_LOSSES
     bursts |= complete and known is None and track.grid > 2 * track.rows
-    shared = track.duplicates > SHARED * track.rows
+    shared = track.duplicates > MIN_SHARED_STAMPS * track.rows
     if typical.has_repeats and interval == typical.mean:
-        base = _arrival_order(stamps, track, stated, settings)
-        coarse = [] if stated else [_coarse(base.rate, 1.0 / (typical.other or interval))]
+        base = _assume_consecutive(stamps, track, stated, settings)
+        coarse = (
+            []
+            if stated
+            else [_describe_coarse_stamps(base.rate, 1.0 / (typical.other or interval))]
+        )
         return replace(base, findings=(*base.findings, *coarse))
     if track.off_grid > settings.jitter * track.rows or bursts or shared:
         if stated and known is None and not complete:  # many samples may be missing
             of_stated = from_stamps(stamps, stated, settings, known=1.0 / stated)
-            if of_stated.stamped and _is(stated, 1.0 / of_stated.rate, settings):
+            if of_stated.stamped and _is_rate_of(stated, 1.0 / of_stated.rate, settings):
                 return of_stated
-        return _arrival_order(stamps, track, stated, settings)
+        return _assume_consecutive(stamps, track, stated, settings)
     _check_segments(len(track.starts))
     exact = track.mean_interval or interval
-    findings = _grid_findings(track, exact)
+    findings = _describe_grid(track, exact)
     rate = 1.0 / exact
     if typical.other is not None and stated is None:
-        findings.append(_coarse(rate, 1.0 / typical.other))
-    findings += _rate_findings(rate, stated, settings)
-    findings += _drift_findings(track, settings)
+        findings.append(_describe_coarse_stamps(rate, 1.0 / typical.other))
+    findings += _compare_rates(rate, stated, settings)
+    findings += _find_drift(track, settings)
     if track.grid - track.rows > MIN_MISSING * track.grid:
         follow = Track(track.interval, settings.longest_hole)
         findings += rate_changes((follow.follow(block) for block in stamps()), rate)
@@ -200,7 +207,7 @@ def positions(
             yield np.arange(start, start + len(block), dtype=np.int64)
             start += len(block)
         return
-    assert base.tracking_interval is not None  # as from_stamps makes it
+    assert base.tracking_interval is not None  # from_stamps sets it if stamped
     track = Track(base.tracking_interval, settings.longest_hole)
     for block in stamps():
         yield track.follow(block)
@@ -211,14 +218,14 @@ def rate_changes(
 ) -> list[Finding]:
     """Return a finding if a part of a log has every second (third, ...) sample only.
 
-    Random losses do not look so: 32 samples in a row would have to be equally far apart.
+    Random losses do not give 32 equal steps in a row.
 
     Parameters
     ----------
     points : iterator of ndarray
         Grid points of the samples, in blocks; below 0 for those left out.
     rate : float
-        Of the grid, Hz.
+        Rate of the grid, Hz.
     """
     samples: Counter[int] = Counter()
     begin: dict[int, int] = {}
@@ -226,21 +233,21 @@ def rate_changes(
     total = 0
     for block in points:
         kept = block[block >= 0]
-        number = (len(kept) - 1) // _WINDOW
+        number = (len(kept) - 1) // _RATE_WINDOW
         if number < 1:
             continue
-        steps = np.diff(kept[: number * _WINDOW + 1]).reshape(number, _WINDOW)
+        steps = np.diff(kept[: number * _RATE_WINDOW + 1]).reshape(number, _RATE_WINDOW)
         typical = np.median(steps, axis=1).astype(np.int64)
-        regular = np.mean(steps == typical[:, None], axis=1) >= _MIN_REGULAR
+        regular = np.mean(steps == typical[:, None], axis=1) >= _MIN_REGULAR_STEPS
         total += number
         for step in np.unique(typical[regular & (typical > 1)]).tolist():
             windows = np.flatnonzero(regular & (typical == step))
             samples[step] += len(windows)
-            begin.setdefault(step, int(kept[windows[0] * _WINDOW]))
-            end[step] = int(kept[(windows[-1] + 1) * _WINDOW])
+            begin.setdefault(step, int(kept[windows[0] * _RATE_WINDOW]))
+            end[step] = int(kept[(windows[-1] + 1) * _RATE_WINDOW])
     findings = []
     for step, count in sorted(samples.items()):
-        if count < _MIN_STRETCH * total:
+        if count < _MIN_SLOW_WINDOWS * total:
             continue
         percent = 100.0 * (1.0 - math.sqrt(1.0 / step))
         first, last = begin[step] / rate, end[step] / rate
@@ -258,15 +265,15 @@ def rate_changes(
     return findings
 
 
-def _is(stated: float | None, interval: float, settings: QualitySettings) -> bool:
-    """Return whether a stated rate is that of an interval."""
+def _is_rate_of(stated: float | None, interval: float, settings: QualitySettings) -> bool:
+    """Return whether a stated rate agrees with an interval."""
     return stated is not None and abs(interval * stated - 1.0) <= settings.rate_tolerance
 
 
-def _coarse(rate: float, other: float) -> Finding:
-    """Return the finding of stamps with double or zero steps at regular distances.
+def _describe_coarse_stamps(rate: float, other: float) -> Finding:
+    """Return the finding about stamps with double or zero steps at regular distances.
 
-    ``other``: rate without rounding, Hz: double steps are lost samples, zero steps are copies.
+    ``other``: rate, Hz, if double steps are lost samples and zero steps are copies, not rounding.
     """
     steps, instead, change = (
         ("double steps", "samples are lost so regularly", "less")
@@ -284,7 +291,7 @@ def _coarse(rate: float, other: float) -> Finding:
     )
 
 
-def _grid_findings(track: Track, interval: float) -> list[Finding]:
+def _describe_grid(track: Track, interval: float) -> list[Finding]:
     findings = []
     missing = track.grid - (track.rows - track.duplicates)
     if missing:
@@ -305,7 +312,7 @@ def _grid_findings(track: Track, interval: float) -> list[Finding]:
         findings.append(Finding("missing_samples", severity, detail, missing, start=begin, end=end))
     if len(track.starts) > 1:
         times = [point * interval for point in track.starts[1:]]
-        findings.append(_segments("the clock jumps or stops", times, track.jumps[1:]))
+        findings.append(_describe_segments("the clock jumps or stops", times, track.jumps[1:]))
     if track.duplicates:
         detail = (
             f"{track.duplicates} records repeat a stamp or fall on an earlier one: they were "
@@ -320,18 +327,19 @@ def _grid_findings(track: Track, interval: float) -> list[Finding]:
 
 
 def _check_segments(number: int) -> None:
-    if number > _MOST_SEGMENTS:
+    if number > _MAX_SEGMENTS:
         raise RecordingError(
             f"the time stamps jump or stop so often that there are {number} segments, expected "
-            f"{_MOST_SEGMENTS} at most: is the right column named, and 'wraps' where they begin "
+            f"{_MAX_SEGMENTS} at most: is the right column named, and 'wraps' where they begin "
             "again at 0? Else cut the log at its pauses"
         )
 
 
-def _segments(what: str, times: list[float], jumps: list[float]) -> Finding:
-    """Return the finding of pauses, with the place of the longest one.
+def _describe_segments(what: str, times: list[float], jumps: list[float]) -> Finding:
+    """Return the finding about pauses, with the position of the longest one.
 
-    ``times``: s of samples before each; ``jumps``: step of the stamps, s, below 0 backwards.
+    ``times``: duration of the samples before each pause, s. ``jumps``: steps of the stamps, s;
+    negative ones go backwards.
     """
     jump, at = max(zip(jumps, times, strict=True), key=lambda place: abs(place[0]))
     direction = "backwards" if jump < 0 else "forward"
@@ -343,7 +351,7 @@ def _segments(what: str, times: list[float], jumps: list[float]) -> Finding:
     return Finding("segments", "warning", detail, segments, start=at, end=at)
 
 
-def _rate_findings(rate: float, stated: float | None, settings: QualitySettings) -> list[Finding]:
+def _compare_rates(rate: float, stated: float | None, settings: QualitySettings) -> list[Finding]:
     if stated is None or abs(rate / stated - 1.0) <= settings.rate_tolerance:
         return []
     thousands = np.log10(rate / stated) / 3.0
@@ -359,8 +367,8 @@ def _rate_findings(rate: float, stated: float | None, settings: QualitySettings)
     return [Finding("rate_contradicts_stamps", "warning", detail, rate)]
 
 
-def _drift_findings(track: Track, settings: QualitySettings) -> list[Finding]:
-    """Tell whether the interval between samples is another in the second half of the log."""
+def _find_drift(track: Track, settings: QualitySettings) -> list[Finding]:
+    """Return a finding if the sampling interval differs in the second half of the log."""
     if len(track.starts) > 1 or len(track.marks) < 8:
         return []
     points, stamps = np.array(track.marks, dtype=np.float64).T
@@ -379,26 +387,26 @@ def _drift_findings(track: Track, settings: QualitySettings) -> list[Finding]:
     return [Finding("rate_drifts", "warning", detail, drift)]
 
 
-def _arrival_order(
+def _assume_consecutive(
     stamps: Stamps, track: Track, stated: float | None, settings: QualitySettings
 ) -> TimeBase:
-    """Return the time base of stamps that lie on no grid: consecutive samples at the mean rate."""
-    # A pause is long against the mean interval and against the steps of stamps that are shared.
-    mean = _span(stamps) / max(track.rows - 1, 1)
+    """Return the time base for stamps on no grid: consecutive samples at the mean rate."""
+    # A pause is long compared with the mean interval and with the steps between shared stamps.
+    mean = _measure_span(stamps) / max(track.rows - 1, 1)
     gap = max(1.0, 100 * mean, 10 * track.interval) * (1 + 1e-6)
     rows, last, worst, worst_at = 0, np.nan, 0.0, 0
     starts, jumps = [0], []
-    # Between the records with which a stamp changes: samples that share one are counted whole.
+    # Time is measured between changes of the stamp, so that groups with one stamp are complete.
     changed_at, changed_stamp = 0, np.nan
     groups = Groups()
     for block in stamps():
-        # A missing stamp stands for no time: the step after it covers it.
+        # Missing stamps are replaced by the latest one: the next step includes their time.
         latest = np.concatenate(([last], block))
         good = np.maximum.accumulate(np.where(np.isnan(latest), 0, np.arange(len(latest))))
         latest = latest[good]
         steps = np.diff(latest)
         cut = np.abs(steps) > gap
-        for i in np.flatnonzero(steps < -SET_BACK):
+        for i in np.flatnonzero(steps < -MIN_SET_BACK):
             cut[i] |= is_set_back(latest, i + 1, steps[i], mean)
         starts += [rows + int(i) for i in np.flatnonzero(cut)]
         jumps += steps[cut].tolist()
@@ -418,14 +426,14 @@ def _arrival_order(
         raise RecordingError("the time stamps do not advance; is the right column named?")
     _check_segments(len(starts))
     rate, others = groups.rate()
-    findings = [_jittered(track, rate, worst, worst_at / rate)]
+    findings = [_describe_jitter(track, rate, worst, worst_at / rate)]
     if others:
-        findings.append(_irregular(others, rate))
-    findings += _rate_findings(rate, stated, settings)
+        findings.append(_describe_irregular_groups(others, rate))
+    findings += _compare_rates(rate, stated, settings)
     segments = tuple(zip(starts, [*starts[1:], rows], strict=True))
     if len(segments) > 1:
         times = [start / rate for start in starts[1:]]
-        findings.append(_segments("the stamps stop or run backwards", times, jumps))
+        findings.append(_describe_segments("the stamps stop or run backwards", times, jumps))
     return TimeBase(
         rate,
         "stamps",
@@ -440,39 +448,39 @@ def _arrival_order(
 
 
 class Groups:
-    """Numbers of samples between the records with which the stamp changes, and their times."""
+    """Groups of samples between changes of the stamp: their sizes and durations."""
 
     def __init__(self) -> None:
         self.samples, self.elapsed, self._number = 0, 0.0, 0
-        # How often each pair of samples and time in ns was met; None: no regular groups.
+        # Number of groups by size and duration in ns; None: no regular groups.
         self._pairs: Counter[tuple[int, int]] | None = Counter()
 
     def add(self, samples: NDArray[np.int64], times: NDArray[np.float64]) -> None:
-        """Take consecutive groups, their times in s; shape (n,) each."""
+        """Add consecutive groups: their sizes, and their durations in s; shape (n,) each."""
         self.samples += int(samples.sum())
         self.elapsed += float(times.sum())
         self._number += len(samples)
-        if self._pairs is None or self._number * _FEWEST_OF_GROUP > self.samples:
+        if self._pairs is None or self._number * _MIN_GROUP_SIZE > self.samples:
             self._pairs = None
             return
         pairs = np.stack([samples, np.rint(1e9 * times).astype(np.int64)])
         kinds, numbers = np.unique(pairs, axis=1, return_counts=True)
         for (samples_of, time), number in zip(kinds.T.tolist(), numbers.tolist(), strict=True):
             self._pairs[samples_of, time] += number
-        if len(self._pairs) > _MOST_PAIRS:
+        if len(self._pairs) > _MAX_PAIRS:
             self._pairs = None
 
     def rate(self) -> tuple[float, int]:
-        """Return the rate, Hz, and how many groups are of another one and do not count for it.
+        """Return the rate, Hz, and the number of irregular groups that were left out of it.
 
-        Stamps in whole seconds have the same number of samples each, but where the clock was set or
-        samples are lost. Without such a number all count alike.
+        Stamps in whole seconds have equal numbers of samples, except if the clock was set or
+        samples were lost. Without a most frequent number all groups are used.
         """
         everything = self.samples / self.elapsed, 0
         if not self._pairs:
             return everything
         (samples, time), _ = max(self._pairs.items(), key=lambda pair: pair[1])
-        if samples < _FEWEST_OF_GROUP or time <= 0:
+        if samples < _MIN_GROUP_SIZE or time <= 0:
             return everything
         regular = {
             pair: number
@@ -480,15 +488,15 @@ class Groups:
             if abs(pair[0] * time - pair[1] * samples) <= max(1.5, 0.02 * samples) * time
         }
         number = sum(regular.values())
-        if number < max(_FEWEST_GROUPS, _REGULAR * self._number):
+        if number < max(_MIN_GROUPS, _MIN_REGULAR_GROUPS * self._number):
             return everything
         counted = sum(pair[0] * number_of for pair, number_of in regular.items())
         duration = sum(pair[1] * number_of for pair, number_of in regular.items())
         return 1e9 * counted / duration, self._number - number
 
 
-def _irregular(groups: int, rate: float) -> Finding:
-    """Return the finding of stamps with more or fewer samples than the others."""
+def _describe_irregular_groups(groups: int, rate: float) -> Finding:
+    """Return the finding about stamps with more or fewer samples than the others."""
     detail = (
         f"{groups} stamps have more or fewer samples than the others: the clock was set, "
         f"or samples are lost; the rate of {rate:.6g} Hz is taken from the others"
@@ -496,8 +504,8 @@ def _irregular(groups: int, rate: float) -> Finding:
     return Finding("irregular_stamps", "warning", detail, groups)
 
 
-def _jittered(track: Track, rate: float, worst: float, at: float) -> Finding:
-    """Return the finding of stamps that lie on no grid; ``worst``: the longest interval, s."""
+def _describe_jitter(track: Track, rate: float, worst: float, at: float) -> Finding:
+    """Return the finding about stamps on no grid; ``worst``: the longest interval, s."""
     detail = (
         f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
         f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at {at:.5g} s); the "
@@ -507,8 +515,8 @@ def _jittered(track: Track, rate: float, worst: float, at: float) -> Finding:
     return Finding("jittered_stamps", "warning", detail, worst, start=at, end=at)
 
 
-def _span(stamps: Stamps) -> float:
-    """Return the time from the earliest to the latest stamp, s."""
+def _measure_span(stamps: Stamps) -> float:
+    """Return the time between the earliest and the latest stamp, s."""
     low, high = np.inf, -np.inf
     for block in stamps():
         if np.isfinite(block).any():
