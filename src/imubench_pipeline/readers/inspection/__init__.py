@@ -1,4 +1,4 @@
-"""What a log holds, and a sensor file drafted for it: `imubench inspect`."""
+"""Inspect a log and draft a sensor file for it: `imubench inspect`."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ __all__ = ["Draft", "Inspection", "Proof", "inspect"]
 
 @dataclass(frozen=True)
 class Inspection:
-    """What was found of a recording."""
+    """Contents of a recording, and the drafted sensor file."""
 
     listing: str
-    """What it holds, for a human."""
+    """The contents as text."""
     block: str
-    """The sensor file, YAML."""
+    """The sensor file as YAML."""
     draft: Draft
-    """The same, as values."""
+    """The sensor file as values."""
     proof: Proof
-    """What came of reading the first records with it."""
+    """Result of reading the first records with it."""
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is left to fill in, and the log is read so."""
+        """Whether the draft has no gaps and the log can be read with it."""
         return self.proof.read and not self.draft.unfilled()
 
 
 def inspect(path: Path, model: str | None = None) -> Inspection:
-    """Look into a recording, and draft a sensor file for it.
+    """Inspect a recording and draft a sensor file for it.
 
-    Only the beginning of each file is read, so that it takes no longer for a long log.
+    Only the beginning of each file is read, so that the time does not depend on the length.
 
     Parameters
     ----------
     path : Path
         A log file, or the folder, zip archive or ROS 2 bag of a recording.
     model : str or None
-        What the sensor is called; None: as the log.
+        Name of the sensor; None: the name of the log.
 
     Raises
     ------
     RecordingError
-        If it cannot be read, or is no log.
+        If the recording cannot be read, or is no log.
     """
-    # What stands in a damaged file may overflow.
+    # Numbers in a damaged file may overflow.
     with np.errstate(all="ignore"):
         log = contents(path)
         drafted = draft(log, model)

@@ -1,4 +1,4 @@
-"""A sensor file in the making: entries, each with a comment that says where it is from; YAML."""
+"""Drafted sensor file: entries with comments on their origin, and their YAML."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 UNKNOWN = "?"
-"""What stands where the file does not tell: the sensor file is refused until it is filled in."""
+"""Placeholder for a missing value; the sensor file is rejected until it is filled in."""
 
 
 @dataclass(frozen=True)
@@ -18,12 +18,12 @@ class Entry:
 
     value: Any
     comment: str = ""
-    """What was guessed and from what; empty: nothing was."""
+    """Origin of a guessed value; empty if nothing was guessed."""
 
 
 @dataclass
 class Draft:
-    """A sensor file as far as the log tells."""
+    """A sensor file with the values that the log determines."""
 
     vendor: Entry
     model: Entry
@@ -33,10 +33,10 @@ class Draft:
     channels: dict[str, Entry] = field(default_factory=dict)
     temperature: Entry | None = None
     left_over: list[str] = field(default_factory=list)
-    """What was not taken, and why, for a human to finish."""
+    """Remarks about columns that are not used, for the user to complete the file."""
 
     def log(self) -> dict[str, Any]:
-        """Return what stands under ``log``."""
+        """Return the values under ``log``."""
         entries = {
             key: entry.value
             for key, entry in (("reader", self.reader), ("rate", self.rate), ("time", self.time))
@@ -48,99 +48,99 @@ class Draft:
         return entries
 
     def sensor(self) -> dict[str, Any]:
-        """Return the whole sensor file."""
+        """Return the complete sensor file as values."""
         return {"vendor": self.vendor.value, "model": self.model.value, "log": self.log()}
 
     def unfilled(self) -> list[str]:
-        """Return the keys of what is left to fill in."""
-        return [".".join(key) for key in _unfilled(self.log(), ())]
+        """Return the keys of the missing values."""
+        return [".".join(key) for key in _find_unfilled(self.log(), ())]
 
 
-def _unfilled(value: object, key: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+def _find_unfilled(value: object, key: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     if isinstance(value, dict):
         for name, inner in value.items():
-            yield from _unfilled(inner, (*key, name))
+            yield from _find_unfilled(inner, (*key, name))
     elif value == UNKNOWN:
         yield key
 
 
-_WIDEST = 1 << 20
-_LONGEST_TEXT = 600
-_LONGEST_LINE = 110
-_MOST_LEFT = 20
-_LIKEWISE = "likewise"
+_MAX_YAML_WIDTH = 1 << 20
+_MAX_TEXT_LENGTH = 600
+_MAX_LINE_LENGTH = 110
+_MAX_REMARKS = 20
+_SAME_COMMENT = "likewise"
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes what cannot be printed as escapes, so that each entry stays on its line."""
+    """Writes unprintable characters as escapes, so that each entry stays on its line."""
 
 
-def _text(dumper: yaml.SafeDumper, value: str) -> yaml.ScalarNode:
+def _represent_text(dumper: yaml.SafeDumper, value: str) -> yaml.ScalarNode:
     style = None if value.isprintable() and value != UNKNOWN else '"'
     return dumper.represent_scalar("tag:yaml.org,2002:str", value, style=style)
 
 
-_Dumper.add_representer(str, _text)
+_Dumper.add_representer(str, _represent_text)
 
 
 def block(draft: Draft, file: str) -> str:
-    """Return a sensor file.
+    """Return a sensor file as YAML.
 
-    ``file``: the name of the log, for the first line.
+    ``file``: name of the log, for the first line.
     """
     above = (("reader", draft.reader), ("rate", draft.rate), ("time", draft.time))
     inside = [(key, entry) for key, entry in above if entry is not None]
     lines = [f"# drafted from the log {printable(file)}"]
-    lines += _entries([("vendor", draft.vendor), ("model", draft.model)], "")
-    lines += ["log:", *_entries(inside, "  "), "  channels:"]
-    lines += _entries(list(draft.channels.items()), "    ")
+    lines += _format_entries([("vendor", draft.vendor), ("model", draft.model)], "")
+    lines += ["log:", *_format_entries(inside, "  "), "  channels:"]
+    lines += _format_entries(list(draft.channels.items()), "    ")
     if draft.temperature is not None:
-        lines += _entries([("temperature", draft.temperature)], "  ")
+        lines += _format_entries([("temperature", draft.temperature)], "  ")
     lines += ["datasheet:", "  document: null  # its name; and below, the figures as printed"]
     lines += ["  gyro: {}", "  accel: {}"]
-    lines += [f"# {printable(text)}" for text in draft.left_over[:_MOST_LEFT]]
-    if len(draft.left_over) > _MOST_LEFT:
-        lines.append(f"# ... and {len(draft.left_over) - _MOST_LEFT} more")
+    lines += [f"# {printable(text)}" for text in draft.left_over[:_MAX_REMARKS]]
+    if len(draft.left_over) > _MAX_REMARKS:
+        lines.append(f"# ... and {len(draft.left_over) - _MAX_REMARKS} more")
     return "\n".join(lines) + "\n"
 
 
 def printable(text: str) -> str:
-    """Return a text of one line, shortened, without what a terminal would act upon."""
-    shown = "".join(sign if sign.isprintable() else "?" for sign in text[: _LONGEST_TEXT + 1])
-    return shown if len(shown) <= _LONGEST_TEXT else shown[:_LONGEST_TEXT] + " ..."
+    """Return a text as one shortened line without control characters."""
+    shown = "".join(sign if sign.isprintable() else "?" for sign in text[: _MAX_TEXT_LENGTH + 1])
+    return shown if len(shown) <= _MAX_TEXT_LENGTH else shown[:_MAX_TEXT_LENGTH] + " ..."
 
 
-def _entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[str]:
-    """Return the lines of some entries, with their comments one below another.
+def _format_entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[str]:
+    """Return the lines of entries with aligned comments.
 
-    Where a line would be long, the comment stands above it.
+    If the lines would be too long, comments are on lines of their own above the entries.
     """
-    written = [f"{margin}{key}: {_flow(entry.value)}" for key, entry in entries]
+    written = [f"{margin}{key}: {_format_value(entry.value)}" for key, entry in entries]
     comments = [printable(entry.comment) for _, entry in entries]
     behind = [len(line) for line, comment in zip(written, comments, strict=True) if comment]
     width = max(behind, default=0)
-    above = width + max(map(len, comments), default=0) > _LONGEST_LINE
+    above = width + max(map(len, comments), default=0) > _MAX_LINE_LENGTH
     lines, before = [], ""
     for line, comment in zip(written, comments, strict=True):
         if comment and above:
             lines += ([] if comment == before else [f"{margin}# {comment}"]) + [line]
         elif comment:
-            lines.append(f"{line:<{width}}  # {_LIKEWISE if comment == before else comment}")
+            lines.append(f"{line:<{width}}  # {_SAME_COMMENT if comment == before else comment}")
         else:
             lines.append(line)
         before = comment
     return lines
 
 
-def _flow(value: Any) -> str:
-    """Return a value on one line, of printable signs."""
+def _format_value(value: Any) -> str:
+    """Return a value as YAML on one line of printable characters."""
     written = [
         yaml.dump(
             value,
             Dumper=_Dumper,
             default_flow_style=True,
             sort_keys=False,
-            width=_WIDEST,
+            width=_MAX_YAML_WIDTH,
             allow_unicode=as_it_is,
         )
         .removesuffix("...\n")

@@ -1,4 +1,4 @@
-"""From what is chosen of a log to the entries of a sensor file."""
+"""Convert the chosen columns of a log to the entries of a sensor file."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from imubench_pipeline.readers.inspection.names import WITHOUT_GRAVITY
 from imubench_pipeline.settings.sensor import CHANNELS
 
 _GYRO_HINT = "the file does not say: deg/s or rad/s? see the logger's manual"
-_SHOWN = 20
-_ENDINGS = re.compile(r"(?:\.[A-Za-z]\w{0,7})+$")
-_COUNTS = tuple(1 << bits for bits in range(8, 20))
-_NEAR = 0.06
+_MAX_LISTED_NAMES = 20
+_FILE_SUFFIXES = re.compile(r"(?:\.[A-Za-z]\w{0,7})+$")
+_COUNTS_PER_G = tuple(1 << bits for bits in range(8, 20))
+_GRAVITY_TOLERANCE = 0.06
 
 
 def draft(contents: Contents, model: str | None = None) -> Draft:
-    """Write a sensor file for what a recording holds, as far as it tells.
+    """Draft a sensor file from the contents of a recording.
 
-    ``model``: what the sensor is called; None: as the log.
+    ``model``: name of the sensor; None: the name of the log.
     """
     choice = chosen(contents)
     drafted = Draft(
-        Entry(_vendor(contents), "who makes the sensor, for the report"),
-        Entry(model or _ENDINGS.sub("", contents.path.name) or "sensor", "what it is called"),
+        Entry(_find_vendor(contents), "who makes the sensor, for the report"),
+        Entry(model or _FILE_SUFFIXES.sub("", contents.path.name) or "sensor", "what it is called"),
     )
     if contents.stated is not None:
         drafted.reader = Entry(contents.stated.name, "the file does not tell it by its first bytes")
@@ -42,31 +42,31 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
             value["column"] = choice.clock.column.source
         drafted.time = Entry(value, choice.clock.entry.comment)
     if choice.clock is None or choice.clock.counts:
-        drafted.rate = rate_entry(choice.anchor or _stating(contents.tables))
+        drafted.rate = rate_entry(choice.anchor or _find_table_with_rate(contents.tables))
     files = {group.table.file for group in choice.selected}
     alone = len(files) == 1 and files == {contents.only}
     for group in (choice.gyro, choice.accel):
         if group is not None:
-            _add(drafted, group, alone)
+            _add_group(drafted, group, alone)
     if choice.temperature is not None:
         _add_temperature(drafted, choice.temperature, alone)
     if not drafted.channels:
         _add_placeholders(drafted)
-    drafted.left_over += _left_over(choice, contents)
+    drafted.left_over += _list_remarks(choice, contents)
     return drafted
 
 
-def _vendor(contents: Contents) -> str:
+def _find_vendor(contents: Contents) -> str:
     usable = (table.file_format for table in contents.tables if table.fault is None)
     return next((made.vendor for made in usable if made.vendor), "unknown")
 
 
-def _stating(tables: Iterable[LogTable]) -> LogTable | None:
+def _find_table_with_rate(tables: Iterable[LogTable]) -> LogTable | None:
     return next((table for table in tables if table.rate is not None), None)
 
 
-def _source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> dict[str, Any]:
-    """Return what a sensor file says of a column."""
+def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> dict[str, Any]:
+    """Return the values of a sensor file that select a column."""
     source: dict[str, Any] = {}
     if table.file is not None and not alone:
         source["file"] = table.file
@@ -78,11 +78,11 @@ def _source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> dict[
 # --------------------------------------------------------------------------------- channels
 
 
-def _add(drafted: Draft, group: Group, alone: bool) -> None:
-    """Add the axes of a group."""
+def _add_group(drafted: Draft, group: Group, alone: bool) -> None:
+    """Add the axes of a group to a draft."""
     unit, comment = group.unit, ""
     if unit is None and group.quantity == "accel":
-        unit, comment = _guessed_acceleration(group)
+        unit, comment = _guess_acceleration_unit(group)
     elif unit is None:
         unit, comment = UNKNOWN, _GYRO_HINT
         if group.written:
@@ -95,18 +95,18 @@ def _add(drafted: Draft, group: Group, alone: bool) -> None:
         comment = f"the mean is {group.mean_length:.4g} {unit} long, which is not gravity"
     comment = "; ".join(text for text in (group.guessed, comment) if text)
     for axis, column in group.columns.items():
-        entry = Entry(_source(group.table, column, unit, alone), comment)
+        entry = Entry(_describe_source(group.table, column, unit, alone), comment)
         drafted.channels[f"{group.quantity}_{axis}"] = entry
 
 
-def _guessed_acceleration(group: Group) -> tuple[str, str]:
-    """Return the unit in which the mean is as long as gravity, and say so."""
+def _guess_acceleration_unit(group: Group) -> tuple[str, str]:
+    """Return the unit in which the mean has the length of gravity, and a comment."""
     length, unit = group.mean_length, group.gravity_unit
     if length is None:
         return UNKNOWN, "the file does not say: m/s^2, g or mg?"
     if unit is not None:
         return unit, f"guessed: the mean is {length:.4g} long, as gravity in {unit}"
-    counts = [count for count in _COUNTS if abs(length / count - 1) < _NEAR]
+    counts = [count for count in _COUNTS_PER_G if abs(length / count - 1) < _GRAVITY_TOLERANCE]
     hint = (
         f": counts of g/{counts[0]}? then 'unit: g, scale: {1 / counts[0]:.10g}'" if counts else ""
     )
@@ -115,7 +115,7 @@ def _guessed_acceleration(group: Group) -> tuple[str, str]:
 
 
 def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
-    """Add the temperature, unless its unit cannot be told."""
+    """Add the temperature to a draft, unless its unit is unknown."""
     (column,) = list(group.columns.values())[:1]
     unit, comment = group.unit, ""
     present = column.values[np.isfinite(column.values)]
@@ -125,10 +125,10 @@ def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
         comment = f"guessed: {level:.4g} is one in {unit}"
     if unit is None:
         drafted.left_over.append(
-            f"not taken: {_shown(group)}, a temperature in a unit that the file does not say"
+            f"not taken: {_name_group(group)}, a temperature in a unit that the file does not say"
         )
         return
-    drafted.temperature = Entry(_source(group.table, column, unit, alone), comment)
+    drafted.temperature = Entry(_describe_source(group.table, column, unit, alone), comment)
 
 
 def _add_placeholders(drafted: Draft) -> None:
@@ -146,25 +146,25 @@ def _is_whole(column: LogColumn) -> bool:
 # -------------------------------------------------------------------------------- left over
 
 
-def _left_over(choice: Choice, contents: Contents) -> list[str]:
-    remarks = [f"not taken: {_shown(group)} ({why})" for group, why in choice.left]
+def _list_remarks(choice: Choice, contents: Contents) -> list[str]:
+    remarks = [f"not taken: {_name_group(group)} ({why})" for group, why in choice.left]
     if choice.other_clocks:
-        names = _listed(str(clock.entry.value["column"]) for clock in choice.other_clocks)
+        names = _join_names(str(clock.entry.value["column"]) for clock in choice.other_clocks)
         remarks.append(f"also a time: {names}")
     if choice.unknown:
-        names = _listed(c.label or f"column {c.source}" for c in choice.unknown)
+        names = _join_names(c.label or f"column {c.source}" for c in choice.unknown)
         remarks.append(f"not recognised: {names}")
     if contents.files > len({table.file for table in contents.tables}):
         remarks.append(f"only some of the {contents.files} files were looked into")
     return remarks
 
 
-def _shown(group: Group) -> str:
+def _name_group(group: Group) -> str:
     where = ", ".join(text for text in (group.table.file, group.table.name) if text)
     return f"{group.names} of {where}" if where else group.names
 
 
-def _listed(names: Iterable[str]) -> str:
+def _join_names(names: Iterable[str]) -> str:
     every = list(names)
-    more = f" and {len(every) - _SHOWN} more" if len(every) > _SHOWN else ""
-    return ", ".join(every[:_SHOWN]) + more
+    more = f" and {len(every) - _MAX_LISTED_NAMES} more" if len(every) > _MAX_LISTED_NAMES else ""
+    return ", ".join(every[:_MAX_LISTED_NAMES]) + more

@@ -1,4 +1,4 @@
-"""The columns of a log put together: the axes of one gyro, of one accelerometer, a temperature."""
+"""Group the columns of a log: axes of one gyro or accelerometer, or a temperature."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from imubench_pipeline.readers.stated_units import bracketed, unit_of
 from imubench_pipeline.units import conversion
 
 _AXES = "xyz"
-GRAVITIES: Mapping[str, float] = {"g": 1.0, "m/s^2": STANDARD_GRAVITY, "mg": 1000.0}
-"""The length of gravity in each unit that is guessed from it."""
+GRAVITY_BY_UNIT: Mapping[str, float] = {"g": 1.0, "m/s^2": STANDARD_GRAVITY, "mg": 1000.0}
+"""Gravity in each unit that can be guessed from it."""
 
-_NEAR, _STATED_NEAR = 0.1, 0.2
-_NAMELESS = 0.05
-_TELLING = 40
-"""Records of all axes that are the same, from which a sensor was not read."""
+_GRAVITY_TOLERANCE, _STATED_GRAVITY_TOLERANCE = 0.1, 0.2
+_NAMELESS_GRAVITY_TOLERANCE = 0.05
+_MIN_CONSTANT_RECORDS = 40
+"""Least number of equal records of all axes of a sensor that was not read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,47 +43,54 @@ class Group:
     quantity: Quantity
     table: LogTable
     columns: dict[str, LogColumn]
-    """By axis; of a temperature by an empty text."""
+    """Columns by axis; the key of a temperature is an empty text."""
     unit: str | None
     """The unit that the file states."""
     written: str
-    """What the file says where a unit is expected and none is understood."""
+    """Text of the file in the place of the unit, if it is no known unit."""
     rank: int
     """See `imubench_pipeline.readers.inspection.names.Meaning`."""
     guessed: str = ""
-    """Why these columns are taken for it, where no name says so."""
+    """Reason for the choice of the columns, if it is not from their names."""
 
     @property
     def names(self) -> str:
-        """What the file calls the columns."""
+        """Names of the columns in the file."""
         return ", ".join(
             column.label or f"column {column.source}" for column in self.columns.values()
         )
 
     @property
     def mean_length(self) -> float | None:
-        """The length of the mean vector, as written; None where an axis is missing."""
+        """Length of the mean vector in the unit of the file; None if an axis is missing."""
         if sorted(self.columns) != list(_AXES):
             return None
-        means = [_mean(column) for column in self.columns.values()]
+        means = [_average(column) for column in self.columns.values()]
         return None if None in means else float(np.linalg.norm(np.array(means, np.float64)))
 
     @property
     def constant(self) -> bool:
-        """Whether no axis ever changes in the first records: fields that nothing was put into."""
+        """Whether all axes are constant in the first records, as unused fields are."""
         axes = [column.values[np.isfinite(column.values)] for column in self.columns.values()]
-        return all(values.size >= _TELLING and np.ptp(values) == 0.0 for values in axes)
+        return all(
+            values.size >= _MIN_CONSTANT_RECORDS and np.ptp(values) == 0.0 for values in axes
+        )
 
     @property
     def gravity_unit(self) -> str | None:
-        """The unit in which the mean is as long as gravity; the stated one, if that is right."""
+        """Unit in which the mean has the length of gravity; the stated one, if there is one."""
         length = self.mean_length
         if length is None:
             return None
         if self.unit is not None:
             in_si = length * conversion(self.unit, DIMENSIONS["accel"])[0]
-            return self.unit if abs(in_si / STANDARD_GRAVITY - 1) < _STATED_NEAR else None
-        return next((u for u, g in GRAVITIES.items() if abs(length / g - 1) < _NEAR), None)
+            return (
+                self.unit if abs(in_si / STANDARD_GRAVITY - 1) < _STATED_GRAVITY_TOLERANCE else None
+            )
+        return next(
+            (u for u, g in GRAVITY_BY_UNIT.items() if abs(length / g - 1) < _GRAVITY_TOLERANCE),
+            None,
+        )
 
 
 def groups(contents: Contents) -> list[Group]:
@@ -91,13 +98,13 @@ def groups(contents: Contents) -> list[Group]:
     recognised: list[Group] = []
     for table in contents.tables:
         if table.fault is None:
-            recognised += _named(table, contents) or _nameless(table)
+            recognised += _group_by_name(table, contents) or _group_without_names(table)
     return recognised
 
 
-def _named(table: LogTable, contents: Contents) -> list[Group]:
-    """Return the groups that the names of the columns tell."""
-    context = _context(table, contents)
+def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
+    """Return the groups that are recognised by the names of their columns."""
+    context = _find_context(table, contents)
     together: dict[tuple[Quantity, str, bool], dict[str, tuple[LogColumn, Meaning]]] = {}
     for column in table.columns:
         if column.kind != "number":
@@ -112,30 +119,30 @@ def _named(table: LogTable, contents: Contents) -> list[Group]:
                 together["temperature", label, False] = {"": (column, meant)}
     result = []
     for (quantity, _, counted), axes in together.items():
-        placed = _counted_axes(axes) if counted else axes
+        placed = _assign_counted_axes(axes) if counted else axes
         if placed:
-            result.append(_group(quantity, table, placed))
-    return result + list(_roll_pitch_yaw(table, result))
+            result.append(_make_group(quantity, table, placed))
+    return result + list(_find_roll_pitch_yaw(table, result))
 
 
-def _context(table: LogTable, contents: Contents) -> str:
-    """Return the nearest of the names about a table that says a quantity."""
+def _find_context(table: LogTable, contents: Contents) -> str:
+    """Return the most specific name of a table or its file that contains a quantity."""
     file = PurePosixPath(table.file or contents.path.name)
     names = (table.name.rpartition("/")[2], table.name, file.name.partition(".")[0])
     return next((name for name in names if name and quantity_of_text(name)), "")
 
 
-def _counted_axes(
+def _assign_counted_axes(
     axes: Mapping[str, tuple[LogColumn, Meaning]],
 ) -> dict[str, tuple[LogColumn, Meaning]]:
-    """Return three axes that are counted, without a time before them; none if they are not."""
+    """Return three numbered columns as axes, without a time before them; else no axes."""
     columns = [axes[number] for number in sorted(axes, key=int)]
     if len(columns) == 4 and advances(columns[0][0].values):
         columns = columns[1:]
     return dict(zip(_AXES, columns, strict=True)) if len(columns) == 3 else {}
 
 
-def _group(
+def _make_group(
     quantity: Quantity, table: LogTable, axes: Mapping[str, tuple[LogColumn, Meaning]]
 ) -> Group:
     columns = {axis: axes[axis][0] for axis in sorted(axes)}
@@ -153,8 +160,8 @@ def _group(
     return Group(quantity, table, columns, unit if same else None, written, rank)
 
 
-def _roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]:
-    """Yield the rates that are called p, q and r, where no other gyro is there."""
+def _find_roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]:
+    """Yield the rates with the names p, q and r, if there is no other gyro."""
     if any(group.quantity == "gyro" for group in named):
         return
     by_name = {re.split(r"[\s(\[]", c.label)[0].lower(): c for c in table.columns}
@@ -165,13 +172,13 @@ def _roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]:
         }
         axes = {axis: (column, meant) for axis, (column, meant) in meanings.items() if meant}
         if len(axes) == 3:
-            group = _group("gyro", table, axes)
+            group = _make_group("gyro", table, axes)
             yield Group("gyro", table, group.columns, group.unit, group.written, WEAK,
                         "guessed from the names p, q and r")  # fmt: skip
 
 
-def _nameless(table: LogTable) -> list[Group]:
-    """Return gyro and accelerometer of columns without names, where gravity tells them apart."""
+def _group_without_names(table: LogTable) -> list[Group]:
+    """Return gyro and accelerometer from unnamed columns, distinguished by gravity."""
     columns = [c for c in table.columns if c.kind == "number"]
     if any(column.label for column in columns) or len(columns) > 8:
         return []
@@ -185,7 +192,11 @@ def _nameless(table: LogTable) -> list[Group]:
     heavy = [
         n
         for n, length in enumerate(lengths)
-        if length and any(abs(length / gravity - 1) < _NAMELESS for gravity in GRAVITIES.values())
+        if length
+        and any(
+            abs(length / gravity - 1) < _NAMELESS_GRAVITY_TOLERANCE
+            for gravity in GRAVITY_BY_UNIT.values()
+        )
     ]
     if len(threes) not in (1, 2) or len(heavy) != 1:
         return []
@@ -199,6 +210,6 @@ def _nameless(table: LogTable) -> list[Group]:
     return guessed
 
 
-def _mean(column: LogColumn) -> float | None:
+def _average(column: LogColumn) -> float | None:
     values = column.values[np.isfinite(column.values)]
     return float(values.mean()) if len(values) else None

@@ -1,4 +1,4 @@
-"""A drafted sensor file tried on its log: the first records are read with it."""
+"""Test a drafted sensor file by reading the first records of its log with it."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.units import from_si
 
-_ENOUGH, _MOST_BATCHES = 1000, 8
+_MIN_RECORDS, _MAX_BATCHES = 1000, 8
 _STAND_IN_RATE = "1 Hz"
 _STAND_IN_UNITS = {"gyro": "rad/s", "acce": "m/s^2", "temp": "degC", "time": "s"}
-_ORDER = ("gyro", "accel", "temperature")
-_NEAR = 0.2
+_QUANTITY_ORDER = ("gyro", "accel", "temperature")
+_GRAVITY_TOLERANCE = 0.2
 
 
 @dataclass(frozen=True)
 class Proof:
-    """What came of reading the first records as drafted."""
+    """Result of reading the first records with a draft."""
 
     read: bool
-    """They could be read."""
+    """The records could be read."""
     said: str
-    """One line: what they are, or why they cannot be read."""
+    """One line about the records, or about the reason why they cannot be read."""
 
 
 @dataclass
-class _First:
+class _FirstRecords:
     """The first records of one file of a recording."""
 
     columns: dict[str, NDArray[np.float64]] = field(default_factory=dict)
@@ -46,30 +46,34 @@ class _First:
 
 
 def proof(path: Path, draft: Draft) -> Proof:
-    """Read the first records of a recording as a draft says.
+    """Read the first records of a recording with a draft.
 
-    Where it has not been filled in, another unit stands in, for the reading alone.
+    Missing units and rates are replaced by arbitrary ones, for this reading only.
     """
     unfilled = draft.unfilled()
     if any(key.endswith(".column") for key in unfilled):
-        return Proof(False, f"not read: fill in {_list(unfilled)}")
+        return Proof(False, f"not read: fill in {_list_keys(unfilled)}")
     try:
         if not unfilled:
             parse(Sensor, draft.sensor(), "the sensor file")
-        log = parse(LogFormat, _filled(draft.log()), "log")
-        files = [_first(file) for file in read(path, log)]
+        log = parse(LogFormat, _fill_placeholders(draft.log()), "log")
+        files = [_read_first_records(file) for file in read(path, log)]
     except (RecordingError, ConfigError) as error:
         return Proof(False, printable(f"not read so: {error}"))
-    remarks = [_shown_count(files), _shown_rate(files, draft), *_shown_vectors(files, unfilled)]
+    remarks = [
+        _describe_channels(files),
+        _describe_rate(files, draft),
+        *_describe_vectors(files, unfilled),
+    ]
     started = next((file.started for file in files if file.started), None)
     if started is not None:
         remarks.append(f"from {started[:19]} on")
-    rest = f"; left to fill in: {_list(unfilled)}" if unfilled else ""
+    rest = f"; left to fill in: {_list_keys(unfilled)}" if unfilled else ""
     return Proof(True, "read so: " + ", ".join(remarks) + rest)
 
 
-def _filled(log: dict[str, Any]) -> dict[str, Any]:
-    """Return a log format in which something stands for what is not filled in."""
+def _fill_placeholders(log: dict[str, Any]) -> dict[str, Any]:
+    """Return a log format with arbitrary values in place of the missing ones."""
     filled: dict[str, Any] = {
         key: _STAND_IN_RATE if entry == UNKNOWN else entry for key, entry in log.items()
     }
@@ -80,7 +84,7 @@ def _filled(log: dict[str, Any]) -> dict[str, Any]:
     return filled
 
 
-def _first(file: LogFile) -> _First:
+def _read_first_records(file: LogFile) -> _FirstRecords:
     """Read the first batches of a file."""
     parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in file.sources}
     times: list[NDArray[np.float64]] = []
@@ -91,26 +95,26 @@ def _first(file: LogFile) -> _First:
             parts[name].append(values)
         if batch.time is not None:
             times.append(batch.time)
-        if rows >= _ENOUGH or number >= _MOST_BATCHES:
+        if rows >= _MIN_RECORDS or number >= _MAX_BATCHES:
             break
     if not rows:
         raise RecordingError(f"{file.path.name}: no record in its beginning")
     interval = typical_step(np.concatenate(times)) if times else None
-    return _First(
+    return _FirstRecords(
         {name: np.concatenate(values) for name, values in parts.items()},
         None if interval is None else 1 / interval,
         file.started,
     )
 
 
-def _shown_count(files: list[_First]) -> str:
+def _describe_channels(files: list[_FirstRecords]) -> str:
     names = [name for file in files for name in file.columns]
     count = sum(name in CHANNELS for name in names)
     shown = f"{count} channel" + ("s" if count != 1 else "")
     return shown + (" and temperature" if len(names) > count else "")
 
 
-def _shown_rate(files: list[_First], draft: Draft) -> str:
+def _describe_rate(files: list[_FirstRecords], draft: Draft) -> str:
     if draft.time is None or draft.rate is not None:
         rate = draft.rate.value if draft.rate is not None else UNKNOWN
         return "no rate" if rate == UNKNOWN else f"{rate} as stated"
@@ -125,12 +129,12 @@ def _shown_rate(files: list[_First], draft: Draft) -> str:
     distinct = {f"{rate:.4g} Hz" for rate in rates.values() if rate is not None}
     if len(distinct) == 1:
         return f"{distinct.pop()} from the stamps"
-    each = (f"{name} {rates[name]:.4g} Hz" for name in sorted(rates, key=_ORDER.index))
+    each = (f"{name} {rates[name]:.4g} Hz" for name in sorted(rates, key=_QUANTITY_ORDER.index))
     return ", ".join(each) + " from the stamps"
 
 
-def _shown_vectors(files: list[_First], unfilled: list[str]) -> list[str]:
-    """Return the lengths of the mean vectors of both quantities."""
+def _describe_vectors(files: list[_FirstRecords], unfilled: list[str]) -> list[str]:
+    """Describe the lengths of the mean vectors of gyro and accelerometer."""
     means = {
         name: float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
         for file in files
@@ -144,12 +148,12 @@ def _shown_vectors(files: list[_First], unfilled: list[str]) -> list[str]:
         length = float(np.linalg.norm(axes))
         dimension = "angular_rate" if quantity == "gyro" else "acceleration"
         shown = from_si(length, unit, dimension)
-        far = quantity == "accel" and abs(length / STANDARD_GRAVITY - 1) > _NEAR
+        far = quantity == "accel" and abs(length / STANDARD_GRAVITY - 1) > _GRAVITY_TOLERANCE
         wrong = f" (gravity is {STANDARD_GRAVITY:.2f}: is the unit right?)" if far else ""
         lengths.append(f"|{quantity}| = {shown:.3g} {unit}{wrong}")
     return lengths
 
 
-def _list(keys: list[str]) -> str:
-    """Return some keys, those of the axes of one quantity as one."""
+def _list_keys(keys: list[str]) -> str:
+    """Return keys as text, with the axes of one quantity combined."""
     return ", ".join(dict.fromkeys(re.sub(r"_[xyz]\.", "_*.", key) for key in keys))
