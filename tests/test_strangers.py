@@ -196,8 +196,8 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     begin = time.process_time()
     with pytest.MonkeyPatch.context() as patch:
         # An eighth of what is allowed, so that less is read before it is refused.
-        patch.setattr(arrays, "UNSUSPICIOUS", arrays.UNSUSPICIOUS // 8)
-        patch.setattr(hdf5, "MOST_CHUNKS", hdf5.MOST_CHUNKS // 8)
+        patch.setattr(arrays, "MIN_CHECKED_EXPANSION", arrays.MIN_CHECKED_EXPANSION // 8)
+        patch.setattr(hdf5, "MAX_CHUNKS", hdf5.MAX_CHUNKS // 8)
         found = {name: quality.recording for _, name, quality in check(plan_of(folder))}
     assert time.process_time() - begin < 10.0
     return found

@@ -343,9 +343,9 @@ def test_a_bag_that_expands_too_far_is_rejected(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     path = bag(tmp_path, kind, {"/imu": imu_topic(kind, np.zeros((500, 6)))})
-    monkeypatch.setattr(version_1, "UNSUSPICIOUS", 1000)
+    monkeypatch.setattr(version_1, "MIN_CHECKED_EXPANSION", 1000)
     assert len(columns(path, log_format())[0]["gyro_x"]) == 500
-    monkeypatch.setattr(version_1, "LARGEST_RATIO", 1)
+    monkeypatch.setattr(version_1, "MAX_EXPANSION_RATIO", 1)
     with pytest.raises(RecordingError, match="its chunks expand to more than 1 times its size"):
         columns(path, log_format())
 

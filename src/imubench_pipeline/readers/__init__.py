@@ -1,4 +1,4 @@
-"""Log files of every format (`formats`) -> batches of SI samples, in bounded memory."""
+"""Read log files of all formats (`formats`) as batches of SI samples, in bounded memory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
-from imubench_pipeline.readers.bounds import MOST_LOOKED_INTO
+from imubench_pipeline.readers.bounds import MAX_ARCHIVE_PROBES
 from imubench_pipeline.readers.compressed import holds_text, is_archive, is_member, members, visible
 from imubench_pipeline.readers.content import format_of, format_of_folder, is_endless
 from imubench_pipeline.settings.sensor import (
@@ -41,24 +41,25 @@ __all__ = [
 def log_files(path: Path) -> list[Path]:
     """Return the files of a recording: the file itself, or the visible files of its folder.
 
-    Links to files that are not there are among them; links to folders are not followed.
+    Broken links to files are included; links to folders are not followed.
 
     Raises
     ------
     OSError
-        If it is a device or a named pipe, which may never end, or a folder cannot be listed.
+        If the path is a device or a named pipe, which may never end, or if a folder cannot be
+        listed.
     """
     if path.is_dir():
         return sorted(
-            file for file in _inside(path) if visible(file.relative_to(path)) and _is_file(file)
+            file for file in _walk_files(path) if visible(file.relative_to(path)) and _is_file(file)
         )
     if is_endless(path):
         raise OSError(errno.EINVAL, "it is neither a file nor a folder")
     return [path]
 
 
-def _inside(folder: Path) -> Iterator[Path]:
-    """Yield what lies in a folder and those below."""
+def _walk_files(folder: Path) -> Iterator[Path]:
+    """Yield the files of a folder and its subfolders."""
     waiting = [folder]
     while waiting:
         with os.scandir(waiting.pop()) as entries:
@@ -70,7 +71,7 @@ def _inside(folder: Path) -> Iterator[Path]:
 
 
 def _is_file(path: Path) -> bool:
-    """Return whether a path is a regular file, or a link to one that may not be there now."""
+    """Return whether a path is a regular file, or a link to a file that may be missing."""
     return path.is_file() or (path.is_symlink() and not path.exists())
 
 
@@ -80,24 +81,24 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     Parameters
     ----------
     path : Path
-        A log file, or the folder or zip archive of a recording that has several.
+        A log file, or a folder or zip archive with the files of a recording.
     log : LogFormat
-        How the files are written.
+        Format of the files.
 
     Returns
     -------
     list of LogFile
-        One a file, and a topic of it, sorted by name, each with the columns that it holds.
+        One for each file, or each topic of a file, sorted by name, with its columns.
 
     Raises
     ------
     RecordingError
-        If a file that the format names is not there, or the recording is a folder and the
-        format does not say which file a channel is in.
+        If a file that the format names is missing, or if the recording is a folder and the format
+        does not name the file of a channel.
     """
     if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
-    # In one order, however the sensor file has them: so are findings, and the columns kept.
+    # In a fixed order, independent of the sensor file, so that findings and columns are too.
     channels = sorted(log.channels, key=CHANNELS.index)
     sources = {str(name): log.channels[name] for name in channels}
     if log.temperature is not None:
@@ -106,24 +107,24 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
         sources[POSITION] = log.position
     if log.table_rate is not None:
         sources[TABLE_RATE] = log.table_rate
-    present = _present(path, log)
+    present = _list_present(path, log)
     together: dict[tuple[Path, str], dict[str, ColumnSource]] = {}
     for name, source in sources.items():
-        file = _file_of(path, present, source, name)
-        together.setdefault((file, _clock(file, log, source)), {})[name] = source
+        file = _find_file(path, present, source, name)
+        together.setdefault((file, _find_clock(file, log, source)), {})[name] = source
     in_order = sorted(together.items(), key=lambda item: item[0])
     return [_open(file, log, columns) for (file, _), columns in in_order]
 
 
-def _clock(file: Path, log: LogFormat, source: ColumnSource) -> str:
-    """Return what has a clock of its own in a file: a topic, or a kind of message."""
+def _find_clock(file: Path, log: LogFormat, source: ColumnSource) -> str:
+    """Return the part of a file with a clock of its own: a topic, or a kind of message."""
     if source.variable is None or is_member(file):
         return ""
     return source.variable if format_of(file, log.reader).clock_of == "variable" else ""
 
 
-def _present(path: Path, log: LogFormat) -> list[Path] | None:
-    """Return the files of a folder or an archive; None where it is one log."""
+def _list_present(path: Path, log: LogFormat) -> list[Path] | None:
+    """Return the files of a folder or an archive; None if the path is one log."""
     if format_of_folder(path) is not None:
         return None
     if path.is_dir():
@@ -133,7 +134,7 @@ def _present(path: Path, log: LogFormat) -> list[Path] | None:
     return None
 
 
-def _file_of(path: Path, present: list[Path] | None, source: ColumnSource, name: str) -> Path:
+def _find_file(path: Path, present: list[Path] | None, source: ColumnSource, name: str) -> Path:
     if source.file is None:
         return path if present is None else only_log(path, present)
     if present is None:
@@ -141,9 +142,9 @@ def _file_of(path: Path, present: list[Path] | None, source: ColumnSource, name:
             f"{path.name}: is one file, but the sensor file takes {name} from {source.file!r} of "
             "a folder; put the files into a folder, or drop 'file:'"
         )
-    # A folder that was packed with its own name, or unpacked into another one, has it deeper.
-    names = {file: _composed(file.relative_to(path).as_posix()) for file in present}
-    wanted = _composed(Path(source.file).as_posix())
+    # The file may be one level deeper: a folder packed with its name, or unpacked into another.
+    names = {file: _compose_accents(file.relative_to(path).as_posix()) for file in present}
+    wanted = _compose_accents(Path(source.file).as_posix())
     found = [file for file in present if names[file] == wanted] or [
         file for file in present if names[file].endswith(f"/{wanted}")
     ]
@@ -151,18 +152,18 @@ def _file_of(path: Path, present: list[Path] | None, source: ColumnSource, name:
         what = f"{len(found)} files" if found else "no file"
         raise RecordingError(
             f"{path.name}: {what} {source.file!r} for {name}; the folder has "
-            f"{_names(path, found or present)}; mend 'file' of {name} in {stated_in(name)}"
+            f"{_join_names(path, found or present)}; mend 'file' of {name} in {stated_in(name)}"
         )
     return found[0]
 
 
-def _composed(name: str) -> str:
-    """Return a name as it is mostly written: some systems keep a letter and its accent apart."""
+def _compose_accents(name: str) -> str:
+    """Return a name with composed accents (NFC): some systems store them separately (NFD)."""
     return unicodedata.normalize("NFC", name)
 
 
 def only_log(path: Path, present: list[Path]) -> Path:
-    """Return the one log of a folder or archive; what is in its sub-folders describes it.
+    """Return the only log of a folder or archive; files in subfolders describe it.
 
     Parameters
     ----------
@@ -173,7 +174,7 @@ def only_log(path: Path, present: list[Path]) -> Path:
     Raises
     ------
     RecordingError
-        If there is another number of logs.
+        If there is no log, or more than one.
     """
     if not present and not path.is_dir():
         raise RecordingError(
@@ -181,18 +182,18 @@ def only_log(path: Path, present: list[Path]) -> Path:
             "hidden files and names outside of it (../) alone; pack the log again"
         )
     logs = [file for file in present if file.parent == path] or present
-    if 1 < len(logs) <= MOST_LOOKED_INTO and not path.is_dir():
-        logs = list(islice(filter(holds_text, logs), 2))  # two are as bad as a thousand
+    if 1 < len(logs) <= MAX_ARCHIVE_PROBES and not path.is_dir():
+        logs = list(islice(filter(holds_text, logs), 2))  # two are enough for the error
     if len(logs) != 1:
         kind = "folder" if path.is_dir() else "archive"
         raise RecordingError(
-            f"{path.name}: expected one file, the {kind} has {_names(path, present)}; name the "
-            "file of each channel with 'file:' in the sensor file"
+            f"{path.name}: expected one file, the {kind} has {_join_names(path, present)}; name "
+            "the file of each channel with 'file:' in the sensor file"
         )
     return logs[0]
 
 
-def _names(path: Path, files: list[Path]) -> str:
+def _join_names(path: Path, files: list[Path]) -> str:
     names = (
         ", ".join(cut(file.relative_to(path).as_posix(), str) for file in files[:30]) or "no file"
     )
@@ -200,7 +201,7 @@ def _names(path: Path, files: list[Path]) -> str:
 
 
 def _open(file: Path, log: LogFormat, sources: dict[str, ColumnSource]) -> LogFile:
-    inside = None if is_member(file) else _present(file, log)
+    inside = None if is_member(file) else _list_present(file, log)
     if inside is not None:
-        file = only_log(file, inside)  # a log that is packed alone, among others
+        file = only_log(file, inside)  # an archive with one log, among other files
     return format_of(file, log.reader).load().log_file(file, log, sources)

@@ -1,4 +1,4 @@
-"""What every reader gives: batches of SI samples, and findings on what it left out."""
+"""Interface of the readers: batches of SI samples, and findings on omitted data."""
 
 from __future__ import annotations
 
@@ -28,12 +28,13 @@ from imubench_pipeline.units import conversion
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in a unit of time stamps."""
 
-_LEAST = 1e-75
-"""SI. Less was never measured, and its square is 0: a column of such figures is one of zeros."""
+_MIN_MAGNITUDE = 1e-75
+"""Least magnitude of the largest value of a column, SI. A column of smaller values is set to 0:
+they are no measurements, and their squares underflow."""
 
 
 def stated_in(key: str) -> str:
-    """Return where it is to be mended from which column a channel, or what is beside, is read."""
+    """Return the file with the column of a channel or an additional column, for messages."""
     notes = "the notes beside the log or " if key == POSITION else ""
     return f"{notes}the sensor file"
 
@@ -51,7 +52,7 @@ class Batch:
         return len(next(iter(self.columns.values())))
 
     def after(self, records: int) -> Batch:
-        """Return it without its first records."""
+        """Return the batch without its first records."""
         time = None if self.time is None else self.time[records:]
         return Batch(time, {name: values[records:] for name, values in self.columns.items()})
 
@@ -62,18 +63,18 @@ class LogFile(ABC):
 
     fixed_units: ClassVar[Mapping[str, str]] = {}
     fixed_by: ClassVar[str] = ""
-    """Units that the format fixes, by quantity, and what it is called."""
+    """Units that the format fixes, by quantity, and the name of the format."""
 
     path: Path
     log: LogFormat
     sources: Mapping[str, ColumnSource]
-    """The columns that are taken from this file: channels, and perhaps temperature."""
+    """Columns that are read from this file: channels and, where it has one, the temperature."""
     started: str | None = None
     """ISO 8601 date and time of the first sample, known after the first batch."""
     rate: float | None = None
     """Sampling rate that the file itself states, Hz; known after the first batch."""
     findings: list[Finding] = field(default_factory=list)
-    """What was left out or passed over; complete once `batches` is exhausted."""
+    """Findings on omitted data; complete after `batches` is exhausted."""
     units: dict[str, StatedUnit] = field(default_factory=dict)
     """Units of channels that the file itself states, known after the first batch."""
     simulated: bool = False
@@ -86,7 +87,7 @@ class LogFile(ABC):
         Raises
         ------
         RecordingError
-            If the file is not what its sensor file says, or is corrupt inside.
+            If the file does not match its sensor file, or is corrupt.
         """
 
     def note(self, finding: str, text: str, value: float, severity: Severity = "warning") -> None:
@@ -94,7 +95,7 @@ class LogFile(ABC):
         self.findings.append(Finding(finding, severity, f"{self.path.name}: {text}", value))
 
     def contradicted_units(self) -> list[Finding]:
-        """Return the channels of which the file states another unit than the sensor file."""
+        """Return findings on channels for which log and sensor file state different units."""
         fixed = {
             name: StatedUnit(self.fixed_units[quantity_of(name)], self.fixed_by)
             for name in self.sources
@@ -103,7 +104,7 @@ class LogFile(ABC):
         return contradictions(self.path.name, self.sources, fixed | self.units)
 
     def seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:
-        """Convert stamps as written to s since the first one; integers lose no digit."""
+        """Convert stamps as written to s since the first one; exact for integers."""
         assert self.log.time is not None  # asked for where there are stamps
         unit, scale = self.log.time.unit or "ns", self.log.time.scale
         if unit == "samples":
@@ -112,7 +113,7 @@ class LogFile(ABC):
         return np.asarray((stamps - first) * (SECONDS[unit] * scale), np.float64)
 
     def to_si(self, name: str, raw: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Convert the figures of a column as written to SI: scale * (raw - offset), then unit."""
+        """Convert the values of a column as written to SI: scale * (raw - offset), then unit."""
         source = self.sources[name]
         if name == POSITION:
             return source.scale * (raw - source.offset)
@@ -123,6 +124,6 @@ class LogFile(ABC):
             raw = raw - source.offset
         with np.errstate(over="ignore"):  # infinite, and counted as such
             figures = raw * (source.scale * factor)
-        if len(figures) and max(np.fmax.reduce(figures), -np.fmin.reduce(figures)) < _LEAST:
+        if len(figures) and max(np.fmax.reduce(figures), -np.fmin.reduce(figures)) < _MIN_MAGNITUDE:
             figures = np.where(np.isnan(figures), np.nan, 0.0)
         return figures + zero if zero else figures

@@ -1,4 +1,4 @@
-"""Bounds of memory and time that hold whatever a library does with what a file says of itself."""
+"""Enforce limits of memory and time on library calls with untrusted files."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ import psutil
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_READ = 1 << 20
+_PIPE_BLOCK = 1 << 20
 
-_OVERLOADED = 5.0
-"""Times as long may take what waits for a core or a disk that others use."""
+_OVERLOAD_FACTOR = 5.0
+"""Factor by which the time limit is extended while a process waits for a core or a disk."""
 
-_FORKING = Lock()
-"""Held while a pipe is open in two processes that ought to have one end each: what another thread
-forks meanwhile would keep it open."""
+_FORK_LOCK = Lock()
+"""Held between opening a pipe and closing its unused ends: a process forked by another thread in
+the meantime would keep the pipe open."""
 
 
 class BoundError(Exception):
-    """What was called took more memory or time than it may.
+    """The function exceeded its limit of memory or time.
 
     Attributes
     ----------
@@ -46,10 +46,10 @@ class BoundError(Exception):
 
 
 def limit_memory(more: int) -> None:
-    """Let this process have so many bytes more than it has now, on Linux.
+    """Limit the additional memory of this process to ``more`` bytes, on Linux.
 
-    What it asks for beyond is refused to it, which the libraries report as an error. Addresses
-    that are only reserved do not count, as they do with RLIMIT_AS: Arrow and numba reserve many.
+    Larger allocations fail, which the libraries report as an error. Unlike RLIMIT_AS, the limit
+    does not count reserved addresses, of which Arrow and numba have many.
     """
     if sys.platform != "linux":
         return
@@ -63,34 +63,35 @@ def limit_memory(more: int) -> None:
 def bounded(
     seconds: float, memory: int, function: Callable[P, T], *arguments: P.args, **named: P.kwargs
 ) -> T:
-    """Call a function in a process of its own, which is ended where it takes too long.
+    """Return the result of a function in a process of its own, with limits of time and memory.
 
     Parameters
     ----------
     seconds : float
-        How long it may take; of a busy machine, how much time of a core, and five times as long.
+        Time limit. On a busy machine it applies to the time of a core, and the real time may be
+        five times as long.
     memory : int
-        Bytes that it may take beside what this process has.
+        Additional memory, bytes.
     function : callable
-        What it returns or raises is pickled.
+        Its result or exception is pickled.
     *arguments, **named
         Its arguments.
 
     Raises
     ------
     BoundError
-        If it takes more, or is ended by the system.
+        If a limit is exceeded, or the system ends the process.
     """
     return Bounded(memory, function, *arguments, **named).result(seconds)
 
 
 class Bounded(Generic[T]):
-    """A function that is called in a process of its own, which begins at once.
+    """A function call in a process of its own, which starts immediately.
 
     Parameters
     ----------
     memory, function, *arguments, **named
-        As of `bounded`.
+        See `bounded`.
     """
 
     def __init__(
@@ -98,22 +99,22 @@ class Bounded(Generic[T]):
     ) -> None:
         self._memory = memory
         self._status: int | None = None
-        with _FORKING:
+        with _FORK_LOCK:
             self._pipe, theirs = os.pipe()
             self._process = os.fork()
             if self._process:
                 os.close(theirs)
         if self._process == 0:
             os.close(self._pipe)
-            _answer(theirs, memory, lambda: function(*arguments, **named))
+            _send_result(theirs, memory, lambda: function(*arguments, **named))
 
     @property
     def answered(self) -> bool:
-        """Whether `result` would not wait."""
+        """Whether the result is available without waiting."""
         return self._status is not None or bool(select.select([self._pipe], [], [], 0.0)[0])
 
     def end(self) -> None:
-        """End the process, unless that was done."""
+        """End the process, if it has not ended."""
         if self._status is None:
             os.close(self._pipe)
             with suppress(ProcessLookupError):
@@ -121,18 +122,18 @@ class Bounded(Generic[T]):
             _, self._status = os.waitpid(self._process, 0)
 
     def result(self, seconds: float) -> T:
-        """Return what it returns, or raise what it raises; ask once.
+        """Return the result of the function, or raise its exception; to be called once.
 
         Raises
         ------
         BoundError
-            If that takes more than ``seconds`` from now on, or as `bounded` counts them where the
-            machine is busy, or more memory than it may, or the process is ended by the system.
+            If the result takes more than ``seconds`` from now, counted as in `bounded` on a busy
+            machine, if the memory limit is exceeded, or if the system ends the process.
         """
         process = psutil.Process(self._process)
         try:
-            answer = _received(self._pipe, seconds, process)
-            was_waiting = answer is None and _time_of_core(process) < seconds / 2.0
+            answer = _receive(self._pipe, seconds, process)
+            was_waiting = answer is None and _get_core_time(process) < seconds / 2.0
         finally:
             self.end()  # it has answered, or it will not
         if answer is None:
@@ -151,8 +152,8 @@ class Bounded(Generic[T]):
         raise value
 
 
-def _answer(pipe: int, memory: int, called: Callable[[], Any]) -> None:
-    """Send what a function returns or raises, and end this process."""
+def _send_result(pipe: int, memory: int, called: Callable[[], Any]) -> None:
+    """Send the result or the exception of a function, and end this process."""
     try:
         limit_memory(memory)
         try:
@@ -165,14 +166,14 @@ def _answer(pipe: int, memory: int, called: Callable[[], Any]) -> None:
         os._exit(0)
 
 
-def _received(pipe: int, seconds: float, sender: psutil.Process) -> bytes | None:
-    """Return what comes through a pipe until its end; None where that takes longer."""
+def _receive(pipe: int, seconds: float, sender: psutil.Process) -> bytes | None:
+    """Return all bytes from a pipe until its end; None if the time limit is exceeded."""
     begin = time.monotonic()
-    end, last = begin + seconds, begin + _OVERLOADED * seconds
+    end, last = begin + seconds, begin + _OVERLOAD_FACTOR * seconds
     received: list[bytes] = []
     while True:
         if select.select([pipe], [], [], max(0.0, end - time.monotonic()))[0]:
-            block = os.read(pipe, _READ)
+            block = os.read(pipe, _PIPE_BLOCK)
             if not block:
                 return b"".join(received)
             received.append(block)
@@ -183,16 +184,16 @@ def _received(pipe: int, seconds: float, sender: psutil.Process) -> bytes | None
 
 
 def is_kept_waiting(process: psutil.Process, seconds: float) -> bool:
-    """Tell whether a process had less time of a core than it may, and would go on if it had one."""
+    """Return whether a process is waiting for a core or disk, within its limit of core time."""
     try:
         waiting = process.status() in (psutil.STATUS_RUNNING, psutil.STATUS_DISK_SLEEP)
     except psutil.NoSuchProcess:
         return False
-    return waiting and _time_of_core(process) < seconds
+    return waiting and _get_core_time(process) < seconds
 
 
-def _time_of_core(process: psutil.Process) -> float:
-    """Return the time of a core that a process has used, s; infinite where it has ended."""
+def _get_core_time(process: psutil.Process) -> float:
+    """Return the core time that a process has used, s; infinite if it has ended."""
     try:
         used = process.cpu_times()
     except psutil.NoSuchProcess:

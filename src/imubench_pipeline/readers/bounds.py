@@ -1,79 +1,87 @@
-"""What a log may ask of its reader; beyond it, it is rejected, whatever it says of itself.
+"""Resource limits of the readers: a log that exceeds one of them is rejected.
 
-Far above what the log of a sensor has, and so low that a reader takes no more than 600 MB, and
-says what a file holds within 10 s. docs/reliability.md has what was measured.
+The limits are far above the logs of real sensors. They keep a reader below 600 MB, and the
+inspection of a file below 10 s. The measurements are in docs/reliability.md.
 """
 
 # ------------------------------------------------------------------- compression and archives
 
-UNSUSPICIOUS, LARGEST_RATIO = 1 << 28, 800
-"""Bytes that compressed data may expand to at least, and how many times their size: a log that
-expands further holds nothing but one character."""
+MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO = 1 << 28, 800
+"""Bytes to which any compressed data may expand, and largest ratio of expansion above that: only
+the repetition of one character expands further."""
 
-LARGEST_WINDOW = 1 << 27
-"""Bytes that decompression itself may take: the window of zstd, the dictionary of xz."""
+MAX_WINDOW = 1 << 27
+"""Memory of the decompression, bytes: the window of zstd, the dictionary of xz."""
 
-MOST_PARTS, LEAST_IN_PART = 10_000, 64
-"""Parts, such as members of gzip, that may hold next to nothing, and bytes that more of them hold
-on the average at least."""
+MAX_UNCHECKED_PARTS, MIN_MEAN_PART = 10_000, 64
+"""Number of compressed parts, such as members of gzip, that may be nearly empty; least mean size of
+more parts, bytes."""
 
-LARGEST_DIRECTORY, MOST_MEMBERS = 1 << 21, 1 << 16
-"""Bytes of the directory of a zip archive; members of one that has lost it."""
+MAX_DIRECTORY, MAX_MEMBERS = 1 << 21, 1 << 16
+"""Bytes of the directory of a zip archive; members of an archive without a directory."""
 
-MOST_LOOKED_INTO = 1 << 14
-"""Members of an archive among which the one that is text is looked for."""
+MAX_ARCHIVE_PROBES = 1 << 14
+"""Members of an archive that are searched for the only text file."""
 
 # --------------------------------------------------------------------------------------- text
 
-MOST_LISTED = 1000
-"""Columns of a table, of text or arrays, among which those of the sensor are looked for."""
+MAX_SEARCHED_COLUMNS = 1000
+"""Columns of a table, of text or arrays, that are searched for the sensor."""
 
-LONGEST_LINE = 1 << 20
-MOST_LINES_BEFORE, MOST_BYTES_BEFORE = 500_000, 1 << 26
-"""Lines and bytes in which the first record is looked for."""
+MAX_LINE_LENGTH = 1 << 20
+"""Bytes of a line of text."""
 
-COMMENT_LINES, COMMENT_BYTES = 1000, 1 << 23
-"""Comments before the first record that are kept."""
+MAX_LINES_BEFORE, MAX_BYTES_BEFORE = 500_000, 1 << 26
+"""Lines and bytes that are searched for the first record."""
+
+MAX_COMMENT_LINES, MAX_COMMENT_BYTES = 1000, 1 << 23
+"""Lines and bytes of comments before the first record that are stored."""
 
 # ------------------------------------------------------------------------------------- arrays
 
-MOST_ARRAYS, MOST_FIELDS = 10_000, 1 << 14
+MAX_ARRAYS, MAX_FIELDS = 10_000, 1 << 14
 """Arrays of a file; columns of an array of records."""
 
-LARGEST_RECORD = 1 << 26
-LARGEST_CHUNKS = 1 << 28
-"""Bytes of the chunks of all columns of an HDF5 file together: each is unpacked as a whole."""
+MAX_BLOCK_BYTES = 1 << 26
+"""Bytes of a block of records, which may be a single record."""
 
-MOST_CHUNKS = 1 << 17
-"""Of an HDF5 data set: the library takes 2 kB for each."""
+MAX_CHUNK_BYTES = 1 << 28
+"""Total bytes of one chunk of each column of an HDF5 file: chunks are unpacked as a whole."""
 
-LARGEST_ARROW_BATCH = 1 << 28
+MAX_CHUNKS = 1 << 17
+"""Chunks of an HDF5 data set: the library takes 2 kB for each."""
+
+MAX_ARROW_BATCH = 1 << 28
 """Bytes of a compressed record batch of Feather or Arrow IPC, which is unpacked as a whole."""
 
-LARGEST_PAGES = 1 << 28
-MOST_PAGES, LEAST_IN_PAGE = 1 << 17, 1 << 12
-"""Bytes that the largest pages of all columns of a Parquet file unpack to together; pages of them,
-and bytes that more of them hold on the average at least."""
+MAX_PAGE_BYTES = 1 << 28
+MAX_UNCHECKED_PAGES, MIN_MEAN_PAGE = 1 << 17, 1 << 12
+"""Total unpacked bytes of the largest page of each column of a Parquet file; number of pages of any
+size, and least mean size of more pages, bytes."""
 
-MOST_OBJECTS, DEEPEST_GROUP = 20_000, 64
-"""Objects of an HDF5 file, and groups within each other."""
+MAX_OBJECTS, MAX_GROUP_DEPTH = 20_000, 64
+"""Objects of an HDF5 file, and depth of nested groups."""
 
-LONGEST_NPY_HEADER = 10_000
-"""Bytes, which NumPy takes, too; but it reads what is said to be there before it looks."""
+MAX_NPY_HEADER = 10_000
+"""Bytes of a header. NumPy has the same limit, but reads a header before it checks the size."""
 
-DEEPEST_STRUCTURE, LONGEST_MATLAB_NAME, MOST_SIDES = 16, 256, 32
-"""Of MATLAB 5: structures within each other; bytes of a name, where MATLAB's have 63."""
+MAX_STRUCTURE_DEPTH, MAX_MATLAB_NAME, MAX_DIMENSIONS = 16, 256, 32
+"""For MATLAB 5: depth of nested structures; bytes of a name (MATLAB allows 63); dimensions of an
+array."""
 
 # --------------------------------------------------------------------------------------- bags
 
-LARGEST_CHUNK, LARGEST_OVERLAP = 1 << 27, 96 << 20
-"""Bytes of a chunk or record as unpacked, and of chunks of one time together, which are unpacked
-to put their messages in order: those that hold nothing else take five times as much."""
+MAX_BAG_CHUNK, MAX_BAG_OVERLAP = 1 << 27, 96 << 20
+"""Unpacked bytes of a chunk or record, and of all chunks that overlap in time, which are unpacked
+together to sort their messages: the messages take up to five times as much memory."""
 
-LARGEST_MESSAGE, LARGEST_BATCH = 1 << 16, 1 << 24
-"""Bytes of a message with inertial figures, which are 320 and the name of a frame, and of those
-that are read together."""
+MAX_MESSAGE, MAX_MESSAGE_BATCH = 1 << 16, 1 << 24
+"""Bytes of an inertial message (320 and the name of a frame), and of messages that are read
+together.
+"""
 
-MOST_TOPICS, LONGEST_TOPIC = 10_000, 1024
-LARGEST_METADATA = 1 << 20
+MAX_TOPICS, MAX_TOPIC_LENGTH = 10_000, 1024
+"""Topics of a bag, and bytes of the name of a topic."""
+
+MAX_METADATA = 1 << 20
 """Bytes of metadata.yaml: a topic takes some 300, more with its quality of service."""

@@ -1,4 +1,4 @@
-"""The bytes of a log that may be compressed, or a file inside an archive; told by content."""
+"""Read the bytes of a log that may be compressed or in an archive, recognised by content."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ from pathlib import Path
 from typing import IO, Any
 
 from imubench_pipeline.readers.bounds import (
-    LARGEST_DIRECTORY,
-    LARGEST_RATIO,
-    MOST_MEMBERS,
-    UNSUSPICIOUS,
+    MAX_DIRECTORY,
+    MAX_EXPANSION_RATIO,
+    MAX_MEMBERS,
+    MIN_CHECKED_EXPANSION,
 )
-from imubench_pipeline.readers.decompression import LONGEST_MAGIC, OPENED, compression_of
+from imubench_pipeline.readers.decompression import DECOMPRESSORS, MAX_MAGIC_LENGTH, compression_of
 from imubench_pipeline.readers.holes import FileWithoutHoles, ZeroRuns
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
-_READ = 1 << 16
-_SEEN = 1 << 12
-_SCANNED = 1 << 20
+_READ_BLOCK = 1 << 16
+_PROBE_BYTES = 1 << 12
+_SCAN_BLOCK = 1 << 20
 _ZIP_LOCAL = b"PK\x03\x04"
 _ZIP_EMPTY = b"PK\x05\x06"
 _ZIP_HEADER = struct.Struct("<4sHHHHHIIIHH")
 _ZIP_METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
 _OTHER_METHODS = {9: "deflate64", 12: "bzip2", 14: "LZMA", 93: "zstd", 95: "xz", 98: "PPMd"}
-_ENCRYPTED, _SIZE_FOLLOWS, _UTF_8 = 1, 8, 0x800
-_LONGEST_MEMBER_NAME = 512
-_LONGEST_HEADER = _ZIP_HEADER.size + _LONGEST_MEMBER_NAME
+_FLAG_ENCRYPTED, _FLAG_SIZE_FOLLOWS, _FLAG_UTF_8 = 1, 8, 0x800
+_MAX_MEMBER_NAME = 512
+_MAX_HEADER = _ZIP_HEADER.size + _MAX_MEMBER_NAME
 _UNKNOWN_SIZE = 1 << 62
 
 
 class Bytes:
-    """The bytes of a log as it was before it was compressed; ``name``: of the log, for messages."""
+    """The decompressed bytes of a log; ``name``: name of the log, for messages."""
 
     def __init__(self, name: str, stream: Any, size: int, under: tuple[Any, ...] = ()) -> None:
         self.name = name
-        self.ended_early = False  # whether the compressed data stop before their end
+        self.ended_early = False  # whether the compressed data are truncated
         self._stream = stream
         self._streams = (stream, *under)
-        self._left = max(UNSUSPICIOUS, LARGEST_RATIO * size)
+        self._left = max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size)
 
     def read(self, size: int) -> bytes:
         """Return the next bytes, at most ``size``; none at the end.
@@ -55,26 +55,26 @@ class Bytes:
         Raises
         ------
         RecordingError
-            If the compressed data are corrupt, encrypted, or expand beyond all reason.
+            If the compressed data are corrupt or encrypted, or expand beyond the limit.
         """
         try:
-            # read1, for read would throw away what comes before an early end.
+            # Not `read`, which discards the data before an early end.
             block: bytes = self._stream.read1(size)
         except EOFError:
             self.ended_early = True
             return b""
-        except _CORRUPT as error:
-            raise _corrupt(self.name, error) from None
+        except _CORRUPT_DATA_ERRORS as error:
+            raise _make_corrupt_error(self.name, error) from None
         self._left -= len(block)
         if self._left < 0:
             raise RecordingError(
-                f"{self.name}: expands to more than {LARGEST_RATIO} times its size, which no log "
-                "does; expected compressed text: unpack it and look what it is"
+                f"{self.name}: expands to more than {MAX_EXPANSION_RATIO} times its size, which no "
+                "log does; expected compressed text: unpack it and look what it is"
             )
         return block
 
     def filled(self, size: int) -> bytes:
-        """Return the next ``size`` bytes, fewer at the end alone."""
+        """Return the next ``size`` bytes; fewer only at the end."""
         blocks: list[bytes] = []
         while size > 0 and (block := self.read(size)):
             blocks.append(block)
@@ -83,7 +83,7 @@ class Bytes:
 
     @property
     def omitted(self) -> int:
-        """Zero bytes of holes of the log that were passed over so far."""
+        """Number of zero bytes in holes of the log that were skipped so far."""
         return self._stream.omitted if isinstance(self._stream, FileWithoutHoles) else 0
 
     def close(self) -> None:
@@ -92,10 +92,10 @@ class Bytes:
             stream.close()
 
 
-class _Deflated:
-    """A deflated file in an archive; unlike the library's, it gives all that is there of a cut one.
+class _DeflatedMember:
+    """A deflated file in an archive; unlike the library, it returns all data of a truncated one.
 
-    ``file`` is at the first byte of the data; the checksum of ``info`` is None where not known.
+    ``file`` is at the first byte of the data; the checksum of ``info`` is None if it is unknown.
     """
 
     def __init__(self, file: IO[bytes], info: zipfile.ZipInfo) -> None:
@@ -110,7 +110,7 @@ class _Deflated:
         while not self._inflate.eof:
             packed = self._inflate.unconsumed_tail
             if not packed:
-                packed = self._file.read(min(_READ, self._left))
+                packed = self._file.read(min(_READ_BLOCK, self._left))
                 self._left -= len(packed)
             block = self._inflate.decompress(packed, size)
             if block:
@@ -132,7 +132,7 @@ class _Deflated:
             raise zipfile.BadZipFile("more data than the directory says")
 
 
-_NOT_READ: Mapping[bytes, str] = {
+_UNSUPPORTED_COMPRESSIONS: Mapping[bytes, str] = {
     b"7z\xbc\xaf\x27\x1c": "7z",
     b"Rar!\x1a\x07": "rar",
     b"\x04\x22\x4d\x18": "lz4",
@@ -140,7 +140,7 @@ _NOT_READ: Mapping[bytes, str] = {
     _ZIP_LOCAL: "zip in another way",
 }
 
-_CORRUPT = (
+_CORRUPT_DATA_ERRORS = (
     OSError,
     ValueError,
     zlib.error,
@@ -150,10 +150,10 @@ _CORRUPT = (
     struct.error,
     MemoryError,
 )
-"""What the libraries raise for data that are not as their format says."""
+"""Exceptions of the libraries for data that violate their format."""
 
 
-def _corrupt(name: str, error: Exception) -> RecordingError:
+def _make_corrupt_error(name: str, error: Exception) -> RecordingError:
     if isinstance(error, RecordingError):
         return error
     reason = str(error)[:300]
@@ -163,15 +163,15 @@ def _corrupt(name: str, error: Exception) -> RecordingError:
 def open_bytes(path: Path) -> Bytes:
     """Open a log for reading.
 
-    ``path``: a file, compressed or not, or a member of a zip archive: the path of the archive and
-    the name in it.
+    ``path``: a file, compressed or not, or a member of a zip archive, as the path of the archive
+    followed by the name in it.
 
     Raises
     ------
     RecordingError
-        If it cannot be opened, or is compressed in another way.
+        If it cannot be opened, or its compression is not supported.
     """
-    archive = None if path.is_file() else _archive_of(path)
+    archive = None if path.is_file() else _find_archive(path)
     try:
         if archive is None:
             return _open_file(path, FileWithoutHoles(path))
@@ -182,9 +182,9 @@ def open_bytes(path: Path) -> Bytes:
 
 def _open_file(path: Path, file: FileWithoutHoles) -> Bytes:
     try:
-        begin = file.read(LONGEST_MAGIC)
+        begin = file.read(MAX_MAGIC_LENGTH)
         file.rewind()
-        for magic, kind in _NOT_READ.items():
+        for magic, kind in _UNSUPPORTED_COMPRESSIONS.items():
             if begin.startswith(magic):
                 raise RecordingError(
                     f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
@@ -192,7 +192,7 @@ def _open_file(path: Path, file: FileWithoutHoles) -> Bytes:
                 )
         if not (how := compression_of(begin)):
             return Bytes(path.name, file, _UNKNOWN_SIZE)
-        return Bytes(path.name, OPENED[how](file), path.stat().st_size, (file,))
+        return Bytes(path.name, DECOMPRESSORS[how](file), path.stat().st_size, (file,))
     except BaseException:
         file.close()
         raise
@@ -202,7 +202,7 @@ def _open_file(path: Path, file: FileWithoutHoles) -> Bytes:
 
 
 def is_archive(path: Path) -> bool:
-    """Tell whether a path is a zip archive; a named pipe, which may never answer, is none."""
+    """Return whether a path is a zip archive; named pipes, which may block, are not opened."""
     if not path.is_file():
         return False
     try:
@@ -213,82 +213,82 @@ def is_archive(path: Path) -> bool:
 
 
 def is_member(path: Path) -> bool:
-    """Tell whether a path names a member of an archive: its archive is a file, not a folder."""
-    return not path.exists() and _archive_of(path) is not None
+    """Return whether a path is a member of an archive: one of its parents is a file."""
+    return not path.exists() and _find_archive(path) is not None
 
 
 def members(archive: Path) -> list[Path]:
-    """Return the visible files of a zip archive, sorted: its path with their names appended.
+    """Return the visible files of a zip archive, sorted, as its path followed by their names.
 
     Raises
     ------
     RecordingError
         If the archive cannot be read.
     """
-    return sorted(archive / name for name in _directory(archive) if visible(Path(name)))
+    return sorted(archive / name for name in _list_directory(archive) if visible(Path(name)))
 
 
 def visible(path: Path) -> bool:
-    """Tell a file from what systems leave beside files; the path is within its folder."""
+    """Return whether a path within a folder is no hidden file of the operating system."""
     return not any(part.startswith((".", "__MACOSX")) for part in path.parts)
 
 
-def _archive_of(path: Path) -> Path | None:
+def _find_archive(path: Path) -> Path | None:
     return next((parent for parent in path.parents if parent.is_file()), None)
 
 
 def holds_text(path: Path) -> bool:
-    """Tell whether a file or a member of an archive begins as text does."""
+    """Return whether a file or a member of an archive begins like text."""
     with closing(open_bytes(path)) as stream:
-        begin = stream.read(_SEEN)
+        begin = stream.read(_PROBE_BYTES)
     return b"\0" not in begin or begin.startswith((b"\xff\xfe", b"\xfe\xff"))
 
 
-def _directory(archive: Path) -> Mapping[str, zipfile.ZipInfo]:
-    """Return the files of an archive by name, also of one whose end is missing."""
+def _list_directory(archive: Path) -> Mapping[str, zipfile.ZipInfo]:
+    """Return the members of an archive by name, also of a truncated archive."""
     try:
         state = archive.stat()
     except OSError as error:
         raise RecordingError(f"{archive.name}: cannot be opened ({error.strerror})") from None
-    return _directory_of(archive, state.st_size, state.st_mtime_ns)
+    return _read_directory(archive, state.st_size, state.st_mtime_ns)
 
 
 @lru_cache(maxsize=2)
-def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipfile.ZipInfo]:
-    """Read the directory of an archive once, and not for each of its files."""
+def _read_directory(archive: Path, _size: int, _written: int) -> Mapping[str, zipfile.ZipInfo]:
+    """Return the members of an archive by name; cached by size and time of writing."""
     try:
         try:
             with opened_archive(archive) as file:
                 members = file.infolist()
         except zipfile.BadZipFile:
-            members = _scanned(archive)
+            members = _scan_for_members(archive)
     except OSError as error:
         raise RecordingError(f"{archive.name}: cannot be opened ({error.strerror})") from None
-    except _CORRUPT as error:
-        raise _corrupt(archive.name, error) from None
+    except _CORRUPT_DATA_ERRORS as error:
+        raise _make_corrupt_error(archive.name, error) from None
     by_name: dict[str, zipfile.ZipInfo] = {}
     for info in members:
-        if not 0 < len(info.filename) <= _LONGEST_MEMBER_NAME or info.is_dir():
+        if not 0 < len(info.filename) <= _MAX_MEMBER_NAME or info.is_dir():
             continue
-        # A name that begins with / would leave the archive.
+        # An absolute name would lead out of the archive.
         name = Path(info.filename.lstrip("/")).as_posix()
         other = by_name.setdefault(name, info)
         if other is not info and visible(Path(name)):
             raise RecordingError(
-                f"{archive.name}: {_described(other)} and {_described(info)} have one name; "
-                "expected each name once: pack it again without the copy"
+                f"{archive.name}: {_describe_member(other)} and {_describe_member(info)} have one "
+                "name; expected each name once: pack it again without the copy"
             )
     return by_name
 
 
-def _described(info: zipfile.ZipInfo) -> str:
+def _describe_member(info: zipfile.ZipInfo) -> str:
     size = "unknown size" if info.file_size == _UNKNOWN_SIZE else f"{info.file_size} bytes"
     return f"{cut(info.filename, str)} ({size}, at byte {info.header_offset})"
 
 
 @contextmanager
 def opened_archive(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open a zip archive whose directory is no larger than that of a log.
+    """Open a zip archive with a directory within `MAX_DIRECTORY`.
 
     Raises
     ------
@@ -301,12 +301,12 @@ def opened_archive(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 class _Archive(io.FileIO):
-    """An archive of which the library cannot read a large directory, which it does at once."""
+    """An archive file that limits the size of the directory, which the library reads at once."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "rb")
         self._shown = path.name
-        self.most: int | None = LARGEST_DIRECTORY
+        self.most: int | None = MAX_DIRECTORY
 
     def read(self, size: int | None = -1) -> bytes:
         """Return the next bytes."""
@@ -318,41 +318,41 @@ class _Archive(io.FileIO):
         return super().read(-1 if size is None else size)
 
 
-def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
-    """Return the members of an archive without a directory, which stands at its end."""
+def _scan_for_members(archive: Path) -> list[zipfile.ZipInfo]:
+    """Return the members of a truncated archive, whose directory at the end is missing."""
     members: list[zipfile.ZipInfo] = []
     with closing(FileWithoutHoles(archive)) as file:
         data = b""
-        while block := file.read(_SCANNED):
+        while block := file.read(_SCAN_BLOCK):
             data += block
             start = file.tell() - len(data)
             at = data.find(_ZIP_LOCAL)
-            while at >= 0 and at + _LONGEST_HEADER <= len(data):
-                members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
+            while at >= 0 and at + _MAX_HEADER <= len(data):
+                members += _parse_local_header(data[at : at + _MAX_HEADER], start + at)
                 at = data.find(_ZIP_LOCAL, at + 1)
-            if len(members) > MOST_MEMBERS:
+            if len(members) > MAX_MEMBERS:
                 raise RecordingError(
                     f"{archive.name}: an archive without its directory, with more than "
-                    f"{MOST_MEMBERS} members; expected the log alone: pack it anew"
+                    f"{MAX_MEMBERS} members; expected the log alone: pack it anew"
                 )
             data = data[at if at >= 0 else max(len(data) - 3, 0) :]
         start = file.tell() - len(data)
         at = data.find(_ZIP_LOCAL)
         while at >= 0:
-            members += _local_header(data[at : at + _LONGEST_HEADER], start + at)
+            members += _parse_local_header(data[at : at + _MAX_HEADER], start + at)
             at = data.find(_ZIP_LOCAL, at + 1)
     return members
 
 
-def _local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
-    """Return the member whose header begins so; none where it is no header."""
+def _parse_local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
+    """Return the member whose local header is at the beginning; empty if there is none."""
     if len(begin) < _ZIP_HEADER.size:
         return []
     _, version, flags, method, _, _, crc, packed, size, name_size, _ = _ZIP_HEADER.unpack(
         begin[: _ZIP_HEADER.size]
     )
     name = begin[_ZIP_HEADER.size :][:name_size].decode(
-        "utf-8" if flags & _UTF_8 else "cp437", "replace"
+        "utf-8" if flags & _FLAG_UTF_8 else "cp437", "replace"
     )
     if (
         (version & 0xFF) > 63
@@ -364,8 +364,8 @@ def _local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
     info = zipfile.ZipInfo(name)
     info.header_offset, info.compress_type, info.flag_bits = offset, method, flags
     info.orig_filename = name
-    if flags & _SIZE_FOLLOWS or 0xFFFFFFFF in (packed, size):
-        # The compressed data say themselves where they end.
+    if flags & _FLAG_SIZE_FOLLOWS or 0xFFFFFFFF in (packed, size):
+        # Deflated data mark their own end.
         info.compress_size = info.file_size = _UNKNOWN_SIZE
         info.CRC = None  # type: ignore[assignment]  # zipfile checks none then; its types know none
     else:
@@ -375,18 +375,18 @@ def _local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
 
 def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     try:
-        return _member(archive, name, file)
+        return _open_stored_member(archive, name, file)
     except BaseException:
         file.close()
         raise
 
 
-def _member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
+def _open_stored_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     shown = f"{archive.name}/{name}"
-    info = _directory(archive).get(name)
+    info = _list_directory(archive).get(name)
     if info is None:
         raise RecordingError(f"{shown}: no such file in the archive; it may be cut short")
-    if info.flag_bits & _ENCRYPTED:
+    if info.flag_bits & _FLAG_ENCRYPTED:
         raise RecordingError(f"{shown}: is encrypted; unpack the archive with its password")
     if stat.S_ISLNK(info.external_attr >> 16):
         raise RecordingError(f"{shown}: is a link; expected the log itself: pack it anew")
@@ -403,9 +403,9 @@ def _member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
             raise zipfile.BadZipFile("no header where the directory says")
         file.seek(header[9] + header[10], io.SEEK_CUR)
         deflated = info.compress_type == zipfile.ZIP_DEFLATED
-        stream = _Deflated(file, info) if deflated else zipfile.ZipExtFile(file, "r", info)
-    except _CORRUPT as error:
-        raise _corrupt(shown, error) from None
+        stream = _DeflatedMember(file, info) if deflated else zipfile.ZipExtFile(file, "r", info)
+    except _CORRUPT_DATA_ERRORS as error:
+        raise _make_corrupt_error(shown, error) from None
     except NotImplementedError as error:
         raise RecordingError(f"{shown}: {error}; unpack the archive") from None
     return Bytes(shown, stream, min(info.compress_size, archive.stat().st_size), (file,))
@@ -417,7 +417,7 @@ BLOCK_BYTES = 1 << 20
 def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[bytes]:
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
-    ``findings`` receives the findings: compressed data that end early, and runs of at least
+    ``findings`` receives findings about truncated compressed data, and about runs of at least
     ``least_zeros`` zero bytes, which no logger writes.
 
     Raises
@@ -440,6 +440,6 @@ def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[by
 
 
 def ended_early(path: Path) -> Finding:
-    """Return the finding on a log whose compressed data end early."""
+    """Return the finding about a log with truncated compressed data."""
     detail = f"{path.name}: the compressed file ends early; read as far as it goes"
     return Finding("truncated_file", "warning", detail, 1)

@@ -1,4 +1,4 @@
-"""What a log holds, before anything is known of it: its tables and columns, from its beginning."""
+"""List the tables and columns of an unknown log, from the beginning of its files."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from imubench_pipeline.readers.file_format import FileFormat, LogTable
 from imubench_pipeline.readers.formats import TEXT
 from imubench_pipeline.tables.findings import RecordingError
 
-_FAULTS = 5
+_MAX_SHOWN_FAULTS = 5
 
-MOST_FILES = 200
-"""Files of a folder that are looked at, at most."""
+MAX_FILES = 200
+"""Largest number of files of a folder that are examined."""
 
 
 @dataclass(frozen=True)
 class Contents:
-    """What a recording holds."""
+    """Contents of a recording."""
 
     path: Path
     about: str
-    """What it is."""
+    """Kind of the recording, such as its format."""
     tables: tuple[LogTable, ...]
     stated: FileFormat | None = None
-    """What the sensor file must state, since the file does not tell it by its first bytes."""
+    """Format that the sensor file must state, since the first bytes do not show it."""
     files: int = 1
-    """How many there are; at most `MOST_FILES` are looked into."""
+    """Number of files; at most `MAX_FILES` are examined."""
     only: str | None = None
-    """The one file of a folder that is read where no ``file`` is stated."""
+    """The only file of a folder that is read if no ``file`` is stated."""
 
 
 def contents(path: Path) -> Contents:
-    """Look into a recording; no more than the beginning of each of its files is read.
+    """Return the contents of a recording, from the beginning of each of its files.
 
     Parameters
     ----------
@@ -47,29 +47,29 @@ def contents(path: Path) -> Contents:
     Raises
     ------
     RecordingError
-        If it cannot be read, or holds nothing.
+        If it cannot be read, or has no data.
     """
     if not path.exists():
         raise RecordingError(f"{path.name}: no such file or folder; expected a log")
     if path.is_dir() and format_of_folder(path) is None:
-        return _of_files(path, "a folder", log_files(path))
+        return _inspect_files(path, "a folder", log_files(path))
     if is_archive(path) and format_of(path) is TEXT:
-        return _of_files(path, "a zip archive", members(path))
+        return _inspect_files(path, "a zip archive", members(path))
     file_format, packed = content_of(path)
     about = file_format.title + (f", compressed by {packed}" if packed else "")
     tables = tuple(file_format.tables(path))
-    _check_figures(path, tables)
+    _check_has_numbers(path, tables)
     return Contents(path, about, tables)
 
 
-def _of_files(path: Path, kind: str, files: list[Path]) -> Contents:
+def _inspect_files(path: Path, kind: str, files: list[Path]) -> Contents:
     if not files:
         raise RecordingError(f"{path.name}: {kind} without a visible file; expected logs in it")
-    of_files = list(_of_each(path, files[:MOST_FILES]))
+    of_files = list(_inspect_each_file(path, files[:MAX_FILES]))
     tables = [table for of_file, _ in of_files for table in of_file]
     to_state = {stated for of_file, stated in of_files if not all(table.fault for table in of_file)}
     (stated,) = to_state if len(to_state) == 1 else (None,)
-    _check_figures(path, tables)
+    _check_has_numbers(path, tables)
     only = None
     with suppress(RecordingError):
         only = only_log(path, files).relative_to(path).as_posix()
@@ -77,8 +77,8 @@ def _of_files(path: Path, kind: str, files: list[Path]) -> Contents:
     return Contents(path, about, tuple(tables), stated, len(files), only)
 
 
-def _check_figures(path: Path, tables: Sequence[LogTable]) -> None:
-    """Raise `RecordingError` if nothing can be used, with the reasons."""
+def _check_has_numbers(path: Path, tables: Sequence[LogTable]) -> None:
+    """Raise `RecordingError` with the reasons if there is no column of numbers."""
     if any(column.kind == "number" for table in tables for column in table.columns):
         return
     faults = [
@@ -86,13 +86,15 @@ def _check_figures(path: Path, tables: Sequence[LogTable]) -> None:
         for table in tables
         if table.fault
     ]
-    why = "; ".join(faults[:_FAULTS]) or "text alone"
+    why = "; ".join(faults[:_MAX_SHOWN_FAULTS]) or "text alone"
     raise RecordingError(
         f"{path.name}: holds no column of figures ({why}); expected the log of an inertial sensor"
     )
 
 
-def _of_each(path: Path, files: list[Path]) -> Iterator[tuple[list[LogTable], FileFormat | None]]:
+def _inspect_each_file(
+    path: Path, files: list[Path]
+) -> Iterator[tuple[list[LogTable], FileFormat | None]]:
     """Yield the tables of each file, and the format that the sensor file must state."""
     for file in files:
         name = file.relative_to(path).as_posix()
@@ -100,7 +102,7 @@ def _of_each(path: Path, files: list[Path]) -> Iterator[tuple[list[LogTable], Fi
         try:
             log = file
             if not is_member(file) and is_archive(file) and format_of(file) is TEXT:
-                log = only_log(file, members(file))  # a log that is packed alone
+                log = only_log(file, members(file))  # an archive with one log
             file_format, packed = content_of(log)
             untold = TEXT if is_member(log) else file_format
             tables = [

@@ -1,4 +1,4 @@
-"""What decompresses gzip, zstd, xz and bzip2, block by block and in bounded memory."""
+"""Decompress gzip, zstd, xz and bzip2 block by block, in bounded memory."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ import zlib
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from imubench_pipeline.readers.bounds import LARGEST_WINDOW, LEAST_IN_PART, MOST_PARTS
+from imubench_pipeline.readers.bounds import MAX_UNCHECKED_PARTS, MAX_WINDOW, MIN_MEAN_PART
 
 if sys.version_info >= (3, 14):
     from compression import zstd
 else:
     from backports import zstd
 
-_READ = 1 << 16
+_READ_BLOCK = 1 << 16
 
 
 class Source(Protocol):
-    """What compressed bytes are read from."""
+    """A source of compressed bytes."""
 
     def read(self, size: int, /) -> bytes:
         """Return the next bytes; none at the end."""
 
     def close(self) -> None:
-        """Close it."""
+        """Close the source."""
 
 
-class _Parts:
-    """The decompressed bytes of what may be several compressed parts, one behind another.
+class _CompressedParts:
+    """The decompressed bytes of one or several consecutive compressed parts.
 
-    Parts that hold next to nothing cost time and no bytes of the file to speak of: the libraries
-    pass over them by the million before they return.
+    Nearly empty parts take time but few bytes of the file: the libraries skip millions of them
+    before they return. Their number is therefore limited.
 
-    ``new`` makes what decompresses one part. Zeros may follow a part, and nothing else.
+    ``new`` creates the decompressor of one part. Only zeros may follow a part.
     """
 
     def __init__(self, file: Source, new: Callable[[], Any]) -> None:
@@ -51,14 +51,14 @@ class _Parts:
             begins = self._part.eof
             packed = self._part.unused_data if begins else b""
             if not packed and (begins or self._part.needs_input):
-                packed = self._file.read(_READ)
+                packed = self._file.read(_READ_BLOCK)
             if begins:
                 while packed and not (packed := packed.lstrip(b"\0")):
-                    packed = self._file.read(_READ)
+                    packed = self._file.read(_READ_BLOCK)
                 if not packed:
                     return b""
                 self._part = self._new()
-                self._parts = _counted(self._parts, self._size)
+                self._parts = _count_part(self._parts, self._size)
             try:
                 block: bytes = self._part.decompress(packed, size)
             except (OSError, EOFError, lzma.LZMAError, zlib.error, zstd.ZstdError) as error:
@@ -74,17 +74,17 @@ class _Parts:
         self._file.close()
 
 
-def _counted(parts: int, size: int) -> int:
-    """Return one part more than there were; raise if they are many that hold next to nothing."""
-    if parts >= MOST_PARTS and size < LEAST_IN_PART * parts:
+def _count_part(parts: int, size: int) -> int:
+    """Return the number of parts plus one; raise if there are too many nearly empty parts."""
+    if parts >= MAX_UNCHECKED_PARTS and size < MIN_MEAN_PART * parts:
         raise OSError(
-            f"{parts} compressed parts hold {size} bytes, expected more than {LEAST_IN_PART} a part"
+            f"{parts} compressed parts hold {size} bytes, expected more than {MIN_MEAN_PART} a part"
         )
     return parts + 1
 
 
-class _Gunzip:
-    """One member of gzip, as bz2 and lzma have it of their streams."""
+class _GzipDecompressor:
+    """Decompressor of one member of gzip, with the interface of those of bz2 and lzma."""
 
     def __init__(self) -> None:
         self._inflate = zlib.decompressobj(zlib.MAX_WBITS | 16)
@@ -106,9 +106,9 @@ class _Gunzip:
 
 
 def unpacked_zstd(data: bytes, most: int) -> bytes:
-    """Return the first bytes of what is compressed in a frame of zstd.
+    """Return the first decompressed bytes of a frame of zstd.
 
-    ``most``: that are unpacked at most.
+    ``most``: largest number of bytes to decompress.
 
     Raises
     ------
@@ -116,41 +116,41 @@ def unpacked_zstd(data: bytes, most: int) -> bytes:
         If the data are corrupt.
     """
     try:
-        return _unzstd().decompress(data, most)
+        return _create_zstd().decompress(data, most)
     except zstd.ZstdError as error:
         raise ValueError(str(error)) from None
 
 
-def _unzstd() -> zstd.ZstdDecompressor:
+def _create_zstd() -> zstd.ZstdDecompressor:
     largest: dict[int, int] = {
-        zstd.DecompressionParameter.window_log_max: LARGEST_WINDOW.bit_length() - 1
+        zstd.DecompressionParameter.window_log_max: MAX_WINDOW.bit_length() - 1
     }
     return zstd.ZstdDecompressor(options=largest)
 
 
-def _unxz() -> lzma.LZMADecompressor:
-    # The dictionary that a file asks for is taken from memory before the first byte.
-    return lzma.LZMADecompressor(memlimit=LARGEST_WINDOW)
+def _create_xz() -> lzma.LZMADecompressor:
+    # The memory for the dictionary that a file requests is allocated before the first byte.
+    return lzma.LZMADecompressor(memlimit=MAX_WINDOW)
 
 
-OPENED: Mapping[str, Callable[[Source], Any]] = {
-    "gzip": lambda file: _Parts(file, _Gunzip),
-    "zstd": lambda file: _Parts(file, _unzstd),
-    "xz": lambda file: _Parts(file, _unxz),
-    "bzip2": lambda file: _Parts(file, bz2.BZ2Decompressor),
+DECOMPRESSORS: Mapping[str, Callable[[Source], Any]] = {
+    "gzip": lambda file: _CompressedParts(file, _GzipDecompressor),
+    "zstd": lambda file: _CompressedParts(file, _create_zstd),
+    "xz": lambda file: _CompressedParts(file, _create_xz),
+    "bzip2": lambda file: _CompressedParts(file, bz2.BZ2Decompressor),
 }
-"""How a file is opened that is compressed so."""
+"""Function that opens a compressed file, by compression."""
 
 _MAGIC = re.compile(
     rb"(?P<gzip>\x1f\x8b\x08[\0-\x1f])|(?P<zstd>\x28\xb5\x2f\xfd)|(?P<xz>\xfd7zXZ\0)"
     rb"|(?P<bzip2>BZh[1-9](?:1AY&SY|\x17rE8P\x90|.{0,5}\Z))",
     re.DOTALL,
 )
-LONGEST_MAGIC = 10
+MAX_MAGIC_LENGTH = 10
 """Signatures of compressed files. A shorter signature would match random bytes."""
 
 
 def compression_of(begin: bytes) -> str:
-    """Return how a file is compressed that begins so, as `OPENED` calls it; empty: it is not."""
-    magic = _MAGIC.match(begin[:LONGEST_MAGIC])
+    """Return the compression (a key of `DECOMPRESSORS`) by the first bytes; empty if none."""
+    magic = _MAGIC.match(begin[:MAX_MAGIC_LENGTH])
     return "" if magic is None else magic.lastgroup or ""

@@ -1,4 +1,4 @@
-"""What is declared of a format of log files, and what a file of it is said to hold."""
+"""Declaration of a format of log files, and description of the contents of a file."""
 
 from __future__ import annotations
 
@@ -17,73 +17,72 @@ from imubench_pipeline.tables.findings import RecordingError
 
 Kind = Literal["number", "date", "text", "other"]
 
-ROWS = 1000
-"""Records that are looked at, at most."""
+MAX_EXAMINED_RECORDS = 1000
+"""Largest number of records that are examined in an inspection."""
 
-FIRST = 4
-"""Values of a column that are shown."""
+MAX_SHOWN_VALUES = 4
+"""Largest number of values of a column that are shown."""
 
 NOTHING_STATED = LogFormat.model_validate(
     {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
 )
-"""The format of a log of which nothing is known; what it has to have says nothing."""
+"""Log format for an unknown log; its required entries are arbitrary."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Signature:
-    """How a log of a format is told from others: by what it holds, and never by its name."""
+    """Features by which a format is recognised: contents only, never the name of a file."""
 
     begins: tuple[bytes, ...] = ()
-    """A file that begins with one of these is of the format."""
+    """A file that begins with one of these byte strings has the format."""
     tells: Callable[[bytes], bool] | None = None
-    """Tells from the first 64 kB of a file whether it is of the format, where these begin as that
-    of no format. Bytes of chance have nothing of the kind, however many they are."""
+    """Returns whether the first 64 kB of a file have the format; used if they match no ``begins``.
+    Random bytes must not be accepted, in any amount."""
     folder_has: str | None = None
     """A folder with a file of this name is one log."""
     archive_has: str | None = None
-    """A zip archive with a file that ends so is one log."""
+    """A zip archive with a file with this suffix is one log."""
 
 
 class Code(NamedTuple):
-    """What reads the files of a format."""
+    """The code that reads the files of a format."""
 
     log_file: type[LogFile]
     """Reads one file, or one topic of it."""
     tables: Callable[[Path, FileFormat], list[LogTable]]
-    """Of a path and the format: the tables of a file, told from its beginning. It raises
-    `RecordingError` where there is none."""
+    """Returns the tables of a file from its path and format; reads its beginning only. Raises
+    `RecordingError` if there is no table."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FileFormat:
-    """A format of log files: all that is known of it beside the code that reads it."""
+    """Properties of a format of log files, without the code that reads it."""
 
     name: Reader
-    """What ``reader`` of a sensor file says; its module in `imubench_pipeline.readers.formats` is
-    called so."""
+    """Value of ``reader`` in a sensor file, and name of the module in
+    `imubench_pipeline.readers.formats`."""
     title: str
-    """What people call it."""
+    """Common name of the format."""
     endings: tuple[str, ...]
-    """How the names of its files mostly end, for people."""
+    """Usual suffixes of its files, for messages."""
     signature: Signature
     streamed: bool
-    """Its logs are read from front to back, so that they may be compressed, or in a zip archive."""
+    """Its logs are read sequentially, so that they may be compressed or in a zip archive."""
     clock_of: Literal["file", "variable", "length"]
-    """What has a clock of its own: the whole file, each ``variable``, or all arrays of one length.
-    """
+    """Data that share a clock: the whole file, each ``variable``, or all arrays of one length."""
     time_columns: tuple[str, ...]
-    """What the format calls the columns of time; empty: they are called as their writer likes."""
+    """Names of the time columns in the format; empty if the format does not fix them."""
     settings: tuple[str, ...]
-    """Entries of ``log``, or of its channels, that are for logs of some formats, and this one."""
+    """Entries of ``log``, or of its channels, that apply to this format but not to all."""
     code: Callable[[], Code]
-    """Imports and returns the code, since only what a run needs is to be imported."""
+    """Imports and returns the code; a function, so that a run imports only the formats it needs."""
     vendor: str | None = None
-    """Who makes every sensor with such logs."""
+    """Vendor of all sensors with such logs."""
     measured_by_name: bool = False
-    """The format has names for what is measured alone: its linear acceleration has gravity in it.
-    """
+    """All names of the format mean measured quantities: its linear acceleration includes
+    gravity."""
     extra: Extra | None = None
-    """The extra of the package with the library that the code takes; None: it takes none."""
+    """Extra of the package with the library that the code needs; None: no library."""
 
     def load(self) -> Code:
         """Return the code.
@@ -91,7 +90,7 @@ class FileFormat:
         Raises
         ------
         RecordingError
-            If the library that it takes is not installed.
+            If the library that the code needs is not installed.
         """
         if self.extra is None:
             return self.code()
@@ -102,68 +101,68 @@ class FileFormat:
             raise RecordingError(str(error)) from None
 
     def tables(self, path: Path) -> list[LogTable]:
-        """Return what a log holds, told from its beginning.
+        """Return the tables of a log, from its beginning.
 
-        ``path``: a file, or a member of a zip archive where the format is streamed.
+        ``path``: a file, or a member of a zip archive if the format is streamed.
 
         Raises
         ------
         RecordingError
-            If it cannot be read, or holds nothing.
+            If it cannot be read, or has no data.
         """
         return self.load().tables(path, self)
 
 
 @dataclass(frozen=True, eq=False)
 class LogColumn:
-    """One column, as far as the beginning of a file tells."""
+    """One column, as described by the beginning of a file."""
 
     source: str | int
-    """What ``column`` of a sensor file says for it."""
+    """Value of ``column`` in a sensor file."""
     label: str
-    """Its name; empty where it has none."""
+    """Name of the column; empty if it has none."""
     kind: Kind
     first: tuple[str, ...] = ()
     """The first values as written."""
     values: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    """The first values, ns since 1970 (or since midnight) of dates, NaN where one is missing, shape
-    (n,); empty where they are no figures."""
+    """First values, shape (n,); NaN where missing; dates in ns since 1970 or since midnight. Empty
+    if they are no numbers."""
     unit: str | None = None
-    """As the file states it, or its format fixes it."""
+    """Unit that the file states or its format fixes."""
     forms: tuple[str, ...] = ()
-    """Of dates in text: ``iso8601`` or patterns that fit, the likeliest first; a date alone or a
-    time of day alone is a part of one."""
+    """For dates in text: ``iso8601`` or matching patterns, the most plausible first; a pattern may
+    be for a date only or a time of day only."""
     address: str | int | None = None
-    """What ``column`` of ``time`` says for it, where that is not ``source``."""
+    """Value of ``column`` under ``time``, if it differs from ``source``."""
 
 
 @dataclass(frozen=True, eq=False)
 class LogTable:
-    """Columns that have their records in common: of a text log, an array, a topic, a message."""
+    """Columns with common records: a text log, an array, a topic or a message."""
 
     file_format: FileFormat
     name: str = ""
-    """Of the array, topic or message; empty in a text log."""
+    """Name of the array, topic or message; empty for a text log."""
     columns: tuple[LogColumn, ...] = ()
     variable: str | None = None
-    """What ``variable`` of a sensor file says for it."""
+    """Value of ``variable`` in a sensor file."""
     file: str | None = None
-    """What ``file`` of a sensor file says for it; None: the recording is one file."""
+    """Value of ``file`` in a sensor file; None: the recording is one file."""
     rows: int | None = None
-    """Records, where that is cheap to know."""
+    """Number of records, if it is known without reading them."""
     rate: float | None = None
-    """Hz, as the file states it."""
+    """Rate that the file states, Hz."""
     started: str | None = None
-    """ISO 8601, as the file states it."""
+    """Start of the log that the file states, ISO 8601."""
     about: str = ""
-    """How it is written."""
+    """Layout of the table, for messages."""
     notes: tuple[str, ...] = ()
-    """What the file says in words."""
+    """Comments in the file."""
     fault: str | None = None
-    """Why it cannot be used, as the end of a sentence."""
+    """Reason why the table cannot be used, as the end of a sentence."""
 
 
 def shown(values: NDArray[Any]) -> tuple[str, ...]:
-    """Return the first figures as text."""
+    """Return the first numbers as text."""
     whole = values.dtype.kind in "iu"
-    return tuple(str(value) if whole else f"{value:.10g}" for value in values[:FIRST])
+    return tuple(str(value) if whole else f"{value:.10g}" for value in values[:MAX_SHOWN_VALUES])

@@ -29,7 +29,13 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.compressed import blocks
-from imubench_pipeline.readers.file_format import ROWS, FileFormat, LogColumn, LogTable, shown
+from imubench_pipeline.readers.file_format import (
+    MAX_EXAMINED_RECORDS,
+    FileFormat,
+    LogColumn,
+    LogTable,
+    shown,
+)
 from imubench_pipeline.readers.stamps import WrapState, unwrapped
 from imubench_pipeline.readers.ubx_frames import Frames
 from imubench_pipeline.tables.findings import RecordingError
@@ -420,7 +426,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     words = {kind: Words(kind, names) for kind in KINDS}
     frames = Frames(blocks(path, [], _LEAST_ZEROS))
     for key, payload in frames:
-        if key in words and len(words[key]) < ROWS * len(names):
+        if key in words and len(words[key]) < MAX_EXAMINED_RECORDS * len(names):
             words[key].add(payload)
         if frames.read > (_DESCRIBED_IN if any(map(len, words.values())) else _LOOKED_FOR):
             break

@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile
 from imubench_pipeline.readers.compressed import BLOCK_BYTES, blocks
 from imubench_pipeline.readers.file_format import (
-    FIRST,
-    ROWS,
+    MAX_EXAMINED_RECORDS,
+    MAX_SHOWN_VALUES,
     FileFormat,
     LogColumn,
     LogTable,
@@ -507,7 +507,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
 
 
 def _table(file_format: FileFormat, kind: str, rows: list[Row], alone: bool) -> LogTable:
-    fields, _ = fields_of(kind, rows[:ROWS], set(range(len(FIELDS[kind]))))
+    fields, _ = fields_of(kind, rows[:MAX_EXAMINED_RECORDS], set(range(len(FIELDS[kind]))))
     columns = [
         LogColumn(
             name if alone else f"{kind}.{name}",
@@ -519,8 +519,8 @@ def _table(file_format: FileFormat, kind: str, rows: list[Row], alone: bool) -> 
         )
         for place, name in enumerate(FIELDS[kind])
     ]
-    columns += _time(HOST, [row.before.strip(AROUND_STAMP) for row in rows[:ROWS]])
-    columns += _time(COUNTER, [row.counter for row in rows[:ROWS]])
+    columns += _time(HOST, [row.before.strip(AROUND_STAMP) for row in rows[:MAX_EXAMINED_RECORDS]])
+    columns += _time(COUNTER, [row.counter for row in rows[:MAX_EXAMINED_RECORDS]])
     about = f"{len(rows)} sentences at the beginning"
     return LogTable(file_format, kind, tuple(columns), about=about)
 
@@ -528,7 +528,7 @@ def _table(file_format: FileFormat, kind: str, rows: list[Row], alone: bool) -> 
 def _time(name: str, cells: list[bytes]) -> list[LogColumn]:
     """Return a column of stamps, if it is there."""
     texts = [cell.decode("ascii", "replace") for cell in cells]
-    first = tuple(text for text in texts[:FIRST])
+    first = tuple(text for text in texts[:MAX_SHOWN_VALUES])
     if not any(texts):
         return []
     if all(is_number(text, ".") for text in texts if text):

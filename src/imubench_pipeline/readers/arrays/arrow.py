@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.parquet_pages import check_pages
 from imubench_pipeline.readers.arrays.table import Column, Table, UnusableError
-from imubench_pipeline.readers.bounds import LARGEST_ARROW_BATCH
+from imubench_pipeline.readers.bounds import MAX_ARROW_BATCH
 
 METADATA = b"imubench"
 """Metadata key of Parquet files that this package writes; the value is JSON."""
@@ -198,10 +198,10 @@ def check_batches(path: Path, in_file: bool) -> None:
         source.seek(_FILE_HEAD if in_file else 0)
         for message in pa.ipc.MessageReader.open_stream(source):
             unpacked = sum(_unpacked(bytes(message.metadata), message.body))
-            if unpacked > LARGEST_ARROW_BATCH:
+            if unpacked > MAX_ARROW_BATCH:
                 raise UnusableError(
                     f"a compressed record batch unpacks to {unpacked} bytes; expected at most "
-                    f"{LARGEST_ARROW_BATCH}: write it with pyarrow.feather.write_feather, which "
+                    f"{MAX_ARROW_BATCH}: write it with pyarrow.feather.write_feather, which "
                     "makes smaller ones"
                 )
 

@@ -30,17 +30,17 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Column, Table, UnusableError
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.bounds import (
-    LARGEST_CHUNKS,
-    LARGEST_RATIO,
-    LARGEST_RECORD,
-    MOST_ARRAYS,
-    MOST_LISTED,
-    UNSUSPICIOUS,
+    MAX_ARRAYS,
+    MAX_BLOCK_BYTES,
+    MAX_CHUNK_BYTES,
+    MAX_EXPANSION_RATIO,
+    MAX_SEARCHED_COLUMNS,
+    MIN_CHECKED_EXPANSION,
 )
 from imubench_pipeline.readers.file_format import (
-    FIRST,
+    MAX_EXAMINED_RECORDS,
+    MAX_SHOWN_VALUES,
     NOTHING_STATED,
-    ROWS,
     FileFormat,
     Kind,
     LogColumn,
@@ -85,7 +85,7 @@ class ArrayFile(LogFile):
     def _guarded(self) -> Iterator[dict[str, NDArray[Any]]]:
         """Yield the blocks as written; whatever a library raises becomes a `RecordingError`."""
         with explained(self.path), ExitStack() as stack:
-            yield from self._blocks(self._places(list(islice(self.tables(stack), MOST_ARRAYS + 1))))
+            yield from self._blocks(self._places(list(islice(self.tables(stack), MAX_ARRAYS + 1))))
 
     # --------------------------------------------------------------------------- blocks
 
@@ -97,16 +97,16 @@ class ArrayFile(LogFile):
             for table in tables
         }
         chunk_bytes = sum(table.held_bytes(wanted[table]) for table in tables)
-        if chunk_bytes > LARGEST_CHUNKS:
+        if chunk_bytes > MAX_CHUNK_BYTES:
             raise UnusableError(
                 f"the columns lie in chunks of {chunk_bytes} bytes together; expected at most "
-                f"{LARGEST_CHUNKS}: repack the file with smaller chunks"
+                f"{MAX_CHUNK_BYTES}: repack the file with smaller chunks"
             )
         rows = rows_of_block(
-            sum(table.row_bytes(wanted[table]) for table in tables), LARGEST_RECORD
+            sum(table.row_bytes(wanted[table]) for table in tables), MAX_BLOCK_BYTES
         )
         read, size = 0, self.path.stat().st_size
-        most = max(UNSUSPICIOUS, LARGEST_RATIO * size)
+        most = max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size)
         streams = [table.blocks(wanted[table], rows) for table in tables]
         for parts in zip(*streams, strict=True):
             of_table = dict(zip(tables, parts, strict=True))
@@ -119,7 +119,7 @@ class ArrayFile(LogFile):
             if 8 * read * len(places) > most:
                 raise UnusableError(
                     f"its {size} bytes hold more than {read - count} records; expected figures "
-                    f"that take at most {LARGEST_RATIO} times the size of their file"
+                    f"that take at most {MAX_EXPANSION_RATIO} times the size of their file"
                 )
             if count:
                 yield block
@@ -133,8 +133,8 @@ class ArrayFile(LogFile):
 
     def _places(self, tables: Sequence[Table]) -> dict[str, _Place]:
         by_name: dict[str, Table] = {}
-        if len(tables) > MOST_ARRAYS:
-            raise UnusableError(f"more than {MOST_ARRAYS} arrays; expected the log of one sensor")
+        if len(tables) > MAX_ARRAYS:
+            raise UnusableError(f"more than {MAX_ARRAYS} arrays; expected the log of one sensor")
         for table in tables:
             if table.name in by_name:
                 raise UnusableError(f"{table.shown} stands twice; expected one array of that name")
@@ -469,7 +469,7 @@ def _together(described: Sequence[LogTable]) -> list[LogTable]:
 def _described(path: Path, file_format: FileFormat, table: Table) -> LogTable:
     if table.fault is not None:
         return LogTable(file_format, table.name, fault=table.fault)
-    described = [table.column(place) for place in range(min(table.width, MOST_LISTED))]
+    described = [table.column(place) for place in range(min(table.width, MAX_SEARCHED_COLUMNS))]
     usable = [n for n, column in enumerate(described) if column.kind in NUMBERS + DATES]
     try:
         with explained(path):
@@ -489,7 +489,7 @@ def _described(path: Path, file_format: FileFormat, table: Table) -> LogTable:
                 source,
                 column.label or (table.name if table.width == 1 else ""),
                 kinds.get(column.kind, "other"),
-                tuple(map(str, raw[:FIRST])) if dated else shown(raw),
+                tuple(map(str, raw[:MAX_SHOWN_VALUES])) if dated else shown(raw),
                 _floats_of(raw) if dated else numbers(raw),
                 units[place],
                 ("iso8601",) if dated else (),
@@ -522,7 +522,7 @@ def _first_records(table: Table, places: Sequence[int]) -> dict[int, NDArray[Any
     """Return the first records of some columns, by position."""
     if not places:
         return {}
-    rows = min(ROWS, rows_of_block(table.row_bytes(places), _MOST_BYTES))
+    rows = min(MAX_EXAMINED_RECORDS, rows_of_block(table.row_bytes(places), _MOST_BYTES))
     for block in table.blocks(places, rows):
         if len(block[0]):
             return {place: values[:rows] for place, values in zip(places, block, strict=True)}

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.table import Array, Table, UnusableError
 from imubench_pipeline.readers.bounds import (
-    DEEPEST_GROUP,
-    LARGEST_CHUNKS,
-    MOST_CHUNKS,
-    MOST_OBJECTS,
+    MAX_CHUNK_BYTES,
+    MAX_CHUNKS,
+    MAX_GROUP_DEPTH,
+    MAX_OBJECTS,
 )
 
 _CACHE_SLOTS, _CACHE_WEIGHT, _LEAST_CACHE = 521, 0.75, 1 << 20
@@ -91,14 +91,14 @@ def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> l
 def _names(group: h5py.Group, before: int, depth: int) -> list[str | bytes]:
     """Return the names in a group; ``before``: how many there were in others."""
     # The library's own visit goes down with the process where groups lie deep.
-    if depth > DEEPEST_GROUP:
+    if depth > MAX_GROUP_DEPTH:
         raise UnusableError(
-            f"groups lie more than {DEEPEST_GROUP} deep; expected the log of one sensor: copy its "
-            "data sets into a file of their own"
+            f"groups lie more than {MAX_GROUP_DEPTH} deep; expected the log of one sensor: copy "
+            "its data sets into a file of their own"
         )
-    if before + len(group) > MOST_OBJECTS:
+    if before + len(group) > MAX_OBJECTS:
         raise UnusableError(
-            f"more than {MOST_OBJECTS} objects; expected the log of one sensor: copy its data "
+            f"more than {MAX_OBJECTS} objects; expected the log of one sensor: copy its data "
             "sets into a file of their own"
         )
     return sorted(group, key=lambda name: name.encode() if isinstance(name, str) else name)
@@ -218,9 +218,9 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
                 f"{name} is compressed with filter {code} ({title.decode('ascii', 'replace')}), "
                 "which is not here; expected gzip: repack it with h5repack -f GZIP=4"
             )
-    if unpacked > LARGEST_CHUNKS:
+    if unpacked > MAX_CHUNK_BYTES:
         raise UnusableError(
-            f"{name} has chunks of {unpacked} bytes; expected at most {LARGEST_CHUNKS}: "
+            f"{name} has chunks of {unpacked} bytes; expected at most {MAX_CHUNK_BYTES}: "
             "repack it with h5repack -l"
         )
     chunks = math.prod(
@@ -232,9 +232,9 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
             f"{written} of {chunks} chunks of {name} were written, the others would read as "
             "zeros; cut it to what was recorded, or copy the file again"
         )
-    if chunks > MOST_CHUNKS:
+    if chunks > MAX_CHUNKS:
         raise UnusableError(
-            f"{name} lies in {chunks} chunks; expected at most {MOST_CHUNKS}: repack it with "
+            f"{name} lies in {chunks} chunks; expected at most {MAX_CHUNKS}: repack it with "
             "h5repack -l"
         )
 

@@ -24,16 +24,16 @@ from imubench_pipeline.readers.arrays import hdf5
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, header_of
 from imubench_pipeline.readers.arrays.table import (
-    LARGEST_RATIO,
-    Refused,
+    MAX_DEFLATE_RATIO,
     StreamedArray,
     Table,
+    UnsupportedArray,
     UnusableError,
+    describe_shape,
     exactly,
-    sides_of,
     skip,
 )
-from imubench_pipeline.readers.bounds import DEEPEST_STRUCTURE, LONGEST_MATLAB_NAME, MOST_SIDES
+from imubench_pipeline.readers.bounds import MAX_DIMENSIONS, MAX_MATLAB_NAME, MAX_STRUCTURE_DEPTH
 
 _LONGEST_CLASS = 64
 
@@ -103,7 +103,7 @@ def _variables_of_4(path: Path) -> Iterator[Table]:
             if end > size:
                 raise _cut_short(end, size)
             if header.fault is not None:
-                yield Refused(header.name, header.fault)
+                yield UnsupportedArray(header.name, header.fault)
             else:
                 opened = partial(_plain, path)
                 yield StreamedArray(
@@ -169,7 +169,7 @@ def _variables_of_5(path: Path) -> Iterator[Table]:
             if kind == _COMPRESSED:
                 opened = partial(_inflated, path, begin, length)
                 with opened() as stream:
-                    most = LARGEST_RATIO * (length + 8)
+                    most = MAX_DEFLATE_RATIO * (length + 8)
                     elements = _Elements(stream, order, 0, most, opened, checked=True)
                     yield from _matrix(elements, elements.tag(_MATRIX))
             elif kind == _MATRIX:
@@ -262,13 +262,13 @@ def _matrix(
     end = elements.at + length
     outer, elements.end = elements.end, end
     if length == 0 and above is not None:
-        yield Refused(above, "is empty; expected a vector or a matrix")
+        yield UnsupportedArray(above, "is empty; expected a vector or a matrix")
     else:
         (flags, _) = struct.unpack(f"{elements.order}II", elements.data(6)[:8].ljust(8, b"\0"))
         kind = flags & 0xFF
         shape = () if kind == _TABLE else _shape(elements)
         own = elements.data(1, 16).decode("utf-8", "replace")
-        if len(own) > LONGEST_MATLAB_NAME:
+        if len(own) > MAX_MATLAB_NAME:
             raise _damaged(f"a name of {len(own)} letters", elements.at)
         name = own if above is None else above
         if not name:
@@ -276,9 +276,11 @@ def _matrix(
         elif kind == _STRUCTURE and math.prod(shape) == 1:
             yield from _fields(elements, name, depth)
         elif not _FIRST_NUMERIC <= kind <= _LAST_NUMERIC:
-            yield Refused(name, _CLASSES.get(kind, f"is of the unknown class {kind}"))
+            yield UnsupportedArray(name, _CLASSES.get(kind, f"is of the unknown class {kind}"))
         elif flags & _COMPLEX:
-            yield Refused(name, "holds complex numbers; expected numbers: save real() of it")
+            yield UnsupportedArray(
+                name, "holds complex numbers; expected numbers: save real() of it"
+            )
         else:
             yield _numeric(elements, name, shape)
     elements.end = outer
@@ -289,8 +291,8 @@ def _matrix(
 def _shape(elements: _Elements) -> tuple[int, ...]:
     data = elements.data(5)
     shape: tuple[int, ...] = struct.unpack(f"{elements.order}{len(data) // 4}i", data)
-    if not 2 <= len(shape) <= MOST_SIDES or min(shape) < 0:
-        raise _damaged(f"sides {shape[:MOST_SIDES]}", elements.at)
+    if not 2 <= len(shape) <= MAX_DIMENSIONS or min(shape) < 0:
+        raise _damaged(f"sides {shape[:MAX_DIMENSIONS]}", elements.at)
     return shape
 
 
@@ -299,19 +301,19 @@ def _numeric(elements: _Elements, name: str, shape: tuple[int, ...]) -> Streamed
     dtype = np.dtype(elements.order + _NUMBERS[elements.kind])
     if size != math.prod(shape) * dtype.itemsize:
         raise UnusableError(
-            f"corrupt data: {name} promises {sides_of(shape)} values of {dtype.itemsize} "
+            f"corrupt data: {name} promises {describe_shape(shape)} values of {dtype.itemsize} "
             f"bytes, but has {size} bytes; copy the file again"
         )
     return StreamedArray(name, shape, dtype, True, elements.opened, elements.at, elements.checked)
 
 
 def _fields(elements: _Elements, name: str, depth: int) -> Iterator[Table]:
-    if depth == DEEPEST_STRUCTURE:
-        yield Refused(name, f"lies {depth} structures deep; expected a vector or a matrix")
+    if depth == MAX_STRUCTURE_DEPTH:
+        yield UnsupportedArray(name, f"lies {depth} structures deep; expected a vector or a matrix")
         return
     width = int.from_bytes(elements.data(5), "little" if elements.order == "<" else "big")
     names = elements.data(1)
-    if not 1 <= width <= LONGEST_MATLAB_NAME:
+    if not 1 <= width <= MAX_MATLAB_NAME:
         raise _damaged(f"names of fields of {width} bytes", elements.at)
     for start in range(0, len(names), width):
         field = names[start : start + width].split(b"\0")[0].decode("utf-8", "replace")

@@ -21,14 +21,14 @@ from numpy.lib import format as npy
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.table import (
-    LARGEST_RATIO,
+    MAX_DEFLATE_RATIO,
     StreamedArray,
     Table,
     UnusableError,
+    describe_shape,
     exactly,
-    sides_of,
 )
-from imubench_pipeline.readers.bounds import LONGEST_NPY_HEADER
+from imubench_pipeline.readers.bounds import MAX_NPY_HEADER
 from imubench_pipeline.readers.compressed import opened_archive
 
 _ENDING = ".npy"
@@ -64,7 +64,9 @@ def _members(archive: zipfile.ZipFile, size: int) -> Iterator[Table]:
                 f"{name} is packed by method {info.compress_type}; expected stored or deflated: "
                 "save it with numpy.savez or numpy.savez_compressed"
             )
-        if info.compress_size > size or info.file_size > LARGEST_RATIO * (info.compress_size + 8):
+        if info.compress_size > size or info.file_size > MAX_DEFLATE_RATIO * (
+            info.compress_size + 8
+        ):
             raise UnusableError(
                 f"{name} is said to have {info.file_size} bytes, which {info.compress_size} packed "
                 f"bytes in a file of {size} cannot hold; the file is corrupt: copy it again"
@@ -83,10 +85,10 @@ def _array(name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool)
             )
         length = exactly(stream, struct.calcsize(_LENGTH[version]))
         (header_size,) = struct.unpack(_LENGTH[version], length)
-        if header_size > LONGEST_NPY_HEADER:
+        if header_size > MAX_NPY_HEADER:
             raise UnusableError(
                 f"{shown} has a header of {header_size} bytes; expected at most "
-                f"{LONGEST_NPY_HEADER}: save fewer fields, or copy the file again"
+                f"{MAX_NPY_HEADER}: save fewer fields, or copy the file again"
             )
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
         shape, fortran, dtype = read(io.BytesIO(length + exactly(stream, header_size)))
@@ -100,14 +102,14 @@ def _array(name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool)
     promised = offset + elements * dtype.itemsize
     if min(shape, default=0) < 0 or (promised > size and not dtype.hasobject):
         raise UnusableError(
-            f"{shown} promises {sides_of(shape)} values of {dtype.itemsize} bytes, "
+            f"{shown} promises {describe_shape(shape)} values of {dtype.itemsize} bytes, "
             f"{promised} bytes with the header, but {size} are there; the file is cut short or "
             "corrupt: copy it again"
         )
     if promised < size and not dtype.hasobject:
         raise UnusableError(
-            f"{size - promised} bytes stand behind {shown} ({sides_of(shape)} values); expected "
-            "one array: save several with numpy.savez"
+            f"{size - promised} bytes stand behind {shown} ({describe_shape(shape)} values); "
+            "expected one array: save several with numpy.savez"
         )
     return array
 

@@ -14,7 +14,7 @@ from typing import BinaryIO
 import pyarrow.parquet as pq
 
 from imubench_pipeline.readers.arrays.table import UnusableError
-from imubench_pipeline.readers.bounds import LARGEST_PAGES, LEAST_IN_PAGE, MOST_PAGES
+from imubench_pipeline.readers.bounds import MAX_PAGE_BYTES, MAX_UNCHECKED_PAGES, MIN_MEAN_PAGE
 
 _UNPACKED, _PACKED = 2, 3
 _HEADER, _LONGEST_HEADER = 1 << 10, 1 << 20
@@ -31,7 +31,7 @@ def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> 
     UnusableError
         If they may not, or are too many for what they hold.
     """
-    most = max(MOST_PAGES, path.stat().st_size // LEAST_IN_PAGE)
+    most = max(MAX_UNCHECKED_PAGES, path.stat().st_size // MIN_MEAN_PAGE)
     paths = [metadata.schema.column(place).path for place in range(metadata.num_columns)]
     places = [place for place, name in enumerate(paths) if name in names]
     number = 0
@@ -49,10 +49,10 @@ def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> 
                             "pyarrow.parquet.write_table"
                         )
                 together += largest
-            if together > LARGEST_PAGES:
+            if together > MAX_PAGE_BYTES:
                 raise UnusableError(
                     f"pages unpack to {together} bytes together; expected at most "
-                    f"{LARGEST_PAGES}: write it with pyarrow.parquet.write_table, which makes "
+                    f"{MAX_PAGE_BYTES}: write it with pyarrow.parquet.write_table, which makes "
                     "smaller ones"
                 )
 

@@ -14,7 +14,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.bounds import MOST_FIELDS
+from imubench_pipeline.readers.bounds import MAX_FIELDS
 
 NUMBERS = "fiu"
 """NumPy's letters of the kinds of data that are figures: float, signed and unsigned integer."""
@@ -100,7 +100,7 @@ class Table(ABC):
         """
 
 
-class Refused(Table):
+class UnsupportedArray(Table):
     """What a file has under a name but no reader takes."""
 
     def __init__(self, name: str, fault: str) -> None:
@@ -151,23 +151,23 @@ class Array(Table):
         self._leaves: list[_Leaf] = []
         if len(shape) not in (1, 2):
             self.fault = (
-                f"has {len(shape)} dimensions ({sides_of(shape)}); expected a vector, or a "
+                f"has {len(shape)} dimensions ({describe_shape(shape)}); expected a vector, or a "
                 "matrix with a column a channel: reshape it"
                 if shape
                 else "is a single value; expected a vector or a matrix"
             )
             return
         if 0 in shape:
-            self.fault = f"is empty ({sides_of(shape)}); expected at least one record"
+            self.fault = f"is empty ({describe_shape(shape)}); expected at least one record"
             return
         if len(shape) == 1 or shape[0] != shape[1]:
             self.time_axis = 0 if len(shape) == 1 or shape[0] > shape[1] else 1
         sides = (*shape, 1)[:2]
         self.rows, self.width = sides[self.time_axis], sides[1 - self.time_axis]
         if dtype.names:
-            self._leaves = list(islice(_leaves(dtype), MOST_FIELDS + 1))
-            if len(self._leaves) > MOST_FIELDS:
-                self.fault = f"has more than {MOST_FIELDS} columns; expected a log of one sensor"
+            self._leaves = list(islice(_leaves(dtype), MAX_FIELDS + 1))
+            if len(self._leaves) > MAX_FIELDS:
+                self.fault = f"has more than {MAX_FIELDS} columns; expected a log of one sensor"
             if self.width != 1:
                 self.fault = "is a matrix of records; expected a vector of records"
             self.width = len(self._leaves)
@@ -198,7 +198,7 @@ class Array(Table):
         return values
 
 
-def sides_of(shape: tuple[int, ...]) -> str:
+def describe_shape(shape: tuple[int, ...]) -> str:
     """Return the sides of an array in words."""
     return " x ".join(str(side) for side in shape) or "1"
 
@@ -222,7 +222,7 @@ def _leaves(
         yield _Leaf(label, path, dtype)
 
 
-LARGEST_RATIO = 1040
+MAX_DEFLATE_RATIO = 1040
 """Bytes that a byte of deflate stands for, at most, with room for rounding."""
 
 _SKIPPED = 1 << 20

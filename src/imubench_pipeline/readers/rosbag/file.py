@@ -23,8 +23,14 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from imubench_pipeline.readers.batch import Batch, LogFile
-from imubench_pipeline.readers.bounds import LARGEST_BATCH
-from imubench_pipeline.readers.file_format import ROWS, FileFormat, LogColumn, LogTable, shown
+from imubench_pipeline.readers.bounds import MAX_MESSAGE_BATCH
+from imubench_pipeline.readers.file_format import (
+    MAX_EXAMINED_RECORDS,
+    FileFormat,
+    LogColumn,
+    LogTable,
+    shown,
+)
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder
 from imubench_pipeline.readers.stamps import Clock, date_of
@@ -218,7 +224,7 @@ class RosbagFile(LogFile):
                     times.append(time)
                     messages.append(message)
                     size += len(message)
-                    if len(times) == _BATCH or size > LARGEST_BATCH:
+                    if len(times) == _BATCH or size > MAX_MESSAGE_BATCH:
                         break
                 written = np.array(times, np.int64)
             if not times:
@@ -412,7 +418,7 @@ def _table(
             file_format, topic, rows=rows, about=kind, fault=f"is {kind}; only {kinds} are read"
         )
     layout = LAYOUTS[kind]
-    count = ROWS if layout.covariances else _RARE
+    count = MAX_EXAMINED_RECORDS if layout.covariances else _RARE
     columns = () if rows == 0 else _columns(source, topic, layout, count)
     fault = None if columns else "has no message that can be read"
     return LogTable(file_format, topic, columns, topic, rows=rows, about=kind, fault=fault)

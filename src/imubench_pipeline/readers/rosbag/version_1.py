@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import BinaryIO
 
 from imubench_pipeline.readers.bounds import (
-    LARGEST_CHUNK,
-    LARGEST_MESSAGE,
-    LARGEST_RATIO,
-    LONGEST_TOPIC,
-    MOST_TOPICS,
-    UNSUSPICIOUS,
+    MAX_BAG_CHUNK,
+    MAX_EXPANSION_RATIO,
+    MAX_MESSAGE,
+    MAX_TOPIC_LENGTH,
+    MAX_TOPICS,
+    MIN_CHECKED_EXPANSION,
 )
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
@@ -84,7 +84,9 @@ class Bag:
         """
         with self._path.open("rb") as file:
             at = 0
-            self._left = max(UNSUSPICIOUS, LARGEST_RATIO * os.fstat(file.fileno()).st_size)
+            self._left = max(
+                MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * os.fstat(file.fileno()).st_size
+            )
             try:
                 self.unclosed = not self._start(file)
                 while True:
@@ -126,11 +128,11 @@ class Bag:
         self, header: dict[bytes, bytes], data: bytes, topic: str
     ) -> Iterator[tuple[int, bytes]]:
         (size,) = _U4.unpack(header[b"size"])
-        if size > LARGEST_CHUNK:
-            raise ValueError(f"a chunk of {size} bytes, expected at most {LARGEST_CHUNK}")
+        if size > MAX_BAG_CHUNK:
+            raise ValueError(f"a chunk of {size} bytes, expected at most {MAX_BAG_CHUNK}")
         self._left -= size
         if self._left < 0:
-            raise ValueError(f"its chunks expand to more than {LARGEST_RATIO} times its size")
+            raise ValueError(f"its chunks expand to more than {MAX_EXPANSION_RATIO} times its size")
         compression = header[b"compression"].decode("ascii", "replace")
         if compression == "bz2":
             data = bz2.BZ2Decompressor().decompress(data, size + 1)
@@ -156,17 +158,17 @@ class Bag:
         if header[b"op"] == _MESSAGE:
             if self._connections[_number_of(header)][0] == topic:
                 seconds, nanoseconds = _TIME.unpack(header[b"time"])
-                yield seconds * 10**9 + nanoseconds, data if len(data) <= LARGEST_MESSAGE else b""
+                yield seconds * 10**9 + nanoseconds, data if len(data) <= MAX_MESSAGE else b""
         elif header[b"op"] == _CONNECTION:
             self._connect(header, data)
 
     def _connect(self, header: dict[bytes, bytes], data: bytes) -> None:
         kind = _fields(data)[b"type"].decode("utf-8", "replace")
         topic = header[b"topic"].decode("utf-8", "replace")
-        if max(len(topic), len(kind)) > LONGEST_TOPIC:
-            raise ValueError(f"a topic or type of more than {LONGEST_TOPIC} letters")
-        if len(self._connections) >= MOST_TOPICS:
-            raise ValueError(f"more than {MOST_TOPICS} connections, expected those of a vehicle")
+        if max(len(topic), len(kind)) > MAX_TOPIC_LENGTH:
+            raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
+        if len(self._connections) >= MAX_TOPICS:
+            raise ValueError(f"more than {MAX_TOPICS} connections, expected those of a vehicle")
         # The name that ROS 2 has for the same type.
         self._connections[_number_of(header)] = topic, kind.replace("/", "/msg/", 1)
 
@@ -200,8 +202,8 @@ def _exactly(file: BinaryIO, size: bytes) -> bytes:
     # Asked before, since a damaged size may be larger than the memory.
     if count > os.fstat(file.fileno()).st_size - file.tell():
         raise _CutShortError
-    if count > LARGEST_CHUNK:
-        raise ValueError(f"a record of {count} bytes, expected at most {LARGEST_CHUNK}")
+    if count > MAX_BAG_CHUNK:
+        raise ValueError(f"a record of {count} bytes, expected at most {MAX_BAG_CHUNK}")
     return file.read(count)
 
 

@@ -19,14 +19,14 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from imubench_pipeline.readers.bounds import (
-    LARGEST_CHUNK,
-    LARGEST_MESSAGE,
-    LARGEST_METADATA,
-    LARGEST_OVERLAP,
-    LARGEST_RATIO,
-    LONGEST_TOPIC,
-    MOST_TOPICS,
-    UNSUSPICIOUS,
+    MAX_BAG_CHUNK,
+    MAX_BAG_OVERLAP,
+    MAX_EXPANSION_RATIO,
+    MAX_MESSAGE,
+    MAX_METADATA,
+    MAX_TOPIC_LENGTH,
+    MAX_TOPICS,
+    MIN_CHECKED_EXPANSION,
 )
 from imubench_pipeline.readers.compressed import open_bytes
 from imubench_pipeline.readers.decompression import unpacked_zstd
@@ -46,8 +46,8 @@ def _zstd(data: bytes, size: int) -> bytes:
 
 
 def _bounded(size: int) -> int:
-    if size > LARGEST_CHUNK:
-        raise ValueError(f"a chunk of {size} bytes, expected at most {LARGEST_CHUNK}")
+    if size > MAX_BAG_CHUNK:
+        raise ValueError(f"a chunk of {size} bytes, expected at most {MAX_BAG_CHUNK}")
     return size
 
 
@@ -82,10 +82,10 @@ class Bag2:
 
     def _check(self) -> None:
         """Raise if the bag asks for more than one has."""
-        if len(self._connections) > MOST_TOPICS:
-            raise ValueError(f"more than {MOST_TOPICS} topics, expected those of a vehicle")
-        if any(len(str(c.topic) + str(c.msgtype)) > LONGEST_TOPIC for c in self._connections):
-            raise ValueError(f"a topic or type of more than {LONGEST_TOPIC} letters")
+        if len(self._connections) > MAX_TOPICS:
+            raise ValueError(f"more than {MAX_TOPICS} topics, expected those of a vehicle")
+        if any(len(str(c.topic) + str(c.msgtype)) > MAX_TOPIC_LENGTH for c in self._connections):
+            raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
         storages = _storages(self._reader)
         if len({storage.path for storage in storages}) < len(storages):
             raise ValueError("metadata.yaml names a file twice, expected each once")
@@ -111,8 +111,8 @@ class Bag2:
             # A damaged database may hold anything.
             data = message if isinstance(message, bytes) else b""
             if packed:
-                data = unpacked_zstd(data, LARGEST_MESSAGE + 1)
-            yield time, data if len(data) <= LARGEST_MESSAGE else b""
+                data = unpacked_zstd(data, MAX_MESSAGE + 1)
+            yield time, data if len(data) <= MAX_MESSAGE else b""
 
     def _stored(self, topic: str, packed: bool) -> Iterator[tuple[int, object]]:
         """Yield the messages as they are stored; the library unpacks packed ones as a whole."""
@@ -141,8 +141,8 @@ def _check_index(storage: McapReader) -> None:
     """
     size_of_file = Path(str(storage.path)).stat().st_size
     expanded = sum(chunk.uncompressed_size for chunk in storage.chunks)
-    if expanded > max(UNSUSPICIOUS, LARGEST_RATIO * size_of_file):
-        raise ValueError(f"its chunks expand to more than {LARGEST_RATIO} times its size")
+    if expanded > max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size_of_file):
+        raise ValueError(f"its chunks expand to more than {MAX_EXPANSION_RATIO} times its size")
     open_until: list[tuple[int, int]] = []
     size = 0
     for chunk in sorted(storage.chunks, key=lambda chunk: chunk.message_start_time):
@@ -150,9 +150,9 @@ def _check_index(storage: McapReader) -> None:
             size -= heapq.heappop(open_until)[1]
         heapq.heappush(open_until, (chunk.message_end_time, chunk.uncompressed_size))
         size += chunk.uncompressed_size
-        if size > LARGEST_OVERLAP:
+        if size > MAX_BAG_OVERLAP:
             raise ValueError(
-                f"chunks of one time have {size} bytes, expected at most {LARGEST_OVERLAP}"
+                f"chunks of one time have {size} bytes, expected at most {MAX_BAG_OVERLAP}"
             )
 
 
@@ -168,9 +168,9 @@ def check_folder(path: Path) -> None:
                 "the bag again"
             )
     size = (path / "metadata.yaml").stat().st_size
-    if size > LARGEST_METADATA:
+    if size > MAX_METADATA:
         raise RecordingError(
-            f"{path.name}: metadata.yaml has {size} bytes; expected at most {LARGEST_METADATA}: "
+            f"{path.name}: metadata.yaml has {size} bytes; expected at most {MAX_METADATA}: "
             "copy the bag again"
         )
     for packed in sorted(path.glob("*.zstd")):

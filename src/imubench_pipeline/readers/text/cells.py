@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-MOST_COLUMNS = 1 << 15
+MAX_COLUMNS = 1 << 15
 """A line with more is no record of a log."""
 
 _APART = re.compile(r"\s{2,}|\t")
@@ -25,13 +25,13 @@ class Split:
     def cells(self, text: str) -> list[str]:
         """Return the cells of a line."""
         if self.runs:
-            return text.replace('"', "").split(None, MOST_COLUMNS)
+            return text.replace('"', "").split(None, MAX_COLUMNS)
         if '"' in text:
             try:
                 return next(csv.reader([text], delimiter=self.delimiter, skipinitialspace=True))
             except csv.Error:
                 pass  # a stray quote in a long line
-        return text.split(self.delimiter, MOST_COLUMNS)
+        return text.split(self.delimiter, MAX_COLUMNS)
 
     def names(self, text: str, width: int | None = None) -> list[str]:
         """Return the names of a header line; between runs of spaces a name may have a space."""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
-from imubench_pipeline.readers.bounds import LONGEST_LINE
+from imubench_pipeline.readers.bounds import MAX_LINE_LENGTH
 from imubench_pipeline.readers.compressed import ended_early, open_bytes
 from imubench_pipeline.readers.holes import ZeroRuns
 from imubench_pipeline.tables.findings import Finding, RecordingError
@@ -176,10 +176,10 @@ class CompleteLines:
         cut = block.rfind(b"\n") + 1
         if not cut:
             self.rest += block
-            if len(self.rest) > LONGEST_LINE:
+            if len(self.rest) > MAX_LINE_LENGTH:
                 shown = self.rest[:40].decode("utf-8", "replace")
                 raise RecordingError(
-                    f"{self._path.name}: no line break in {LONGEST_LINE} bytes from {shown!r}; "
+                    f"{self._path.name}: no line break in {MAX_LINE_LENGTH} bytes from {shown!r}; "
                     "expected shorter lines: this is no text log, or not one record a line"
                 )
             return b""

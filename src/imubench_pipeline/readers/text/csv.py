@@ -12,11 +12,11 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import Batch, LogFile
-from imubench_pipeline.readers.bounds import MOST_LISTED
+from imubench_pipeline.readers.bounds import MAX_SEARCHED_COLUMNS
 from imubench_pipeline.readers.file_format import (
-    FIRST,
+    MAX_EXAMINED_RECORDS,
+    MAX_SHOWN_VALUES,
     NOTHING_STATED,
-    ROWS,
     FileFormat,
     LogColumn,
     LogTable,
@@ -333,12 +333,12 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     layout = find_layout(path, NOTHING_STATED, [], [])
     before = [line.decode("utf-8", "replace") for line in layout.preamble]
     units, units_line = line_of_units(layout)
-    rows = [row for row in layout.rows[:ROWS] if len(row) >= len(layout.names)]
+    rows = [row for row in layout.rows[:MAX_EXAMINED_RECORDS] if len(row) >= len(layout.names)]
     rows = rows[:-1] or rows  # the last one may be cut short
     named = layout.names != [str(number) for number in range(1, len(layout.names) + 1)]
     columns = tuple(
         _column(layout, place, [row[place] for row in rows], named, units.get(place))
-        for place in range(min(len(layout.names), MOST_LISTED))
+        for place in range(min(len(layout.names), MAX_SEARCHED_COLUMNS))
     )
     names = "with names" if named else "without names"
     return [
@@ -364,7 +364,7 @@ def _column(
     source: str | int = name
     if not name or layout.names.count(name) > 1 or not name.isprintable():
         source = place + 1
-    first = tuple(cell.strip() for cell in cells[:FIRST])
+    first = tuple(cell.strip() for cell in cells[:MAX_SHOWN_VALUES])
     unit = None if unit is None or is_missing(unit) else unit
     present = [cell for cell in cells if not is_missing(cell)]
     if present and all(is_number(cell, layout.decimal) for cell in present):

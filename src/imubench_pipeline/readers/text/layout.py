@@ -13,7 +13,7 @@ from pathlib import Path
 from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.batch import stated_in
 from imubench_pipeline.readers.text.cells import (
-    MOST_COLUMNS,
+    MAX_COLUMNS,
     Decimal,
     Split,
     are_figures,
@@ -171,9 +171,9 @@ class _Search:
         if split.delimiter == "," and not (self._names or self._log.delimiter or self._log.decimal):
             refuse_decimals_apart(self._file, record.number, record.text, rows)
         names = self._column_names(split, header, rows[0])
-        if len(names) > MOST_COLUMNS:
+        if len(names) > MAX_COLUMNS:
             raise RecordingError(
-                f"{self._file}, line {record.number}: more than {MOST_COLUMNS} columns with "
+                f"{self._file}, line {record.number}: more than {MAX_COLUMNS} columns with "
                 f"delimiter {split}; expected one record a line: write the log so, or mend "
                 "'delimiter' in the sensor file"
             )
@@ -214,11 +214,11 @@ class _Search:
         number, start, line_bytes, comment_bytes = 0, 0, 0, 0
         # Whether a semicolon begins a comment or is the delimiter is not yet known.
         signs = tuple(sign for sign in self._signs(None) if sign != ";")
-        for raw in first_lines(path, bounds.MOST_BYTES_BEFORE):
+        for raw in first_lines(path, bounds.MAX_BYTES_BEFORE):
             number, here, start = number + 1, start, start + len(raw)
-            if number > bounds.MOST_LINES_BEFORE + self._log.skip_lines:
+            if number > bounds.MAX_LINES_BEFORE + self._log.skip_lines:
                 break
-            if number <= min(self._log.skip_lines, bounds.COMMENT_LINES):
+            if number <= min(self._log.skip_lines, bounds.MAX_COMMENT_LINES):
                 self._skipped.append(raw.rstrip(b"\r\n"))
             if number <= self._log.skip_lines or not raw.strip(b"\0 \t\r\n"):
                 continue
@@ -226,14 +226,17 @@ class _Search:
             if line.text.startswith(signs):
                 comments.append(line)
                 comment_bytes += len(line.raw)
-                while len(comments) > bounds.COMMENT_LINES or comment_bytes > bounds.COMMENT_BYTES:
+                while (
+                    len(comments) > bounds.MAX_COMMENT_LINES
+                    or comment_bytes > bounds.MAX_COMMENT_BYTES
+                ):
                     comment_bytes -= len(comments.popleft().raw)
                 continue
             lines.append(line)
             line_bytes += len(raw)
             if len(lines) >= _LINES or (line_bytes > _BYTES and len(lines) > _UNIT_LINES):
                 break
-        if not lines and (number > bounds.MOST_LINES_BEFORE or start > bounds.MOST_BYTES_BEFORE):
+        if not lines and (number > bounds.MAX_LINES_BEFORE or start > bounds.MAX_BYTES_BEFORE):
             raise RecordingError(
                 f"{self._file}: no record in the first {number} lines, which are blank or "
                 "comments; expected some: mend 'comment' in the sensor file"
