@@ -74,7 +74,7 @@ def log(channels: dict[str, Any], **keys: Any) -> LogFormat:
 def test_columns_of_every_numeric_type(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, rows_a_block: int
 ) -> None:
-    monkeypatch.setattr(arrays, "_BLOCK_ROWS", rows_a_block)
+    monkeypatch.setattr(arrays, "_MAX_BLOCK_ROWS", rows_a_block)
     path = saved(tmp_path / "a", sample(), kind)
     rows = np.arange(float(ROWS))
     nulls = np.where(np.arange(ROWS) % 7 == 3, np.nan, rows)

@@ -75,7 +75,7 @@ def log(channels: dict[str, Any], **keys: Any) -> LogFormat:
 def test_vectors_matrices_and_records(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chunked: bool, rows_a_block: int
 ) -> None:
-    monkeypatch.setattr(arrays, "_BLOCK_ROWS", rows_a_block)
+    monkeypatch.setattr(arrays, "_MAX_BLOCK_ROWS", rows_a_block)
     path = saved(tmp_path / "a.h5", chunked)
     rows = np.arange(float(ROWS))
     for column, variable, expected in [

@@ -205,7 +205,7 @@ def test_version_5(
     compressed: bool,
     rows_a_block: int,
 ) -> None:
-    monkeypatch.setattr(arrays, "_BLOCK_ROWS", rows_a_block)
+    monkeypatch.setattr(arrays, "_MAX_BLOCK_ROWS", rows_a_block)
     made = variables(rng, 60)
     path = version_5(tmp_path / "a.mat", made, compressed)
     truth = scipy.io.loadmat(path)
@@ -232,7 +232,7 @@ def test_version_5(
 def test_version_5_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator, compressed: bool
 ) -> None:
-    monkeypatch.setattr(arrays, "_BLOCK_ROWS", 1 << 16)
+    monkeypatch.setattr(arrays, "_MAX_BLOCK_ROWS", 1 << 16)
     path = version_5(tmp_path / "a.mat", variables(rng, 70_000), compressed)
     channels = {"gyro_x": {"column": 2, "variable": "m"}, "gyro_y": {"column": 3, "variable": "m"}}
     _, time = columns(path, log_format(channels, time=SECONDS))
@@ -430,7 +430,7 @@ def version_4(path: Path, made: dict[str, Any], order: str = "<") -> Path:
 def test_version_4(
     tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch, rows_a_block: int
 ) -> None:
-    monkeypatch.setattr(arrays, "_BLOCK_ROWS", rows_a_block)
+    monkeypatch.setattr(arrays, "_MAX_BLOCK_ROWS", rows_a_block)
     unread = {"cell", "cube", "imu", "several", "t"}
     made = {name: value for name, value in variables(rng, 60).items() if name not in unread}
     path = version_4(tmp_path / "a.mat", made)

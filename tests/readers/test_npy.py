@@ -58,7 +58,7 @@ def test_a_matrix(
     dtype: str,
     layout: str,
 ) -> None:
-    monkeypatch.setattr(arrays, "_BLOCK_ROWS", rows_a_block)
+    monkeypatch.setattr(arrays, "_MAX_BLOCK_ROWS", rows_a_block)
     values = np.abs(1000 * matrix(rng, 50)).astype(dtype)
     values[:, 0] = np.arange(50) + 7
     stored = np.asarray(values.T if "turned" in layout else values)
@@ -95,7 +95,7 @@ def test_records_with_fields(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
 def test_a_vector_a_variable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, save: Any) -> None:
-    monkeypatch.setattr(arrays, "_BLOCK_ROWS", 1 << 16)
+    monkeypatch.setattr(arrays, "_MAX_BLOCK_ROWS", 1 << 16)
     stamps = FIRST.astype(np.int64) + np.arange(70_000) * STEP
     values = np.arange(70_000.0)
     path = tmp_path / "a.npz"

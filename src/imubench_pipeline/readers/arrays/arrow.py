@@ -1,8 +1,9 @@
 """Parquet, and Feather or Arrow IPC files and streams: read by row group or record batch.
 
 A column is a name or a position; ``variable`` is not used. A null is a missing sample. A column of
-timestamps is time with ``format: iso8601``. A corrupt page of Parquet is seen where the file has
-checksums. A record batch of a compressed Feather file is unpacked as a whole, and refused if large.
+timestamps is time with ``format: iso8601``. A corrupt page of Parquet is detected if the file has
+checksums. A record batch of a compressed Feather file is unpacked as a whole, and rejected if it is
+large.
 """
 
 from __future__ import annotations
@@ -28,7 +29,12 @@ from imubench_pipeline.readers.bounds import MAX_ARROW_BATCH
 METADATA = b"imubench"
 """Metadata key of Parquet files that this package writes; the value is JSON."""
 
-_PARQUET, _FILE, _STREAM, _FEATHER_1 = b"PAR1", b"ARROW1", b"\xff\xff\xff\xff", b"FEA1"
+_PARQUET_MAGIC, _ARROW_FILE_MAGIC, _ARROW_STREAM_MAGIC, _FEATHER_1_MAGIC = (
+    b"PAR1",
+    b"ARROW1",
+    b"\xff\xff\xff\xff",
+    b"FEA1",
+)
 
 
 class ArrowFile(ArrayFile):
@@ -37,19 +43,19 @@ class ArrowFile(ArrayFile):
     def tables(self, stack: ExitStack) -> Iterable[Table]:
         """Read the schema."""
         with self.path.open("rb") as file:
-            begin = file.read(len(_FILE))
-        if begin.startswith(_PARQUET):
-            # Mapped, for else a whole column of a row group is read at once.
+            begin = file.read(len(_ARROW_FILE_MAGIC))
+        if begin.startswith(_PARQUET_MAGIC):
+            # Memory-mapped, since otherwise a whole column of a row group is read at once.
             file = pq.ParquetFile(
                 self.path, memory_map=True, pre_buffer=False, page_checksum_verification=True
             )
             return [_ParquetTable(self.path, stack.enter_context(file))]
-        if begin.startswith((_FILE, _STREAM)):
-            check_batches(self.path, begin == _FILE)
+        if begin.startswith((_ARROW_FILE_MAGIC, _ARROW_STREAM_MAGIC)):
+            check_batches(self.path, begin == _ARROW_FILE_MAGIC)
             source = stack.enter_context(pa.memory_map(str(self.path)))
-            opened = pa.ipc.open_file if begin == _FILE else pa.ipc.open_stream
+            opened = pa.ipc.open_file if begin == _ARROW_FILE_MAGIC else pa.ipc.open_stream
             return [_IpcTable(opened(source))]
-        if begin.startswith(_FEATHER_1):
+        if begin.startswith(_FEATHER_1_MAGIC):
             raise UnusableError(
                 "is Feather version 1; expected version 2: read it with an older pyarrow, and "
                 "write it with pyarrow.feather.write_feather"
@@ -73,21 +79,21 @@ class _ArrowTable(Table):
     def column(self, position: int) -> Column:
         """Return a column by its position, counted from 0."""
         kind = self.schema.field(position).type
-        return Column(self.labels[position], _kind(kind), str(kind))
+        return Column(self.labels[position], _find_numpy_kind(kind), str(kind))
 
     def unit(self, position: int) -> str | None:
-        """Return the unit of a column, where its metadata state it."""
+        """Return the unit of a column, if its metadata state it."""
         stated = self.schema.field(position).metadata or {}
         unit = next((stated[key] for key in (b"unit", b"units") if key in stated), b"")
         return unit.decode("utf-8", "replace") or None
 
     def row_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory that a record takes while these columns are read."""
+        """Return the memory per record for reading these columns, bytes."""
         return 8 * len(positions)
 
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
         """Yield these columns, ``rows`` records at a time or fewer (see `Table.blocks`)."""
-        # Of columns with the same name, all are read.
+        # Columns with the same name are all read.
         same = [self.labels[:position].count(self.labels[position]) for position in positions]
         names = [self.labels[position] for position in positions]
         for batch in self._batches(list(dict.fromkeys(names)), rows):
@@ -96,14 +102,14 @@ class _ArrowTable(Table):
                 for name, number in zip(names, same, strict=True)
             ]
             for column in chosen:
-                # Of what a damaged file says, nothing is sure to lie within its memory.
+                # Offsets in a damaged file may lie outside of its memory.
                 column.validate(full=True)
             for start in range(0, len(batch), rows):
-                yield [_values(column.slice(start, rows)) for column in chosen]
+                yield [_convert_to_numpy(column.slice(start, rows)) for column in chosen]
 
     @abstractmethod
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
-        """Yield the columns of these names, and perhaps others, by row group or batch."""
+        """Yield batches with at least the columns of these names, by row group or record batch."""
 
 
 class _ParquetTable(_ArrowTable):
@@ -119,7 +125,7 @@ class _ParquetTable(_ArrowTable):
         for batch in self._file.iter_batches(rows, columns=names, use_threads=False):
             read += len(batch)
             yield batch
-        if read != self.rows:  # of a damaged page, rows can be left out without an error
+        if read != self.rows:  # rows of a damaged page can be left out without an error
             raise UnusableError(
                 f"is damaged: {read} rows are found, expected {self.rows}; copy the file again"
             )
@@ -139,7 +145,7 @@ class _IpcTable(_ArrowTable):
 
 
 def _states_simulated(metadata: Mapping[bytes, bytes]) -> bool:
-    """Return whether the metadata of a file that this package wrote say that it is simulated."""
+    """Return whether the metadata of this package mark a file as simulated."""
     try:
         about = json.loads(metadata.get(METADATA, b"{}"))
     except ValueError:
@@ -147,8 +153,8 @@ def _states_simulated(metadata: Mapping[bytes, bytes]) -> bool:
     return isinstance(about, dict) and about.get("simulated") is True
 
 
-def _kind(kind: pa.DataType) -> str:
-    """Return NumPy's letter for a type whose values become such."""
+def _find_numpy_kind(kind: pa.DataType) -> str:
+    """Return the kind of the NumPy type to which a type is converted."""
     if pa.types.is_dictionary(kind):
         kind = kind.value_type
     if pa.types.is_floating(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind):
@@ -158,7 +164,7 @@ def _kind(kind: pa.DataType) -> str:
     return "M" if pa.types.is_timestamp(kind) else "O"
 
 
-def _values(column: pa.Array) -> NDArray[Any]:
+def _convert_to_numpy(column: pa.Array) -> NDArray[Any]:
     if pa.types.is_dictionary(column.type):
         column = column.dictionary_decode()
     if pa.types.is_decimal(column.type) or pa.types.is_null(column.type):
@@ -169,35 +175,35 @@ def _values(column: pa.Array) -> NDArray[Any]:
     return np.asarray(column.to_numpy(zero_copy_only=False))
 
 
-# ---------------------------------------- what record batches unpack to, before they are unpacked
+# --------------------------------------- unpacked size of record batches, before they are unpacked
 #
 # A message is a FlatBuffers table: "Encapsulated message format" and ``Message.fbs`` of Arrow.
 
-_FILE_HEAD = 8
-"""Bytes of a file before the stream that it holds."""
+_FILE_PREFIX_BYTES = 8
+"""Bytes of a file before its stream."""
 
-_HEADER_TYPE, _HEADER = 1, 2
-_DICTIONARY_BATCH, _RECORD_BATCH = 2, 3
-_DATA_OF_DICTIONARY = 1
-_BUFFERS, _COMPRESSION = 2, 3
-_SIZE = struct.Struct("<q")
-_BUFFER = struct.Struct("<qq")
+_FIELD_HEADER_TYPE, _FIELD_HEADER = 1, 2
+_TYPE_DICTIONARY_BATCH, _TYPE_RECORD_BATCH = 2, 3
+_FIELD_DICTIONARY_DATA = 1
+_FIELD_BUFFERS, _FIELD_COMPRESSION = 2, 3
+_SIZE_STRUCT = struct.Struct("<q")
+_BUFFER_STRUCT = struct.Struct("<qq")
 
 
 def check_batches(path: Path, in_file: bool) -> None:
-    """Raise where a compressed batch is larger than may be in memory as a whole.
+    """Raise if a compressed batch is too large to be unpacked as a whole.
 
-    ``in_file``: the format is that of a file, and not that of a stream.
+    ``in_file``: the format is the file format, not the stream format.
 
     Raises
     ------
     UnusableError
-        If one is.
+        If a batch is too large.
     """
     with pa.memory_map(str(path)) as source:
-        source.seek(_FILE_HEAD if in_file else 0)
+        source.seek(_FILE_PREFIX_BYTES if in_file else 0)
         for message in pa.ipc.MessageReader.open_stream(source):
-            unpacked = sum(_unpacked(bytes(message.metadata), message.body))
+            unpacked = sum(_read_unpacked_sizes(bytes(message.metadata), message.body))
             if unpacked > MAX_ARROW_BATCH:
                 raise UnusableError(
                     f"a compressed record batch unpacks to {unpacked} bytes; expected at most "
@@ -206,29 +212,31 @@ def check_batches(path: Path, in_file: bool) -> None:
                 )
 
 
-def _unpacked(metadata: bytes, body: pa.Buffer | None) -> Iterator[int]:
-    """Yield to how many bytes each compressed buffer of a message is said to unpack."""
+def _read_unpacked_sizes(metadata: bytes, body: pa.Buffer | None) -> Iterator[int]:
+    """Yield the stated unpacked size of each compressed buffer of a message, bytes."""
     try:
         table = _FlatTable(metadata, struct.unpack_from("<I", metadata)[0])
-        kind = table.byte(_HEADER_TYPE)
-        header = table.table(_HEADER)
-        if header is not None and kind == _DICTIONARY_BATCH:
-            header = header.table(_DATA_OF_DICTIONARY)
-        elif kind != _RECORD_BATCH:
+        kind = table.byte(_FIELD_HEADER_TYPE)
+        header = table.table(_FIELD_HEADER)
+        if header is not None and kind == _TYPE_DICTIONARY_BATCH:
+            header = header.table(_FIELD_DICTIONARY_DATA)
+        elif kind != _TYPE_RECORD_BATCH:
             return
-        if body is None or header is None or header.table(_COMPRESSION) is None:
+        if body is None or header is None or header.table(_FIELD_COMPRESSION) is None:
             return
-        start, count = header.vector(_BUFFERS)
+        start, count = header.vector(_FIELD_BUFFERS)
         for number in range(count):
-            offset, length = _BUFFER.unpack_from(metadata, start + number * _BUFFER.size)
-            if length >= _SIZE.size:
-                yield max(0, *_SIZE.unpack(bytes(body[offset : offset + _SIZE.size])))
+            offset, length = _BUFFER_STRUCT.unpack_from(
+                metadata, start + number * _BUFFER_STRUCT.size
+            )
+            if length >= _SIZE_STRUCT.size:
+                yield max(0, *_SIZE_STRUCT.unpack(bytes(body[offset : offset + _SIZE_STRUCT.size])))
     except struct.error:
         raise UnusableError("corrupt data: a damaged message; copy the file again") from None
 
 
 class _FlatTable:
-    """A table of FlatBuffers: its fields stand where its list of offsets says."""
+    """A table of FlatBuffers, with fields at the positions in its list of offsets (vtable)."""
 
     def __init__(self, data: bytes, at: int) -> None:
         self._data = data
@@ -252,7 +260,7 @@ class _FlatTable:
         return _FlatTable(self._data, place + struct.unpack_from("<I", self._data, place)[0])
 
     def vector(self, field: int) -> tuple[int, int]:
-        """Return where the elements of a vector begin, and how many there are."""
+        """Return the position and the number of the elements of a vector."""
         place = self._place(field)
         if place is None:
             return 0, 0

@@ -1,6 +1,6 @@
-"""What the readers of array formats share: columns by position or by name, blocks to batches.
+"""Common code of the readers of array formats: find columns, convert blocks to batches.
 
-``variable`` names an array of the file, and ``column`` what is taken of it:
+``variable`` names an array of the file, and ``column`` a part of it:
 
 - a number: the column of a matrix, counted from 1; the longer side of a matrix is time. A vector
   is a matrix of one column;
@@ -9,7 +9,7 @@
 - without ``variable``: the name of a vector, or ``imu/wx``, or ``gyro[2]`` for the second column
   of the matrix ``gyro``.
 
-A number as the column of time is one of the same array.
+A number as the column of time is a column of the same array.
 """
 
 from __future__ import annotations
@@ -27,7 +27,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Column, Table, UnusableError
+from imubench_pipeline.readers.arrays.table import (
+    DATE_KIND,
+    NUMBER_KINDS,
+    Column,
+    Table,
+    UnusableError,
+)
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.bounds import (
     MAX_ARRAYS,
@@ -53,10 +59,10 @@ from imubench_pipeline.settings.sensor import TimeSource
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
-_BLOCK_ROWS = 1 << 18
-_TIME = "time"
-_SHOWN = 20
-_OF_MATRIX = re.compile(r"(.+)\[(\d{1,9})\]")
+_MAX_BLOCK_ROWS = 1 << 18
+_TIME_KEY = "time"
+_MAX_LISTED_NAMES = 20
+_MATRIX_COLUMN = re.compile(r"(.+)\[(\d{1,9})\]")
 
 _Place = tuple[Table, int]
 
@@ -66,24 +72,24 @@ class ArrayFile(LogFile):
 
     @abstractmethod
     def tables(self, stack: ExitStack) -> Iterable[Table]:
-        """Open the file, to be closed by the stack, and tell what it holds."""
+        """Open the file, to be closed by the stack, and return its tables."""
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
         check_not_empty(self.path)
         time = None if self.log.time is None else ArrayTime(self, self.log.time)
         for block in self._guarded():
-            # What stands in a damaged file may overflow: infinite, and counted as such.
+            # Values in a damaged file may overflow; infinities are counted as such.
             with np.errstate(over="ignore", invalid="ignore"):
                 try:
-                    seconds = None if time is None else time.seconds(block.pop(_TIME))
+                    seconds = None if time is None else time.seconds(block.pop(_TIME_KEY))
                 except UnusableError as error:
                     raise RecordingError(f"{self.path.name}: {error}") from None
                 columns = {name: self.to_si(name, numbers(raw)) for name, raw in block.items()}
             yield Batch(seconds, columns)
 
     def _guarded(self) -> Iterator[dict[str, NDArray[Any]]]:
-        """Yield the blocks as written; whatever a library raises becomes a `RecordingError`."""
+        """Yield the blocks as written; exceptions of the libraries become `RecordingError`."""
         with explained(self.path), ExitStack() as stack:
             yield from self._blocks(self._places(list(islice(self.tables(stack), MAX_ARRAYS + 1))))
 
@@ -141,11 +147,11 @@ class ArrayFile(LogFile):
             by_name[table.name] = table
         places = {}
         for key, source in self.sources.items():
-            places[key] = _place(by_name, source.column, source.variable, key)
-            _check_kind(places[key], key, NUMBERS)
+            places[key] = _find_column(by_name, source.column, source.variable, key)
+            _check_kind(places[key], key, NUMBER_KINDS)
         if self.log.time is not None:
-            places[_TIME] = self._time_place(by_name)
-        self.units = _stated_units(places)
+            places[_TIME_KEY] = self._time_place(by_name)
+        self.units = _find_stated_units(places)
         self.simulated = any(table.simulated for table, _ in places.values())
         return places
 
@@ -163,7 +169,7 @@ class ArrayFile(LogFile):
             )
         variables = {source.variable for source in self.sources.values()}
         if isinstance(time.column, int) and len(variables) > 1:
-            names = _listed(str(name) for name in variables)
+            names = _join_names(str(name) for name in variables)
             raise UnusableError(
                 f"'time' is column {time.column}, but the channels are from several variables "
                 f"({names}); say which has the stamps, as in 'column: name' or "
@@ -171,16 +177,17 @@ class ArrayFile(LogFile):
             )
         variable = next(iter(variables)) if len(variables) == 1 else None
         if isinstance(time.column, str) and not (
-            _address(time.column, variable) in tables or _addressed(tables, time.column, variable)
+            _make_address(time.column, variable) in tables
+            or _find_addressed(tables, time.column, variable)
         ):
             variable = None
-        place = _place(tables, time.column, variable, _TIME)
-        _check_kind(place, _TIME, NUMBERS if time.unit else DATES)
+        place = _find_column(tables, time.column, variable, _TIME_KEY)
+        _check_kind(place, _TIME_KEY, NUMBER_KINDS if time.unit else DATE_KIND)
         return place
 
 
-def _stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
-    """Return the units that a file states of its channels."""
+def _find_stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
+    """Return the units that a file states for its channels."""
     units = {}
     for name, (table, position) in places.items():
         label = table.column(position).label or table.name.rpartition("/")[2]
@@ -191,22 +198,22 @@ def _stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
 
 
 def rows_of_block(row_bytes: int, most: int) -> int:
-    """Return how many records are read at a time.
+    """Return the number of records of a block.
 
-    ``row_bytes``: memory that one takes.
-    ``most``: that all may take together.
+    ``row_bytes``: memory per record, bytes.
+    ``most``: largest memory of a block, bytes.
 
     Raises
     ------
     UnusableError
-        If one alone takes more.
+        If a single record exceeds the limit.
     """
     if row_bytes > most:
         raise UnusableError(
             f"one record takes {row_bytes} bytes; expected at most {most}: store the log's columns "
             "in an array of their own"
         )
-    return min(_BLOCK_ROWS, most // max(row_bytes, 1))
+    return min(_MAX_BLOCK_ROWS, most // max(row_bytes, 1))
 
 
 def check_not_empty(path: Path) -> None:
@@ -224,7 +231,7 @@ def check_not_empty(path: Path) -> None:
 
 @contextmanager
 def explained(path: Path) -> Iterator[None]:
-    """Make a `RecordingError` of whatever a library raises on a file."""
+    """Convert all exceptions of the libraries about a file to `RecordingError`."""
     try:
         yield
     except UnusableError as error:
@@ -243,21 +250,23 @@ def numbers(raw: NDArray[Any]) -> NDArray[np.float64]:
     return np.ma.filled(np.ma.asanyarray(raw, np.float64), np.nan)
 
 
-def _place(tables: dict[str, Table], column: str | int, variable: str | None, key: str) -> _Place:
-    """Find a column.
+def _find_column(
+    tables: dict[str, Table], column: str | int, variable: str | None, key: str
+) -> _Place:
+    """Return the table and the position of a column.
 
     Raises
     ------
     UnusableError
-        If it is not there, or not the only one that is meant.
+        If the column does not exist, or several columns match.
     """
     if isinstance(column, int):
-        return _numbered(_table(tables, variable, key), column, key)
-    matches = _addressed(tables, column, variable)
+        return _take_numbered(_find_table(tables, variable, key), column, key)
+    matches = _find_addressed(tables, column, variable)
     if len(matches) == 1:
         return matches[0]
     if matches:
-        names = _listed(table.shown for table, _ in matches)
+        names = _join_names(table.shown for table, _ in matches)
         if len({table for table, _ in matches}) == 1:
             raise UnusableError(
                 f"column {column!r} for {key} stands twice in {names}; take it by its position, "
@@ -267,39 +276,39 @@ def _place(tables: dict[str, Table], column: str | int, variable: str | None, ke
             f"column {column!r} for {key} is in several variables ({names}); name the one with "
             f"'variable:', or as in 'column: {matches[0][0].name}/{column}'"
         )
-    address = _address(column, variable)
+    address = _make_address(column, variable)
     if address in tables:
-        table = _sound(tables[address], key)
+        table = _check_usable(tables[address], key)
         if table.width > 1:
             raise UnusableError(
                 f"{address!r} for {key} is a matrix of {table.width} columns; name the column "
                 f"with 'column: 2, variable: {address}'"
             )
         return table, 0
-    if variable is None and (match := _OF_MATRIX.fullmatch(column)) and match[1] in tables:
-        return _numbered(_sound(tables[match[1]], key), int(match[2]), key)
+    if variable is None and (match := _MATRIX_COLUMN.fullmatch(column)) and match[1] in tables:
+        return _take_numbered(_check_usable(tables[match[1]], key), int(match[2]), key)
     if variable is not None:
-        table = _table(tables, variable, key)
-        has = _listed(table.labels) or f"{table.width} columns without names: give a number"
+        table = _find_table(tables, variable, key)
+        has = _join_names(table.labels) or f"{table.width} columns without names: give a number"
         raise UnusableError(
             f"no column {column!r} for {key}; {table.shown} has {has}; mend 'column' of {key} in "
             f"{stated_in(key)}"
         )
     raise UnusableError(
         f"no variable or column {column!r} for {key}; the file has "
-        f"{_contents(tables, labels=True)}; mend 'column' of {key} in {stated_in(key)}"
+        f"{_describe_contents(tables, labels=True)}; mend 'column' of {key} in {stated_in(key)}"
     )
 
 
-def _address(column: str, variable: str | None) -> str:
-    """Return the path that a vector or a field has in the file."""
+def _make_address(column: str, variable: str | None) -> str:
+    """Return the path of a vector or a field in the file."""
     parts = [column] if variable is None else [variable, column]
     return "/".join(part.strip("/") for part in parts)
 
 
-def _addressed(tables: dict[str, Table], column: str, variable: str | None) -> list[_Place]:
-    """Return the named columns that an address may mean."""
-    address = _address(column, variable)
+def _find_addressed(tables: dict[str, Table], column: str, variable: str | None) -> list[_Place]:
+    """Return the named columns that match an address."""
+    address = _make_address(column, variable)
     return [
         (table, position)
         for table in tables.values()
@@ -309,40 +318,42 @@ def _addressed(tables: dict[str, Table], column: str, variable: str | None) -> l
     ]
 
 
-def _table(tables: dict[str, Table], variable: str | None, key: str) -> Table:
-    """Return the array that is named, or the only one."""
+def _find_table(tables: dict[str, Table], variable: str | None, key: str) -> Table:
+    """Return the array with a name, or the only array."""
     if variable is not None:
         name = variable.strip("/")
         if name and name in tables:
-            return _sound(tables[name], key)
+            return _check_usable(tables[name], key)
         if list(tables) == [""]:
             raise UnusableError(
                 f"{variable!r} is named for {key}, but the file holds one array without a name; "
                 "drop 'variable:'"
             )
         raise UnusableError(
-            f"no variable {variable!r} for {key}; the file has {_contents(tables)}; mend "
+            f"no variable {variable!r} for {key}; the file has {_describe_contents(tables)}; mend "
             f"'variable' of {key} in {stated_in(key)}"
         )
     usable = [table for table in tables.values() if table.fault is None]
-    # A number such as the rate may stand beside the samples.
+    # Single values, such as the rate, are not counted.
     usable = [table for table in usable if (table.rows, table.width) != (1, 1)] or usable
     if len(tables) == 1:
-        return _sound(next(iter(tables.values())), key)
+        return _check_usable(next(iter(tables.values())), key)
     if not usable:
-        raise UnusableError(f"no numeric array for {key}; the file has {_contents(tables)}")
+        raise UnusableError(
+            f"no numeric array for {key}; the file has {_describe_contents(tables)}"
+        )
     if len(usable) > 1:
         raise UnusableError(
-            f"several variables ({_listed(table.shown for table in usable)}); name the one of "
+            f"several variables ({_join_names(table.shown for table in usable)}); name the one of "
             f"{key} with 'variable:'"
         )
     return usable[0]
 
 
-def _numbered(table: Table, column: int, key: str) -> _Place:
+def _take_numbered(table: Table, column: int, key: str) -> _Place:
     if column > table.width:
         samples = "" if table.rows is None else f" of {table.rows} samples"
-        names = f" ({_listed(table.labels)})" if table.labels else ""
+        names = f" ({_join_names(table.labels)})" if table.labels else ""
         raise UnusableError(
             f"no column {column} for {key}; {table.shown} has {table.width} columns{samples}"
             f"{names}; mend 'column' of {key} in {stated_in(key)}"
@@ -350,7 +361,7 @@ def _numbered(table: Table, column: int, key: str) -> _Place:
     return table, column - 1
 
 
-def _sound(table: Table, key: str) -> Table:
+def _check_usable(table: Table, key: str) -> Table:
     if table.fault is not None:
         raise UnusableError(f"{table.shown} for {key} {table.fault}")
     return table
@@ -364,11 +375,11 @@ def _check_kind(place: _Place, key: str, expected: str) -> None:
     where = table.shown
     if column.label or table.width > 1:
         where = f"column {column.label or position + 1!r} of {where}"
-    if expected == DATES:
+    if expected == DATE_KIND:
         mend = "give 'unit' of 'time' (s, ms, us, ns), or store dates"
         raise UnusableError(f"{where} for {key} holds {column.holds}; expected dates: {mend}")
     mend = "store the column as numbers"
-    if key == _TIME and column.kind in DATES:
+    if key == _TIME_KEY and column.kind in DATE_KIND:
         mend = "give 'format: iso8601' of 'time' in the sensor file"
     raise UnusableError(f"{where} for {key} holds {column.holds}; expected numbers: {mend}")
 
@@ -381,12 +392,12 @@ def _check_lengths(places: dict[str, _Place]) -> None:
             "split them into files with 'file:'"
         )
     if 0 in lengths.values():
-        names = _listed(dict.fromkeys(table.shown for table, _ in places.values()))
+        names = _join_names(dict.fromkeys(table.shown for table, _ in places.values()))
         raise UnusableError(f"no record in {names}; expected at least one")
 
 
-def _contents(tables: dict[str, Table], labels: bool = False) -> str:
-    """Say what the file has: arrays and perhaps their columns, or why none can be used."""
+def _describe_contents(tables: dict[str, Table], labels: bool = False) -> str:
+    """Describe the arrays of a file and, if ``labels``, their columns, or why none can be used."""
     usable = [table for table in tables.values() if table.fault is None]
     has = [table.name for table in usable if table.name]
     if labels:
@@ -394,32 +405,32 @@ def _contents(tables: dict[str, Table], labels: bool = False) -> str:
     if not has:
         has = [f"{table.width} columns without names" for table in usable]
     return (
-        _listed(has)
-        or _listed(f"{table.shown}, which {table.fault}" for table in tables.values())
+        _join_names(has)
+        or _join_names(f"{table.shown}, which {table.fault}" for table in tables.values())
         or "none"
     )
 
 
-def _listed(names: Iterable[str]) -> str:
+def _join_names(names: Iterable[str]) -> str:
     every = list(names)
-    return ", ".join(cut(name, str) for name in every[:_SHOWN]) + (
-        ", ..." if len(every) > _SHOWN else ""
+    return ", ".join(cut(name, str) for name in every[:_MAX_LISTED_NAMES]) + (
+        ", ..." if len(every) > _MAX_LISTED_NAMES else ""
     )
 
 
-# ----------------------------------------------------------------------- what a log holds
+# ------------------------------------------------------------------------- inspection
 
-_MOST_TABLES = 1000
-_MOST_BYTES = 1 << 24
-_RATES = frozenset(
+_MAX_TABLES = 1000
+_MAX_EXAMINED_BYTES = 1 << 24
+_RATE_NAMES = frozenset(
     ("fs", "rate", "sr", "samplerate", "samplingrate", "samplefreq", "samplingfreq", "freq",
      "samplefrequency", "samplingfrequency", "frequency", "odr")
 )  # fmt: skip
-_HIGHEST_RATE = 1e6
+_MAX_RATE = 1e6
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return the tables of a file, as far as the first thousand.
+    """Return the tables of a file, at most a thousand.
 
     Raises
     ------
@@ -430,26 +441,26 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     file = file_format.load().log_file(path, NOTHING_STATED, {})
     assert isinstance(file, ArrayFile)  # the readers of these files
     with explained(path), ExitStack() as stack:
-        tables = list(islice(file.tables(stack), _MOST_TABLES))
-        described = [_described(path, file_format, table) for table in tables]
-    rates = {rate for table in described if (rate := _rate(table)) is not None}
+        tables = list(islice(file.tables(stack), _MAX_TABLES))
+        described = [_describe_table(path, file_format, table) for table in tables]
+    rates = {rate for table in described if (rate := _find_rate(table)) is not None}
     if len(rates) == 1:
         (rate,) = rates
         described = [replace(table, rate=rate) for table in described]
-    return _together(described)
+    return _combine_vectors(described)
 
 
-def _rate(table: LogTable) -> float | None:
-    """Return the rate that a single value is, by its name."""
+def _find_rate(table: LogTable) -> float | None:
+    """Return the rate in a table with a single value with the name of a rate; else None."""
     name = re.sub(r"[\W_\d]+", "", table.name.rpartition("/")[2]).lower().removesuffix("hz")
-    if table.rows != 1 or len(table.columns) != 1 or name not in _RATES:
+    if table.rows != 1 or len(table.columns) != 1 or name not in _RATE_NAMES:
         return None
     values = table.columns[0].values
-    return float(values[0]) if len(values) and 0 < values[0] < _HIGHEST_RATE else None
+    return float(values[0]) if len(values) and 0 < values[0] < _MAX_RATE else None
 
 
-def _together(described: Sequence[LogTable]) -> list[LogTable]:
-    """Put vectors of one length, side by side in the file, into one table."""
+def _combine_vectors(described: Sequence[LogTable]) -> list[LogTable]:
+    """Combine vectors of equal length in the same group into one table."""
     tables: dict[object, LogTable] = {}
     for number, table in enumerate(described):
         alone = table.fault or table.variable or not table.name or table.rows in (None, 1)
@@ -466,31 +477,31 @@ def _together(described: Sequence[LogTable]) -> list[LogTable]:
     return list(tables.values())
 
 
-def _described(path: Path, file_format: FileFormat, table: Table) -> LogTable:
+def _describe_table(path: Path, file_format: FileFormat, table: Table) -> LogTable:
     if table.fault is not None:
         return LogTable(file_format, table.name, fault=table.fault)
     described = [table.column(place) for place in range(min(table.width, MAX_SEARCHED_COLUMNS))]
-    usable = [n for n, column in enumerate(described) if column.kind in NUMBERS + DATES]
+    usable = [n for n, column in enumerate(described) if column.kind in NUMBER_KINDS + DATE_KIND]
     try:
         with explained(path):
-            values = _first_records(table, usable)
+            values = _read_first_records(table, usable)
             units = [table.unit(place) for place in range(len(described))]
     except RecordingError as error:
         return LogTable(file_format, table.name, fault=str(error).removeprefix(f"{path.name}: "))
-    kinds: dict[str, Kind] = {DATES: "date", **dict.fromkeys(NUMBERS, "number")}
+    kinds: dict[str, Kind] = {DATE_KIND: "date", **dict.fromkeys(NUMBER_KINDS, "number")}
     columns = []
     labels = Counter(table.labels)
     for place, column in enumerate(described):
-        source, address = _called(table, place, labels)
+        source, address = _name_column(table, place, labels)
         raw = values.get(place, np.empty(0))
-        dated = column.kind == DATES
+        dated = column.kind == DATE_KIND
         columns.append(
             LogColumn(
                 source,
                 column.label or (table.name if table.width == 1 else ""),
                 kinds.get(column.kind, "other"),
                 tuple(map(str, raw[:MAX_SHOWN_VALUES])) if dated else shown(raw),
-                _floats_of(raw) if dated else numbers(raw),
+                _dates_to_floats(raw) if dated else numbers(raw),
                 units[place],
                 ("iso8601",) if dated else (),
                 address,
@@ -502,8 +513,10 @@ def _described(path: Path, file_format: FileFormat, table: Table) -> LogTable:
     return LogTable(file_format, table.name, tuple(columns), variable, rows=table.rows, about=about)
 
 
-def _called(table: Table, place: int, labels: Mapping[str, int]) -> tuple[str | int, str | int]:
-    """Return what a column is called, in its table and in the whole file."""
+def _name_column(
+    table: Table, place: int, labels: Mapping[str, int]
+) -> tuple[str | int, str | int]:
+    """Return the name of a column in its table, and in the whole file."""
     label = table.labels[place] if table.labels else ""
     if label and (not label.isprintable() or labels[label] > 1):
         label = ""
@@ -518,18 +531,18 @@ def _called(table: Table, place: int, labels: Mapping[str, int]) -> tuple[str | 
     )
 
 
-def _first_records(table: Table, places: Sequence[int]) -> dict[int, NDArray[Any]]:
+def _read_first_records(table: Table, places: Sequence[int]) -> dict[int, NDArray[Any]]:
     """Return the first records of some columns, by position."""
     if not places:
         return {}
-    rows = min(MAX_EXAMINED_RECORDS, rows_of_block(table.row_bytes(places), _MOST_BYTES))
+    rows = min(MAX_EXAMINED_RECORDS, rows_of_block(table.row_bytes(places), _MAX_EXAMINED_BYTES))
     for block in table.blocks(places, rows):
         if len(block[0]):
             return {place: values[:rows] for place, values in zip(places, block, strict=True)}
     return {}
 
 
-def _floats_of(raw: NDArray[Any]) -> NDArray[np.float64]:
+def _dates_to_floats(raw: NDArray[Any]) -> NDArray[np.float64]:
     """Return dates as ns since 1970; NaN where one is missing."""
     dates = raw.astype("M8[ns]")
     return np.where(np.isnat(dates), np.nan, dates.astype(np.int64).astype(np.float64))
@@ -537,7 +550,7 @@ def _floats_of(raw: NDArray[Any]) -> NDArray[np.float64]:
 
 # ------------------------------------------------------------------------------------------- stamps
 
-_NANOSECONDS = {
+_NANOSECONDS_PER_UNIT = {
     "D": 86_400 * 10**9,
     "h": 3_600 * 10**9,
     "m": 60 * 10**9,
@@ -546,11 +559,11 @@ _NANOSECONDS = {
     "us": 10**3,
     "ns": 1,
 }
-_LARGEST = 2**63 - 1
+_MAX_INT64 = 2**63 - 1
 
 
 class ArrayTime:
-    """Makes seconds of the stamps of an array; integers and dates lose no digit."""
+    """Converts the stamps of an array to seconds; exact for integers and dates."""
 
     def __init__(self, file: LogFile, source: TimeSource) -> None:
         self._source = source
@@ -569,15 +582,15 @@ class ArrayTime:
         """
         missing = np.ma.getmaskarray(raw).copy()
         values = np.ma.getdata(raw)
-        self._dated = values.dtype.kind == DATES
+        self._dated = values.dtype.kind == DATE_KIND
         if self._dated:
             missing |= np.isnat(values)
-            stamps = _nanoseconds(values, missing)
+            stamps = _dates_to_nanoseconds(values, missing)
         elif values.dtype.kind == "f":
             stamps = values.astype(np.float64)
             missing |= ~np.isfinite(stamps)
         else:
-            # The differences of uint64 are right in int64 too, and may be negative there.
+            # In int64 the differences of uint64 stamps are correct, and may be negative.
             stamps = values.astype(np.int64)
         return self._clock.seconds(stamps, ~missing)
 
@@ -585,17 +598,17 @@ class ArrayTime:
         return date_of_nanoseconds(first) if self._dated else date_of_stamp(first, self._source)
 
 
-def _nanoseconds(dates: NDArray[Any], missing: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _dates_to_nanoseconds(dates: NDArray[Any], missing: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return dates as ns since 1970."""
     unit, count = np.datetime_data(dates.dtype)
-    if unit not in _NANOSECONDS:
+    if unit not in _NANOSECONDS_PER_UNIT:
         raise UnusableError(
             f"time stamps are dates in units of {unit}; expected "
-            f"{', '.join(_NANOSECONDS)}: convert them"
+            f"{', '.join(_NANOSECONDS_PER_UNIT)}: convert them"
         )
-    factor = _NANOSECONDS[unit] * count
+    factor = _NANOSECONDS_PER_UNIT[unit] * count
     whole = dates.astype(f"M8[{count}{unit}]", copy=False).view(np.int64)
-    limit = _LARGEST // factor
+    limit = _MAX_INT64 // factor
     if np.any(~missing & ((whole > limit) | (whole < -limit))):
         raise UnusableError(
             "time stamps are dates before 1678 or after 2262, expected the time of a log; mend "

@@ -30,10 +30,10 @@ from imubench_pipeline.readers.bounds import (
     MAX_OBJECTS,
 )
 
-_CACHE_SLOTS, _CACHE_WEIGHT, _LEAST_CACHE = 521, 0.75, 1 << 20
-"""As the library has them."""
+_CACHE_SLOTS, _CACHE_PREEMPTION, _MIN_CACHE = 521, 0.75, 1 << 20
+"""Defaults of the library: slots, preemption weight (w0) and bytes of the chunk cache."""
 
-_ELSEWHERE = "is kept in other files; expected one file: repack it with h5repack"
+_EXTERNAL_FAULT = "is kept in other files; expected one file: repack it with h5repack"
 
 
 class Hdf5File(ArrayFile):
@@ -55,29 +55,29 @@ def opened(path: Path) -> h5py.File:
 
 
 def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
-    """Return the data sets of a file by name; links, hard ones apart, are not followed.
+    """Return the data sets of a file by name; only hard links are followed.
 
-    ``time_axis``: the side of a square matrix that is time.
-    ``passed_over``: beginning of the names in the root that are no data.
+    ``time_axis``: axis of time of a square matrix.
+    ``passed_over``: prefix of the names in the root group that are not data.
 
     Raises
     ------
     UnusableError
-        If there are more objects than a log has, or groups lie deeper.
+        If there are too many objects, or groups are nested too deeply.
     """
     objects = 0
-    seen = {_identity(file)}
+    seen = {_get_identity(file)}
 
     def below(group: h5py.Group, above: str, depth: int) -> Iterator[DataSet]:
         nonlocal objects
-        for key in _names(group, objects, depth):
+        for key in _list_names(group, objects, depth):
             objects += 1
             name = key if isinstance(key, str) else key.decode("utf-8", "replace")
             hard = isinstance(group.get(key, getlink=True), h5py.HardLink)
             if not hard or (not above and name.startswith(passed_over)):
                 continue
             item = group[key]
-            if (identity := _identity(item)) in seen:
+            if (identity := _get_identity(item)) in seen:
                 continue
             seen.add(identity)
             if isinstance(item, h5py.Dataset):
@@ -88,9 +88,9 @@ def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> l
     return list(below(file, "", 0))
 
 
-def _names(group: h5py.Group, before: int, depth: int) -> list[str | bytes]:
-    """Return the names in a group; ``before``: how many there were in others."""
-    # The library's own visit goes down with the process where groups lie deep.
+def _list_names(group: h5py.Group, before: int, depth: int) -> list[str | bytes]:
+    """Return the names in a group; ``before``: number of names in other groups so far."""
+    # The `visit` of the library crashes the process on deeply nested groups.
     if depth > MAX_GROUP_DEPTH:
         raise UnusableError(
             f"groups lie more than {MAX_GROUP_DEPTH} deep; expected the log of one sensor: copy "
@@ -104,8 +104,8 @@ def _names(group: h5py.Group, before: int, depth: int) -> list[str | bytes]:
     return sorted(group, key=lambda name: name.encode() if isinstance(name, str) else name)
 
 
-def _identity(item: h5py.Group | h5py.Dataset) -> tuple[int, int]:
-    """Return what tells an object from all others of a file."""
+def _get_identity(item: h5py.Group | h5py.Dataset) -> tuple[int, int]:
+    """Return the unique identity of an object in its file."""
     info = h5py.h5o.get_info(item.id)
     return info.fileno, info.addr
 
@@ -123,14 +123,14 @@ class DataSet(Array):
         try:
             dtype = data.dtype
         except (TypeError, ValueError):
-            dtype = np.dtype(object)  # a type that NumPy does not have
+            dtype = np.dtype(object)  # a type without equivalent in NumPy
         properties = data.id.get_create_plist()
-        # To ask a virtual one for its sides opens the files that it is in, perhaps a pipe.
+        # Reading the shape of a virtual data set opens its source files, which may be pipes.
         virtual = properties.get_layout() == h5py.h5d.VIRTUAL
         shape = None if virtual else data.shape
         super().__init__(name, shape if shape is not None else (0,), dtype, time_axis)
         if virtual:
-            self.fault = _ELSEWHERE
+            self.fault = _EXTERNAL_FAULT
         elif self.fault is None and not _is_sound(dtype):
             self.fault = "has a damaged or unusual type; expected standard numbers: copy it again"
         self._chunk = 0
@@ -140,22 +140,22 @@ class DataSet(Array):
 
     @property
     def data(self) -> h5py.Dataset:
-        """The data set, opened anew: what is open holds what was last unpacked of it."""
+        """The data set, newly opened, so that no unpacked chunks stay in memory."""
         access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
-        # A chunk that lasts for several blocks is then unpacked once.
-        access.set_chunk_cache(_CACHE_SLOTS, max(self._chunk, _LEAST_CACHE), _CACHE_WEIGHT)
+        # With this cache, a chunk that spans several blocks is unpacked only once.
+        access.set_chunk_cache(_CACHE_SLOTS, max(self._chunk, _MIN_CACHE), _CACHE_PREEMPTION)
         return h5py.Dataset(h5py.h5d.open(self._file.id, self._path, access))
 
     def unit(self, position: int) -> str | None:
-        """Return the unit of its columns, where an attribute states it."""
+        """Return the unit of the columns, if an attribute states it."""
         return stated_unit(self.data)
 
     def held_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory that is held, beside the records, while these columns are read."""
+        """Return the additional memory for reading these columns, bytes."""
         return self._chunk
 
     def row_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory that a record takes while these columns are read."""
+        """Return the memory per record for reading these columns, bytes."""
         names = self.fields(positions)
         if names:
             return sum(self.dtype[name].itemsize for name in names)
@@ -175,7 +175,7 @@ class DataSet(Array):
             yield [self.column_in(block, position - before) for position in positions]
 
     def _block(self, data: Any, time: slice, columns: slice) -> NDArray[Any]:
-        """Return a block with time downwards; of records, a vector."""
+        """Return a block with time along the first axis; a vector for records."""
         if len(self.shape) == 1:
             block = np.asarray(data[time])
             return block if self.labels else block.reshape(-1, 1)
@@ -187,7 +187,7 @@ class DataSet(Array):
 
 
 def _is_sound(dtype: np.dtype[Any]) -> bool:
-    """Tell whether the library can convert a type without leaving its memory."""
+    """Return whether the library converts a type without access outside of its memory."""
     if dtype.names is None:
         return dtype.base.kind != "f" or dtype.base.itemsize <= 8
     assert dtype.fields is not None  # a type with names has them
@@ -201,12 +201,12 @@ def _is_sound(dtype: np.dtype[Any]) -> bool:
 
 
 def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
-    """Raise where values would be made up, are elsewhere, or are not to be unpacked in blocks."""
+    """Raise if values were not written, are in other files, or cannot be unpacked in blocks."""
     properties = data.id.get_create_plist()
     layout = properties.get_layout()
     if layout == h5py.h5d.CONTIGUOUS and properties.get_external_count():
-        raise UnusableError(f"{name} {_ELSEWHERE}")
-    size = data.id.get_type().get_size()  # as stored, which NumPy may not have
+        raise UnusableError(f"{name} {_EXTERNAL_FAULT}")
+    size = data.id.get_type().get_size()  # as stored; NumPy may have no equivalent
     if layout == h5py.h5d.CONTIGUOUS and data.id.get_storage_size() < data.size * size:
         raise UnusableError(f"{name} was never written; expected {data.size} values: record again")
     if layout != h5py.h5d.CHUNKED:
@@ -241,46 +241,54 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
 
 # -------------------------------------------------------- units, in attributes of the data sets
 
-_NAMES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
-_LONGEST_WAIT = 3.0
-_LONGEST = 40
-_LONGEST_STORED = 1 << 12
-_MEMORY = 1 << 29
+_UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
+_MAX_WAIT = 3.0
+_MAX_UNIT_LENGTH = 40
+_MAX_STORED_LENGTH = 1 << 12
+_MAX_MEMORY = 1 << 29
 
 
 def stated_unit(data: h5py.Dataset) -> str | None:
     """Return the unit that an attribute of a data set states."""
-    name = next((name for name in _NAMES if name in data.attrs), None)
+    name = next((name for name in _UNIT_ATTRIBUTES if name in data.attrs), None)
     if name is None:
         return None
     kind = data.attrs.get_id(name)
-    if kind.shape != () or kind.dtype.itemsize > _LONGEST_STORED:
+    if kind.shape != () or kind.dtype.itemsize > _MAX_STORED_LENGTH:
         return None
     if kind.dtype.kind == "S":
         text = bytes(data.attrs[name]).decode("utf-8", "replace")
     elif h5py.check_string_dtype(kind.dtype) is not None:
         path = Path(data.file.filename).resolve()
         status = path.stat()
-        units = _texts_of_variable_length(str(path), status.st_mtime_ns, status.st_size)
+        units = _read_variable_length_texts(str(path), status.st_mtime_ns, status.st_size)
         text = units.get(str(data.name), "")
     else:
         return None
-    return text.strip("\0 \t\r\n")[:_LONGEST] or None
+    return text.strip("\0 \t\r\n")[:_MAX_UNIT_LENGTH] or None
 
 
 @lru_cache(maxsize=4)
-def _texts_of_variable_length(path: str, *_: int) -> dict[str, str]:
-    """Return the units of a file by data set; none where they cannot be read.
+def _read_variable_length_texts(path: str, *_: int) -> dict[str, str]:
+    """Return the units of a file by data set; empty if they cannot be read.
 
-    The library does not come back from every damaged text of variable length: a process of its own
-    reads these, and is ended where it does not answer. It has to unpack a text to tell its length,
-    so it reads no further where one is no unit.
+    The library may crash or hang on damaged texts of variable length. They are therefore read in a
+    process of their own with a time limit. The length of a text is known only after it is unpacked,
+    so the process stops at the first text that is too long for a unit.
     """
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _READING, path, str(_LONGEST_STORED), str(_MEMORY), *_NAMES],
+            [
+                sys.executable,
+                "-c",
+                _READER_SCRIPT,
+                path,
+                str(_MAX_STORED_LENGTH),
+                str(_MAX_MEMORY),
+                *_UNIT_ATTRIBUTES,
+            ],
             capture_output=True,
-            timeout=_LONGEST_WAIT,
+            timeout=_MAX_WAIT,
             check=True,
         )
         units = json.loads(done.stdout)
@@ -289,7 +297,7 @@ def _texts_of_variable_length(path: str, *_: int) -> dict[str, str]:
     return {str(name): str(unit) for name, unit in units.items()}
 
 
-_READING = """
+_READER_SCRIPT = """
 import json, resource, sys
 import h5py
 

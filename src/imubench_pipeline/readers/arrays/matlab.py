@@ -35,42 +35,42 @@ from imubench_pipeline.readers.arrays.table import (
 )
 from imubench_pipeline.readers.bounds import MAX_DIMENSIONS, MAX_MATLAB_NAME, MAX_STRUCTURE_DEPTH
 
-_LONGEST_CLASS = 64
+_MAX_CLASS_LENGTH = 64
 
 
 class MatlabFile(ArrayFile):
-    """A MATLAB file, of version 7.3, 5 or 4."""
+    """A MATLAB file of version 7.3, 5 or 4."""
 
     def tables(self, stack: ExitStack) -> Iterable[Table]:
         """Describe every variable."""
         if h5py.is_hdf5(self.path):
-            return _variables(stack.enter_context(hdf5.opened(self.path)))
+            return _list_variables(stack.enter_context(hdf5.opened(self.path)))
         if _is_version_5(self.path):
-            return _variables_of_5(self.path)
+            return _list_variables_of_5(self.path)
         with self.path.open("rb") as file:
             begin = file.read(HEADER_BYTES)
         if header_of(begin) is not None:
-            return _variables_of_4(self.path)
+            return _list_variables_of_4(self.path)
         raise UnusableError(
             "not a MATLAB file of version 4, 5 or 7.3, or its beginning is damaged; save it with "
             "-v7.3"
         )
 
 
-def _variables(file: h5py.File) -> list[Table]:
-    """Return the variables of version 7.3: matrices lie there with time along the second side."""
+def _list_variables(file: h5py.File) -> list[Table]:
+    """Return the variables of version 7.3, where matrices are stored transposed."""
     tables: list[Table] = []
-    # What cells, objects and sparse matrices are made of has no meaning alone.
+    # Parts of cells, objects and sparse matrices are not variables.
     for data_set in hdf5.data_sets(file, time_axis=1, passed_over="#"):
         if "MATLAB_sparse" in data_set.data.parent.attrs:
             continue
         if data_set.fault is None:
-            data_set.fault = _fault(data_set)
+            data_set.fault = _find_fault(data_set)
         tables.append(data_set)
     return tables
 
 
-def _fault(data_set: hdf5.DataSet) -> str | None:
+def _find_fault(data_set: hdf5.DataSet) -> str | None:
     if data_set.dtype.names is not None:
         return "holds complex numbers; expected numbers: save real() of it"
     attributes = data_set.data.attrs
@@ -78,9 +78,9 @@ def _fault(data_set: hdf5.DataSet) -> str | None:
         return "is empty; expected a vector or a matrix"
     if "MATLAB_class" not in attributes:
         return None
-    # Only a plain text is read: the library does not survive every damaged one of another kind.
+    # Only fixed-length texts are read: the library may crash on damaged texts of other kinds.
     kind = attributes.get_id("MATLAB_class")
-    if kind.dtype.kind != "S" or kind.shape != () or kind.dtype.itemsize > _LONGEST_CLASS:
+    if kind.dtype.kind != "S" or kind.shape != () or kind.dtype.itemsize > _MAX_CLASS_LENGTH:
         return "has a damaged class; copy the file again"
     if np.bytes_(attributes["MATLAB_class"]) == b"char":
         return "holds text; expected numbers"
@@ -90,7 +90,7 @@ def _fault(data_set: hdf5.DataSet) -> str | None:
 # --------------------------------------------------------------------------------- version 4
 
 
-def _variables_of_4(path: Path) -> Iterator[Table]:
+def _list_variables_of_4(path: Path) -> Iterator[Table]:
     """Yield the variables of a file."""
     start, size = 0, path.stat().st_size
     with path.open("rb") as file:
@@ -98,14 +98,14 @@ def _variables_of_4(path: Path) -> Iterator[Table]:
             file.seek(start)
             header = header_of(file.read(HEADER_BYTES))
             if header is None:
-                raise _damaged("no header of a variable of version 4", start)
+                raise _make_damaged_error("no header of a variable of version 4", start)
             begin, end = start + header.begin, start + header.begin + header.size
             if end > size:
-                raise _cut_short(end, size)
+                raise _make_truncated_error(end, size)
             if header.fault is not None:
                 yield UnsupportedArray(header.name, header.fault)
             else:
-                opened = partial(_plain, path)
+                opened = partial(_open_plain, path)
                 yield StreamedArray(
                     header.name, header.shape, header.dtype, True, opened, begin, False
                 )
@@ -114,21 +114,21 @@ def _variables_of_4(path: Path) -> Iterator[Table]:
 
 # --------------------------------------------------------------------------------- version 5
 #
-# Arrays are found and streamed here, for the readers of the format that hold whole variables in
-# memory also read beyond it where a file is damaged. A file is a sequence of elements: type, size,
-# and data padded to eight bytes. A variable is an element of elements: flags, sides, name and
-# values; the values of a structure are such elements again. See "MAT-File Format" of MATLAB.
+# The format is parsed here, since existing readers load whole variables, and read beyond their
+# memory if a file is damaged. A file is a sequence of elements: type, size, and data padded to
+# eight bytes. A variable is an element that contains elements: flags, dimensions, name and values.
+# The values of a structure are again such elements. See "MAT-File Format" of MATLAB.
 
-_HEADER = 128
-_ORDERS = {b"IM": "<", b"MI": ">"}
+_HEADER_5_BYTES = 128
+_BYTE_ORDERS = {b"IM": "<", b"MI": ">"}
 _VERSION = 1
-_MATRIX, _COMPRESSED = 14, 15
-_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8",
+_TYPE_MATRIX, _TYPE_COMPRESSED = 14, 15
+_NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8",
             13: "u8"}  # fmt: skip
-"""Types of elements whose data are figures. Integral values may be kept in a smaller type."""
+"""Types of elements with numbers. Integral values may be stored in a smaller type."""
 
-_STRUCTURE, _FIRST_NUMERIC, _LAST_NUMERIC = 2, 6, 15
-_CLASSES = {
+_CLASS_STRUCTURE, _FIRST_NUMERIC_CLASS, _LAST_NUMERIC_CLASS = 2, 6, 15
+_CLASS_FAULTS = {
     1: "is a cell array; expected a vector or a matrix: save cell2mat of it",
     2: "is an array of structures; expected one structure",
     3: "is an object; expected a vector or a matrix",
@@ -137,54 +137,54 @@ _CLASSES = {
     16: "is a function; expected a vector or a matrix",
     17: "is a table or an object; expected a vector or a matrix: save table2array of it",
 }
-_COMPLEX = 0x0800
-_TABLE = 17
-_LARGEST_HEADER = 1 << 16
-_STEP = {"<": 1, ">": -1}
-"""Size and type of a small element stand in the order of the bytes."""
+_FLAG_COMPLEX = 0x0800
+_CLASS_TABLE = 17
+_MAX_ELEMENT_HEADER = 1 << 16
+_TAG_ORDER = {"<": 1, ">": -1}
+"""Order of type and size in the tag of a small element, which depends on the byte order."""
 
-_FED = 1 << 16
+_READ_BLOCK = 1 << 16
 
 
 def _is_version_5(path: Path) -> bool:
-    """Tell whether a file begins as MATLAB files of version 5 do."""
+    """Return whether a file begins like a MATLAB file of version 5."""
     with path.open("rb") as file:
-        header = file.read(_HEADER)
-    order = _ORDERS.get(header[126:])
+        header = file.read(_HEADER_5_BYTES)
+    order = _BYTE_ORDERS.get(header[126:])
     return order is not None and struct.unpack(f"{order}H", header[124:126])[0] >> 8 == _VERSION
 
 
-def _variables_of_5(path: Path) -> Iterator[Table]:
+def _list_variables_of_5(path: Path) -> Iterator[Table]:
     """Yield the variables of a file, and the fields of its structures as ``name/field``."""
     size = path.stat().st_size
     with path.open("rb") as file:
-        order = _ORDERS[file.read(_HEADER)[126:]]
-        start = _HEADER
+        order = _BYTE_ORDERS[file.read(_HEADER_5_BYTES)[126:]]
+        start = _HEADER_5_BYTES
         while start < size:
             file.seek(start)
             kind, length = struct.unpack(f"{order}II", exactly(file, 8))
             begin, end = start + 8, start + 8 + length
             if end > size:
-                raise _cut_short(end, size)
-            if kind == _COMPRESSED:
-                opened = partial(_inflated, path, begin, length)
+                raise _make_truncated_error(end, size)
+            if kind == _TYPE_COMPRESSED:
+                opened = partial(_open_inflated, path, begin, length)
                 with opened() as stream:
                     most = MAX_DEFLATE_RATIO * (length + 8)
                     elements = _Elements(stream, order, 0, most, opened, checked=True)
-                    yield from _matrix(elements, elements.tag(_MATRIX))
-            elif kind == _MATRIX:
-                opened = partial(_plain, path)
+                    yield from _read_matrix(elements, elements.tag(_TYPE_MATRIX))
+            elif kind == _TYPE_MATRIX:
+                opened = partial(_open_plain, path)
                 elements = _Elements(file, order, begin, end, opened, checked=False)
-                yield from _matrix(elements, length)
+                yield from _read_matrix(elements, length)
             else:
-                raise _damaged(f"a variable of type {kind}", start)
+                raise _make_damaged_error(f"a variable of type {kind}", start)
             start = end
 
 
 class _Elements:
     """Reads the elements of a variable one after another.
 
-    ``opened`` opens the stream afresh; ``checked``: it has a checksum at its end.
+    ``opened`` opens a new stream; ``checked``: the stream has a checksum at its end.
     """
 
     def __init__(
@@ -197,7 +197,7 @@ class _Elements:
         checked: bool,
     ) -> None:
         self.order, self.opened, self.checked, self._stream = order, opened, checked, stream
-        self.at, self.end = at, end  # bytes from the beginning; the end is that of the element
+        self.at, self.end = at, end  # bytes from the beginning; end of the enclosing element
         self.kind = 0  # of the last element
 
     def tag(self, *kinds: int) -> int:
@@ -207,32 +207,32 @@ class _Elements:
         """
         self._check(8)
         first = self._read(4)
-        self.kind, length = struct.unpack(f"{self.order}HH", first)[:: _STEP[self.order]]
+        self.kind, length = struct.unpack(f"{self.order}HH", first)[:: _TAG_ORDER[self.order]]
         if not length:
             self.kind, length = struct.unpack(f"{self.order}II", first + self._read(4))
             self._check(length)
         elif length > 4:
-            raise _damaged(f"a small element of {length} bytes", self.at)
+            raise _make_damaged_error(f"a small element of {length} bytes", self.at)
         if self.kind not in kinds:
-            raise _damaged(f"an element of type {self.kind}", self.at)
+            raise _make_damaged_error(f"an element of type {self.kind}", self.at)
         return length
 
     def data(self, *kinds: int) -> bytes:
         """Return the data of the next element."""
         begin = self.at
         length = self.tag(*kinds)
-        if length > _LARGEST_HEADER:
-            raise _damaged(f"{length} bytes of sides or names", self.at)
+        if length > _MAX_ELEMENT_HEADER:
+            raise _make_damaged_error(f"{length} bytes of sides or names", self.at)
         read = self._read(length)
         self.pad(begin)
         return read
 
     def pad(self, begin: int) -> None:
-        """Go on to the next element, which stands a multiple of eight bytes further."""
+        """Skip the padding to a multiple of eight bytes before the next element."""
         self.skip(-(self.at - begin) % 8)
 
     def skip(self, size: int) -> None:
-        """Pass over data."""
+        """Skip data."""
         skip(self._stream, size)
         self.at += size
 
@@ -242,20 +242,22 @@ class _Elements:
 
     def _check(self, length: int) -> None:
         if self.at + length > self.end:
-            raise _damaged(f"an element of {length} bytes with {self.end - self.at} left", self.at)
+            raise _make_damaged_error(
+                f"an element of {length} bytes with {self.end - self.at} left", self.at
+            )
 
 
-def _cut_short(end: int, size: int) -> UnusableError:
+def _make_truncated_error(end: int, size: int) -> UnusableError:
     return UnusableError(
         f"cut short: a variable ends at byte {end}, the file at {size}; copy it again"
     )
 
 
-def _damaged(what: str, at: int) -> UnusableError:
+def _make_damaged_error(what: str, at: int) -> UnusableError:
     return UnusableError(f"corrupt data: {what} at byte {at}; copy the file again")
 
 
-def _matrix(
+def _read_matrix(
     elements: _Elements, length: int, above: str | None = None, depth: int = 0
 ) -> Iterator[Table]:
     """Yield the arrays of an element that is a variable, or a field of the structure ``above``."""
@@ -266,39 +268,39 @@ def _matrix(
     else:
         (flags, _) = struct.unpack(f"{elements.order}II", elements.data(6)[:8].ljust(8, b"\0"))
         kind = flags & 0xFF
-        shape = () if kind == _TABLE else _shape(elements)
+        shape = () if kind == _CLASS_TABLE else _read_shape(elements)
         own = elements.data(1, 16).decode("utf-8", "replace")
         if len(own) > MAX_MATLAB_NAME:
-            raise _damaged(f"a name of {len(own)} letters", elements.at)
+            raise _make_damaged_error(f"a name of {len(own)} letters", elements.at)
         name = own if above is None else above
         if not name:
-            pass  # what MATLAB keeps of functions and objects
-        elif kind == _STRUCTURE and math.prod(shape) == 1:
-            yield from _fields(elements, name, depth)
-        elif not _FIRST_NUMERIC <= kind <= _LAST_NUMERIC:
-            yield UnsupportedArray(name, _CLASSES.get(kind, f"is of the unknown class {kind}"))
-        elif flags & _COMPLEX:
+            pass  # internal data of functions and objects
+        elif kind == _CLASS_STRUCTURE and math.prod(shape) == 1:
+            yield from _read_fields(elements, name, depth)
+        elif not _FIRST_NUMERIC_CLASS <= kind <= _LAST_NUMERIC_CLASS:
+            yield UnsupportedArray(name, _CLASS_FAULTS.get(kind, f"is of the unknown class {kind}"))
+        elif flags & _FLAG_COMPLEX:
             yield UnsupportedArray(
                 name, "holds complex numbers; expected numbers: save real() of it"
             )
         else:
-            yield _numeric(elements, name, shape)
+            yield _read_numeric(elements, name, shape)
     elements.end = outer
     if above is not None:
         elements.skip(end - elements.at)
 
 
-def _shape(elements: _Elements) -> tuple[int, ...]:
+def _read_shape(elements: _Elements) -> tuple[int, ...]:
     data = elements.data(5)
     shape: tuple[int, ...] = struct.unpack(f"{elements.order}{len(data) // 4}i", data)
     if not 2 <= len(shape) <= MAX_DIMENSIONS or min(shape) < 0:
-        raise _damaged(f"sides {shape[:MAX_DIMENSIONS]}", elements.at)
+        raise _make_damaged_error(f"sides {shape[:MAX_DIMENSIONS]}", elements.at)
     return shape
 
 
-def _numeric(elements: _Elements, name: str, shape: tuple[int, ...]) -> StreamedArray:
-    size = elements.tag(*_NUMBERS)
-    dtype = np.dtype(elements.order + _NUMBERS[elements.kind])
+def _read_numeric(elements: _Elements, name: str, shape: tuple[int, ...]) -> StreamedArray:
+    size = elements.tag(*_NUMBER_TYPES)
+    dtype = np.dtype(elements.order + _NUMBER_TYPES[elements.kind])
     if size != math.prod(shape) * dtype.itemsize:
         raise UnusableError(
             f"corrupt data: {name} promises {describe_shape(shape)} values of {dtype.itemsize} "
@@ -307,18 +309,18 @@ def _numeric(elements: _Elements, name: str, shape: tuple[int, ...]) -> Streamed
     return StreamedArray(name, shape, dtype, True, elements.opened, elements.at, elements.checked)
 
 
-def _fields(elements: _Elements, name: str, depth: int) -> Iterator[Table]:
+def _read_fields(elements: _Elements, name: str, depth: int) -> Iterator[Table]:
     if depth == MAX_STRUCTURE_DEPTH:
         yield UnsupportedArray(name, f"lies {depth} structures deep; expected a vector or a matrix")
         return
     width = int.from_bytes(elements.data(5), "little" if elements.order == "<" else "big")
     names = elements.data(1)
     if not 1 <= width <= MAX_MATLAB_NAME:
-        raise _damaged(f"names of fields of {width} bytes", elements.at)
+        raise _make_damaged_error(f"names of fields of {width} bytes", elements.at)
     for start in range(0, len(names), width):
         field = names[start : start + width].split(b"\0")[0].decode("utf-8", "replace")
-        length = elements.tag(_MATRIX)
-        yield from _matrix(elements, length, f"{name}/{field}", depth + 1)
+        length = elements.tag(_TYPE_MATRIX)
+        yield from _read_matrix(elements, length, f"{name}/{field}", depth + 1)
 
 
 class _Inflated(io.RawIOBase):
@@ -336,12 +338,12 @@ class _Inflated(io.RawIOBase):
         return True
 
     def readinto(self, buffer: object) -> int:
-        """Fill a buffer; 0 at the end, where the checksum has been compared."""
+        """Fill a buffer; return 0 at the end, after the checksum has been verified."""
         view = memoryview(buffer)  # type: ignore[arg-type]  # RawIOBase hands over any writable buffer
         while not self._inflate.eof:
             packed = self._inflate.unconsumed_tail
             if not packed:
-                packed = self._file.read(min(_FED, self._left))
+                packed = self._file.read(min(_READ_BLOCK, self._left))
                 self._left -= len(packed)
             read = self._inflate.decompress(packed, len(view))
             if read:
@@ -359,9 +361,9 @@ class _Inflated(io.RawIOBase):
         super().close()
 
 
-def _plain(path: Path) -> IO[bytes]:
+def _open_plain(path: Path) -> IO[bytes]:
     return path.open("rb")
 
 
-def _inflated(path: Path, start: int, length: int) -> IO[bytes]:
-    return io.BufferedReader(_Inflated(path, start, length), _FED)
+def _open_inflated(path: Path, start: int, length: int) -> IO[bytes]:
+    return io.BufferedReader(_Inflated(path, start, length), _READ_BLOCK)

@@ -3,7 +3,7 @@
 An array is a matrix, a vector, or a vector of records with named fields (a structured dtype).
 ``variable`` is the name of an array in an archive; an NPY file has one array, without a name.
 Dates (datetime64) are time stamps with ``format: iso8601``. Arrays of Python objects, which are
-pickled, are refused: to read them would run what is in the file.
+pickled, are rejected: reading them would execute code in the file.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from imubench_pipeline.readers.arrays.table import (
 from imubench_pipeline.readers.bounds import MAX_NPY_HEADER
 from imubench_pipeline.readers.compressed import opened_archive
 
-_ENDING = ".npy"
-_LENGTH = {(1, 0): "<H", (2, 0): "<I", (3, 0): "<I"}
+_SUFFIX = ".npy"
+_HEADER_SIZE_FORMATS = {(1, 0): "<H", (2, 0): "<I", (3, 0): "<I"}
 
 
 class NumpyFile(ArrayFile):
@@ -44,21 +44,21 @@ class NumpyFile(ArrayFile):
             begin = file.read(len(npy.MAGIC_PREFIX))
         if begin == npy.MAGIC_PREFIX:
             size = self.path.stat().st_size
-            return [_array("", lambda: self.path.open("rb"), size, checked=False)]
+            return [_read_array_header("", lambda: self.path.open("rb"), size, checked=False)]
         if not begin.startswith(b"PK"):
             raise UnusableError(
                 "not a NumPy file, or its beginning is damaged; expected what numpy.save or "
                 "numpy.savez writes: mend 'reader' in the sensor file, or copy the file again"
             )
         archive = stack.enter_context(opened_archive(self.path))
-        return list(_members(archive, self.path.stat().st_size))
+        return list(_read_members(archive, self.path.stat().st_size))
 
 
-def _members(archive: zipfile.ZipFile, size: int) -> Iterator[Table]:
+def _read_members(archive: zipfile.ZipFile, size: int) -> Iterator[Table]:
     for info in archive.infolist():
-        if not info.filename.endswith(_ENDING):
+        if not info.filename.endswith(_SUFFIX):
             continue
-        name = info.filename.removesuffix(_ENDING)
+        name = info.filename.removesuffix(_SUFFIX)
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise UnusableError(
                 f"{name} is packed by method {info.compress_type}; expected stored or deflated: "
@@ -71,20 +71,22 @@ def _members(archive: zipfile.ZipFile, size: int) -> Iterator[Table]:
                 f"{name} is said to have {info.file_size} bytes, which {info.compress_size} packed "
                 f"bytes in a file of {size} cannot hold; the file is corrupt: copy it again"
             )
-        yield _array(name, partial(archive.open, info), info.file_size, checked=True)
+        yield _read_array_header(name, partial(archive.open, info), info.file_size, checked=True)
 
 
-def _array(name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool) -> StreamedArray:
-    """Read the header of an array, and compare what it promises with the bytes that are there."""
+def _read_array_header(
+    name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool
+) -> StreamedArray:
+    """Read the header of an array, and compare the promised size with the actual one."""
     shown = name or "the table"
     with opened() as stream:
         version = npy.read_magic(stream)
-        if version not in _LENGTH:
+        if version not in _HEADER_SIZE_FORMATS:
             raise UnusableError(
                 f"{shown} has format version {version}; expected 1.0 to 3.0: save again"
             )
-        length = exactly(stream, struct.calcsize(_LENGTH[version]))
-        (header_size,) = struct.unpack(_LENGTH[version], length)
+        length = exactly(stream, struct.calcsize(_HEADER_SIZE_FORMATS[version]))
+        (header_size,) = struct.unpack(_HEADER_SIZE_FORMATS[version], length)
         if header_size > MAX_NPY_HEADER:
             raise UnusableError(
                 f"{shown} has a header of {header_size} bytes; expected at most "
@@ -115,6 +117,6 @@ def _array(name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool)
 
 
 def _decode_names(dtype: np.dtype[Any]) -> None:
-    """Make the names of fields what they were: version 3.0 differs from 2.0 by being UTF-8."""
+    """Decode the names of fields in place: version 3.0 differs from 2.0 by UTF-8."""
     if dtype.names is not None:
         dtype.names = tuple(name.encode("latin1").decode("utf-8") for name in dtype.names)

@@ -1,7 +1,7 @@
-"""What the pages of a Parquet file unpack to, before they are unpacked.
+"""Check the unpacked size of the pages of a Parquet file before they are unpacked.
 
-A page is unpacked as a whole, to what its own header says; the metadata at the end of the file know
-nothing of it. The header is a structure of Thrift's compact protocol: ``PageHeader`` of
+A page is unpacked as a whole, to the size in its own header; the metadata at the end of the file do
+not have this size. The header is a structure of Thrift's compact protocol: ``PageHeader`` of
 ``parquet.thrift``.
 """
 
@@ -16,20 +16,20 @@ import pyarrow.parquet as pq
 from imubench_pipeline.readers.arrays.table import UnusableError
 from imubench_pipeline.readers.bounds import MAX_PAGE_BYTES, MAX_UNCHECKED_PAGES, MIN_MEAN_PAGE
 
-_UNPACKED, _PACKED = 2, 3
-_HEADER, _LONGEST_HEADER = 1 << 10, 1 << 20
-"""Bytes of a header that are read at first, and at most: it may hold the extremes of its page."""
+_FIELD_UNPACKED_SIZE, _FIELD_PACKED_SIZE = 2, 3
+_HEADER_PROBE, _MAX_HEADER = 1 << 10, 1 << 20
+"""Bytes of a header that are read first, and at most: it may contain the extremes of its page."""
 
 
 def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> None:
-    """Raise where the pages of columns, of each the largest, may not be in memory together.
+    """Raise if the largest pages of all columns together exceed the memory limit.
 
-    ``names``: of the columns that are read side by side.
+    ``names``: names of the columns that are read together.
 
     Raises
     ------
     UnusableError
-        If they may not, or are too many for what they hold.
+        If they exceed the limit, or if there are too many small pages.
     """
     most = max(MAX_UNCHECKED_PAGES, path.stat().st_size // MIN_MEAN_PAGE)
     paths = [metadata.schema.column(place).path for place in range(metadata.num_columns)]
@@ -58,23 +58,23 @@ def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> 
 
 
 def pages(file: BinaryIO, column: pq.ColumnChunkMetaData) -> Iterator[int]:
-    """Yield to how many bytes each page of a column unpacks."""
+    """Yield the unpacked size of each page of a column, bytes."""
     at = column.data_page_offset
     if column.has_dictionary_page and 0 < column.dictionary_page_offset < at:
         at = column.dictionary_page_offset
     end = at + column.total_compressed_size
     while at < end:
-        for most in (_HEADER, _LONGEST_HEADER):
+        for most in (_HEADER_PROBE, _MAX_HEADER):
             file.seek(at)
             data = file.read(most)
             try:
-                fields, length = _header(data)
+                fields, length = _parse_header(data)
                 break
             except IndexError:
                 continue
         else:
             raise UnusableError("corrupt data: a damaged page; copy the file again")
-        unpacked, packed = fields.get(_UNPACKED, 0), fields.get(_PACKED, -1)
+        unpacked, packed = fields.get(_FIELD_UNPACKED_SIZE, 0), fields.get(_FIELD_PACKED_SIZE, -1)
         if unpacked < 0 or packed < 0:
             raise UnusableError("corrupt data: a damaged page; copy the file again")
         yield unpacked
@@ -83,42 +83,42 @@ def pages(file: BinaryIO, column: pq.ColumnChunkMetaData) -> Iterator[int]:
 
 # ------------------------------------------------------------------- Thrift's compact protocol
 
-_TRUE, _FALSE, _BYTE, _DOUBLE, _BINARY, _STRUCT = 1, 2, 3, 7, 8, 12
-_NUMBERS = frozenset((4, 5, 6))
-_DEEPEST = 8
+_TYPE_TRUE, _TYPE_FALSE, _TYPE_BYTE, _TYPE_DOUBLE, _TYPE_BINARY, _TYPE_STRUCT = 1, 2, 3, 7, 8, 12
+_INTEGER_TYPES = frozenset((4, 5, 6))
+_MAX_DEPTH = 8
 
 
-def _header(data: bytes) -> tuple[dict[int, int], int]:
-    """Return the whole numbers of a structure by their fields, and its length.
+def _parse_header(data: bytes) -> tuple[dict[int, int], int]:
+    """Return the integers of a structure by field number, and its length.
 
     Raises
     ------
     IndexError
-        If it does not end within the data.
+        If the structure does not end within the data.
     """
     numbers: dict[int, int] = {}
     at, field = 0, 0
     while kind := data[at]:
-        field, at = _field(data, at, field)
+        field, at = _parse_field(data, at, field)
         kind &= 15
-        if kind in _NUMBERS:
-            value, at = _varint(data, at)
+        if kind in _INTEGER_TYPES:
+            value, at = _parse_varint(data, at)
             numbers[field] = (value >> 1) ^ -(value & 1)
         else:
-            at = _behind(data, at, kind, 0)
+            at = _skip_value(data, at, kind, 0)
     return numbers, at + 1
 
 
-def _field(data: bytes, at: int, before: int) -> tuple[int, int]:
-    """Return the number of the field whose type stands at a place, and the place behind that."""
+def _parse_field(data: bytes, at: int, before: int) -> tuple[int, int]:
+    """Return the number of the field with its type at a position, and the next position."""
     step = data[at] >> 4
     if step:
         return before + step, at + 1
-    number, at = _varint(data, at + 1)
+    number, at = _parse_varint(data, at + 1)
     return (number >> 1) ^ -(number & 1), at
 
 
-def _varint(data: bytes, at: int) -> tuple[int, int]:
+def _parse_varint(data: bytes, at: int) -> tuple[int, int]:
     value = shift = 0
     while True:
         value |= (data[at] & 127) << shift
@@ -130,21 +130,21 @@ def _varint(data: bytes, at: int) -> tuple[int, int]:
             raise IndexError("a number without end")
 
 
-def _behind(data: bytes, at: int, kind: int, depth: int) -> int:
-    """Return the place behind a value of a type."""
-    if kind in (_TRUE, _FALSE):
+def _skip_value(data: bytes, at: int, kind: int, depth: int) -> int:
+    """Return the position after a value of a type."""
+    if kind in (_TYPE_TRUE, _TYPE_FALSE):
         return at
-    if kind in _NUMBERS:
-        return _varint(data, at)[1]
-    if kind in (_BYTE, _DOUBLE):
-        return at + (1 if kind == _BYTE else 8)
-    if kind == _BINARY:
-        size, at = _varint(data, at)
+    if kind in _INTEGER_TYPES:
+        return _parse_varint(data, at)[1]
+    if kind in (_TYPE_BYTE, _TYPE_DOUBLE):
+        return at + (1 if kind == _TYPE_BYTE else 8)
+    if kind == _TYPE_BINARY:
+        size, at = _parse_varint(data, at)
         return at + size
-    if kind == _STRUCT and depth < _DEEPEST:
+    if kind == _TYPE_STRUCT and depth < _MAX_DEPTH:
         field = 0
         while inner := data[at]:
-            field, at = _field(data, at, field)
-            at = _behind(data, at, inner & 15, depth + 1)
+            field, at = _parse_field(data, at, field)
+            at = _skip_value(data, at, inner & 15, depth + 1)
         return at + 1
     raise IndexError("no type of a page header")

@@ -1,4 +1,4 @@
-"""What an array format has in it: tables of columns, read in blocks of records."""
+"""Tables of columns in the array formats, read in blocks of records."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.bounds import MAX_FIELDS
 
-NUMBERS = "fiu"
-"""NumPy's letters of the kinds of data that are figures: float, signed and unsigned integer."""
+NUMBER_KINDS = "fiu"
+"""Kinds of NumPy types that are numbers: float, signed and unsigned integer."""
 
-DATES = "M"
+DATE_KIND = "M"
+"""Kind of the NumPy type of dates (datetime64)."""
 
-_WORDS = {
+_KIND_NAMES = {
     "f": "numbers",
     "i": "numbers",
     "u": "numbers",
@@ -35,12 +36,12 @@ _WORDS = {
     "O": "objects",
     "V": "raw bytes or arrays",
 }
-_WIDEST_FIELD = 1024
-"""Elements of a field of a record that are told apart as columns."""
+_MAX_FIELD_ELEMENTS = 1024
+"""Largest number of elements of a field that become columns of their own."""
 
 
 class UnusableError(Exception):
-    """What is asked of a file is not there, or cannot be read; the text leaves out the file."""
+    """Requested data are missing or unreadable; the message does not name the file."""
 
 
 @dataclass(frozen=True)
@@ -48,32 +49,32 @@ class Column:
     """One column of a table."""
 
     label: str
-    """Its name; empty in a matrix, whose columns have none."""
+    """Name of the column; empty for the columns of a matrix."""
     kind: str
-    """NumPy's letter for the kind of data."""
+    """Kind of the NumPy type."""
     holds: str
-    """The same in words."""
+    """Kind of the data in words."""
 
 
 class Table(ABC):
-    """Columns of equal length that a file keeps under one name."""
+    """Columns of equal length with a common name in a file."""
 
     name: str = ""
-    """Empty where the file holds one table, without a name."""
+    """Name of the table; empty if the file has one table without a name."""
     rows: int | None = None
-    """Records; None where only reading tells."""
+    """Number of records; None if it is known only after reading."""
     width: int = 0
-    """Columns."""
+    """Number of columns."""
     labels: Sequence[str] = ()
-    """Names of the columns; empty where they have none."""
+    """Names of the columns; empty if they have none."""
     fault: str | None = None
-    """Why it cannot be used at all, as the end of a sentence."""
+    """Reason why the table cannot be used, as the end of a sentence."""
     simulated: bool = False
-    """It has the mark of a simulated log."""
+    """The table has the mark of a simulated log."""
 
     @property
     def shown(self) -> str:
-        """What messages call it."""
+        """Name of the table in messages."""
         return self.name or "the table"
 
     @abstractmethod
@@ -81,15 +82,15 @@ class Table(ABC):
         """Return a column by its position, counted from 0."""
 
     def unit(self, position: int) -> str | None:
-        """Return the unit of a column, where the file states it."""
+        """Return the unit of a column, if the file states it."""
         return None
 
     @abstractmethod
     def row_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory that a record takes while these columns are read."""
+        """Return the memory per record for reading these columns, bytes."""
 
     def held_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory that is held, beside the records, while these columns are read."""
+        """Return the additional memory for reading these columns, bytes."""
         return 0
 
     @abstractmethod
@@ -101,14 +102,14 @@ class Table(ABC):
 
 
 class UnsupportedArray(Table):
-    """What a file has under a name but no reader takes."""
+    """An entry of a file that no reader supports."""
 
     def __init__(self, name: str, fault: str) -> None:
         self.name = name
         self.fault = fault
 
     def column(self, position: int) -> Column:
-        """Raise: it has no column."""
+        """Raise `UnusableError`: there are no columns."""
         raise UnusableError(f"{self.shown} {self.fault}")
 
     def row_bytes(self, positions: Sequence[int]) -> int:
@@ -122,7 +123,7 @@ class UnsupportedArray(Table):
 
 @dataclass(frozen=True)
 class _Leaf:
-    """A column of an array of records: a field, or one element of a field that is a vector."""
+    """A column of an array of records: a field, or one element of a vector field."""
 
     label: str
     path: tuple[str | int, ...]
@@ -130,7 +131,7 @@ class _Leaf:
 
 
 class Array(Table):
-    """A vector, a matrix whose longer side is time, or a vector of records with named fields.
+    """A vector, a matrix with time along its longer side, or a vector of records with fields.
 
     A field that is a vector of three is the columns ``gyro[1]``, ``gyro[2]`` and ``gyro[3]``; a
     field of a field is ``imu.gyro``.
@@ -138,7 +139,7 @@ class Array(Table):
     Parameters
     ----------
     time_axis : int
-        The side that is time where both are equally long.
+        Axis of time of a square matrix.
     """
 
     def __init__(
@@ -165,31 +166,35 @@ class Array(Table):
         sides = (*shape, 1)[:2]
         self.rows, self.width = sides[self.time_axis], sides[1 - self.time_axis]
         if dtype.names:
-            self._leaves = list(islice(_leaves(dtype), MAX_FIELDS + 1))
+            self._leaves = list(islice(_list_leaves(dtype), MAX_FIELDS + 1))
             if len(self._leaves) > MAX_FIELDS:
                 self.fault = f"has more than {MAX_FIELDS} columns; expected a log of one sensor"
             if self.width != 1:
                 self.fault = "is a matrix of records; expected a vector of records"
             self.width = len(self._leaves)
             self.labels = [leaf.label for leaf in self._leaves]
-        elif dtype.kind not in NUMBERS + DATES:
-            self.fault = f"holds {_WORDS.get(dtype.kind, str(dtype))}; expected numbers: convert it"
+        elif dtype.kind not in NUMBER_KINDS + DATE_KIND:
+            self.fault = (
+                f"holds {_KIND_NAMES.get(dtype.kind, str(dtype))}; expected numbers: convert it"
+            )
 
     def column(self, position: int) -> Column:
         """Return a column by its position, counted from 0."""
         if not self._leaves:
-            return Column("", self.dtype.kind, _WORDS[self.dtype.kind])
+            return Column("", self.dtype.kind, _KIND_NAMES[self.dtype.kind])
         leaf = self._leaves[position]
-        return Column(leaf.label, leaf.dtype.kind, _WORDS.get(leaf.dtype.kind, str(leaf.dtype)))
+        return Column(
+            leaf.label, leaf.dtype.kind, _KIND_NAMES.get(leaf.dtype.kind, str(leaf.dtype))
+        )
 
     def fields(self, positions: Sequence[int]) -> list[str]:
-        """Return the fields of a record that these columns are in; none if it has no fields."""
+        """Return the fields of a record with these columns; empty if it has no fields."""
         if not self._leaves:
             return []
         return list(dict.fromkeys(str(self._leaves[position].path[0]) for position in positions))
 
     def column_in(self, block: NDArray[Any], position: int) -> NDArray[Any]:
-        """Return one column of a block: of records, or of a matrix with time downwards."""
+        """Return one column of a block of records, or of a matrix with time along axis 0."""
         if not self._leaves:
             return block[:, position]
         values = block
@@ -199,21 +204,21 @@ class Array(Table):
 
 
 def describe_shape(shape: tuple[int, ...]) -> str:
-    """Return the sides of an array in words."""
+    """Return a shape as text, such as 1000 x 3."""
     return " x ".join(str(side) for side in shape) or "1"
 
 
-def _leaves(
+def _list_leaves(
     dtype: np.dtype[Any], label: str = "", path: tuple[str | int, ...] = ()
 ) -> Iterator[_Leaf]:
     if dtype.names is not None:
         for name in dtype.names:
             below = f"{label}.{name}" if label else name
-            yield from _leaves(dtype[name], below, (*path, name))
+            yield from _list_leaves(dtype[name], below, (*path, name))
     elif (
         dtype.subdtype is not None
         and len(dtype.shape) == 1
-        and math.prod(dtype.shape) <= _WIDEST_FIELD
+        and math.prod(dtype.shape) <= _MAX_FIELD_ELEMENTS
         and dtype.base.names is None
     ):
         for element in range(dtype.shape[0]):
@@ -223,29 +228,29 @@ def _leaves(
 
 
 MAX_DEFLATE_RATIO = 1040
-"""Bytes that a byte of deflate stands for, at most, with room for rounding."""
+"""Largest expansion ratio of deflate, with a margin for rounding."""
 
-_SKIPPED = 1 << 20
+_SKIP_BLOCK = 1 << 20
 
 
 class StreamedArray(Array):
-    """An array whose elements follow each other in a file or in a compressed part of one.
+    """An array with consecutive elements in a file or in a compressed part of a file.
 
-    Where the columns of a matrix stand one after another, each is read by a stream of its own, so
-    that no more than a block of each is in memory.
+    If a matrix is stored column by column, each column is read by a stream of its own, so that only
+    one block of each is in memory.
 
     Parameters
     ----------
     name, shape, dtype, time_axis
         See `Array`.
     fortran : bool
-        The first index runs fastest.
+        The first index varies fastest.
     opened : callable
-        Opens the bytes afresh; the caller of it closes them.
+        Opens a new stream of the bytes, which its caller closes.
     offset : int
         Bytes before the first element.
     checked : bool
-        The bytes have a checksum that is compared at their end.
+        The bytes have a checksum, which is verified at their end.
     """
 
     def __init__(
@@ -262,12 +267,12 @@ class StreamedArray(Array):
         self._opened = opened
         self._offset = offset
         self._checked = checked
-        # Whole records follow each other, rather than whole columns.
+        # The array is stored record by record, not column by column.
         self._by_record = 1 in (len(shape), *shape) or (self.time_axis == 0) != fortran
         self._across = 1 if self._leaves else self.width
 
     def row_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory that a record takes while these columns are read."""
+        """Return the memory per record for reading these columns, bytes."""
         return self.dtype.itemsize * (self._across if self._by_record else len(positions))
 
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
@@ -289,12 +294,12 @@ class StreamedArray(Array):
                     yield [self._next(stream, count) for stream in streams]
             if self._checked:
                 last = streams[0 if self._by_record else int(np.argmax(positions))]
-                while last.read(_SKIPPED):
+                while last.read(_SKIP_BLOCK):
                     pass
 
     def _at(self, stack: ExitStack, element: int) -> IO[bytes]:
         stream = stack.enter_context(self._opened())
-        # The checksum of a member of an archive is of what is read of it, from its beginning.
+        # The checksum of a member of an archive requires reading from its beginning.
         place = self._offset + element * self.dtype.itemsize
         skip(stream, place, seek=not self._checked)
         return stream
@@ -305,12 +310,12 @@ class StreamedArray(Array):
 
 
 def skip(stream: IO[bytes], size: int, *, seek: bool = True) -> None:
-    """Pass over bytes of a stream; by reading them where it cannot seek, or is not to."""
+    """Skip bytes of a stream; read them if it cannot seek or ``seek`` is false."""
     if seek and stream.seekable():
         stream.seek(size, io.SEEK_CUR)
         return
     while size > 0:
-        size -= len(exactly(stream, min(size, _SKIPPED)))
+        size -= len(exactly(stream, min(size, _SKIP_BLOCK)))
 
 
 def exactly(stream: IO[bytes], size: int) -> bytes:
@@ -319,7 +324,7 @@ def exactly(stream: IO[bytes], size: int) -> bytes:
     Raises
     ------
     UnusableError
-        If it ends before.
+        If the stream ends early.
     """
     read = stream.read(size)
     if len(read) < size:
