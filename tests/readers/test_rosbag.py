@@ -266,7 +266,7 @@ def test_two_topics_have_two_clocks(tmp_path: Path) -> None:
 
 
 def test_many_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bags, "_BATCH", 1 << 11)
+    monkeypatch.setattr(bags, "_BATCH_MESSAGES", 1 << 11)
     rows = np.tile(figures(100), (50, 1))
     data = [message(2, IMU, EPOCH, row) for row in rows[:100]]
     topic = IMU, [(EPOCH + i * 10**7, i, data[i % 100]) for i in range(len(rows))]

@@ -1,7 +1,7 @@
-"""Zeros that are no part of a log: holes of sparse files, and runs of zero bytes.
+"""Handle zeros that are no part of a log: holes of sparse files, and runs of zero bytes.
 
-A logger that reserves space leaves zeros behind the log when it loses its power. A file system may
-store none of them: such a hole is found and passed over without reading it.
+A logger that reserves space leaves zeros after the log when it loses its power. A file system may
+not store them: such a hole is found and skipped without reading it.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from pathlib import Path
 
 from imubench_pipeline.tables.findings import Finding
 
-_LONGEST_READ = 1 << 16
-_STAND_IN = 512
+_MAX_HOLE_READ = 1 << 16
+_REPLACEMENT_ZEROS = 512
 """Bytes: the zeros that are returned in place of a longer hole."""
 
 
 def next_data(descriptor: int, offset: int) -> int | None:
-    """Return where the first stored byte at or after an offset is; None: only a hole follows.
+    """Return the offset of the first stored byte at or after an offset; None if there is none.
 
-    Where the system does not say, every byte counts as stored.
+    Without support of the system, every byte counts as stored.
 
-    ``descriptor``: of an open file; its position is unspecified afterwards.
+    ``descriptor``: descriptor of an open file; its position is unspecified afterwards.
     """
     if not hasattr(os, "SEEK_DATA"):
         return offset
@@ -36,8 +36,8 @@ def next_data(descriptor: int, offset: int) -> int | None:
 def end_of_data(path: Path) -> int:
     """Return the size of a file without the hole at its end, in bytes.
 
-    All bytes behind it read as zeros. It takes some 40 system calls and reads nothing, whatever
-    the size; 0 for a file that is one hole. Zeros that are stored count as data.
+    All bytes after it read as zeros. The search takes about 40 system calls for any size, and reads
+    no data. Returns 0 for a file that is one hole. Zeros that are stored count as data.
 
     Raises
     ------
@@ -56,9 +56,9 @@ def end_of_data(path: Path) -> int:
 
 
 class FileWithoutHoles:
-    """A file that is read from its beginning; of a long hole, only its last bytes are read.
+    """A file that is read sequentially; a long hole is replaced by a few zeros.
 
-    ``omitted``: zero bytes passed over so far.
+    ``omitted``: number of zero bytes skipped so far.
     """
 
     def __init__(self, path: Path) -> None:
@@ -71,10 +71,10 @@ class FileWithoutHoles:
         descriptor = self._file.fileno()
         data = next_data(descriptor, self._at)
         hole = (os.fstat(descriptor).st_size if data is None else data) - self._at
-        if hole > _LONGEST_READ:
-            self.omitted += hole - _STAND_IN
+        if hole > _MAX_HOLE_READ:
+            self.omitted += hole - _REPLACEMENT_ZEROS
             self._at += hole
-            return bytes(_STAND_IN)
+            return bytes(_REPLACEMENT_ZEROS)
         block = os.pread(descriptor, size, self._at)
         self._at += len(block)
         return block
@@ -86,7 +86,7 @@ class FileWithoutHoles:
         self._at = self.omitted = 0
 
     def tell(self) -> int:
-        """Return the place of the next byte."""
+        """Return the position of the next byte."""
         return self._at
 
     def close(self) -> None:
@@ -100,7 +100,7 @@ class ZeroRuns:
     Parameters
     ----------
     least : int
-        A shorter run is not counted.
+        Least length of a run that is counted.
     """
 
     def __init__(self, least: int = 1) -> None:
@@ -112,10 +112,10 @@ class ZeroRuns:
         self.count = 0
         self.places = 0
         self.first = (0, 0)
-        """Byte from 0, and line from 1, at which the first run begins."""
+        """Position of the first run: byte from 0 and line from 1."""
         self.read = 0
         self.lines = 0
-        """Bytes and line breaks so far."""
+        """Number of bytes and line breaks so far."""
 
     @property
     def at_end(self) -> bool:
@@ -142,7 +142,7 @@ class ZeroRuns:
         self.lines += block.count(b"\n")
 
     def _extend(self, block: bytes, begin: int, end: int) -> None:
-        """Add zeros to the present run, or begin one with them."""
+        """Add zeros to the current run, or begin a new run."""
         if not self._run and begin < end:
             self._run_begin = self.read + begin, self.lines + block.count(b"\n", 0, begin) + 1
         before, self._run = self._run, self._run + end - begin
@@ -158,8 +158,8 @@ class ZeroRuns:
     def finding(self, name: str, where: str, total: int, fate: str = "") -> Finding | None:
         """Return the finding about the zero bytes; None if there are none.
 
-        ``name``: of the file; ``where``: of the first run; ``total``: zero bytes with those that
-        were not read (`FileWithoutHoles`); ``fate``: what was done with text between zeros.
+        ``name``: name of the file. ``where``: place of the first run. ``total``: number of zero
+        bytes, with those in holes (`FileWithoutHoles`). ``fate``: treatment of text between zeros.
         """
         if not self.count:
             return None

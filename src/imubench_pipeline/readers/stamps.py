@@ -1,4 +1,4 @@
-"""Stamps as numbers: s since the first one, its date, and counters that start again from 0."""
+"""Convert numeric stamps: s since the first one, its date, and unwrapping of counters."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _YEAR_2100 = 4_102_444_800 * 10**9
 
 
 class Clock:
-    """Makes s since the first stamp of a file of its stamps.
+    """Converts the stamps of a file to s since the first one.
 
     Parameters
     ----------
     file : LogFile
-        Gets ``started`` with the first stamp.
+        Its ``started`` is set with the first stamp.
     wraps : float or None
-        Where stamps start again from 0, in their unit; None: they do not.
+        Value at which stamps wrap to 0, in their unit; None: they do not wrap.
     started : callable
-        Returns ISO 8601 date and time of the first stamp; None where that does not tell it.
+        Returns ISO 8601 date and time of the first stamp; None if the stamp is no date.
     """
 
     def __init__(
@@ -65,34 +65,33 @@ class Clock:
 
 @dataclass
 class WrapState:
-    """What is known of a counter after the stamps read so far."""
+    """State of a counter after the stamps read so far."""
 
     last: Any = None
-    """The last stamp that was there, as written."""
+    """The last present stamp, as written."""
     turns: int = 0
-    """How often the counter has started again."""
+    """Number of wraps of the counter."""
 
 
 def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:
-    """Make the stamps of a counter that starts again from 0 go on.
+    """Unwrap the stamps of a counter.
 
-    A step back by more than half of ``wraps`` is a new start. A step forward by more than half
-    is a record from before the start that comes late, or a damaged stamp, which so harms itself
-    alone.
+    A step back by more than half of ``wraps`` is a wrap. A step forward by more than half is a late
+    record from before the wrap, or a damaged stamp, which then does not affect the others.
 
     Parameters
     ----------
     stamps : ndarray of int or float
         The next stamps, as written; NaN where one is missing.
     wraps : float
-        Where the counter starts again from 0, in the unit of the stamps.
+        Value at which the counter wraps to 0, in the unit of the stamps.
     state : WrapState
-        Carried on from block to block; changed in place.
+        State between blocks; changed in place.
 
     Returns
     -------
     ndarray
-        int64 for whole numbers, with no digit lost; else float64, NaN where it was NaN.
+        int64 for integers, exact; else float64, NaN where the stamp is NaN.
     """
     whole = stamps.dtype.kind in "iu" and float(wraps).is_integer()
     going_on = stamps.astype(np.int64 if whole else np.float64)
@@ -112,8 +111,8 @@ def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[A
 def date_of(nanoseconds: int) -> str | None:
     """Return ISO 8601 date and time (UTC) of ns since 1970.
 
-    None where the figure lies outside the years 2001 to 2099: then it counts from something
-    else, such as the start of the device or of a simulation.
+    None outside of the years 2001 to 2099: the stamps then count from another origin, such as the
+    start of the device or of a simulation.
     """
     if not _YEAR_2001 <= nanoseconds < _YEAR_2100:
         return None
@@ -123,8 +122,8 @@ def date_of(nanoseconds: int) -> str | None:
 def date_of_stamp(first: float, source: TimeSource) -> str | None:
     """Return ISO 8601 date and time (UTC) of a numeric stamp, as `date_of` does.
 
-    ``first``: as written, in ticks of ``source``; integer ns lose no digit.
-    ``source``: its unit and scale; None is returned for a count of samples.
+    ``first``: stamp as written, in ticks of ``source``; integer ns are exact.
+    ``source``: unit and scale; the result is None for a count of samples.
     """
     if source.unit not in SECONDS:
         return None

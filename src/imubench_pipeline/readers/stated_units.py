@@ -1,4 +1,4 @@
-"""Units that logs state themselves, held against those that the sensor file states."""
+"""Find the units that logs state, and compare them with those of the sensor file."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, ColumnSource
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import UnitError, conversion
 
-_LONGEST = 24
-_TAILS = 6
+_MAX_UNIT_LENGTH = 24
+_MAX_TAILS = 6
 _BRACKETED = re.compile(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]")
 _SEPARATOR = re.compile(r"[\s_,:;|./-]+")
-_PLAIN = re.compile(r"(?:[^\W\d_]|[°º²µμ·*/^() -]|(?<!\d)[1-3](?!\d))+")
-"""What is handed on to be read as a unit: the names in a file may be anything."""
+_UNIT_CHARACTERS = re.compile(r"(?:[^\W\d_]|[°º²µμ·*/^() -]|(?<!\d)[1-3](?!\d))+")
+"""Texts that are parsed as a unit; names in a file may have any characters."""
 
 _PER = r"[ _/.]*(?:p|per)?[ _/.]*"
-_SPELLED: dict[str, tuple[tuple[str, str], ...]] = {
+_SPELLINGS: dict[str, tuple[tuple[str, str], ...]] = {
     "angular_rate": (
         (rf"mrads?{_PER}s(?:ec)?(?:ond)?", "mrad/s"),
         (rf"(?:rads?|radians?){_PER}s(?:ec)?(?:ond)?", "rad/s"),
@@ -45,7 +45,7 @@ _SPELLED: dict[str, tuple[tuple[str, str], ...]] = {
 
 
 def unit_of(text: str, dimension: str) -> str | None:
-    """Return the unit that a text is, as a sensor file may state it.
+    """Return the unit of a text, in the notation of a sensor file.
 
     Parameters
     ----------
@@ -57,15 +57,20 @@ def unit_of(text: str, dimension: str) -> str | None:
     Returns
     -------
     str or None
-        None: it is no unit of that dimension that is known.
+        None: the text is no known unit of this dimension.
     """
     text = text.strip()
-    if not text or len(text) > _LONGEST:
+    if not text or len(text) > _MAX_UNIT_LENGTH:
         return None
-    for pattern, unit in _SPELLED[dimension]:
+    for pattern, unit in _SPELLINGS[dimension]:
         if re.fullmatch(pattern, text, re.IGNORECASE):
             return unit
-    if dimension == "time" or not _PLAIN.fullmatch(text) or text.count("^") > 1 or "**" in text:
+    if (
+        dimension == "time"
+        or not _UNIT_CHARACTERS.fullmatch(text)
+        or text.count("^") > 1
+        or "**" in text
+    ):
         return None
     try:
         conversion(text, dimension)
@@ -75,17 +80,17 @@ def unit_of(text: str, dimension: str) -> str | None:
 
 
 def divided(label: str, dimension: str) -> tuple[str, str | None]:
-    """Divide a name such as ``Gyroscope x (rad/s)`` or ``accel_x_m_s2`` into name and unit.
+    """Split a name such as ``Gyroscope x (rad/s)`` or ``accel_x_m_s2`` into name and unit.
 
     Parameters
     ----------
     dimension : str
-        Of the unit that is looked for.
+        Dimension of the unit that is searched.
 
     Returns
     -------
     name : str
-        Without the unit, and without what stands in brackets and is no number.
+        Name without the unit, and without texts in brackets except numbers.
     unit : str or None
     """
     unit = next((unit for text in bracketed(label) if (unit := unit_of(text, dimension))), None)
@@ -93,7 +98,7 @@ def divided(label: str, dimension: str) -> tuple[str, str | None]:
         lambda bracket: bracket[0] if bracket[1].strip().isdigit() else " ", label
     )
     if unit is None:
-        for start, tail in _tails(name):
+        for start, tail in _list_tails(name):
             unit = unit_of(tail, dimension)
             if unit is not None:
                 return name[:start], unit
@@ -101,48 +106,48 @@ def divided(label: str, dimension: str) -> tuple[str, str | None]:
 
 
 def bracketed(label: str) -> list[str]:
-    """Return what stands in brackets in a name and is no number."""
+    """Return the texts in brackets in a name that are no numbers."""
     return [text for text in _BRACKETED.findall(label) if text.strip() and not text.isdigit()]
 
 
-def _tails(name: str) -> Iterator[tuple[int, str]]:
-    """Yield what stands behind each separator, the longest first, and where."""
+def _list_tails(name: str) -> Iterator[tuple[int, str]]:
+    """Yield position and text after each separator of a name, the longest text first."""
     text = name.rstrip()
-    begin = max(len(text) - _LONGEST, 0)
+    begin = max(len(text) - _MAX_UNIT_LENGTH, 0)
     places = [begin + separator.end() for separator in _SEPARATOR.finditer(text[begin:])]
-    for place in places[-_TAILS:]:
+    for place in places[-_MAX_TAILS:]:
         if 0 < place < len(text):
             yield place, text[place:]
 
 
-_OTHER = 1.5
-"""Ratio of two units that are not the same: the nearest ones, mg and cm/s², are 1.02 apart, and no
-logger writes both; then come mrad/s and °/s, 17 apart. A scale may hold a calibration."""
+_MIN_FACTOR_OF_OTHER_UNIT = 1.5
+"""Least ratio of two different units. The ratio of mg and cm/s² is 1.02, but no logger uses both;
+the next one, of mrad/s and °/s, is 17. Smaller ratios may be a calibration in ``scale``."""
 
-_LONGEST_NAME = 60
+_MAX_SHOWN_NAME = 60
 
 
 @dataclass(frozen=True)
 class StatedUnit:
-    """The unit of a channel as the log itself states it."""
+    """The unit of a channel that the log states."""
 
     unit: str
-    """As a sensor file would state it."""
+    """Unit in the notation of a sensor file."""
     where: str
     """The place in the log."""
 
 
 def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit | None:
-    """Return the unit that a log states of a channel; None: none that is understood.
+    """Return the unit that a log states for a channel; None if there is no known unit.
 
     Parameters
     ----------
     channel : str
-        Or what is beside channels, of which nothing is returned.
+        Channel or additional column; the result is None for the latter.
     text, where : str
-        What stands where units do, and where that is.
+        Text in the place of the unit, and a description of this place.
     label : str
-        The name of the column, which may have the unit in it.
+        Name of the column, which may contain the unit.
     """
     if channel not in CHANNELS:
         return None
@@ -151,22 +156,22 @@ def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit
     if unit is not None:
         return StatedUnit(unit, where)
     unit = unit_of(label, dimension) or divided(label, dimension)[1]
-    return None if unit is None else StatedUnit(unit, f"the name {label[:_LONGEST_NAME]!r}")
+    return None if unit is None else StatedUnit(unit, f"the name {label[:_MAX_SHOWN_NAME]!r}")
 
 
 def contradictions(
     file: str, sources: Mapping[str, ColumnSource], units: Mapping[str, StatedUnit]
 ) -> list[Finding]:
-    """Return the channels of which log and sensor file state units that are not the same.
+    """Return findings on channels for which log and sensor file state different units.
 
     Parameters
     ----------
     file : str
         Name of the log.
     sources : mapping of str to ColumnSource
-        What the sensor file states.
+        Columns of the sensor file.
     units : mapping of str to StatedUnit
-        What the log states.
+        Units that the log states.
     """
     findings = []
     for channel, in_log in units.items():
@@ -174,7 +179,7 @@ def contradictions(
         dimension = QUANTITIES[quantity_of(channel)]
         read = conversion(source.unit, dimension)[0] * abs(source.scale)
         factor = conversion(in_log.unit, dimension)[0] / read
-        if 1.0 / _OTHER < factor < _OTHER:
+        if 1.0 / _MIN_FACTOR_OF_OTHER_UNIT < factor < _MIN_FACTOR_OF_OTHER_UNIT:
             continue
         scaled = "" if source.scale == 1 else f", times {source.scale:g}"
         detail = (

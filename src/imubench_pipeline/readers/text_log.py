@@ -1,4 +1,4 @@
-"""Simulated logs as text, written as the logger of their sensor would write them."""
+"""Write simulated logs as text, in the format of the logger of their sensor."""
 
 from __future__ import annotations
 
@@ -24,30 +24,31 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.units import conversion
 
 _DECIMALS = 12
-"""The digits beyond are of the arithmetic, and twice the size of the file."""
+"""Decimals that are written; more are rounding errors, and would double the size of the file."""
 
 
 class TextLog:
-    """A text file that is written in the layout of a sensor's logs.
+    """A text file in the layout of the logs of a sensor.
 
     Parameters
     ----------
     path : Path
     log : LogFormat
-        Delimiter, comments, lines to skip and stamps.
+        Format with delimiter, comments, skipped lines and stamps.
     sources : mapping of str to ColumnSource
         Column, unit, scale and offset of each channel, and of ``temperature``, of this file.
     rate : float
         Hz.
     remarks : iterable of str
-        Comments at its top, under the mark of a simulated log, where its layout has comments.
+        Comments at its top, below the mark of a simulated log, if the layout has comments.
     kind : dtype
-        Of the numbers: float32 has seven digits, far finer than the noise, and half the text.
+        Type of the numbers: float32 has seven digits, far finer than the noise, and halves the
+        text.
 
     Raises
     ------
     ConfigError
-        If its stamps are no plain numbers.
+        If its stamps are not simple numbers.
     """
 
     def __init__(
@@ -61,8 +62,8 @@ class TextLog:
     ) -> None:
         self._log, self._sources, self._rate, self._kind = log, sources, rate, kind
         self._written = 0
-        self._seconds = self._stamped()
-        self._names = self._layout()
+        self._seconds = self._find_stamp_unit()
+        self._names = self._list_columns()
         delimiter = log.delimiter or ","
         self._options = pacsv.WriteOptions(
             include_header=False, delimiter=delimiter, quoting_style="none"
@@ -98,7 +99,7 @@ class TextLog:
         pacsv.write_csv(table, self._file, self._options)
         self._written += count
 
-    def _stamped(self) -> float:
+    def _find_stamp_unit(self) -> float:
         """Return the unit of the stamps in s."""
         time = self._log.time
         if time is None:
@@ -109,7 +110,7 @@ class TextLog:
             )
         return SECONDS[time.unit] * time.scale
 
-    def _layout(self) -> list[str]:
+    def _list_columns(self) -> list[str]:
         """Return the names of the columns of the file in order."""
         placed: dict[str | int, str] = {}
         if self._log.time is not None:

@@ -1,18 +1,17 @@
-"""u-blox UBX logs: the inertial sensors of a receiver, in ESF-MEAS or ESF-RAW.
+"""Read u-blox UBX logs: the inertial sensors of a receiver, in ESF-MEAS or ESF-RAW.
 
 Columns are ``gyro_x`` ``gyro_y`` ``gyro_z`` in deg/s, ``accel_x`` ``accel_y`` ``accel_z`` in
-m/s^2 and ``temperature`` in degC: state these units in the sensor file. A log that holds both
-messages needs ``variable: ESF-RAW`` or ``variable: ESF-MEAS`` with each column.
+m/s^2 and ``temperature`` in degC: state these units in the sensor file. A log with both messages
+needs ``variable: ESF-RAW`` or ``variable: ESF-MEAS`` with each column.
 
-The time column is ``time_tag``, with ``unit: ms``. ESF-MEAS writes ms (unless the receiver is
-set to another factor; the unit is then that). ESF-RAW writes ticks of a unit that u-blox does
-not state; they are taken as 1/25.6 ms, which is that of the sensor inside (Bosch), and given in
-ms. Where that is wrong, ``sTtag`` is the count as written. Tags start again from 0 at 32 bits,
-and at 24 bits where ESF-RAW passes the tag of the sensor through: both are seen by themselves
-unless ``wraps`` says otherwise.
+The time column is ``time_tag``, with ``unit: ms``. ESF-MEAS writes ms, unless the receiver is
+configured for another unit. ESF-RAW writes ticks of a unit that u-blox does not state. They are
+assumed to be 1/25.6 ms, the tick of the sensor inside (Bosch), and converted to ms. If that is
+wrong, ``sTtag`` is the count as written. Tags wrap at 32 bits, or at 24 bits if ESF-RAW forwards
+the tag of the sensor: both are detected, unless ``wraps`` is stated.
 
-ESF-MEAS writes gyro and accelerometer in messages of their own, some ms apart. One of each makes
-a record, with the stamp of the first.
+ESF-MEAS writes gyro and accelerometer in separate messages, some ms apart. One of each makes a
+record, with the stamp of the first.
 """
 
 from __future__ import annotations
@@ -40,8 +39,8 @@ from imubench_pipeline.readers.stamps import WrapState, unwrapped
 from imubench_pipeline.readers.ubx_frames import Frames
 from imubench_pipeline.tables.findings import RecordingError
 
-_MEAS, RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
-KINDS = {_MEAS: "ESF-MEAS", RAW: "ESF-RAW"}
+_ESF_MEAS, ESF_RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
+KINDS = {_ESF_MEAS: "ESF-MEAS", ESF_RAW: "ESF-RAW"}
 """The messages that are read, by class and id."""
 
 COLUMNS: dict[str, tuple[int, float]] = {
@@ -53,22 +52,22 @@ COLUMNS: dict[str, tuple[int, float]] = {
     "accel_z": (18, 2.0**-10),
     "temperature": (12, 1e-2),
 }
-"""Data type of each column, and what one count is in its unit."""
+"""Data type of each column, and scale of one count in its unit."""
 
 UNITS = {"gyro": "deg/s", "accel": "m/s^2", "temperature": "degC"}
 """Unit of each quantity."""
 
 TICK_MS = 5 / 128
-"""1/25.6, which float64 holds exactly."""
+"""Length of a tick, ms: 1/25.6, which is exact in float64."""
 
-_LEAST_ZEROS = 512
-"""Bytes of a sector; fewer of them may be a part of a message."""
+_MIN_ZEROS = 512
+"""Least run of zero bytes that is reported, a sector; shorter runs may be part of a message."""
 
 _BATCH_WORDS = 1 << 17
-_LOOKED_AT = 1 << 20
-_LONGEST_HOLE_TICKS = 256_000
-_NEVER = 2.0**62
-_LONGEST_LOG = 1e9
+_MIN_PROBED_BYTES = 1 << 20
+_MAX_HOLE_TICKS = 256_000
+_NO_WRAP = 2.0**62
+_MAX_LOG_LENGTH = 1e9
 
 
 class UbxFile(LogFile):
@@ -81,10 +80,10 @@ class UbxFile(LogFile):
         self._check_columns()
         kind = self._kind()
         self._check_time(kind)
-        frames = Frames(blocks(self.path, self.findings, _LEAST_ZEROS))
+        frames = Frames(blocks(self.path, self.findings, _MIN_ZEROS))
         words = Words(kind, self._columns())
         clock = _Clock(self, kind)
-        records = _Records(len(self._columns()))
+        records = _RecordGrouper(len(self._columns()))
         rows = 0
         for key, payload in frames:
             if key == kind:
@@ -101,7 +100,7 @@ class UbxFile(LogFile):
         self._report(kind, words, frames, rows)
 
     def _batch(
-        self, words: Words, clock: _Clock, records: _Records, ended: bool
+        self, words: Words, clock: _Clock, records: _RecordGrouper, ended: bool
     ) -> Iterator[Batch]:
         columns, values, tags, places = words.drained()
         table, stamps = records.grouped(columns, values, clock.stamps(tags, places), ended)
@@ -118,7 +117,7 @@ class UbxFile(LogFile):
     # -------------------------------------------------------------- what the sensor file says
 
     def _columns(self) -> list[str]:
-        """Return the columns that are wanted, each once."""
+        """Return the required columns, each once."""
         return list(dict.fromkeys(str(source.column) for source in self.sources.values()))
 
     def _check_columns(self) -> None:
@@ -133,13 +132,13 @@ class UbxFile(LogFile):
         time = self.log.time
         if time is None:
             return
-        columns = ("time_tag", "sTtag") if kind == RAW else ("time_tag",)
+        columns = ("time_tag", "sTtag") if kind == ESF_RAW else ("time_tag",)
         if time.column not in columns:
             raise RecordingError(
                 f"{self.path.name}: no time column {time.column!r}; {KINDS[kind]} has "
                 f"{' and '.join(columns)}; mend 'column' of 'time' in the sensor file"
             )
-        in_ms = kind == RAW and time.column == "time_tag"
+        in_ms = kind == ESF_RAW and time.column == "time_tag"
         if time.format is not None or (in_ms and time.unit != "ms"):
             raise RecordingError(
                 f"{self.path.name}: {time.column} of {KINDS[kind]} is "
@@ -147,7 +146,7 @@ class UbxFile(LogFile):
             )
 
     def _kind(self) -> bytes:
-        """Return class and id of the one message that the columns are taken from."""
+        """Return class and id of the message with the columns."""
         stated = {source.variable for source in self.sources.values()} - {None}
         kinds = [key for key, name in KINDS.items() if name in stated]
         if len(stated) > 1 or len(kinds) != len(stated):
@@ -158,7 +157,7 @@ class UbxFile(LogFile):
         if kinds:
             return kinds[0]
         words = {key: Words(key, self._columns()) for key in KINDS}
-        frames = Frames(blocks(self.path, [], _LEAST_ZEROS))
+        frames = Frames(blocks(self.path, [], _MIN_ZEROS))
         for number, (key, payload) in enumerate(frames):
             if key in words:
                 words[key].add(payload)
@@ -182,15 +181,17 @@ class UbxFile(LogFile):
             f"{self.path.name}: found {types or 'no ESF-MEAS and no ESF-RAW'} among "
             f"{frames.right.total()} UBX messages (class and id {frames.kinds()}), "
             f"{frames.wrong.total()} with a wrong checksum; expected the data types of "
-            f"{_types_of(self._columns())}; switch ESF-RAW or ESF-MEAS on in the receiver, or "
-            "mend 'column' in the sensor file"
+            f"{_describe_types(self._columns())}; switch ESF-RAW or ESF-MEAS on in the "
+            "receiver, or mend 'column' in the sensor file"
         )
 
     def _is_clear(self, frames: Frames, words: dict[bytes, Words]) -> bool:
-        """Tell whether the log so far says where the columns are."""
+        """Return whether the log read so far is enough to choose the message."""
         for of_kind in words.values():
             of_kind.drained()
-        return frames.read > _LOOKED_AT and any(of_kind.present for of_kind in words.values())
+        return frames.read > _MIN_PROBED_BYTES and any(
+            of_kind.present for of_kind in words.values()
+        )
 
     # ----------------------------------------------------------------------------- findings
 
@@ -201,7 +202,7 @@ class UbxFile(LogFile):
             raise RecordingError(
                 f"{self.path.name}: found {frames.right[kind]} {name} messages with data types "
                 f"{words.types() or 'none'}, {frames.wrong[kind]} with a wrong checksum; expected "
-                f"{_types_of(absent)}; mend 'column' or 'variable' in the sensor file"
+                f"{_describe_types(absent)}; mend 'column' or 'variable' in the sensor file"
             )
         shifts = (
             ""
@@ -217,18 +218,18 @@ class UbxFile(LogFile):
             self.note("incomplete_last_record", detail, cut, "note")
 
 
-def _types_of(columns: list[str]) -> str:
+def _describe_types(columns: list[str]) -> str:
     return ", ".join(f"{COLUMNS[column][0]} ({column})" for column in columns)
 
 
 class Words:
-    """The measurements of the messages read so far that are not yet in a batch.
+    """Buffer of the measurements of messages that are not yet in a batch.
 
-    ``kind``: class and id of the messages; ``seen``: how often each data type was there.
+    ``kind``: class and id of the messages. ``seen``: number of measurements of each data type.
     """
 
     def __init__(self, kind: bytes, columns: list[str]) -> None:
-        self._raw = kind == RAW
+        self._raw = kind == ESF_RAW
         self._place = np.full(256, -1, np.int64)
         self._scale = np.array([COLUMNS[column][1] for column in columns])
         for place, column in enumerate(columns):
@@ -244,22 +245,22 @@ class Words:
 
     @property
     def present(self) -> bool:
-        """Whether a data type that is wanted was there."""
+        """Whether a required data type has occurred."""
         return bool(self.seen[self._place >= 0].any())
 
     def types(self) -> str:
-        """Say which data types were there."""
+        """Return the data types that have occurred, as text."""
         return ", ".join(map(str, np.flatnonzero(self.seen)))
 
     def add(self, payload: bytes) -> None:
-        """Take in the measurements of a message."""
+        """Add the measurements of a message."""
         if self._raw:
             count = max(len(payload) - 4, 0) // 8
             self._parts.append(payload[4 : 4 + 8 * count])
         else:
             flags = int.from_bytes(payload[4:6], "little")
             available = max(len(payload) - 8, 0) // 4
-            # Behind the measurements there may be one more word, a time of the receiver.
+            # The measurements may be followed by one more word, a time of the receiver.
             count = min(flags >> 11 or available - (flags >> 3 & 1), available)
             self._parts.append(payload[8 : 8 + 4 * max(count, 0)])
             self._counts.append(max(count, 0))
@@ -269,7 +270,7 @@ class Words:
     def drained(
         self,
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-        """Take out column, figure, tag and place of the measurements that are wanted."""
+        """Remove and return column, value, tag and index of the required measurements."""
         written = np.frombuffer(b"".join(self._parts), "<u4")
         if self._raw:
             words, tags = written[::2], written[1::2]
@@ -287,14 +288,14 @@ class Words:
 
 
 class _Clock:
-    """Makes the time tags go on, and finds the date."""
+    """Unwraps the time tags and finds the date."""
 
     def __init__(self, file: UbxFile, kind: bytes) -> None:
         self._file = file
         self._time = file.log.time
         column = None if self._time is None else self._time.column
-        self._tick = TICK_MS if kind == RAW and column == "time_tag" else 1
-        self._wraps: float | None = 2.0**32 if kind == _MEAS else None
+        self._tick = TICK_MS if kind == ESF_RAW and column == "time_tag" else 1
+        self._wraps: float | None = 2.0**32 if kind == _ESF_MEAS else None
         if self._time is not None and self._time.wraps is not None:
             self._wraps = self._time.wraps / self._tick
         self._state = WrapState()
@@ -302,7 +303,7 @@ class _Clock:
         self.first: Any = None
 
     def note_date(self, payload: bytes, place: int) -> None:
-        """Remember the date of a NAV-PVT message that comes before the word at a place."""
+        """Store the date of a NAV-PVT message that precedes the word with this index."""
         if self._time is None or self._file.started or self._date or len(payload) < 12:
             return
         year, (month, day, hour, minute, second, valid) = payload[4:6], payload[6:12]
@@ -314,12 +315,12 @@ class _Clock:
             self._date = date, place
 
     def stamps(self, tags: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[Any]:
-        """Return the stamps of tags, in the unit that the sensor file states."""
+        """Return unwrapped stamps from tags, in the unit of the sensor file."""
         if not len(tags) or self._time is None:
             return tags
         if self._wraps is None:
-            self._wraps = _wrap_of(tags, self._state.last)
-        stamps = unwrapped(tags, self._wraps or _NEVER, self._state) * self._tick
+            self._wraps = _guess_wrap(tags, self._state.last)
+        stamps = unwrapped(tags, self._wraps or _NO_WRAP, self._state) * self._tick
         if self.first is None:
             self.first = stamps[0]
         if self._date is not None:
@@ -327,25 +328,25 @@ class _Clock:
             index = min(int(np.searchsorted(places, place)), len(stamps) - 1)
             passed = float(self._file.seconds(stamps[index : index + 1], self.first)[0])
             self._date = None
-            if abs(passed) < _LONGEST_LOG:
+            if abs(passed) < _MAX_LOG_LENGTH:
                 started = date - timedelta(seconds=passed)
                 self._file.started = started.isoformat(timespec="milliseconds")
         return stamps
 
 
-def _wrap_of(tags: NDArray[np.int64], last: int | None) -> float | None:
-    """Return where tags start again from 0; None where they do not, or it cannot be told."""
+def _guess_wrap(tags: NDArray[np.int64], last: int | None) -> float | None:
+    """Return the value at which tags wrap to 0; None if they do not, or if it is unknown."""
     if tags.max() >= 1 << 24:
         return 2.0**32
     before = np.concatenate(([tags[0] if last is None else last], tags[:-1]))
     falls = np.flatnonzero(tags - before < -(1 << 23))
-    # A receiver that was restarted has no reason to stop just short of 24 bits.
+    # After a restart of the receiver, the last tag would not be just below 24 bits.
     passed = tags[falls] + (1 << 24) - before[falls]
-    return 2.0**24 if len(falls) and passed[0] <= _LONGEST_HOLE_TICKS else None
+    return 2.0**24 if len(falls) and passed[0] <= _MAX_HOLE_TICKS else None
 
 
-class _Records:
-    """Puts the measurements of one time into one record."""
+class _RecordGrouper:
+    """Groups the measurements of one time to a record."""
 
     def __init__(self, width: int) -> None:
         self._open = np.full(width, np.nan)
@@ -364,9 +365,9 @@ class _Records:
             self._stamp = np.zeros(1, stamps.dtype)
         table = np.empty((len(columns) + 1, len(self._open)))
         times = np.empty(len(columns) + 1, stamps.dtype)
-        # Stamps are passed on, whole or not, and so are their bits: one kernel for both.
+        # Stamps are only copied, so that one kernel on their bits serves integers and floats.
         bits = (each.view(np.int64) for each in (stamps, self._stamp, times))
-        count = _group(columns, values, self._open, self._state, table, *bits)
+        count = _group_records(columns, values, self._open, self._state, table, *bits)
         if ended and self._state[1]:
             table[count], times[count] = self._open, self._stamp[0]
             count += 1
@@ -374,7 +375,7 @@ class _Records:
 
 
 @njit(cache=True, nogil=True)
-def _group(
+def _group_records(
     columns: NDArray[np.int64],
     values: NDArray[np.float64],
     row: NDArray[np.float64],
@@ -384,10 +385,10 @@ def _group(
     row_stamp: NDArray[np.int64],
     times: NDArray[np.int64],
 ) -> int:
-    """Fill records; return how many are complete.
+    """Fill records; return the number of complete ones.
 
-    A record begins with the column that the log begins with, and with a column that comes again
-    (that one was lost then). ``state``: the leading column, and whether a record is open.
+    A record begins with the first column of the log, or with a column that repeats (the first
+    column was lost then). ``state``: the first column, and whether a record is open.
     """
     count = 0
     for i in range(columns.size):
@@ -395,7 +396,7 @@ def _group(
         if state[0] < 0:
             state[0] = column
         if state[1] and (column == state[0] or not math.isnan(row[column])):
-            for j in range(row.size):  # an assignment to a slice takes longer to compile than all
+            for j in range(row.size):  # a slice assignment takes longer to compile than the rest
                 table[count, j] = row[j]
                 row[j] = math.nan
             times[count] = row_stamp[0]
@@ -408,39 +409,44 @@ def _group(
     return count
 
 
-# ----------------------------------------------------------------------- what a log holds
+# ------------------------------------------------------------------------- inspection
 
-_DESCRIBED_IN, _LOOKED_FOR = 1 << 22, 1 << 26
-"""Bytes after which a log is known, and those in which a first message is looked for."""
+_MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 22, 1 << 26
+"""Bytes that are examined after a first message was found, and bytes searched for it."""
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return a table for each message that holds inertial figures.
+    """Return a table for each kind of message with inertial data.
 
     Raises
     ------
     RecordingError
-        If there is none.
+        If there is no such message.
     """
     names = list(COLUMNS)
     words = {kind: Words(kind, names) for kind in KINDS}
-    frames = Frames(blocks(path, [], _LEAST_ZEROS))
+    frames = Frames(blocks(path, [], _MIN_ZEROS))
     for key, payload in frames:
         if key in words and len(words[key]) < MAX_EXAMINED_RECORDS * len(names):
             words[key].add(payload)
-        if frames.read > (_DESCRIBED_IN if any(map(len, words.values())) else _LOOKED_FOR):
+        if frames.read > (
+            _MAX_DESCRIBED_BYTES if any(map(len, words.values())) else _MAX_SEARCHED_BYTES
+        ):
             break
     present = [kind for kind in KINDS if len(words[kind])]
-    described = [_table(file_format, kind, words[kind], frames) for kind in present]
+    described = [_describe_messages(file_format, kind, words[kind], frames) for kind in present]
     if not any(table.columns for table in described):
         raise RecordingError(
-            f"{path.name}: no inertial figures in ESF-MEAS or ESF-RAW among {frames.right.total()} "
-            f"UBX messages (class and id {frames.kinds()}); switch ESF-RAW on in the receiver"
+            f"{path.name}: no inertial figures in ESF-MEAS or ESF-RAW among "
+            f"{frames.right.total()} UBX messages (class and id {frames.kinds()}); "
+            "switch ESF-RAW on in the receiver"
         )
-    return sorted(described, key=lambda table: table.name != KINDS[RAW])
+    return sorted(described, key=lambda table: table.name != KINDS[ESF_RAW])
 
 
-def _table(file_format: FileFormat, kind: bytes, words: Words, frames: Frames) -> LogTable:
+def _describe_messages(
+    file_format: FileFormat, kind: bytes, words: Words, frames: Frames
+) -> LogTable:
     """Describe one kind of message."""
     places, figures, tags, _ = words.drained()
     name = KINDS[kind]
@@ -452,9 +458,9 @@ def _table(file_format: FileFormat, kind: bytes, words: Words, frames: Frames) -
             columns.append(LogColumn(column, column, "number", shown(values), values, unit))
     if columns:
         first = tags[places == places[0]].astype(np.float64)
-        ticks = first * TICK_MS if kind == RAW else first
+        ticks = first * TICK_MS if kind == ESF_RAW else first
         columns.append(LogColumn("time_tag", "time_tag", "number", shown(ticks), ticks, "ms"))
-        if kind == RAW:
+        if kind == ESF_RAW:
             columns.append(LogColumn("sTtag", "sTtag", "number", shown(first), first))
     about = f"{frames.right[kind]} messages at the beginning"
     return LogTable(file_format, name, tuple(columns), variable=name, about=about)

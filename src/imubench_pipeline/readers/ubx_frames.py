@@ -1,4 +1,4 @@
-"""Bytes of a u-blox receiver -> UBX messages, by their checksums."""
+"""Extract UBX messages from the bytes of a u-blox receiver, and verify their checksums."""
 
 from __future__ import annotations
 
@@ -7,22 +7,24 @@ from collections.abc import Iterator
 
 import numpy as np
 
-_SYNC = b"\xb5\x62"
-_AROUND = 8
-"""Bytes of a message beside its payload: sync, class and id, length, checksum."""
+_SYNC_BYTES = b"\xb5\x62"
+_OVERHEAD = 8
+"""Bytes of a message without its payload: sync, class and id, length, checksum."""
 
-_CLASSES = frozenset(b"\x01\x02\x03\x04\x05\x06\x09\x0a\x0b\x0c\x0d\x10\x13\x21\x27\x28\x2a")
-"""Those that u-blox uses; what else follows the first two bytes is no message."""
+_MESSAGE_CLASSES = frozenset(
+    b"\x01\x02\x03\x04\x05\x06\x09\x0a\x0b\x0c\x0d\x10\x13\x21\x27\x28\x2a"
+)
+"""Classes that u-blox uses; any other byte after the sync bytes is no message."""
 
 
 class Frames:
-    """The UBX messages in blocks of bytes: class and id, and payload; iterated over once.
+    """Iterator over UBX messages in blocks of bytes: class and id, and payload.
 
-    NMEA and RTCM between them are passed over. After a damaged message, the search goes on
-    behind its first bytes, since its length may be wrong.
+    NMEA and RTCM in between are skipped. After a damaged message the search continues after its
+    sync bytes, since its length may be wrong.
 
-    ``right``, ``wrong`` and ``cut`` count, by class and id, messages, those with a wrong checksum,
-    and those that reach beyond the end of the log; ``read``: bytes read so far.
+    ``right``, ``wrong`` and ``cut``: number of messages by class and id that are valid, have a
+    wrong checksum, or extend beyond the end of the log. ``read``: number of bytes read so far.
     """
 
     def __init__(self, source: Iterator[bytes]) -> None:
@@ -44,14 +46,14 @@ class Frames:
             ended = not block
             self.read += len(block)
             data += block
-            first, second = _sums(data)
+            first, second = _cumulate_checksums(data)
             at = 0
-            while (sync := data.find(_SYNC, at)) >= 0:
+            while (sync := data.find(_SYNC_BYTES, at)) >= 0:
                 at = sync
-                if len(data) > at + 2 and data[at + 2] not in _CLASSES:
+                if len(data) > at + 2 and data[at + 2] not in _MESSAGE_CLASSES:
                     at += 2
                     continue
-                end = at + _AROUND + int.from_bytes(data[at + 4 : at + 6], "little")
+                end = at + _OVERHEAD + int.from_bytes(data[at + 4 : at + 6], "little")
                 if end > len(data):
                     if not ended:
                         break
@@ -69,15 +71,16 @@ class Frames:
                     self.wrong[key] += 1
                     at += 2
             else:
-                # The last byte may be the first one of the next message.
+                # The last byte may be the first byte of the next message.
                 at = max(at, len(data) - 1)
             data = data[at:]
 
 
-def _sums(data: bytes) -> tuple[bytes, bytes]:
-    """Return the sums of all bytes before each place, and the sums of these, modulo 256.
+def _cumulate_checksums(data: bytes) -> tuple[bytes, bytes]:
+    """Return the sums of all bytes before each position, and the sums of these, modulo 256.
 
-    Those of a message are their differences: what begins as a message and is none costs nothing.
+    The checksum of a message (8-bit Fletcher) follows from differences of the sums. False sync
+    bytes therefore cost no time.
     """
     first = np.cumsum(np.frombuffer(data, np.uint8), dtype=np.uint8)
     second = np.cumsum(first, dtype=np.uint8)

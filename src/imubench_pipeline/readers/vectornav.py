@@ -1,14 +1,14 @@
-"""VectorNav ASCII output: asynchronous sentences such as ``$VNYMR,...*68``.
+"""Read VectorNav ASCII output: asynchronous sentences such as ``$VNYMR,...*68``.
 
 Columns are named as in `FIELDS`, with or without the name of the sentence: ``gyro_x`` or
-``VNYMR.gyro_x``. The name is needed only in a log that holds several sentences with that column.
+``VNYMR.gyro_x``. The name is needed only in a log with several sentences with that column.
 
 gyro is in rad/s, accel in m/s^2, temperature in degC as the device writes it. Time columns:
-``host_time``, what a logging host wrote before the ``$``; ``counter``, the figure after ``T`` that
-the device appends on request (SerialCount).
+``host_time``, a stamp of the logging host before the ``$``; ``counter``, the number after ``T``
+that the device appends on request (SerialCount).
 
-VNISL and VNISE are estimates of a filter, not measurements, and VNDTV holds increments: they are
-passed over.
+VNISL and VNISE are estimates of a filter, not measurements, and VNDTV has increments: they are
+skipped.
 """
 
 from __future__ import annotations
@@ -41,63 +41,67 @@ from imubench_pipeline.readers.text.cells import is_number
 from imubench_pipeline.readers.text.stamps import StampError, stamps_of
 from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
 
-_APPENDED = re.compile(rb"(?:,S[0-9A-Fa-f]{4})?(?:,T(\d{1,18}))?$")
-"""What the device appends on request: a status, and a counter or time."""
+_APPENDED_FIELDS = re.compile(rb"(?:,S[0-9A-Fa-f]{4})?(?:,T(\d{1,18}))?$")
+"""Fields that the device appends on request: a status, and a counter or time."""
 
-_BYTE = {form % value: value for value in range(256) for form in (b"%02X", b"%02x")}
+_HEX_VALUES = {form % value: value for value in range(256) for form in (b"%02X", b"%02x")}
 
 
-def _axes(*names: str) -> tuple[str, ...]:
+def _make_axis_names(*names: str) -> tuple[str, ...]:
     return tuple(f"{name}_{axis}" for name in names for axis in "xyz")
 
 
-_ATTITUDE = ("yaw", "pitch", "roll")
-_MEASURED = _axes("mag", "accel", "gyro")
+_ATTITUDE_FIELDS = ("yaw", "pitch", "roll")
+_MEASURED_FIELDS = _make_axis_names("mag", "accel", "gyro")
 FIELDS: dict[str, tuple[str, ...]] = {
-    "VNYMR": (*_ATTITUDE, *_MEASURED),
-    "VNQMR": ("quat_x", "quat_y", "quat_z", "quat_w", *_MEASURED),
-    "VNMAR": _MEASURED,
-    "VNIMU": (*_MEASURED, "temperature", "pressure"),
-    "VNCMV": (*_MEASURED, "temperature"),
-    "VNACC": _axes("accel"),
-    "VNGYR": _axes("gyro"),
-    "VNYBA": (*_ATTITUDE, *_axes("linear_accel", "gyro")),  # without gravity
-    "VNYIA": (*_ATTITUDE, *_axes("inertial_accel", "gyro")),  # in the frame of the Earth
+    "VNYMR": (*_ATTITUDE_FIELDS, *_MEASURED_FIELDS),
+    "VNQMR": ("quat_x", "quat_y", "quat_z", "quat_w", *_MEASURED_FIELDS),
+    "VNMAR": _MEASURED_FIELDS,
+    "VNIMU": (*_MEASURED_FIELDS, "temperature", "pressure"),
+    "VNCMV": (*_MEASURED_FIELDS, "temperature"),
+    "VNACC": _make_axis_names("accel"),
+    "VNGYR": _make_axis_names("gyro"),
+    "VNYBA": (*_ATTITUDE_FIELDS, *_make_axis_names("linear_accel", "gyro")),  # without gravity
+    "VNYIA": (
+        *_ATTITUDE_FIELDS,
+        *_make_axis_names("inertial_accel", "gyro"),
+    ),  # in the frame of the Earth
 }
-"""The fields of each sentence that holds angular rate or acceleration."""
+"""The fields of each sentence with angular rate or acceleration."""
 
 UNITS = {
-    **dict.fromkeys(_axes("gyro"), "rad/s"),
-    **dict.fromkeys(_axes("accel", "linear_accel", "inertial_accel"), "m/s^2"),
-    **dict.fromkeys(_ATTITUDE, "deg"),
-    **dict.fromkeys(_axes("mag"), "gauss"),
+    **dict.fromkeys(_make_axis_names("gyro"), "rad/s"),
+    **dict.fromkeys(_make_axis_names("accel", "linear_accel", "inertial_accel"), "m/s^2"),
+    **dict.fromkeys(_ATTITUDE_FIELDS, "deg"),
+    **dict.fromkeys(_make_axis_names("mag"), "gauss"),
     "temperature": "degC",
     "pressure": "kPa",
 }
-"""The unit that the format fixes for each field that has one."""
+"""The unit of each field, which the format fixes."""
 
 
 @dataclass(slots=True)
 class Row:
-    """One record: what stands before its sentence, its fields, and the counter it ends with."""
+    """One record: the text before its sentence, its fields, and the counter at its end."""
 
     before: bytes
     body: bytes
     counter: bytes = b""
 
 
-_LEAST_ZEROS = 16
-"""Bytes; fewer of them are noise of the line, and counted with the sentences that they damage."""
+_MIN_ZEROS = 16
+"""Least run of zero bytes that is reported; shorter runs are noise of the line, and are counted
+with the sentences that they damage."""
 
-_PIECES = re.compile(rb"[^$]{6,}")
-"""What may be a sentence, from behind its sign: what is shorter than its name is none."""
+_SENTENCE_CANDIDATES = re.compile(rb"[^$]{6,}")
+"""Text after a ``$`` that may be a sentence; shorter text has not even a name."""
 
-_MOST_NAMES, _LONGEST_SENTENCE_NAME = 1000, 32
-"""Names of other sentences that are kept, and letters of one."""
+_MAX_OTHER_NAMES, _MAX_SENTENCE_NAME = 1000, 32
+"""Largest number of stored names of other sentences, and length of a name."""
 
 
 class Sentences:
-    """Sorts the sentences of one kind from all else, and counts."""
+    """Extracts the sentences of one kind, and counts the other text."""
 
     def __init__(self, kind: str, stamped: bool) -> None:
         self._head = kind.encode() + b","
@@ -110,7 +114,7 @@ class Sentences:
         self.others: Counter[str] = Counter()
 
     def add(self, text: bytes) -> list[Row]:
-        """Return the records of some lines; one with an empty body is a missing sample."""
+        """Return the records in some lines; a record with an empty body is a missing sample."""
         befores: list[bytes] = []
         bodies: list[bytes] = []
         checks: list[bytes] = []
@@ -119,8 +123,8 @@ class Sentences:
             if not rest:
                 self.garbage += bool(line.strip(b"\r\0 \t"))
                 continue
-            # A sentence whose line break was lost runs into the next one.
-            pieces = _PIECES.findall(rest)
+            # Without its line break, a sentence is followed by the next one on the same line.
+            pieces = _SENTENCE_CANDIDATES.findall(rest)
             self.garbage += rest.count(b"$") + 1 - len(pieces)
             for piece in pieces:
                 body, _, check = piece.rpartition(b"*")
@@ -136,8 +140,8 @@ class Sentences:
                 self.right += 1
                 rows.append(self._row(before, body))
             elif good:
-                name = _name_of(body)
-                many = len(self.others) >= _MOST_NAMES and name not in self.others
+                name = _take_name(body)
+                many = len(self.others) >= _MAX_OTHER_NAMES and name not in self.others
                 self.others["..." if many else name] += 1
             elif body.startswith(self._head) or self._damaged_name(body):
                 self.wrong += 1
@@ -148,27 +152,27 @@ class Sentences:
         return rows
 
     def _damaged_name(self, body: bytes) -> bool:
-        """Tell whether this was a sentence of our kind: as many fields, and no known name."""
-        name = _name_of(body)
+        """Return whether this is a damaged sentence of our kind: right width, unknown name."""
+        name = _take_name(body)
         other = name in self.others or name in FIELDS
         return not other and body.count(b",") == self._commas
 
     def _row(self, before: bytes, body: bytes) -> Row:
         row = Row(before, body[len(self._head) :])
         if body.count(b",") != self._commas:
-            appended = _APPENDED.search(row.body)
+            appended = _APPENDED_FIELDS.search(row.body)
             if appended is not None:
                 row.counter = appended[1] or b""
                 row.body = row.body[: appended.start()]
         return row
 
 
-def _name_of(body: bytes) -> str:
-    return body[:_LONGEST_SENTENCE_NAME].partition(b",")[0].decode("ascii", "replace")
+def _take_name(body: bytes) -> str:
+    return body[:_MAX_SENTENCE_NAME].partition(b",")[0].decode("ascii", "replace")
 
 
 def position_of(kind: str, column: str | int) -> int:
-    """Return the place of a column in a kind of sentence, from 0; -1: it has no such column."""
+    """Return the position of a column in a kind of sentence, from 0; -1 if there is none."""
     fields = FIELDS[kind]
     if isinstance(column, int):
         return column - 1 if column <= len(fields) else -1
@@ -177,13 +181,13 @@ def position_of(kind: str, column: str | int) -> int:
 
 
 def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
-    """Yield the text of a log in blocks of whole lines.
+    """Yield the text of a log in blocks of complete lines.
 
-    A last line without its line break is kept if its checksum is right; else it was cut short
-    by the end of the recording, which is noted in ``findings``.
+    A last line without its line break is used if its checksum is right. Otherwise the end of the
+    recording truncated it, which is reported in ``findings``.
     """
     rest = b""
-    for block in blocks(path, findings, _LEAST_ZEROS):
+    for block in blocks(path, findings, _MIN_ZEROS):
         text = rest + block
         cut = text.rfind(b"\n") + 1
         rest = text[cut:]
@@ -206,15 +210,15 @@ def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
 
 
 def right_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:
-    """Tell which sentences have a right checksum: XOR of 8 bits, or CRC of 16."""
+    """Return which sentences have a right checksum: XOR of 8 bits, or CRC of 16 bits."""
     if not bodies:
         return []
-    # A zero byte before each changes no XOR, and makes each begin somewhere.
+    # A zero byte before each one does not change its XOR, and makes empty ones valid.
     joined = np.frombuffer(b"\0" + b"\0".join(bodies), np.uint8)
     lengths = np.fromiter(map(len, bodies), np.int64, len(bodies)) + 1
     sums = np.bitwise_xor.reduceat(joined, np.cumsum(lengths) - lengths).tolist()
     return [
-        _BYTE.get(check, -1) == xor
+        _HEX_VALUES.get(check, -1) == xor
         if len(check) != 4
         else b"%04X" % crc_hqx(body, 0) == check.upper()
         for xor, body, check in zip(sums, bodies, checks, strict=True)
@@ -224,24 +228,24 @@ def right_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:
 def fields_of(
     kind: str, rows: list[Row], positions: set[int]
 ) -> tuple[dict[int, NDArray[np.float64]], int]:
-    """Return some fields of some records by place, and how many sentences could not be read."""
+    """Return fields of records by position, and the number of unreadable sentences."""
     commas = len(FIELDS[kind]) - 1
     whole = [number for number, row in enumerate(rows) if row.body.count(b",") == commas]
     present = sum(1 for row in rows if row.body)
     fields = {position: np.full(len(rows), np.nan) for position in positions}
-    read, unread = _numbers([rows[number].body for number in whole], commas + 1, positions)
+    read, unread = _parse_numbers([rows[number].body for number in whole], commas + 1, positions)
     for position, values in read.items():
         fields[position][whole] = values
     return fields, unread + present - len(whole)
 
 
-def _numbers(
+def _parse_numbers(
     texts: list[bytes], width: int, positions: set[int]
 ) -> tuple[dict[int, NDArray[np.float64]], int]:
-    """Return some cells of lines of text, by place, and how many lines could not be read."""
+    """Return cells of lines of text by position, and the number of unreadable lines."""
     names = [str(position) for position in range(width)]
     wanted = [str(position) for position in sorted(positions)]
-    # Arrow takes no plus sign.
+    # Arrow does not accept a plus sign.
     joined = b"\n".join(texts).replace(b"+", b"")
     if texts and joined:
         try:
@@ -258,10 +262,10 @@ def _numbers(
         if table is not None and len(table) == len(texts):
             columns = {int(name): table.column(name).to_numpy() for name in wanted}
             return columns, 0
-    return _numbers_one_by_one(texts, positions)
+    return _parse_numbers_singly(texts, positions)
 
 
-def _numbers_one_by_one(
+def _parse_numbers_singly(
     texts: list[bytes], positions: set[int]
 ) -> tuple[dict[int, NDArray[np.float64]], int]:
     fields = {position: np.full(len(texts), np.nan) for position in positions}
@@ -277,11 +281,11 @@ def _numbers_one_by_one(
     return fields, unread
 
 
-_LOOKED_AT = 1000
-_NAMES, _LONGEST_NAME = 10, 12
-_ZONE = re.compile(rb"(Z|[+-]\d\d:?\d\d)$")
-AROUND_STAMP = b" \t,;:|[]()\"'\r\0"
-HOST, COUNTER = "host_time", "counter"
+_MAX_PROBED_SENTENCES = 1000
+_MAX_LISTED_NAMES, _MAX_SHOWN_NAME = 10, 12
+_ZONE_SUFFIX = re.compile(rb"(Z|[+-]\d\d:?\d\d)$")
+STAMP_PADDING = b" \t,;:|[]()\"'\r\0"
+HOST_TIME, COUNTER = "host_time", "counter"
 """The columns of time."""
 
 
@@ -322,7 +326,7 @@ class VectorNavFile(LogFile):
     # ---------------------------------------------------------------- which sentence it is
 
     def _kind(self) -> str:
-        """Return the one kind of sentence that the columns are taken from."""
+        """Return the kind of sentence with the columns."""
         wanted = [source.column for source in self.sources.values()]
         able = [kind for kind in FIELDS if all(position_of(kind, c) >= 0 for c in wanted)]
         if not able:
@@ -338,7 +342,7 @@ class VectorNavFile(LogFile):
         both = [kind for kind in able if kind in present]
         if len(both) == 1:
             return both[0]
-        seen = _listed(present) or "no sentence with a right checksum"
+        seen = _join_names(present) or "no sentence with a right checksum"
         if not both:
             raise RecordingError(
                 f"{self.path.name}: found {seen}; expected one of {', '.join(able)}, each with "
@@ -361,7 +365,7 @@ class VectorNavFile(LogFile):
                 for good, piece in zip(right, pieces, strict=True)
                 if good and piece[0]
             )
-            if names.total() >= _LOOKED_AT:
+            if names.total() >= _MAX_PROBED_SENTENCES:
                 break
         return set(names)
 
@@ -369,22 +373,22 @@ class VectorNavFile(LogFile):
 
     def _check_time(self) -> None:
         time = self.log.time
-        if time is not None and time.column not in (HOST, COUNTER):
+        if time is not None and time.column not in (HOST_TIME, COUNTER):
             raise RecordingError(
                 f"{self.path.name}: no time column {time.column!r}; a VectorNav log has "
-                f"{HOST!r}, a stamp before the '$', and {COUNTER!r}, the figure after 'T' at "
+                f"{HOST_TIME!r}, a stamp before the '$', and {COUNTER!r}, the figure after 'T' at "
                 "the end; mend 'column' of 'time', or drop 'time' and state 'rate'"
             )
 
     def _stamps(self, rows: list[Row]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Return the stamps of some records, and which of them are missing."""
+        """Return the stamps of some records, and a mask of the missing ones."""
         assert self.log.time is not None
         if self.log.time.column == COUNTER:
             texts = [row.counter for row in rows]
         else:
-            texts = [row.before.strip(AROUND_STAMP) for row in rows]
+            texts = [row.before.strip(STAMP_PADDING) for row in rows]
         if self.log.time.format == "iso8601":
-            return _dates(texts)
+            return _parse_dates(texts)
         whole = self.log.time.unit == "ns" or self.log.time.column == COUNTER
         # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
         stamps = np.zeros(len(texts), np.int64 if whole else np.float64)
@@ -399,7 +403,7 @@ class VectorNavFile(LogFile):
         return stamps, missing
 
     def _without_stamp(self, rows: list[Row]) -> RecordingError:
-        at_host = self.log.time is not None and self.log.time.column == HOST
+        at_host = self.log.time is not None and self.log.time.column == HOST_TIME
         where = "before the '$'" if at_host else "'T' and a count at the end"
         return RecordingError(
             f"{self.path.name}: no stamp that can be read in the first {len(rows)} sentences; "
@@ -410,7 +414,7 @@ class VectorNavFile(LogFile):
 
     def _started(self, first: Any) -> str | None:
         time = self.log.time
-        if time is None or time.column != HOST or time.unit == "samples":
+        if time is None or time.column != HOST_TIME or time.unit == "samples":
             return None
         stamp = first.item()
         scale = SECONDS[time.unit or "ns"] * 1e9
@@ -426,7 +430,7 @@ class VectorNavFile(LogFile):
                 "sensor file right, and the checksum on (register 30)?"
             )
         fate = "left out" if self.log.time is not None else "missing samples"
-        others = _listed(records.others)
+        others = _join_names(records.others)
         self._count(
             records.wrong,
             "wrong_checksum",
@@ -456,16 +460,16 @@ class VectorNavFile(LogFile):
             self.note(name, f"{count} {text}", count, severity)
 
 
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(name[:_LONGEST_NAME] for name in sorted(names)[:_NAMES])
+def _join_names(names: Iterable[str]) -> str:
+    return ", ".join(name[:_MAX_SHOWN_NAME] for name in sorted(names)[:_MAX_LISTED_NAMES])
 
 
-def _dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return ISO 8601 stamps as ns since 1970 (UTC), and which cannot be read."""
+def _parse_dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return ISO 8601 stamps as ns since 1970 (UTC), and a mask of the unreadable ones."""
     stamps = np.zeros(len(texts), np.int64)
     missing = np.zeros(len(texts), bool)
     for number, text in enumerate(texts):
-        zone = "UTC" if _ZONE.search(text) else None
+        zone = "UTC" if _ZONE_SUFFIX.search(text) else None
         try:
             date = pa.scalar(text.decode("ascii")).cast(pa.timestamp("ns", zone))
             stamps[number] = date.value
@@ -474,18 +478,18 @@ def _dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     return stamps, missing
 
 
-# ----------------------------------------------------------------------- what a log holds
+# ------------------------------------------------------------------------- inspection
 
-_DESCRIBED_IN = 1 << 21  # bytes
+_MAX_DESCRIBED_BYTES = 1 << 21  # bytes
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return a table for each kind of sentence that holds inertial figures.
+    """Return a table for each kind of sentence with inertial data.
 
     Raises
     ------
     RecordingError
-        If there is none with a right checksum.
+        If there is no such sentence with a right checksum.
     """
     sentences = {kind: Sentences(kind, stamped=True) for kind in FIELDS}
     rows: dict[str, list[Row]] = {kind: [] for kind in FIELDS}
@@ -495,7 +499,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
             if b"$" + kind.encode() in text:
                 rows[kind] += of_kind.add(text)
         read += len(text)
-        if read > _DESCRIBED_IN:
+        if read > _MAX_DESCRIBED_BYTES:
             break
     present = [kind for kind, of_kind in rows.items() if of_kind]
     if not present:
@@ -503,10 +507,14 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
             f"{path.name}: no sentence of {', '.join(FIELDS)} with a right checksum at its "
             "beginning; set the output of the device (registers 6 and 30)"
         )
-    return [_table(file_format, kind, rows[kind], len(present) == 1) for kind in present]
+    return [
+        _describe_sentence(file_format, kind, rows[kind], len(present) == 1) for kind in present
+    ]
 
 
-def _table(file_format: FileFormat, kind: str, rows: list[Row], alone: bool) -> LogTable:
+def _describe_sentence(
+    file_format: FileFormat, kind: str, rows: list[Row], alone: bool
+) -> LogTable:
     fields, _ = fields_of(kind, rows[:MAX_EXAMINED_RECORDS], set(range(len(FIELDS[kind]))))
     columns = [
         LogColumn(
@@ -519,14 +527,16 @@ def _table(file_format: FileFormat, kind: str, rows: list[Row], alone: bool) -> 
         )
         for place, name in enumerate(FIELDS[kind])
     ]
-    columns += _time(HOST, [row.before.strip(AROUND_STAMP) for row in rows[:MAX_EXAMINED_RECORDS]])
-    columns += _time(COUNTER, [row.counter for row in rows[:MAX_EXAMINED_RECORDS]])
+    columns += _describe_time(
+        HOST_TIME, [row.before.strip(STAMP_PADDING) for row in rows[:MAX_EXAMINED_RECORDS]]
+    )
+    columns += _describe_time(COUNTER, [row.counter for row in rows[:MAX_EXAMINED_RECORDS]])
     about = f"{len(rows)} sentences at the beginning"
     return LogTable(file_format, kind, tuple(columns), about=about)
 
 
-def _time(name: str, cells: list[bytes]) -> list[LogColumn]:
-    """Return a column of stamps, if it is there."""
+def _describe_time(name: str, cells: list[bytes]) -> list[LogColumn]:
+    """Return a list with the column of stamps, empty if there are no stamps."""
     texts = [cell.decode("ascii", "replace") for cell in cells]
     first = tuple(text for text in texts[:MAX_SHOWN_VALUES])
     if not any(texts):

@@ -1,6 +1,6 @@
-"""The formats of log files that can be read: a module each, called as ``reader`` states it.
+"""The formats of log files that can be read: one module each, with the name of the ``reader``.
 
-A module declares its format as ``FORMAT``, and has the code that reads it, or says where it is. The
+A module declares its format as ``FORMAT``, with a function that imports the code that reads it. The
 names are those of `imubench_pipeline.settings.sensor.Reader`: a module without a name there, or a
 name without a module, fails the import of this one.
 """
@@ -15,13 +15,13 @@ from typing import get_args
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.settings.sensor import Reader
 
-_MODULES = "imubench_pipeline.readers.formats.*"
+_MODULE_PATTERN = "imubench_pipeline.readers.formats.*"
 
 
-def _declared(name: str) -> FileFormat:
-    file_format: FileFormat = import_module(_MODULES.replace("*", name)).FORMAT
+def _load_format(name: str) -> FileFormat:
+    file_format: FileFormat = import_module(_MODULE_PATTERN.replace("*", name)).FORMAT
     if file_format.name != name:
-        raise ImportError(f"{_MODULES.replace('*', name)} declares {file_format.name!r}")
+        raise ImportError(f"{_MODULE_PATTERN.replace('*', name)} declares {file_format.name!r}")
     return file_format
 
 
@@ -36,8 +36,8 @@ def _check_names() -> None:
 
 _check_names()
 
-FILE_FORMATS: Mapping[Reader, FileFormat] = {name: _declared(name) for name in get_args(Reader)}
-"""Every format, by the name that ``reader`` of a sensor file has for it."""
+FILE_FORMATS: Mapping[Reader, FileFormat] = {name: _load_format(name) for name in get_args(Reader)}
+"""All formats by the value of ``reader`` in a sensor file."""
 
 TEXT = FILE_FORMATS["csv"]
-"""What a file is that has the signature of no format: text has none."""
+"""Format of files without a known signature: text has none."""

@@ -5,7 +5,7 @@ import re
 from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 _MAGIC = re.compile(rb"(?:PAR1|FEA1|ARROW1)(?:[\0-\x08\x0e-\x1f]|\Z)")
-"""What follows in a text that begins so is no control character."""
+"""The control character excludes texts that begin with these letters."""
 
 
 def _code() -> Code:

@@ -1,4 +1,4 @@
-"""Delimited text: what a log is taken for that no other format claims."""
+"""Delimited text: the format of all logs that no other format matches."""
 
 from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 

@@ -5,13 +5,14 @@ from itertools import islice
 from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 from imubench_pipeline.readers.ubx_frames import Frames
 
-_MESSAGES = 2
-"""With a right checksum. Of two million files of 64 kB of chance, one has one; none has two."""
+_MIN_MESSAGES = 2
+"""Least number of messages with a right checksum. Of two million random blocks of 64 kB, one has
+one message and none has two."""
 
 
 def _has_messages(begin: bytes) -> bool:
-    # The receiver may be in the middle of something else when the log begins.
-    return len(list(islice(Frames(iter([begin])), _MESSAGES))) == _MESSAGES
+    # The log may begin in the middle of a message.
+    return len(list(islice(Frames(iter([begin])), _MIN_MESSAGES))) == _MIN_MESSAGES
 
 
 def _code() -> Code:

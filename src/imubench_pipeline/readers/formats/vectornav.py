@@ -5,7 +5,7 @@ import re
 from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 _SENTENCE = re.compile(rb"\$VN[A-Z]{3},[-+.,\d]{8}")
-"""Whatever its checksum is: the reader says how many are wrong."""
+"""The checksum is not tested here: the reader counts the wrong ones."""
 
 
 def _code() -> Code:

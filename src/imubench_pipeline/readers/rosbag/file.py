@@ -1,10 +1,10 @@
-"""ROS bags: sensor_msgs/Imu of ROS 1 (.bag) and ROS 2 (SQLite, MCAP, or a folder of them).
+"""Read ROS bags: sensor_msgs/Imu of ROS 1 (.bag) and ROS 2 (SQLite, MCAP, or a folder of them).
 
 Columns are ``angular_velocity.x`` ``.y`` ``.z`` in rad/s and ``linear_acceleration.x`` ``.y``
 ``.z`` in m/s^2, of a topic of sensor_msgs/Imu; ``temperature`` in degC, of a topic of
-sensor_msgs/Temperature. ``variable`` is the topic; it is needed where the bag has several that
-hold the column. Time columns, with ``unit: ns``: ``header.stamp``, what the driver wrote, and
-``log_time``, when the message was recorded.
+sensor_msgs/Temperature. ``variable`` is the topic; it is needed if the bag has several topics with
+the column. Time columns, with ``unit: ns``: ``header.stamp``, the stamp of the driver, and
+``log_time``, the time at which the message was recorded.
 """
 
 from __future__ import annotations
@@ -39,38 +39,38 @@ from imubench_pipeline.tables.findings import RecordingError
 
 # ---------------------------------------------------------------------------------- messages
 #
-# Both are a header (stamp, name of a frame) and float64 figures, so many can be read at once.
+# All are a header (stamp, name of a frame) and float64 numbers, so many can be read at once.
 
-_ENCAPSULATION = 4
-_CDR = {b"\0\1": "<", b"\0\0": ">"}
-_SECOND = 10**9
+_ENCAPSULATION_BYTES = 4
+_CDR_BYTE_ORDERS = {b"\0\1": "<", b"\0\0": ">"}
+_NANOSECONDS_PER_SECOND = 10**9
 
 
-def _xyz(name: str, first: int) -> dict[str, int]:
+def _make_axis_columns(name: str, first: int) -> dict[str, int]:
     return {f"{name}.{axis}": first + place for place, axis in enumerate("xyz")}
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the figures of a kind of message stand, counted behind its header."""
+    """Layout of the numbers of a kind of message, after its header."""
 
     figures: int
-    """How many there are."""
+    """Number of numbers."""
     columns: dict[str, int]
-    """Place of each that can be a column."""
+    """Index of each number that can be a column."""
     units: dict[str, str]
-    """Unit of each, which ROS fixes."""
+    """Unit of each column, which ROS fixes."""
     covariances: dict[str, int]
-    """Place of the first covariance of a quantity; it is -1 where the quantity is not there."""
+    """Index of the first covariance of a quantity; its value is -1 if it is not measured."""
 
 
 LAYOUTS: dict[str, Layout] = {
     # Orientation 0 and covariance 4, angular velocity 13 and 16, acceleration 25 and 28.
     "sensor_msgs/msg/Imu": Layout(
         37,
-        _xyz("angular_velocity", 13) | _xyz("linear_acceleration", 25),
-        dict.fromkeys(_xyz("angular_velocity", 0), "rad/s")
-        | dict.fromkeys(_xyz("linear_acceleration", 0), "m/s^2"),
+        _make_axis_columns("angular_velocity", 13) | _make_axis_columns("linear_acceleration", 25),
+        dict.fromkeys(_make_axis_columns("angular_velocity", 0), "rad/s")
+        | dict.fromkeys(_make_axis_columns("linear_acceleration", 0), "m/s^2"),
         {"angular_velocity": 16, "linear_acceleration": 28},
     ),
     "sensor_msgs/msg/Temperature": Layout(2, {"temperature": 0}, {"temperature": "degC"}, {}),
@@ -81,23 +81,23 @@ LAYOUTS: dict[str, Layout] = {
 def figures_of(
     messages: Sequence[bytes], layout: Layout, ros_1: bool
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Read some messages.
+    """Return stamps and numbers of messages.
 
     Parameters
     ----------
     messages : sequence of bytes
-        As recorded.
+        Messages as recorded.
     ros_1 : bool
-        They are written as ROS 1 does; else as CDR.
+        The messages are serialised as in ROS 1; otherwise as CDR.
 
     Returns
     -------
     stamps : ndarray of int64
-        Stamp of the header, ns.
+        Stamps of the headers, ns.
     figures : ndarray of float64, shape (messages, layout.figures)
         NaN where the message is damaged.
     sound : ndarray of bool
-        The message is as its type says.
+        The message has the layout of its type.
     """
     stamps = np.zeros(len(messages), np.int64)
     figures = np.full((len(messages), layout.figures), np.nan)
@@ -106,39 +106,43 @@ def figures_of(
     for place, message in enumerate(messages):
         alike.setdefault((len(message), b"" if ros_1 else message[:2]), []).append(place)
     for (size, encapsulation), places in alike.items():
-        order = "<" if ros_1 else _CDR.get(encapsulation)
+        order = "<" if ros_1 else _CDR_BYTE_ORDERS.get(encapsulation)
         before = size - 8 * layout.figures
         if not ros_1:
-            # CDR aligns float64 to 8 bytes behind its own 4; some bytes may follow.
-            before -= (before - _ENCAPSULATION) % 8
+            # CDR aligns float64 to 8 bytes after its own 4 bytes; padding may follow.
+            before -= (before - _ENCAPSULATION_BYTES) % 8
         if order is None or before < 16:
             continue
         table = np.frombuffer(b"".join(messages[place] for place in places), np.uint8)
         table = table.reshape(len(places), size)
-        seconds, nanoseconds, name_size = _whole_numbers(table[:, 4:16], f"{order}u4").T
+        seconds, nanoseconds, name_size = _view_integers(table[:, 4:16], f"{order}u4").T
         if not ros_1:
             seconds = seconds.astype(np.uint32).view(np.int32)
         ends = 16 + name_size.astype(np.int64)
-        begins = ends if ros_1 else _ENCAPSULATION + -(-(ends - _ENCAPSULATION) // 8) * 8
-        good = (begins == before) & (nanoseconds < _SECOND)
+        begins = (
+            ends if ros_1 else _ENCAPSULATION_BYTES + -(-(ends - _ENCAPSULATION_BYTES) // 8) * 8
+        )
+        good = (begins == before) & (nanoseconds < _NANOSECONDS_PER_SECOND)
         written = np.ascontiguousarray(table[good, before : before + 8 * layout.figures])
         chosen = np.array(places)[good]
         figures[chosen] = written.view(f"{order}f8")
-        stamps[chosen] = seconds[good].astype(np.int64) * _SECOND + nanoseconds[good]
+        stamps[chosen] = (
+            seconds[good].astype(np.int64) * _NANOSECONDS_PER_SECOND + nanoseconds[good]
+        )
         sound[chosen] = True
     return stamps, figures, sound
 
 
-def _whole_numbers(table: NDArray[np.uint8], kind: str) -> NDArray[np.uint32]:
+def _view_integers(table: NDArray[np.uint8], kind: str) -> NDArray[np.uint32]:
     return np.ascontiguousarray(table).view(kind).astype(np.uint32)
 
 
 # -------------------------------------------------------------------------------------- bags
 
-_BATCH = 1 << 14
-_SHOWN = 10
-_SQLITE = b"SQLite format 3"
-STAMP, LOG_TIME = "header.stamp", "log_time"
+_BATCH_MESSAGES = 1 << 14
+_MAX_LISTED_NAMES = 10
+_SQLITE_MAGIC = b"SQLite format 3"
+HEADER_STAMP, LOG_TIME = "header.stamp", "log_time"
 """The columns of time."""
 
 
@@ -173,7 +177,7 @@ class RosbagFile(LogFile):
             self._blank(figures, layout, absent)
             time = None
             if self.log.time is not None:
-                chosen = stamps if self.log.time.column == STAMP else times
+                chosen = stamps if self.log.time.column == HEADER_STAMP else times
                 figures, chosen = figures[good], chosen[good]
                 if not len(chosen):
                     continue
@@ -196,7 +200,7 @@ class RosbagFile(LogFile):
         self._report(topic, source.unclosed, damaged, absent)
 
     def _blank(self, figures: NDArray[np.float64], layout: Layout, absent: dict[str, int]) -> None:
-        """Make NaN what a message says it does not measure."""
+        """Set quantities to NaN that a message marks as not measured; count them."""
         for quantity, place in layout.covariances.items():
             columns = [
                 layout.columns[str(source.column)]
@@ -213,7 +217,7 @@ class RosbagFile(LogFile):
     def _blocks(
         self, source: Source, topic: str
     ) -> Iterator[tuple[NDArray[np.int64], list[bytes]]]:
-        """Yield the messages of a topic in blocks, with the times of their recording."""
+        """Yield the messages of a topic in blocks, with their times of recording."""
         incoming = source.messages(topic)
         while True:
             times: list[int] = []
@@ -224,7 +228,7 @@ class RosbagFile(LogFile):
                     times.append(time)
                     messages.append(message)
                     size += len(message)
-                    if len(times) == _BATCH or size > MAX_MESSAGE_BATCH:
+                    if len(times) == _BATCH_MESSAGES or size > MAX_MESSAGE_BATCH:
                         break
                 written = np.array(times, np.int64)
             if not times:
@@ -237,10 +241,10 @@ class RosbagFile(LogFile):
         time = self.log.time
         if time is None:
             return
-        if time.column not in (STAMP, LOG_TIME):
+        if time.column not in (HEADER_STAMP, LOG_TIME):
             raise RecordingError(
-                f"{self.path.name}: no time column {time.column!r}; a ROS bag has {STAMP!r} and "
-                f"{LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
+                f"{self.path.name}: no time column {time.column!r}; a ROS bag has {HEADER_STAMP!r} "
+                f"and {LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
             )
         if time.unit != "ns":
             raise RecordingError(
@@ -249,13 +253,13 @@ class RosbagFile(LogFile):
             )
 
     def _topic(self, source: Source) -> tuple[str, str]:
-        """Return the topic that the columns are taken from, and its type."""
+        """Return the topic with the columns, and its type."""
         with explained(self.path):
             topics = source.topics()
         stated = {source.variable for source in self.sources.values() if source.variable}
         if len(stated) > 1:
             raise RecordingError(
-                f"{self.path.name}: columns of the topics {_listed(sorted(stated))} cannot be "
+                f"{self.path.name}: columns of the topics {_join_names(sorted(stated))} cannot be "
                 "read together, for each topic has a clock of its own; expected one topic a file"
             )
         able = {
@@ -265,7 +269,7 @@ class RosbagFile(LogFile):
             and all(source.column in LAYOUTS[kind].columns for source in self.sources.values())
         }
         wanted = ", ".join(str(source.column) for source in self.sources.values())
-        present = _listed(f"{topic} ({kind})" for topic, kind in sorted(topics.items()))
+        present = _join_names(f"{topic} ({kind})" for topic, kind in sorted(topics.items()))
         if stated:
             (name,) = stated
             chosen = [topic for topic in able if topic.strip("/") == name.strip("/")]
@@ -275,7 +279,7 @@ class RosbagFile(LogFile):
             return chosen[0], able[chosen[0]]
         if chosen:
             raise RecordingError(
-                f"{self.path.name}: several topics hold {wanted}: {_listed(chosen)}; name one "
+                f"{self.path.name}: several topics hold {wanted}: {_join_names(chosen)}; name one "
                 "with 'variable:' at each column in the sensor file"
             )
         cut = " (the bag is cut short, or was not closed)" if source.unclosed else ""
@@ -306,7 +310,7 @@ class RosbagFile(LogFile):
                 )
         if unclosed:
             self.note("truncated_file", "the bag was not closed; read as far as it goes", 1)
-        for path in _unmerged(self.path):
+        for path in _list_unmerged(self.path):
             self.note(
                 "truncated_file",
                 f"{path.name} holds records that are not yet in the bag and are not read; merge "
@@ -315,20 +319,22 @@ class RosbagFile(LogFile):
             )
 
 
-def _listed(names: Iterable[str]) -> str:
-    """Return the first of some names, each a line at most."""
+def _join_names(names: Iterable[str]) -> str:
+    """Return the first names as text."""
     every = list(names)
-    return ", ".join(cut(name, str) for name in every[:_SHOWN]) + ", ..." * (len(every) > _SHOWN)
+    return ", ".join(cut(name, str) for name in every[:_MAX_LISTED_NAMES]) + ", ..." * (
+        len(every) > _MAX_LISTED_NAMES
+    )
 
 
 @contextmanager
 def explained(path: Path) -> Iterator[None]:
-    """Make a `RecordingError` of whatever the libraries raise on a bag."""
+    """Convert all exceptions of the libraries about a bag to `RecordingError`."""
     try:
         yield
     except RecordingError:
         raise
-    # They raise whatever their parsing meets: struct.error, KeyError, ...
+    # The libraries raise any exception of their parsers: struct.error, KeyError, ...
     except Exception as error:
         reason = " ".join(str(error).replace(f"{path.parent}/", "").split())[:300]
         if isinstance(error, MemoryError):
@@ -341,25 +347,25 @@ def explained(path: Path) -> Iterator[None]:
 
 
 def opened(path: Path) -> Source:
-    """Open a bag; its content tells which kind it is.
+    """Open a bag; its kind is recognised by its content.
 
     ``path``: a file, or the folder of a ROS 2 bag.
 
     Raises
     ------
     RecordingError
-        If it cannot be opened, or is no bag.
+        If the path cannot be opened, or is no bag.
     """
     with explained(path):
         try:
-            return _opened(path)
+            return _open_by_content(path)
         except OSError as error:
             raise RecordingError(
                 f"{path.name}: cannot be opened ({error.strerror or error})"
             ) from None
 
 
-def _opened(path: Path) -> Source:
+def _open_by_content(path: Path) -> Source:
     if path.is_dir():
         for database in sorted(path.glob("*.db3")):
             check_database(database)
@@ -369,20 +375,20 @@ def _opened(path: Path) -> Source:
         begin = file.read(16)
     if begin.startswith(b"\x89MCAP"):
         return Bag2(McapReader(path))
-    if begin.startswith(_SQLITE):
+    if begin.startswith(_SQLITE_MAGIC):
         check_database(path)
         return Bag2(Sqlite3Reader(path))
     return Bag(path)
 
 
-def _unmerged(path: Path) -> list[Path]:
-    """Return the journals of SQLite that hold what was recorded last."""
+def _list_unmerged(path: Path) -> list[Path]:
+    """Return the journals of SQLite with the latest records, which are not in the database."""
     logs = path.glob("*-wal") if path.is_dir() else [path.with_name(f"{path.name}-wal")]
     return [log for log in logs if log.is_file() and log.stat().st_size]
 
 
-_RARE = 20
-"""Messages of a slow topic that are looked at."""
+_MAX_SLOW_MESSAGES = 20
+"""Largest number of messages of a slow topic that are examined."""
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
@@ -402,14 +408,14 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
             if not topics:
                 raise RecordingError(f"{path.name}: the bag has no topic; expected sensor_msgs/Imu")
             return [
-                _table(file_format, source, topic, kind, counts.get(topic))
+                _describe_topic(file_format, source, topic, kind, counts.get(topic))
                 for topic, kind in sorted(topics.items())
             ]
     finally:
         source.close()
 
 
-def _table(
+def _describe_topic(
     file_format: FileFormat, source: Source, topic: str, kind: str, rows: int | None
 ) -> LogTable:
     if kind not in LAYOUTS:
@@ -418,13 +424,15 @@ def _table(
             file_format, topic, rows=rows, about=kind, fault=f"is {kind}; only {kinds} are read"
         )
     layout = LAYOUTS[kind]
-    count = MAX_EXAMINED_RECORDS if layout.covariances else _RARE
-    columns = () if rows == 0 else _columns(source, topic, layout, count)
+    count = MAX_EXAMINED_RECORDS if layout.covariances else _MAX_SLOW_MESSAGES
+    columns = () if rows == 0 else _describe_columns(source, topic, layout, count)
     fault = None if columns else "has no message that can be read"
     return LogTable(file_format, topic, columns, topic, rows=rows, about=kind, fault=fault)
 
 
-def _columns(source: Source, topic: str, layout: Layout, count: int) -> tuple[LogColumn, ...]:
+def _describe_columns(
+    source: Source, topic: str, layout: Layout, count: int
+) -> tuple[LogColumn, ...]:
     messages = list(islice(source.messages(topic), count))
     if not messages:
         return ()
@@ -439,7 +447,7 @@ def _columns(source: Source, topic: str, layout: Layout, count: int) -> tuple[Lo
             continue  # the messages say that it is not measured
         columns.append(LogColumn(name, name, "number", shown(values), values, layout.units[name]))
     logged = np.array([time for time, _ in messages], np.int64)
-    for name, times in ((STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
+    for name, times in ((HEADER_STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
         columns.append(
             LogColumn(name, name, "number", shown(times), times.astype(np.float64), "ns")
         )

@@ -1,7 +1,7 @@
-"""ROS 1 bags (version 2.0), read from the beginning to the end.
+"""Read ROS 1 bags (version 2.0) sequentially.
 
-The index of a bag names every message, so it grows with the recording, and a bag that was not
-closed has none. The chunks in their order need no index and little memory.
+The index of a bag has an entry for every message, so it grows with the recording, and a bag that
+was not closed has no index. Reading the chunks in order needs no index and little memory.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 _MAGIC = b"#ROSBAG V2.0\n"
-_MESSAGE, _BAG, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
-_U4 = struct.Struct("<I")
-_TIME = struct.Struct("<II")
+_OP_MESSAGE, _OP_BAG, _OP_CHUNK, _OP_CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
+_UINT32 = struct.Struct("<I")
+_TIME_STRUCT = struct.Struct("<II")
 
 
 class Bag:
     """A ROS 1 bag.
 
-    ``unclosed``: it was not closed, or is cut short; known after the last message.
+    ``unclosed``: the bag was not closed, or is truncated; known after the last message.
     """
 
     ros_1 = True
@@ -55,15 +55,17 @@ class Bag:
         RecordingError
             If this is no bag, or it is damaged.
         """
-        # The index says where the connections are; without one, all of the bag does.
+        # The connections are in the index; without an index, the whole bag is read.
         with self._path.open("rb") as file:
             try:
                 start = self._start(file)
                 if start:
                     file.seek(start)
-                    while (record := _record(file)) is not None and record[0][b"op"] == _CONNECTION:
+                    while (record := _read_record(file)) is not None and record[0][
+                        b"op"
+                    ] == _OP_CONNECTION:
                         self._connect(*record)
-            except (ValueError, KeyError, struct.error, OSError, _CutShortError):
+            except (ValueError, KeyError, struct.error, OSError, _TruncatedError):
                 self._connections.clear()
         if not self._connections:
             for _ in self.messages(""):
@@ -71,7 +73,7 @@ class Bag:
         return dict(self._connections.values())
 
     def counts(self) -> dict[str, int]:
-        """Return nothing: only the whole bag tells how many messages a topic has."""
+        """Return an empty dict: the numbers of messages are known only after reading the bag."""
         return {}
 
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
@@ -91,15 +93,15 @@ class Bag:
                 self.unclosed = not self._start(file)
                 while True:
                     at = file.tell()
-                    record = _record(file)
+                    record = _read_record(file)
                     if record is None:
                         break
                     header, data = record
-                    if header[b"op"] == _CHUNK:
+                    if header[b"op"] == _OP_CHUNK:
                         yield from self._chunk(header, data, topic)
                     else:
                         yield from self._message(header, data, topic)
-            except _CutShortError:
+            except _TruncatedError:
                 self.unclosed = True
             except (ValueError, KeyError, struct.error, OSError, EOFError, RuntimeError) as error:
                 if isinstance(error, RecordingError):
@@ -112,22 +114,22 @@ class Bag:
                 ) from None
 
     def _start(self, file: BinaryIO) -> int:
-        """Read the first record; return where the index begins, 0 if there is none."""
+        """Read the first record; return the position of the index, 0 if there is none."""
         magic = file.read(len(_MAGIC))
         if magic != _MAGIC:
             raise RecordingError(
                 f"{self._path.name}: begins with {magic!r}; expected {_MAGIC!r}, a ROS 1 bag of "
                 "version 2.0 ('rosbag migrate' mends an older one)"
             )
-        record = _record(file)
-        if record is None or record[0][b"op"] != _BAG:
+        record = _read_record(file)
+        if record is None or record[0][b"op"] != _OP_BAG:
             raise ValueError("no bag header")
         return int.from_bytes(record[0][b"index_pos"], "little")
 
     def _chunk(
         self, header: dict[bytes, bytes], data: bytes, topic: str
     ) -> Iterator[tuple[int, bytes]]:
-        (size,) = _U4.unpack(header[b"size"])
+        (size,) = _UINT32.unpack(header[b"size"])
         if size > MAX_BAG_CHUNK:
             raise ValueError(f"a chunk of {size} bytes, expected at most {MAX_BAG_CHUNK}")
         self._left -= size
@@ -149,78 +151,78 @@ class Bag:
             raise ValueError(f"a chunk is not as long as the {size} bytes that it says")
         at = 0
         while at < len(data):
-            fields, body, at = _record_in(data, at)
+            fields, body, at = _parse_record(data, at)
             yield from self._message(fields, body, topic)
 
     def _message(
         self, header: dict[bytes, bytes], data: bytes, topic: str
     ) -> Iterator[tuple[int, bytes]]:
-        if header[b"op"] == _MESSAGE:
-            if self._connections[_number_of(header)][0] == topic:
-                seconds, nanoseconds = _TIME.unpack(header[b"time"])
+        if header[b"op"] == _OP_MESSAGE:
+            if self._connections[_get_connection(header)][0] == topic:
+                seconds, nanoseconds = _TIME_STRUCT.unpack(header[b"time"])
                 yield seconds * 10**9 + nanoseconds, data if len(data) <= MAX_MESSAGE else b""
-        elif header[b"op"] == _CONNECTION:
+        elif header[b"op"] == _OP_CONNECTION:
             self._connect(header, data)
 
     def _connect(self, header: dict[bytes, bytes], data: bytes) -> None:
-        kind = _fields(data)[b"type"].decode("utf-8", "replace")
+        kind = _parse_fields(data)[b"type"].decode("utf-8", "replace")
         topic = header[b"topic"].decode("utf-8", "replace")
         if max(len(topic), len(kind)) > MAX_TOPIC_LENGTH:
             raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
         if len(self._connections) >= MAX_TOPICS:
             raise ValueError(f"more than {MAX_TOPICS} connections, expected those of a vehicle")
-        # The name that ROS 2 has for the same type.
-        self._connections[_number_of(header)] = topic, kind.replace("/", "/msg/", 1)
+        # The name of the same type in ROS 2.
+        self._connections[_get_connection(header)] = topic, kind.replace("/", "/msg/", 1)
 
 
-def _number_of(header: dict[bytes, bytes]) -> int:
-    """Return the number of the connection that a record is of."""
-    (number,) = _U4.unpack(header[b"conn"])
+def _get_connection(header: dict[bytes, bytes]) -> int:
+    """Return the number of the connection of a record."""
+    (number,) = _UINT32.unpack(header[b"conn"])
     return int(number)
 
 
-class _CutShortError(Exception):
+class _TruncatedError(Exception):
     """The file ends within a record."""
 
 
-def _record(file: BinaryIO) -> tuple[dict[bytes, bytes], bytes] | None:
+def _read_record(file: BinaryIO) -> tuple[dict[bytes, bytes], bytes] | None:
     """Return header and data of the next record of a file; None at the end."""
     size = file.read(4)
     if not size:
         return None
-    header = _exactly(file, size)
+    header = _read_exactly(file, size)
     if not header:
-        # What a power cut leaves of a file that was growing.
-        raise _CutShortError
-    return _fields(header), _exactly(file, file.read(4))
+        # A power cut leaves an empty header in a growing file.
+        raise _TruncatedError
+    return _parse_fields(header), _read_exactly(file, file.read(4))
 
 
-def _exactly(file: BinaryIO, size: bytes) -> bytes:
+def _read_exactly(file: BinaryIO, size: bytes) -> bytes:
     if len(size) < 4:
-        raise _CutShortError
-    (count,) = _U4.unpack(size)
-    # Asked before, since a damaged size may be larger than the memory.
+        raise _TruncatedError
+    (count,) = _UINT32.unpack(size)
+    # Checked before reading, since a damaged size may exceed the memory.
     if count > os.fstat(file.fileno()).st_size - file.tell():
-        raise _CutShortError
+        raise _TruncatedError
     if count > MAX_BAG_CHUNK:
         raise ValueError(f"a record of {count} bytes, expected at most {MAX_BAG_CHUNK}")
     return file.read(count)
 
 
-def _record_in(data: bytes, at: int) -> tuple[dict[bytes, bytes], bytes, int]:
-    """Return header and data of the record at a place of a chunk, and the place behind it."""
-    middle = at + 4 + _U4.unpack_from(data, at)[0]
-    end = middle + 4 + _U4.unpack_from(data, middle)[0]
+def _parse_record(data: bytes, at: int) -> tuple[dict[bytes, bytes], bytes, int]:
+    """Return header and data of the record at a position of a chunk, and the next position."""
+    middle = at + 4 + _UINT32.unpack_from(data, at)[0]
+    end = middle + 4 + _UINT32.unpack_from(data, middle)[0]
     if end > len(data):
         raise ValueError("a record reaches beyond its chunk")
-    return _fields(data[at + 4 : middle]), data[middle + 4 : end], end
+    return _parse_fields(data[at + 4 : middle]), data[middle + 4 : end], end
 
 
-def _fields(header: bytes) -> dict[bytes, bytes]:
+def _parse_fields(header: bytes) -> dict[bytes, bytes]:
     fields: dict[bytes, bytes] = {}
     at = 0
     while at < len(header):
-        end = at + 4 + _U4.unpack_from(header, at)[0]
+        end = at + 4 + _UINT32.unpack_from(header, at)[0]
         name, sign, value = header[at + 4 : end].partition(b"=")
         if not sign or end > len(header):
             raise ValueError("no header of a record")

@@ -1,4 +1,4 @@
-"""ROS 2 bags, read by the library, which is kept from unpacking whatever a bag asks for."""
+"""Read ROS 2 bags with the library, with limits on the sizes that are unpacked."""
 
 from __future__ import annotations
 
@@ -33,26 +33,26 @@ from imubench_pipeline.readers.decompression import unpacked_zstd
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
-_TABLES = ("messages", "topics", "message_definitions", "schema", "metadata")
-_READ = 1 << 20
+_DATABASE_TABLES = ("messages", "topics", "message_definitions", "schema", "metadata")
+_READ_BLOCK = 1 << 20
 
 
-def _lz4(data: bytes, size: int) -> bytes:
-    return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, _bounded(size) + 1))
+def _unpack_lz4(data: bytes, size: int) -> bytes:
+    return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, _check_chunk_size(size) + 1))
 
 
-def _zstd(data: bytes, size: int) -> bytes:
-    return unpacked_zstd(data, _bounded(size) + 1)
+def _unpack_zstd(data: bytes, size: int) -> bytes:
+    return unpacked_zstd(data, _check_chunk_size(size) + 1)
 
 
-def _bounded(size: int) -> int:
+def _check_chunk_size(size: int) -> int:
     if size > MAX_BAG_CHUNK:
         raise ValueError(f"a chunk of {size} bytes, expected at most {MAX_BAG_CHUNK}")
     return size
 
 
-# Its own unpack a chunk before they compare what came of it with what was said.
-storage_mcap.DECOMPRESSORS.update({"lz4": _lz4, "zstd": _zstd})
+# The decompressors of the library unpack a chunk before they check its size.
+storage_mcap.DECOMPRESSORS.update({"lz4": _unpack_lz4, "zstd": _unpack_zstd})
 
 
 _Reader = Reader | McapReader | Sqlite3Reader
@@ -64,7 +64,7 @@ class Bag2:
     Parameters
     ----------
     reader : Reader, McapReader or Sqlite3Reader
-        Of the library, not yet opened.
+        Reader of the library, not yet opened.
     """
 
     ros_1 = False
@@ -81,12 +81,12 @@ class Bag2:
             raise
 
     def _check(self) -> None:
-        """Raise if the bag asks for more than one has."""
+        """Raise if the bag exceeds a resource limit."""
         if len(self._connections) > MAX_TOPICS:
             raise ValueError(f"more than {MAX_TOPICS} topics, expected those of a vehicle")
         if any(len(str(c.topic) + str(c.msgtype)) > MAX_TOPIC_LENGTH for c in self._connections):
             raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
-        storages = _storages(self._reader)
+        storages = _list_storages(self._reader)
         if len({storage.path for storage in storages}) < len(storages):
             raise ValueError("metadata.yaml names a file twice, expected each once")
         for storage in storages:
@@ -98,7 +98,7 @@ class Bag2:
         return {str(connection.topic): str(connection.msgtype) for connection in self._connections}
 
     def counts(self) -> dict[str, int]:
-        """Return how many messages a topic has."""
+        """Return the number of messages of each topic."""
         counts: Counter[str] = Counter()
         for connection in self._connections:
             counts[str(connection.topic)] += connection.msgcount
@@ -108,15 +108,15 @@ class Bag2:
         """Yield time of recording (ns) and bytes of the messages of a topic."""
         packed = isinstance(self._reader, Reader) and self._reader.compression_mode == "message"
         for time, message in self._stored(topic, packed):
-            # A damaged database may hold anything.
+            # A damaged database may contain any type.
             data = message if isinstance(message, bytes) else b""
             if packed:
                 data = unpacked_zstd(data, MAX_MESSAGE + 1)
             yield time, data if len(data) <= MAX_MESSAGE else b""
 
     def _stored(self, topic: str, packed: bool) -> Iterator[tuple[int, object]]:
-        """Yield the messages as they are stored; the library unpacks packed ones as a whole."""
-        for reader in _storages(self._reader) if packed else [self._reader]:
+        """Yield messages as stored: the library would unpack packed ones without a limit."""
+        for reader in _list_storages(self._reader) if packed else [self._reader]:
             wanted = [connection for connection in reader.connections if connection.topic == topic]
             for _, time, message in reader.messages(wanted) if wanted else ():
                 yield time, message
@@ -126,7 +126,7 @@ class Bag2:
         self._reader.close()
 
 
-def _storages(reader: _Reader) -> list[Any]:
+def _list_storages(reader: _Reader) -> list[Any]:
     """Return the readers of the files of a bag."""
     if not isinstance(reader, Reader):
         return [reader]
@@ -135,9 +135,9 @@ def _storages(reader: _Reader) -> list[Any]:
 
 
 def _check_index(storage: McapReader) -> None:
-    """Raise if the chunks expand too far, or those of one time may not be in memory together.
+    """Raise if the chunks expand too far, or too many bytes of chunks overlap in time.
 
-    The index may name one chunk again and again.
+    A damaged index may name the same chunk repeatedly.
     """
     size_of_file = Path(str(storage.path)).stat().st_size
     expanded = sum(chunk.uncompressed_size for chunk in storage.chunks)
@@ -157,9 +157,9 @@ def _check_index(storage: McapReader) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Raise if what describes a bag is too long to be that, or a packed file expands too far.
+    """Raise if the metadata of a bag are too long, or a packed file expands too far.
 
-    ``path``: the folder of a ROS 2 bag, of whose files no one may be a device or a named pipe.
+    ``path``: folder of a ROS 2 bag; a device or a named pipe in it is an error.
     """
     for file in sorted(path.iterdir()):
         if not file.is_file() and not file.is_dir():
@@ -174,18 +174,18 @@ def check_folder(path: Path) -> None:
             "copy the bag again"
         )
     for packed in sorted(path.glob("*.zstd")):
-        # The library unpacks it onto the disk as a whole.
+        # The library unpacks the whole file to the disk.
         with closing(open_bytes(packed)) as stream:
-            while stream.read(_READ):
+            while stream.read(_READ_BLOCK):
                 pass
 
 
 def check_database(path: Path) -> None:
-    """Raise if a database is cut short, or its tables are computed where they are read."""
+    """Raise if a database is truncated, or if its tables are views or have computed columns."""
     _check_whole(path)
     location = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
     with closing(sqlite3.connect(location, uri=True)) as database:
-        for name in _TABLES:
+        for name in _DATABASE_TABLES:
             kinds = database.execute(
                 "SELECT type, rootpage FROM sqlite_master WHERE lower(name) = ?", (name,)
             ).fetchall()
@@ -200,12 +200,12 @@ def check_database(path: Path) -> None:
 
 
 def _check_whole(path: Path) -> None:
-    """Raise if a database is shorter than it says: SQLite would take what is missing as zeros."""
+    """Raise if a database is truncated: SQLite would read the missing part as zeros."""
     with path.open("rb") as file:
         header = file.read(100)
     size = int.from_bytes(header[16:18], "big")
     pages = int.from_bytes(header[28:32], "big")
-    # An old library leaves the count of pages as it was; then the two counters differ.
+    # Old libraries do not update the number of pages; then the two counters differ.
     has_count = header[24:28] == header[92:96]
     expected = (1 << 16 if size == 1 else size) * pages
     if has_count and path.stat().st_size < expected:

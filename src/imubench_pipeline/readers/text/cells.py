@@ -1,4 +1,4 @@
-"""What stands in the cells of a text log: numbers, and what loggers write for none."""
+"""Split the lines of a text log into cells; recognise numbers, dates and missing values."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 MAX_COLUMNS = 1 << 15
-"""A line with more is no record of a log."""
+"""Largest number of columns of a record."""
 
-_APART = re.compile(r"\s{2,}|\t")
+_NAME_SEPARATOR = re.compile(r"\s{2,}|\t")
 
 
 @dataclass(frozen=True)
 class Split:
-    """How a line is divided into cells."""
+    """Rule for splitting a line into cells."""
 
     delimiter: str
     runs: bool = False
@@ -34,19 +34,19 @@ class Split:
         return text.split(self.delimiter, MAX_COLUMNS)
 
     def names(self, text: str, width: int | None = None) -> list[str]:
-        """Return the names of a header line; between runs of spaces a name may have a space."""
+        """Return the names of a header line; with runs as delimiters, names may have spaces."""
         names = self.cells(text)
         if self.runs and width is not None and len(names) != width:
-            apart = _APART.split(text.strip())
+            apart = _NAME_SEPARATOR.split(text.strip())
             names = apart if len(apart) == width else names
         return [name.strip() for name in names]
 
     def quotes(self, text: str) -> bool:
-        """Tell whether a cell of a line stands in quotes, both of them at its ends."""
+        """Return whether a cell of a line is enclosed in quotes."""
         if '"' not in text:
             return False
         sign = re.escape(self.delimiter)
-        # Spaces are never given back, or a line of spaces would take the cube of its length.
+        # Possessive, since backtracking over a line of spaces would take cubic time.
         spaces = rf"[^\S{sign}]*+"
         cell = rf'(?:^|{sign}){spaces}"[^"]*+"(?={spaces}(?:$|{sign}))'
         return re.search(cell, text) is not None
@@ -57,42 +57,47 @@ class Split:
 
 Decimal = Literal[".", ","]
 
-_WORDS = (
+_MISSING_WORDS = (
     *("nan", "na", "n/a", "#n/a", "#na", "null", "none", "missing", "invalid", "error", "err"),
     *("overflow", "ovf", "ovl", "ol", "over", "#value!", "#num!", "#div/0!"),
 )
-_MICROSOFT = ("1.#QNAN", "1.#SNAN", "1.#IND", "1.#INF", "1.#J", "1.#R")
-_REPEATED = "-*?#."
-_LONGEST_REPEATED = 24
-_PADDED = ("{}", " {}", "  {}", "{} ")
+_MICROSOFT_SPECIAL_VALUES = ("1.#QNAN", "1.#SNAN", "1.#IND", "1.#INF", "1.#J", "1.#R")
+_MISSING_SIGNS = "-*?#."
+_MAX_REPEATED_SIGNS = 24
+_PADDINGS = ("{}", " {}", "  {}", "{} ")
 
 
 _STAMP = re.compile(r"\s*\d{1,4}[-./:]\d{1,2}[-./:]\d{1,4}[\dTZ:.,/+\s-]*")
 
 
-def _missing() -> tuple[str, ...]:
-    words = [form(word) for word in _WORDS for form in (str.lower, str.upper, str.title)]
+def _list_missing_cells() -> tuple[str, ...]:
+    words = [form(word) for word in _MISSING_WORDS for form in (str.lower, str.upper, str.title)]
     words += ["NaN", "-nan", "-NaN", "-NAN", "+nan", "+NaN", "+NAN"]
-    # With the zeros that %f puts behind it.
-    words += [sign + word + "0" * n for word in _MICROSOFT for sign in ("", "-") for n in range(17)]
-    words += [sign * n for sign in _REPEATED for n in range(1, _LONGEST_REPEATED + 1)]
-    padded = {form.format(word) for word in words for form in _PADDED}
-    return tuple(sorted(padded | {" " * n for n in range(_LONGEST_REPEATED + 1)}))
+    # With the zeros that %f appends.
+    words += [
+        sign + word + "0" * n
+        for word in _MICROSOFT_SPECIAL_VALUES
+        for sign in ("", "-")
+        for n in range(17)
+    ]
+    words += [sign * n for sign in _MISSING_SIGNS for n in range(1, _MAX_REPEATED_SIGNS + 1)]
+    padded = {form.format(word) for word in words for form in _PADDINGS}
+    return tuple(sorted(padded | {" " * n for n in range(_MAX_REPEATED_SIGNS + 1)}))
 
 
-MISSING = _missing()
-"""The cells that stand for no number, as written, with the spaces around them."""
+MISSING_CELLS = _list_missing_cells()
+"""Cells for missing values as written, with spaces around them."""
 
-_BARE = frozenset(cell.strip() for cell in MISSING)
+_STRIPPED_MISSING = frozenset(cell.strip() for cell in MISSING_CELLS)
 
 
 def is_missing(cell: str) -> bool:
-    """Tell whether a cell stands for a number that is not there."""
-    return cell.strip() in _BARE
+    """Return whether a cell is a missing value."""
+    return cell.strip() in _STRIPPED_MISSING
 
 
 def is_number(cell: str, decimal: Decimal | None = None) -> bool:
-    """Tell whether a cell is a number; with either sign of the decimal where none is given."""
+    """Return whether a cell is a number; with either decimal sign if none is given."""
     text = cell.strip()
     if decimal != "." and text.count(",") == 1 and "." not in text:
         text = text.replace(",", ".")
@@ -106,10 +111,10 @@ def is_number(cell: str, decimal: Decimal | None = None) -> bool:
 
 
 def are_figures(cells: Sequence[str]) -> bool:
-    """Tell whether cells are numbers, or stand for some."""
+    """Return whether all cells are numbers or missing values."""
     return all(is_number(cell) or is_missing(cell) for cell in cells)
 
 
 def is_datum(cell: str) -> bool:
-    """Tell whether a cell is a number, a date or a time of day, or stands for one."""
+    """Return whether a cell is a number, a date, a time of day or a missing value."""
     return is_number(cell) or is_missing(cell) or _STAMP.fullmatch(cell) is not None

@@ -1,4 +1,4 @@
-"""The text of a log as UTF-8 with line feeds, in blocks of complete lines."""
+"""Read the text of a log as UTF-8 with line feeds, in blocks of complete lines."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from imubench_pipeline.readers.compressed import ended_early, open_bytes
 from imubench_pipeline.readers.holes import ZeroRuns
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
-_SEEN = 1 << 16
-_ZEROS = re.compile(rb"\0{2,}")
+_READ_BLOCK = 1 << 16
+_ZERO_RUN = re.compile(rb"\0{2,}")
 _BYTE_ORDER_MARKS: Mapping[bytes, str] = {
     codecs.BOM_UTF8: "",
     # Before UTF-16, whose mark is the beginning of this one.
@@ -26,10 +26,10 @@ _BYTE_ORDER_MARKS: Mapping[bytes, str] = {
 
 
 class _Text:
-    """The bytes of a text log, decompressed, in an encoding that ASCII is a part of.
+    """The decompressed bytes of a text log, in an encoding that contains ASCII.
 
-    A lone carriage return at the ends of lines is a line feed here, a byte order mark is gone, and
-    of zero bytes that follow each other one is left.
+    Carriage returns alone at the ends of lines become line feeds. A byte order mark is removed, and
+    each run of zero bytes is reduced to one.
     """
 
     def __init__(self, path: Path, skipped: int, most: int | None) -> None:
@@ -44,7 +44,7 @@ class _Text:
             raise
 
     def _prepare(self, skipped: int) -> None:
-        begin = self._bytes.filled(_SEEN)
+        begin = self._bytes.filled(_READ_BLOCK)
         mark = next((mark for mark in _BYTE_ORDER_MARKS if begin.startswith(mark)), b"")
         encoding = _BYTE_ORDER_MARKS.get(mark)
         self._decoder = (
@@ -60,7 +60,7 @@ class _Text:
 
     @property
     def ended_early(self) -> bool:
-        """Whether the compressed data stop before their end."""
+        """Whether the compressed data are truncated."""
         return self._bytes.ended_early
 
     def read(self, size: int) -> bytes:
@@ -74,7 +74,7 @@ class _Text:
         return block
 
     def zeros(self, name: str, fate: str) -> Finding | None:
-        """Return the finding on zero bytes so far (see `ZeroRuns.finding`)."""
+        """Return the finding about zero bytes so far (see `ZeroRuns.finding`)."""
         total = self._zeros.count * self._letter + self._bytes.omitted
         return self._zeros.finding(name, f"line {self._zeros.first[1]}", total, fate)
 
@@ -93,26 +93,26 @@ class _Text:
             return block
         if block == bytes(len(block)):
             return b"" if goes_on else b"\0"
-        return _ZEROS.sub(b"\0", block.lstrip(b"\0") if goes_on else block)
+        return _ZERO_RUN.sub(b"\0", block.lstrip(b"\0") if goes_on else block)
 
 
 class CompleteLines:
     """A file for reading that ends with the last complete line.
 
-    What follows the last line break was being written when the power was cut: a record
-    without its line break may have lost digits, so it is left out and noted. A compressed file
-    that ends early is read as far as it goes, and noted.
+    The text after the last line break was being written when the power was cut. Such a record may
+    lack digits; it is left out with a finding. A truncated compressed file is read to its end, with
+    a finding.
 
     Parameters
     ----------
     findings : list of Finding
-        Gets what was left out.
+        Receives the findings about omitted text.
     skipped : int
-        Bytes of the text to pass over.
+        Bytes of the text to skip.
     records : callable
-        Makes of complete lines what is read.
+        Converts complete lines to the text that is read.
     most : int or None
-        Bytes of the text after which no more is read; None: the whole file is.
+        Bytes of the text after which reading stops; None: the whole file.
     """
 
     closed = False
@@ -130,8 +130,8 @@ class CompleteLines:
         self._records = records
         self._ready = b""
         self._ended = False
-        self.rest = b""  # what follows the last complete line
-        # Kept as well as raised: a parser between us and the caller may wrap the exception.
+        self.rest = b""  # text after the last complete line
+        # Stored as well as raised, since a parser in between may wrap the exception.
         self.error: RecordingError | None = None
         self._text = _Text(path, skipped, most)
 
@@ -151,11 +151,11 @@ class CompleteLines:
         return True
 
     def seekable(self) -> bool:
-        """Return False: it is read from its beginning to its end."""
+        """Return False: the file is read sequentially."""
         return False
 
     def read(self, size: int) -> bytes:
-        """Return the next complete lines, ``size`` bytes at most or one line; none at the end."""
+        """Return the next complete lines, at most ``size`` bytes or one line; empty at the end."""
         try:
             while not self._ready and not self._ended:
                 self._ready = self._records(self._lines(size))
@@ -169,8 +169,8 @@ class CompleteLines:
         return block
 
     def _lines(self, size: int) -> bytes:
-        """Return the next complete lines, none where the next line is not yet complete."""
-        block = self._text.read(max(size - len(self.rest), _SEEN))
+        """Return the next complete lines; empty if the next line is not yet complete."""
+        block = self._text.read(max(size - len(self.rest), _READ_BLOCK))
         if not block:
             return self._end()
         cut = block.rfind(b"\n") + 1
@@ -188,9 +188,9 @@ class CompleteLines:
         return lines
 
     def zeros(self, fate: str) -> Finding | None:
-        """Return the finding on zero bytes; None: there are none.
+        """Return the finding about zero bytes; None if there are none.
 
-        ``fate``: of the lines that hold some.
+        ``fate``: text about the lines with zero bytes.
         """
         return self._text.zeros(self._path.name, fate)
 
@@ -216,7 +216,7 @@ class CompleteLines:
 def describe_missing_text(path: Path) -> str:
     """Describe a file without a line of text, as the end of a sentence."""
     with closing(open_bytes(path)) as file:
-        begin = file.filled(_SEEN)
+        begin = file.filled(_READ_BLOCK)
     if not begin:
         return (
             "the compressed data end before any text" if file.ended_early else "the file is empty"
@@ -231,10 +231,10 @@ def describe_missing_text(path: Path) -> str:
 def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
     """Yield the lines of a text log from its beginning; the last one may lack its line break.
 
-    ``most``: bytes that are read, about; None: the whole file is.
+    ``most``: approximate number of bytes to read; None: the whole file.
     """
     with CompleteLines(path, [], most=most) as lines:
-        while block := lines.read(_SEEN):
+        while block := lines.read(_READ_BLOCK):
             yield from (line + b"\n" for line in block[:-1].split(b"\n"))
         if lines.rest.strip(b"\0"):
             yield lines.rest

@@ -1,4 +1,4 @@
-"""Logs of delimited text: found out how they are written, then read by pyarrow in big blocks."""
+"""Read delimited text: find the layout of a log, then read it with pyarrow in large blocks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from imubench_pipeline.readers.file_format import (
     LogTable,
 )
 from imubench_pipeline.readers.stated_units import StatedUnit, stated
-from imubench_pipeline.readers.text.cells import MISSING, Decimal, is_missing, is_number
+from imubench_pipeline.readers.text.cells import MISSING_CELLS, Decimal, is_missing, is_number
 from imubench_pipeline.readers.text.complete_lines import CompleteLines, first_lines
 from imubench_pipeline.readers.text.header import (
     completed,
@@ -47,8 +47,8 @@ _ADVICE = (
     "either the file is corrupt there (copy it again, or cut it before that line), or the sensor "
     "file does not describe it (delimiter, decimal, header, skip_lines, comment, column)"
 )
-_NOTHING = "Empty CSV file"
-_OPEN_QUOTE = "out of sync"
+_ARROW_EMPTY_FILE = "Empty CSV file"
+_ARROW_OPEN_QUOTE = "out of sync"
 _SECOND_SIXTY = re.compile(r"\d:\d\d:60(?!\d)")
 _ARROW_ROW = re.compile(r"Row #(\d+)")
 _ARROW_COLUMN = re.compile(r"In CSV column #(\d+)")
@@ -56,7 +56,7 @@ _ARROW_VALUE = re.compile(r"invalid value '(.*)'|zone offset in '(.*?)'", re.DOT
 
 
 class _SecondSixtyError(Exception):
-    """A stamp in a leap second, which pyarrow does not read."""
+    """A stamp in a leap second, which pyarrow cannot read."""
 
 
 class CsvFile(LogFile):
@@ -101,7 +101,7 @@ class CsvFile(LogFile):
     def _batches(
         self, layout: TextLayout, columns: Mapping[str, int], time: TextTime | None
     ) -> Iterator[Batch]:
-        """Yield all records, their stamps read as ``time`` says."""
+        """Yield all records, with stamps converted by ``time``."""
         records = layout.records()
         rows = 0
         for part in self._parts(layout, set(columns.values()), time, records):
@@ -114,7 +114,8 @@ class CsvFile(LogFile):
                 raise self._bad_cell(line, column, error.text, time.expected) from None
             rows += len(part)
             yield Batch(
-                stamps, {name: self.to_si(name, _numbers(part, at)) for name, at in columns.items()}
+                stamps,
+                {name: self.to_si(name, _take_numbers(part, at)) for name, at in columns.items()},
             )
         if rows == 0:
             raise RecordingError(f"{self.path.name}: no complete record; expected at least one")
@@ -131,7 +132,7 @@ class CsvFile(LogFile):
     def _parts(
         self, layout: TextLayout, figures: set[int], time: TextTime | None, records: Records
     ) -> Iterator[pa.RecordBatch]:
-        """Yield the wanted columns, named by their positions, block by block."""
+        """Yield the required columns, named by their positions, block by block."""
         types = dict.fromkeys(figures, pa.float64()) | (time.types if time else {})
         fault = _WrongWidth()
         rows = 0
@@ -146,14 +147,14 @@ class CsvFile(LogFile):
                     ),
                     parse_options=pacsv.ParseOptions(
                         delimiter=layout.split.delimiter,
-                        # A stray quote would swallow the lines up to the next one.
+                        # A single quote would join all lines up to the next one.
                         quote_char='"' if layout.quoted else False,
                         invalid_row_handler=fault.keep,
                     ),
                     convert_options=pacsv.ConvertOptions(
                         column_types={str(at): kind for at, kind in types.items()},
                         include_columns=[str(at) for at in types],
-                        null_values=MISSING,
+                        null_values=MISSING_CELLS,
                         decimal_point=layout.decimal,
                     ),
                 )
@@ -166,7 +167,7 @@ class CsvFile(LogFile):
             except pa.ArrowException as error:
                 if lines.error is not None:
                     raise lines.error from None
-                if _NOTHING not in str(error):
+                if _ARROW_EMPTY_FILE not in str(error):
                     if time is not None and time.types.get(time.position) != pa.string():
                         value = _ARROW_VALUE.search(str(error))
                         if value is not None and _SECOND_SIXTY.search(value[1] or ""):
@@ -226,7 +227,7 @@ class CsvFile(LogFile):
         )
 
     def _line(self, row: int, layout: TextLayout, *, blank: bool) -> int:
-        """Return the line of a record in the file; ``blank``: lines of spaces count as records."""
+        """Return the line number of a record; ``blank``: lines of spaces count as records."""
         stripped = b"\r\n" if blank else b"\r\n\t "
         records, count = layout.records(), 0
         for number, raw in enumerate(first_lines(self.path), start=1):
@@ -243,12 +244,12 @@ class CsvFile(LogFile):
         layout: TextLayout,
         time: TextTime | None,
     ) -> RecordingError:
-        """Return what an error of pyarrow says, in terms of the file."""
+        """Convert an error of pyarrow to an error about a line of the file."""
         text = str(error)
         row, column = _ARROW_ROW.search(text), _ARROW_COLUMN.search(text)
         if fault.row is not None and (row is None or fault.row.number <= int(row[1])):
             return self._wrong_width(fault.row, layout)
-        if _OPEN_QUOTE in text:
+        if _ARROW_OPEN_QUOTE in text:
             text = "a quote is opened that is not closed on its line; expected one record a line"
         value = _ARROW_VALUE.search(text)
         if row is None or column is None or value is None:
@@ -262,15 +263,15 @@ class CsvFile(LogFile):
 
 
 class _WrongWidth:
-    """The first record with too many or too few columns: no fault where it is the last one."""
+    """The first record with too many or too few columns; allowed if it is the last one."""
 
     def __init__(self) -> None:
         self.row: pacsv.InvalidRow | None = None
-        self.record = 0  # its number without lines of spaces, from 1
+        self.record = 0  # number of the record from 1, without lines of spaces
         self._blank = 0
 
     def keep(self, row: pacsv.InvalidRow) -> str:
-        """Tell pyarrow to go on after the first such record, and to stop at the next."""
+        """Let pyarrow continue after the first such record, and stop at the second."""
         if not row.text.strip():
             self._blank += 1
             return "skip"
@@ -280,15 +281,15 @@ class _WrongWidth:
         return "skip"
 
 
-def _numbers(part: pa.RecordBatch, position: int) -> NDArray[np.float64]:
+def _take_numbers(part: pa.RecordBatch, position: int) -> NDArray[np.float64]:
     return np.asarray(part.column(str(position)).to_numpy(zero_copy_only=False), np.float64)
 
 
-# ---------------------------------------------------------------------- the units it states
+# ------------------------------------------------------------------------ stated units
 
 
 def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
-    """Return the units that a line beside the names says, by the positions of columns; and it."""
+    """Return the units in a line before the records, by column position, and the line."""
     for raw in layout.preamble:
         if raw == layout.header:
             continue
@@ -301,9 +302,9 @@ def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
 
 
 def text_units(layout: TextLayout, columns: Mapping[str, int]) -> dict[str, StatedUnit]:
-    """Return the units that a log states of its channels.
+    """Return the units that a log states for its channels.
 
-    ``columns``: position of the column of each channel, and of what is beside them.
+    ``columns``: position of the column of each channel and additional column.
     """
     beside, _ = line_of_units(layout)
     units = {}
@@ -315,13 +316,13 @@ def text_units(layout: TextLayout, columns: Mapping[str, int]) -> dict[str, Stat
     return units
 
 
-# ----------------------------------------------------------------------- what a log holds
+# ------------------------------------------------------------------------- inspection
 
-_NOTES = 12
+_MAX_NOTES = 12
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return the one table of a text log.
+    """Return the only table of a text log, as a list.
 
     ``path``: a file, compressed or not, or a member of a zip archive.
 
@@ -337,7 +338,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     rows = rows[:-1] or rows  # the last one may be cut short
     named = layout.names != [str(number) for number in range(1, len(layout.names) + 1)]
     columns = tuple(
-        _column(layout, place, [row[place] for row in rows], named, units.get(place))
+        _describe_column(layout, place, [row[place] for row in rows], named, units.get(place))
         for place in range(min(len(layout.names), MAX_SEARCHED_COLUMNS))
     )
     names = "with names" if named else "without names"
@@ -352,12 +353,12 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
                 text.strip().replace("\t", " ")
                 for raw, text in zip(layout.preamble, before, strict=True)
                 if raw not in (layout.header, units_line)
-            )[:_NOTES],
+            )[:_MAX_NOTES],
         )
     ]
 
 
-def _column(
+def _describe_column(
     layout: TextLayout, place: int, cells: list[str], named: bool, unit: str | None
 ) -> LogColumn:
     name = layout.names[place] if named else ""
@@ -368,14 +369,14 @@ def _column(
     unit = None if unit is None or is_missing(unit) else unit
     present = [cell for cell in cells if not is_missing(cell)]
     if present and all(is_number(cell, layout.decimal) for cell in present):
-        values = np.array([_figure(cell, layout.decimal) for cell in cells])
+        values = np.array([_parse_number(cell, layout.decimal) for cell in cells])
         return LogColumn(source, name, "number", first, values, unit)
     if forms := stamp_forms(present):
         return LogColumn(source, name, "date", first, stamps_of(forms[0], cells), None, forms)
     return LogColumn(source, name, "text", first, unit=unit)
 
 
-def _figure(cell: str, decimal: Decimal) -> float:
+def _parse_number(cell: str, decimal: Decimal) -> float:
     if is_missing(cell):
         return np.nan
     return float(cell.strip().replace(decimal, "."))

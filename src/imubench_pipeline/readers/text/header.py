@@ -1,4 +1,4 @@
-"""Lines before the first record of a text log: which has the names, and which the units."""
+"""Interpret the lines before the first record of a text log: names, units, statements."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import numpy as np
 
 from imubench_pipeline.readers.text.cells import is_missing, is_number
 
-_RULED = re.compile(r"[-=_+]{2,}")
-_UNIT = re.compile(
+_RULE = re.compile(r"[-=_+]{2,}")
+_UNIT_CELL = re.compile(
     r"[(\[{<].*[)\]}>]|[-–.]*|"
     r"(?:[munpkMµμ]|milli|micro)?(?:s|sec|seconds?|g|rad|deg|degrees?|dps|m|T|gauss|Gauss|Hz|V|Pa|"
     r"bar|[°º]?C|K|[°º])(?:\W.*|²)?|min|h|samples?|counts?|LSB"
 )
-_WORDS = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
+_WORDS_ONLY = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 
 
 def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
-    """Return which line has the names of the columns, as far as they can be told from units.
+    """Return the index of the line with the names of the columns, as opposed to units.
 
     Parameters
     ----------
     lines : sequence of sequence of str
-        The cells of the lines before the first record, in their order; none where a line is not
-        divided as the record is.
+        The cells of the lines before the first record, in order; empty for a line that is not
+        split like the record.
 
     Returns
     -------
     int or None
-        The one with the most names; of equals the first. None: no line has names.
+        The line with the most names; the first of equals. None: no line has names.
     """
     best, header = 0, None
     for index, cells in enumerate(lines):
@@ -43,17 +43,17 @@ def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
 
 
 def says_units(cells: Sequence[str]) -> bool:
-    """Tell whether a line has a unit in most of its cells."""
+    """Return whether most cells of a line are units."""
     texts = [cell.strip() for cell in cells if cell.strip()]
-    units = sum(_UNIT.fullmatch(text) is not None for text in texts)
+    units = sum(_UNIT_CELL.fullmatch(text) is not None for text in texts)
     named = [text for text in texts if not is_missing(text)]
     return bool(named) and 2 * units > len(texts)
 
 
 def completed(names: list[str], record: list[str]) -> list[str]:
-    """Return a name for each cell of a record; none where there are more or fewer names.
+    """Return a name for each cell of a record; empty if the numbers differ.
 
-    Either line may end with a delimiter, and the other may not.
+    One of the two lines may have an additional delimiter at its end.
     """
     if len(names) == len(record) + 1 and not names[-1]:
         return names[:-1]
@@ -63,15 +63,15 @@ def completed(names: list[str], record: list[str]) -> list[str]:
 
 
 def is_heading(cells: Sequence[str]) -> bool:
-    """Tell whether a line under the names has units, is ruled, or goes on with words."""
+    """Return whether a line below the names has units or words, or is a ruling line."""
     texts = [cell.strip() for cell in cells]
-    ruled = all(_RULED.fullmatch(text) for text in texts)
-    return ruled or says_units(texts) or all(_WORDS.fullmatch(text) for text in texts)
+    ruled = all(_RULE.fullmatch(text) for text in texts)
+    return ruled or says_units(texts) or all(_WORDS_ONLY.fullmatch(text) for text in texts)
 
 
 def are_units(row: list[str], places: set[int]) -> bool:
-    """Tell whether a line under the header says units, or is ruled: it has no figure."""
-    if all(_RULED.fullmatch(cell.strip()) for cell in row):
+    """Return whether a line below the header has units or is a ruling line, without numbers."""
+    if all(_RULE.fullmatch(cell.strip()) for cell in row):
         return True
     cells = [row[place].strip() for place in places if place < len(row)]
     texts = [cell for cell in cells if not is_missing(cell)]
@@ -79,26 +79,29 @@ def are_units(row: list[str], places: set[int]) -> bool:
 
 
 SIMULATED = "SIMULATED by imubench, not measured"
-"""A comment at the top of text logs that this package has simulated."""
+"""Comment at the top of text logs that this package simulates."""
 
-_MARKS = {SIMULATED, "SIMULATED, not measured"}
+_SIMULATED_MARKS = {SIMULATED, "SIMULATED, not measured"}
 """The second one was written by earlier versions."""
 
 
 def states_simulated(lines: Iterable[str]) -> bool:
-    """Return whether one of the lines is the mark of a simulated log, and nothing else.
+    """Return whether one of the lines is exactly the mark of a simulated log.
 
-    A spreadsheet may have added quotes and empty cells.
+    Quotes and empty cells, which a spreadsheet may add, are ignored.
     """
-    return any(line.strip().strip("\"',;\t").lstrip("#%;!/ ").rstrip() in _MARKS for line in lines)
+    return any(
+        line.strip().strip("\"',;\t").lstrip("#%;!/ ").rstrip() in _SIMULATED_MARKS
+        for line in lines
+    )
 
 
-_RATE = re.compile(
+_RATE_STATEMENT = re.compile(
     r"\b(?:update|sampl\w*|output|data|logging)[ _]?(?:data[ _]?)?(?:rate|freq\w*)\W{1,4}?"
     r"(?P<figure>\d+(?:[.,]\d+)?)\s*(?P<kilo>k)?(?:hz|sps)\b",
     re.IGNORECASE,
 )
-_START = re.compile(
+_START_STATEMENT = re.compile(
     r"\bstart(?:ed)?[ _]?(?:time|date|at)?\W{1,4}?"
     r"(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ]+(?P<time>\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)",
     re.IGNORECASE,
@@ -108,11 +111,11 @@ _START = re.compile(
 def stated_rate(lines: Iterable[str]) -> float | None:
     """Return the sampling rate that lines such as ``// Update Rate: 100.0Hz`` state, Hz.
 
-    None where none is stated, or several that differ, such as one a sensor.
+    None if no rate is stated, or different ones, such as one for each sensor.
     """
     rates = set()
     for line in lines:
-        for match in _RATE.finditer(line):
+        for match in _RATE_STATEMENT.finditer(line):
             figure = float(match["figure"].replace(",", "."))
             rates.add(figure * (1000.0 if match["kilo"] else 1.0))
     (rate,) = rates if len(rates) == 1 else (None,)
@@ -120,9 +123,9 @@ def stated_rate(lines: Iterable[str]) -> float | None:
 
 
 def stated_start(lines: Iterable[str]) -> str | None:
-    """Return the date and time (ISO 8601) of lines such as ``// Start Time: 2024-05-01 12:00``."""
+    """Return the start (ISO 8601) in lines such as ``// Start Time: 2024-05-01 12:00``."""
     for line in lines:
-        if match := _START.search(line):
+        if match := _START_STATEMENT.search(line):
             text = f"{match['date'].replace('/', '-')}T{match['time'].replace(',', '.')}"
             try:
                 return str(np.datetime64(text, "ms"))

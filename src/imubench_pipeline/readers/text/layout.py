@@ -34,51 +34,51 @@ from imubench_pipeline.tables.findings import RecordingError
 
 Column = str | int
 
-_COMMENTS = ("#", "//", "%", ";", "!")
-_SPLITS = (*map(Split, ";\t|,"), Split(" ", runs=True), Split(" "))
-_LINES, _BYTES, _UNIT_LINES = 500, 1 << 20, 3
-_SCORED_LINES, _SCORED_CELLS, _SHOWN, _LONGEST_SHOWN = 50, 50, 20, 40
+_COMMENT_SIGNS = ("#", "//", "%", ";", "!")
+_CANDIDATE_SPLITS = (*map(Split, ";\t|,"), Split(" ", runs=True), Split(" "))
+_MAX_HEAD_LINES, _MAX_HEAD_BYTES, _MAX_UNIT_LINES = 500, 1 << 20, 3
+_SCORED_LINES, _SCORED_CELLS, _MAX_SHOWN_NAMES, _MAX_SHOWN_LENGTH = 50, 50, 20, 40
 
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a text log is laid out."""
+    """Layout of a text log."""
 
     file: str
-    """Its name, for messages."""
+    """Name of the file, for messages."""
     lines_before: int
     bytes_before: int
-    """Lines and bytes before the first record."""
+    """Number of lines and bytes before the first record."""
     split: Split
     quoted: bool
     decimal: Decimal
     names: list[str]
-    """The names of the columns; their positions where there is no header."""
+    """Names of the columns; their positions if there is no header."""
     rows: list[list[str]]
-    """The cells of the first records; the last of them may be cut short."""
+    """Cells of the first records; the last record may be incomplete."""
     comments: tuple[str, ...]
-    """Beginnings of lines that are comments."""
+    """Prefixes of comment lines."""
     skipped: tuple[bytes, ...]
-    """The first of the lines that the sensor file says to skip."""
+    """The first lines that are skipped because of ``skip_lines``."""
     header: bytes
-    """The line of names; empty: none."""
+    """The line of names; empty if there is none."""
     preamble: tuple[bytes, ...]
     """The lines before the first record, with the comments."""
     passed_over: tuple[tuple[int, str], ...]
     """Number and text of the lines before the first record that are neither names nor units."""
     blank_is_missing: bool
-    """A blank line among the records is one whose only cell is empty."""
+    """A blank line among the records is a record with one empty cell."""
 
     def position(self, column: Column, key: str) -> int:
-        """Return the position, counted from 0, of a column that the sensor file names.
+        """Return the position, from 0, of a column that the sensor file names.
 
         Raises
         ------
         RecordingError
-            If the file has no such column, or two of that name.
+            If the file has no such column, or two with this name.
         """
-        shown = [name[:_LONGEST_SHOWN] for name in self.names[:_SHOWN]]
-        present = ", ".join(shown) + (", ..." if len(self.names) > _SHOWN else "")
+        shown = [name[:_MAX_SHOWN_LENGTH] for name in self.names[:_MAX_SHOWN_NAMES]]
+        present = ", ".join(shown) + (", ..." if len(self.names) > _MAX_SHOWN_NAMES else "")
         if isinstance(column, int):
             if column > len(self.names):
                 raise RecordingError(
@@ -100,7 +100,7 @@ class TextLayout:
         return self.names.index(column)
 
     def records(self) -> Records:
-        """Return what makes records of the lines from the first record on."""
+        """Return the converter of lines, from the first record on, to records."""
         runs, blank = self.split.runs, self.blank_is_missing
         signs = [sign.encode() for sign in self.comments]
         return Records(signs, self.header, self.preamble, runs, blank)
@@ -108,7 +108,7 @@ class TextLayout:
 
 @dataclass(frozen=True)
 class _Line:
-    """A line of the head of a file, and the bytes before it."""
+    """A line at the beginning of a file; ``start``: number of bytes before it."""
 
     number: int
     start: int
@@ -119,11 +119,11 @@ class _Line:
 def find_layout(
     path: Path, log: LogFormat, figures: Sequence[Column], times: Sequence[Column]
 ) -> TextLayout:
-    """Find how a text log is laid out.
+    """Return the layout of a text log.
 
-    ``log``: what is stated.
-    ``figures`` and ``times``: the columns of figures and those of time stamps that are wanted, by
-    name or position. Where none is, the likeliest layout is found.
+    ``log``: the stated format.
+    ``figures`` and ``times``: the required columns of numbers and of time stamps, by name or
+    position. If there are none, the most plausible layout is returned.
 
     Raises
     ------
@@ -154,7 +154,7 @@ class _Search:
             )
 
     def layout(self) -> TextLayout:
-        """Return the likeliest layout."""
+        """Return the most plausible layout."""
         if self._lines:
             refuse_other_formats(self._file, self._lines[0].raw)
             begin = b"\n".join(line.raw for line in self._lines[:_SCORED_LINES])
@@ -201,18 +201,18 @@ class _Search:
     # --------------------------------------------------------------------- the first lines
 
     def _signs(self, split: Split | None) -> tuple[str, ...]:
-        """Return the beginnings of comments; no delimiter is one."""
+        """Return the prefixes of comments, without the delimiter."""
         if self._log.comment is not None:
             return (self._log.comment,)
         delimiter = split.delimiter if split else self._log.delimiter
-        return tuple(sign for sign in _COMMENTS if sign != delimiter)
+        return tuple(sign for sign in _COMMENT_SIGNS if sign != delimiter)
 
     def _head(self, path: Path) -> tuple[list[_Line], list[_Line]]:
         """Return the comments and the other lines of the beginning of a file."""
         comments: deque[_Line] = deque()
         lines: list[_Line] = []
         number, start, line_bytes, comment_bytes = 0, 0, 0, 0
-        # Whether a semicolon begins a comment or is the delimiter is not yet known.
+        # A semicolon may begin a comment or be the delimiter, which is not yet known.
         signs = tuple(sign for sign in self._signs(None) if sign != ";")
         for raw in first_lines(path, bounds.MAX_BYTES_BEFORE):
             number, here, start = number + 1, start, start + len(raw)
@@ -222,7 +222,7 @@ class _Search:
                 self._skipped.append(raw.rstrip(b"\r\n"))
             if number <= self._log.skip_lines or not raw.strip(b"\0 \t\r\n"):
                 continue
-            line = _Line(number, here, raw.rstrip(b"\r\n"), _decoded(raw.rstrip(b"\r\n")))
+            line = _Line(number, here, raw.rstrip(b"\r\n"), _decode(raw.rstrip(b"\r\n")))
             if line.text.startswith(signs):
                 comments.append(line)
                 comment_bytes += len(line.raw)
@@ -234,7 +234,9 @@ class _Search:
                 continue
             lines.append(line)
             line_bytes += len(raw)
-            if len(lines) >= _LINES or (line_bytes > _BYTES and len(lines) > _UNIT_LINES):
+            if len(lines) >= _MAX_HEAD_LINES or (
+                line_bytes > _MAX_HEAD_BYTES and len(lines) > _MAX_UNIT_LINES
+            ):
                 break
         if not lines and (number > bounds.MAX_LINES_BEFORE or start > bounds.MAX_BYTES_BEFORE):
             raise RecordingError(
@@ -244,7 +246,7 @@ class _Search:
         return list(comments), lines
 
     def _parted(self, split: Split) -> tuple[list[_Line], list[_Line]]:
-        """Return the comments and the other lines, where this is the delimiter."""
+        """Return the comments and the other lines for a given delimiter."""
         if ";" not in self._signs(split):
             return self._comments, self._lines
         comments = [line for line in self._lines if line.text.startswith(";")]
@@ -254,23 +256,25 @@ class _Search:
     # ------------------------------------------------------------------------- delimiter
 
     def _splits(self) -> Sequence[Split]:
-        """Return the ways to divide a line that come into question."""
+        """Return the candidate rules for splitting lines."""
         stated = self._log.delimiter
         if stated is not None:
-            return [split for split in _SPLITS if split.delimiter == stated] or [Split(stated)]
+            return [split for split in _CANDIDATE_SPLITS if split.delimiter == stated] or [
+                Split(stated)
+            ]
         if self._log.decimal != ",":
-            return _SPLITS
+            return _CANDIDATE_SPLITS
         return [
             split
-            for split in _SPLITS
+            for split in _CANDIDATE_SPLITS
             if split.delimiter != "," or any(split.quotes(line.text) for line in self._lines)
         ]
 
     def _likelihood(self, split: Split) -> tuple[float, ...]:
-        """Return how likely a delimiter is; the first of equals is taken.
+        """Return a score of a delimiter for comparison; the first of equals is used.
 
-        The right one shows the names that are wanted, then as many names as there are cells in
-        the records, then more than one column, then numbers in lines of one width.
+        In order of priority: number of required names found; as many names as cells in the records;
+        more than one column; share of numbers in lines of equal width.
         """
         comments, lines = self._parted(split)
         rows = [split.cells(line.text) for line in lines[-_SCORED_LINES:]]
@@ -293,7 +297,7 @@ class _Search:
     # ---------------------------------------------------------------------- header, record
 
     def _names_in(self, split: Split, line: _Line, width: int | None = None) -> list[str]:
-        """Return the names in a line; in a comment, those without its sign."""
+        """Return the names in a line, without the sign of a comment."""
         names = split.names(line.text, width)
         sign = next((sign for sign in self._signs(split) if line.text.startswith(sign)), None)
         if sign is None or (names and names[0] in self._names):
@@ -301,7 +305,7 @@ class _Search:
         return split.names(line.text.lstrip(sign).lstrip(), width)
 
     def _column_names(self, split: Split, header: _Line | None, record: list[str]) -> list[str]:
-        """Return the names of all columns; positions, where none are wanted and none fit."""
+        """Return the names of all columns; positions if no names are required and none fit."""
         if header is not None:
             names = self._names_in(split, header, len(record))
             whole = completed(names, record)
@@ -312,7 +316,7 @@ class _Search:
     def _header_and_first(
         self, split: Split, comments: list[_Line], lines: list[_Line]
     ) -> tuple[_Line | None, int]:
-        """Return the header, and the index of the line that is the first record."""
+        """Return the header and the index of the first record among the lines."""
         if self._log.header is False:
             return None, 0
         rows = [split.cells(line.text) for line in lines]
@@ -346,7 +350,7 @@ class _Search:
     def _likely_header(
         self, split: Split, comments: list[_Line], lines: list[_Line]
     ) -> _Line | None:
-        """Return the line of names before the first record, the last of the lines."""
+        """Return the line of names before the first record, which is the last of the lines."""
         if not lines:
             raise RecordingError(f"{self._file}: no line of figures; expected the text of a log")
         record = split.cells(lines[-1].text)
@@ -356,29 +360,29 @@ class _Search:
         return None if place is None else near[place]
 
     def _named(self, split: Split, lines: list[_Line], width: int) -> _Line | None:
-        """Return the line that has all names that are wanted."""
+        """Return the first line with all required names."""
         return next(
             (x for x in lines if set(self._names).issubset(self._names_in(split, x, width))), None
         )
 
     def _is_record(self, row: list[str]) -> bool:
-        """Tell whether the figures that are wanted are in a line of which no names are known."""
+        """Return whether a line may be a record: numbers in the required columns, or in most."""
         if self._names or not self._wanted:
             return 2 * sum(map(is_datum, row)) >= len(row)
         cells = [row[int(column) - 1] for column in self._figures if int(column) <= len(row)]
         return len(row) >= self._last and are_figures(cells)
 
     def _after_units(self, split: Split, header: _Line, rows: list[list[str]], index: int) -> int:
-        """Return the index of the first line that is no line of units under the header."""
+        """Return the index of the first line below the header that is no line of units."""
         if index < len(rows):
             places = self._places(self._names_in(split, header, len(rows[index])))
-            end = index + _UNIT_LINES
+            end = index + _MAX_UNIT_LINES
             while index < min(end, len(rows)) and are_units(rows[index], places):
                 index += 1
         return index
 
     def _passed_over(self, split: Split, header: _Line | None, before: list[_Line]) -> list[_Line]:
-        """Return the lines right before the first record that are neither names nor units."""
+        """Return the lines directly before the first record that are neither names nor units."""
         rows = [split.cells(line.text) for line in before]
         if self._names and header in before:
             first = before.index(header) + 1
@@ -389,7 +393,7 @@ class _Search:
         return before[max(others, default=-1) + 1 :]
 
     def _places(self, names: list[str]) -> set[int]:
-        """Return the positions of the figures that are wanted, as far as they are there."""
+        """Return the positions of the required number columns that exist."""
         return {
             column - 1 if isinstance(column, int) else names.index(column)
             for column in self._figures
@@ -397,7 +401,7 @@ class _Search:
         }
 
     def _decimal(self, names: list[str], rows: list[list[str]]) -> Decimal:
-        """Return the sign of the decimal: that of the figures that are wanted, or of all."""
+        """Return the decimal sign of the required numbers, or else of all numbers."""
         places = self._places(names)
         wanted = [row[place] for row in rows for place in places if place < len(row)]
         for cells in (wanted, [cell for row in rows for cell in row[:_SCORED_CELLS]]):
@@ -409,8 +413,8 @@ class _Search:
         return "."
 
 
-def _decoded(raw: bytes) -> str:
-    """Return text that may be UTF-8, else is Latin-1."""
+def _decode(raw: bytes) -> str:
+    """Decode text as UTF-8, or else as Latin-1."""
     try:
         return raw.decode()
     except UnicodeDecodeError:

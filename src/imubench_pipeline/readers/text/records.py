@@ -1,4 +1,4 @@
-"""Lines of a text log -> records for a parser of columns, a block of lines at a time."""
+"""Convert the lines of a text log to records for a parser of columns, block by block."""
 
 from __future__ import annotations
 
@@ -11,35 +11,35 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.tables.findings import RecordingError
 
-_IN_NUMBERS = frozenset(b"0123456789+-.,;:|\t \"'eEnNaAiIfFtT/\r")
-_NO_COMMENT = rb"(?!#(?i:n/a|na|value!|num!|div/0!)[;,|\t ])"
-"""What a spreadsheet writes into a cell without a number, which may be the first of a line."""
+_NUMBER_BYTES = frozenset(b"0123456789+-.,;:|\t \"'eEnNaAiIfFtT/\r")
+_NOT_A_COMMENT = rb"(?!#(?i:n/a|na|value!|num!|div/0!)[;,|\t ])"
+"""Errors of a spreadsheet in a cell, which may be the first cell of a line and begin with #."""
 
-_IN_BLANK = b" \t\r\n"
+_BLANK_BYTES = b" \t\r\n"
 _BLANK_LINES = re.compile(rb"^[ \t\r]*+\n", re.MULTILINE)
-_MISSING = b"nan\n"
-_WITH_ZEROS = re.compile(rb"^[^\0\n]*+\0[^\0\n]*+\n", re.MULTILINE)
-"""A line with one run of zero bytes. One with several may be text of two bytes a letter."""
-_MOST_BLANK = 1 << 24  # beside each other, for memory
+_MISSING_CELL = b"nan\n"
+_LINE_WITH_ZEROS = re.compile(rb"^[^\0\n]*+\0[^\0\n]*+\n", re.MULTILINE)
+"""A line with one run of zero bytes. A line with several runs may be UTF-16."""
+_MAX_BLANK_LINES = 1 << 24  # consecutive blank lines, limited for memory
 
 _TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
 
 
 class Records:
-    """Leaves out of the lines of a file what is no record.
+    """Removes from the lines of a file all that are no records.
 
     Parameters
     ----------
     comments : collection of bytes
-        Beginnings of lines that are comments.
+        Prefixes of comment lines.
     header : bytes
-        The line of names, without its line break; empty: none.
+        The line of names, without its line break; empty if there is none.
     preamble : sequence of bytes
-        The lines before the first record, which a logger that starts again repeats.
+        The lines before the first record, which a restarted logger repeats.
     runs : bool
-        Columns are divided by runs of spaces or tabs, which become one space.
+        Columns are separated by runs of spaces or tabs, which become one space.
     blank_is_missing : bool
-        A blank line between two records is one whose only cell is empty.
+        A blank line between two records is a record with one empty cell.
     """
 
     def __init__(
@@ -52,39 +52,39 @@ class Records:
     ) -> None:
         self._comments = tuple(comments)
         alternatives = b"|".join(re.escape(sign) for sign in self._comments)
-        # A pattern that begins with the line break is searched for five times as fast as one
-        # that begins with ^.
+        # A pattern that begins with the line break is five times as fast as one that begins with
+        # ^.
         self._comment_lines = re.compile(
-            rb"\n" + _NO_COMMENT + rb"(?:" + alternatives + rb")[^\n]*"
+            rb"\n" + _NOT_A_COMMENT + rb"(?:" + alternatives + rb")[^\n]*"
         )
         self._header = header
-        # One byte is found ten times as fast as several.
-        self._telling = bytes(b for b in header if b not in _IN_NUMBERS)[:1] or header[:1]
+        # The search for one byte is ten times as fast as for several.
+        self._telling = bytes(b for b in header if b not in _NUMBER_BYTES)[:1] or header[:1]
         self._preamble = frozenset(preamble)
         self._begins = tuple({*preamble[:1], header})
         self._runs = runs
         self._blank_is_missing = blank_is_missing
         self._blank = 0
-        self.restarts = 0  # how often the header stood among the records
-        self.cut = 0  # records cut short, in the line of which the log begins again
-        self.damaged = 0  # records with a run of zero bytes in them
+        self.restarts = 0  # number of headers among the records
+        self.cut = 0  # incomplete records with a restart of the log in the same line
+        self.damaged = 0  # records that contain a run of zero bytes
 
     def __call__(self, lines: bytes) -> bytes:
         """Return the records of complete lines."""
-        # Before the comments, for a header may be one.
+        # Before the comments, since the header may be a comment.
         if self._header and self._telling in lines and self._header in lines:
             lines = self._without_headers(lines)
         if b"\0" in lines:
-            lines = _WITH_ZEROS.sub(self._left_out, lines)
+            lines = _LINE_WITH_ZEROS.sub(self._left_out, lines)
         for sign in self._comments:
             if sign[:1] in lines and (lines.startswith(sign) or b"\n" + sign in lines):
                 lines = self._comment_lines.sub(b"", b"\n" + lines)[1:]
                 break
         if self._runs:
-            lines = _single_spaces(lines)
+            lines = _merge_spaces(lines)
         if self._blank_is_missing and lines:
             lines = self._with_missing(lines)
-        # pyarrow shows us a record of wrong width only if it is UTF-8.
+        # pyarrow reports a record of wrong width only if it is valid UTF-8.
         return lines if lines.isascii() else lines.decode("utf-8", "replace").encode()
 
     def _left_out(self, line: re.Match[bytes]) -> bytes:
@@ -93,20 +93,20 @@ class Records:
         return b""
 
     def _with_missing(self, lines: bytes) -> bytes:
-        """Return the lines with a cell in blank ones; those at the end wait for what follows."""
-        ended = lines.rstrip(_IN_BLANK)
+        """Return the lines with missing cells for blank lines; final blank lines are held back."""
+        ended = lines.rstrip(_BLANK_BYTES)
         after = lines[len(ended) :].count(b"\n")
         if not ended:
             self._blank += after
             return b""
-        if self._blank > _MOST_BLANK:
+        if self._blank > _MAX_BLANK_LINES:
             raise RecordingError(
                 f"{self._blank} blank lines follow each other among the records; expected a log "
                 "without: cut the file there"
             )
-        before = _MISSING * self._blank
+        before = _MISSING_CELL * self._blank
         self._blank = after - 1
-        return before + _BLANK_LINES.sub(_MISSING, ended) + b"\n"
+        return before + _BLANK_LINES.sub(_MISSING_CELL, ended) + b"\n"
 
     def _without_headers(self, lines: bytes) -> bytes:
         records = []
@@ -125,29 +125,29 @@ class Records:
 
 
 def are_apart(numbers: Sequence[int]) -> bool:
-    """Return whether blank lines are between all records, and only set these apart.
+    """Return whether blank lines separate all records.
 
-    ``numbers``: the lines of the first records.
+    ``numbers``: line numbers of the first records.
     """
     return all(later > sooner + 1 for sooner, later in pairwise(numbers))
 
 
-def _single_spaces(lines: bytes) -> bytes:
+def _merge_spaces(lines: bytes) -> bytes:
     if not lines:
         return lines
     if b"\t" in lines:
         lines = lines.translate(_TAB_TO_SPACE)
     signs = np.frombuffer(lines, np.uint8)
     is_space = signs == ord(" ")
-    signs = signs[~(is_space & _after(is_space | (signs == ord("\n"))))]
+    signs = signs[~(is_space & _shift_by_one(is_space | (signs == ord("\n"))))]
     at_end = (signs[1:] == ord("\n")) | (signs[1:] == ord("\r"))
     keep = np.ones(len(signs), bool)
     keep[:-1] = ~((signs[:-1] == ord(" ")) & at_end)
     return signs[keep].tobytes()
 
 
-def _after(here: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return where the sign before is one of these; the block begins after a line break."""
+def _shift_by_one(here: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a mask shifted by one character; the block begins after a line break."""
     before = np.empty_like(here)
     before[0], before[1:] = True, here[:-1]
     return before

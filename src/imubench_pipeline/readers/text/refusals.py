@@ -1,4 +1,4 @@
-"""What is refused of a text log at first sight: other formats, and commas of two meanings."""
+"""Reject text logs of other formats, with binary data, or with ambiguous commas."""
 
 from __future__ import annotations
 
@@ -7,34 +7,34 @@ from collections.abc import Iterable, Sequence
 
 from imubench_pipeline.tables.findings import RecordingError
 
-_MARKUP = (b"<!doctype", b"<html", b"<head", b"<?xml", b"<svg")
-_JSON = (b'{"', b"[{", b"[[", b"{'")
-_ALONE = (b"{", b"[")
-_UTF_16 = 0.4
-"""Part of zero bytes from which a line is text of two bytes a letter."""
+_MARKUP_PREFIXES = (b"<!doctype", b"<html", b"<head", b"<?xml", b"<svg")
+_JSON_PREFIXES = (b'{"', b"[{", b"[[", b"{'")
+_JSON_BRACKETS = (b"{", b"[")
+_MIN_ZERO_SHARE_UTF_16 = 0.4
+"""Least share of zero bytes of a line of UTF-16."""
 
-_CONTROLS = bytes({*range(1, 32)} - set(b"\t\n\r\f\x1a\x1b"))
-_FEW_CONTROLS, _PART_CONTROLS = 4, 0.05
-"""Control characters that a text may have, and part of its bytes; of bytes of chance 1 in 10 is
-one."""
+_CONTROL_CHARACTERS = bytes({*range(1, 32)} - set(b"\t\n\r\f\x1a\x1b"))
+_MAX_CONTROLS, _MAX_CONTROL_SHARE = 4, 0.05
+"""Largest number of control characters of a text, and their largest share; one in ten random bytes
+is a control character."""
 
-_WHOLE = re.compile(r"\s*[-+]?\d+")
+_INTEGER = re.compile(r"\s*[-+]?\d+")
 
 
 def refuse_other_formats(file: str, line: bytes) -> None:
-    """Raise `RecordingError` if a log begins as a page of the web or JSON does.
+    """Raise `RecordingError` if a log begins like a web page or JSON.
 
-    ``file``: its name.
-    ``line``: its first line.
+    ``file``: name of the log.
+    ``line``: first line of the log.
     """
     begin = line.strip().lower()
     shown = line.strip()[:40].decode("utf-8", "replace")
-    if begin.startswith(_MARKUP):
+    if begin.startswith(_MARKUP_PREFIXES):
         raise RecordingError(
             f"{file}: is a page of HTML or XML, which begins with {shown!r}; expected the lines of "
             "a log: download it again, perhaps after a login"
         )
-    if begin.startswith(_JSON) or begin in _ALONE:
+    if begin.startswith(_JSON_PREFIXES) or begin in _JSON_BRACKETS:
         raise RecordingError(
             f"{file}: is JSON, which begins with {shown!r}; expected a line a record: export the "
             "log as CSV"
@@ -42,12 +42,12 @@ def refuse_other_formats(file: str, line: bytes) -> None:
 
 
 def refuse_control_characters(file: str, number: int, begin: bytes) -> None:
-    """Raise `RecordingError` if a log begins with many control characters, which no text has.
+    """Raise `RecordingError` if a log begins with many control characters, unlike text.
 
-    ``number``: of its first line, counted from 1.
+    ``number``: number of its first line, from 1.
     """
-    controls = len(begin) - len(begin.translate(None, _CONTROLS))
-    if controls > max(_FEW_CONTROLS, _PART_CONTROLS * len(begin)):
+    controls = len(begin) - len(begin.translate(None, _CONTROL_CHARACTERS))
+    if controls > max(_MAX_CONTROLS, _MAX_CONTROL_SHARE * len(begin)):
         raise RecordingError(
             f"{file}, line {number}: holds binary data of no known format, the bytes "
             f"{begin[:8].hex(' ')} (hexadecimal) and so on; expected text, or a log of a format "
@@ -56,14 +56,19 @@ def refuse_control_characters(file: str, number: int, begin: bytes) -> None:
 
 
 def refuse_binary(file: str, number: int, line: bytes) -> None:
-    """Raise `RecordingError` if a line holds zero bytes.
+    """Raise `RecordingError` if a line contains zero bytes.
 
-    ``number``: of the line, counted from 1.
+    ``number``: number of the line, from 1.
     """
     zeros = line.count(b"\0")
     if not zeros:
         return
-    if line.isascii() and _UTF_16 * len(line) < zeros < (1 - _UTF_16) * len(line) + 2:
+    if (
+        line.isascii()
+        and _MIN_ZERO_SHARE_UTF_16 * len(line)
+        < zeros
+        < (1 - _MIN_ZERO_SHARE_UTF_16) * len(line) + 2
+    ):
         raise RecordingError(
             f"{file}, line {number}: looks like UTF-16 without the mark that says so; expected "
             "UTF-8, or UTF-16 with its mark: save the text so"
@@ -76,24 +81,24 @@ def refuse_binary(file: str, number: int, line: bytes) -> None:
 
 
 def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequence[str]]) -> None:
-    """Raise `RecordingError` if what a comma divides may be a figure and its decimals.
+    """Raise `RecordingError` if commas may be delimiters as well as decimal signs.
 
-    Decimals have no sign, and begin with 0 now and then, which whole numbers do not, unless they
-    are all written with so many digits.
+    Decimals have no sign and sometimes begin with 0, unlike integers, unless all integers are
+    padded with zeros.
 
     Parameters
     ----------
     number : int
-        Of the first record.
+        Line number of the first record.
     line : str
         The first record.
     rows : sequence of sequence of str
-        What commas divide the first records into.
+        Cells of the first records, split at commas.
     """
     if {len(row) % 2 for row in rows} != {0}:
         return
     pairs = [pair for row in rows for pair in zip(row[::2], row[1::2], strict=True)]
-    if not all(_WHOLE.fullmatch(whole) and part.isdecimal() for whole, part in pairs):
+    if not all(_INTEGER.fullmatch(whole) and part.isdecimal() for whole, part in pairs):
         return
     if _are_padded(part for _, part in pairs) and not _are_padded(whole for whole, _ in pairs):
         raise RecordingError(

@@ -1,4 +1,4 @@
-"""Time stamps of a text log: numbers, ISO 8601, or text in a pattern; in one column or two."""
+"""Read time stamps of a text log: numbers, ISO 8601 or patterns, in one or two columns."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from imubench_pipeline.readers.text.layout import TextLayout
 from imubench_pipeline.settings.sensor import TimeSource
 
 DAY = 24 * 3600 * 10**9
-"""ns."""
+"""Length of a day, ns."""
 
-_ISO = re.compile(
+_ISO_STAMP = re.compile(
     r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?P<seconds>:\d\d(?:\.\d{1,9})?)?(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
 )
 _ISO_PATTERN = (
     r"(?P<Y>\d{4})-(?P<m>\d\d)-(?P<d>\d\d)(?:(?:T|\s+)(?P<H>\d\d):(?P<M>\d\d)"
     r"(?::(?P<S>\d\d)(?:[.,](?P<f>\d{1,9})\d*)?)?\s*(?P<z>Z|UTC|[+-]\d\d(?::?\d\d)?)?)?"
 )
-_FIELDS: Mapping[str, str] = {
+_FIELD_PATTERNS: Mapping[str, str] = {
     "Y": r"(?P<Y>\d{4})",
     "y": r"(?P<y>\d\d)",
     "m": r"(?P<m>\d{1,2})",
@@ -44,11 +44,11 @@ _FIELDS: Mapping[str, str] = {
     "z": r"(?P<z>Z|UTC|[+-]\d\d(?::?\d\d)?)",
     "%": "%",
 }
-_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_MONTH_NAMES = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 
 
 class StampError(Exception):
-    """A stamp that cannot be read: its place in the block, and its text."""
+    """A stamp that cannot be read: its row in the block, and its text."""
 
     def __init__(self, row: int, text: str) -> None:
         super().__init__(text)
@@ -57,11 +57,11 @@ class StampError(Exception):
 
 
 def arrow_type(texts: Collection[str]) -> pa.DataType | None:
-    """Return the type of ISO 8601 stamps that pyarrow reads by itself, much faster than we do.
+    """Return the type of ISO 8601 stamps that pyarrow itself reads, which is much faster.
 
-    None where it does not: a comma before the fraction, spaces around the stamp, a zone apart.
+    None if pyarrow cannot read them: decimal commas, spaces around the stamp or before the zone.
     """
-    stamps = [_ISO.fullmatch(text) for text in texts]
+    stamps = [_ISO_STAMP.fullmatch(text) for text in texts]
     zones = {bool(stamp["zone"]) for stamp in stamps if stamp}
     if not all(stamps) or len(zones) != 1:
         return None
@@ -69,19 +69,19 @@ def arrow_type(texts: Collection[str]) -> pa.DataType | None:
 
 
 class TextStamps:
-    """Reads stamps that are text.
+    """Reads stamps in text.
 
     Parameters
     ----------
     form : str
-        ``iso8601`` or a pattern as for ``strptime``.
+        ``iso8601`` or a ``strptime`` pattern.
     """
 
     def __init__(self, form: str) -> None:
-        pattern = _ISO_PATTERN if form == "iso8601" else _expression(form)
+        pattern = _ISO_PATTERN if form == "iso8601" else _convert_to_regex(form)
         self._expression = rf"^\s*{pattern}\s*$"
         self._fields = re.compile(self._expression).groupindex
-        # Without a date, stamps start again at midnight.
+        # Without a date, stamps wrap to 0 at midnight.
         self.dated = "d" in self._fields or "j" in self._fields
         self._zoned: bool | None = None
         self.leap_seconds = 0
@@ -89,19 +89,19 @@ class TextStamps:
         self._last: tuple[int, bool] = (0, False)
 
     def nanoseconds(self, texts: pa.Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return ns since 1970, or since midnight; and which stamps are there.
+        """Return ns since 1970 or since midnight, and a mask of the stamps that are present.
 
         Raises
         ------
         StampError
-            If a stamp is neither in the pattern nor missing.
+            If a stamp does not match the pattern and is not missing.
         """
         texts = pc.fill_null(texts, "")
         fields = pc.extract_regex(texts, self._expression)
         time, sound = self._composed(fields)
         sound &= np.asarray(fields.is_valid())
         if "z" in self._fields:
-            # Local time among stamps with a zone would be off by hours.
+            # All stamps must have a zone, or none: a mixture would be wrong by hours.
             zoned = np.asarray(pc.fill_null(pc.not_equal(fields.field("z"), ""), False))
             if self._zoned is None and sound.any():
                 self._zoned = bool(zoned[sound.argmax()])
@@ -116,10 +116,11 @@ class TextStamps:
         return time, sound
 
     def _counted(self, time: NDArray[np.int64], leap: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Return stamps that go on through leap seconds.
+        """Return stamps that advance through leap seconds.
 
-        Second 60 is taken for second 0 of the next minute, which follows it after a leap second.
-        Where a figure was only rounded up to 60, time goes on.
+        Second 60 is read as second 0 of the next minute. After a leap second, second 0 follows and
+        repeats this time, so that one second is added. If 60 is only due to rounding, the next
+        stamp is later, and nothing is added.
         """
         if not len(time):
             return time
@@ -149,7 +150,7 @@ class TextStamps:
         month = figures("m", 1)
         if "b" in self._fields:
             names = pc.utf8_lower(pc.fill_null(fields.field("b"), ""))
-            month = np.asarray(pc.fill_null(pc.index_in(names, pa.array(_MONTHS)), -1)) + 1
+            month = np.asarray(pc.fill_null(pc.index_in(names, pa.array(_MONTH_NAMES)), -1)) + 1
         day = figures("d", 1)
         hour = figures("H", 0)
         if "I" in self._fields:
@@ -163,7 +164,7 @@ class TextStamps:
         following = (months + 1).astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
         sound = (month >= 1) & (month <= 12) & (day >= 1) & (first + day <= following)
         sound &= (hour < 24) & (minute < 60) & (second <= 60)
-        sound &= (year > 1700) & (year < 2200)  # else ns overflow
+        sound &= (year > 1700) & (year < 2200)  # otherwise ns overflow
         days = first + day - 1 + figures("j", 1) - 1
         seconds = days * 86_400 + hour * 3600 + minute * 60 + second - self._zone(fields)
         return seconds * 10**9 + figures("f", 0), sound
@@ -173,11 +174,11 @@ class TextStamps:
         if "z" not in self._fields:
             return 0
         zones = pc.fill_null(fields.field("z"), "").dictionary_encode()
-        offsets = np.array([_offset(zone) for zone in zones.dictionary.to_pylist()], np.int64)
+        offsets = np.array([_parse_offset(zone) for zone in zones.dictionary.to_pylist()], np.int64)
         return offsets[np.asarray(zones.indices)] if len(offsets) else 0
 
 
-def _offset(zone: str) -> int:
+def _parse_offset(zone: str) -> int:
     digits = zone.lstrip("+-").replace(":", "")
     if not digits.isdigit():
         return 0
@@ -185,15 +186,15 @@ def _offset(zone: str) -> int:
     return -offset if zone.startswith("-") else offset
 
 
-def _expression(form: str) -> str:
+def _convert_to_regex(form: str) -> str:
     """Return the regular expression of a ``strptime`` pattern."""
     form = form.replace("%T", "%H:%M:%S").replace("%F", "%Y-%m-%d").replace("%R", "%H:%M")
     expression = ""
     for part in re.findall(r"[.,]%f|%.|\s+|[^%\s]", form):
         if part[1:] == "%f":
-            expression += rf"(?:[.,]{_FIELDS['f']})?"  # loggers leave out a fraction of zero
+            expression += rf"(?:[.,]{_FIELD_PATTERNS['f']})?"  # loggers omit a fraction of zero
         elif part.startswith("%"):
-            expression += _FIELDS[part[1:]]
+            expression += _FIELD_PATTERNS[part[1:]]
         else:
             expression += r"\s+" if part.isspace() else re.escape(part)
     return expression
@@ -201,60 +202,65 @@ def _expression(form: str) -> str:
 
 # ----------------------------------------------------------------------------------------- patterns
 
-_DATES = (
+_DATE_FORMS = (
     *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y:%m:%d", "%Y%m%d"),
     *("%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y"),
     *("%d-%b-%Y", "%d %b %Y", "%b %d %Y"),
 )
-_TIMES = ("%H:%M:%S.%f", "%I:%M:%S.%f %p", "%H:%M:%S:%f", "%H:%M")
-_BETWEEN = (" ", "T", "_", "-", " - ", ", ")
-_SHORTEST, _LONGEST = 5, 40
-_NO_SIGN = re.compile(r"%\w|[^\W_]+")
+_TIME_FORMS = ("%H:%M:%S.%f", "%I:%M:%S.%f %p", "%H:%M:%S:%f", "%H:%M")
+_DATE_TIME_SEPARATORS = (" ", "T", "_", "-", " - ", ", ")
+_MIN_STAMP_LENGTH, _MAX_STAMP_LENGTH = 5, 40
+_FIELD_OR_WORD = re.compile(r"%\w|[^\W_]+")
 
 
-def _by_signs() -> dict[str, list[str]]:
-    """Return the patterns by the signs between their fields."""
+def _group_forms_by_signs() -> dict[str, list[str]]:
+    """Return the patterns, grouped by the signs between their fields."""
     patterns: dict[str, list[str]] = {}
-    whole = (date + sign + time for date, sign, time in product(_DATES, _BETWEEN, _TIMES))
-    for form in chain(_TIMES, _DATES, whole):
+    whole = (
+        date + sign + time
+        for date, sign, time in product(_DATE_FORMS, _DATE_TIME_SEPARATORS, _TIME_FORMS)
+    )
+    for form in chain(_TIME_FORMS, _DATE_FORMS, whole):
         for written in dict.fromkeys((form, form.replace(".%f", ""))):
-            patterns.setdefault(_NO_SIGN.sub("", written), []).append(form)
+            patterns.setdefault(_FIELD_OR_WORD.sub("", written), []).append(form)
     return patterns
 
 
-_BY_SIGNS = _by_signs()
+_FORMS_BY_SIGNS = _group_forms_by_signs()
 
 
 def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
-    """Return the patterns that all stamps fit, the likeliest first; none where they are no stamps.
+    """Return the patterns that all stamps match, the most plausible first; empty if there are none.
 
-    A pattern with a date alone or a time of day alone is a part of one, that of a column. Where
-    day and month may be either, those are right that lie nearest together.
+    A pattern may have a date only or a time of day only. If day and month are ambiguous, the
+    patterns with the shortest time span are returned.
 
-    ``texts``: as written; missing ones are passed over.
+    ``texts``: stamps as written; missing ones are ignored.
     """
     stamps = [text.strip() for text in texts if not is_missing(text)]
-    if not stamps or not all(_SHORTEST <= len(stamp) <= _LONGEST for stamp in stamps):
+    if not stamps or not all(
+        _MIN_STAMP_LENGTH <= len(stamp) <= _MAX_STAMP_LENGTH for stamp in stamps
+    ):
         return ()
     if not all(any(sign.isdigit() for sign in stamp) for stamp in stamps):
         return ()
-    forms = _BY_SIGNS.get(_NO_SIGN.sub("", stamps[0]), [])
+    forms = _FORMS_BY_SIGNS.get(_FIELD_OR_WORD.sub("", stamps[0]), [])
     if ":" in stamps[0]:
         forms = ["iso8601", *forms]
     written = pa.array(stamps)
-    fitting = {form: times for form in forms if (times := _fitting(form, written)) is not None}
+    fitting = {form: times for form in forms if (times := _try_form(form, written)) is not None}
     spans = {form: np.ptp(times) for form, times in fitting.items()}
     return tuple(form for form in fitting if spans[form] == min(spans.values()))
 
 
 def stamps_of(form: str, texts: Sequence[str]) -> NDArray[np.float64]:
-    """Return ns since 1970 or since midnight of stamps in a pattern; NaN where one is missing."""
+    """Return stamps in a pattern as ns since 1970 or since midnight; NaN where missing."""
     times, present = TextStamps(form).nanoseconds(pa.array(texts))
     return np.where(present, times, np.nan)
 
 
-def _fitting(form: str, texts: pa.Array) -> NDArray[np.int64] | None:
-    """Return stamps in a pattern; None where one is not."""
+def _try_form(form: str, texts: pa.Array) -> NDArray[np.int64] | None:
+    """Return stamps in a pattern, ns; None if one does not match it."""
     try:
         times, present = TextStamps(form).nanoseconds(texts)
     except StampError:
@@ -264,21 +270,21 @@ def _fitting(form: str, texts: pa.Array) -> NDArray[np.int64] | None:
 
 # ----------------------------------------------------------------------------------------- of a log
 
-_WHOLE = re.compile(r"-?\d{1,19}")
+_INTEGER = re.compile(r"-?\d{1,19}")
 
 
 class TextTime:
-    """Makes seconds of the stamps of a text log.
+    """Converts the stamps of a text log to seconds.
 
-    ``types`` has the type that pyarrow reads, by position, a date in a column of its own first;
-    ``position`` is the column of the stamps, and ``expected`` describes a stamp in messages.
-    ``as_text``: ISO 8601 is read as text, and not by pyarrow.
+    ``types``: type for pyarrow by column position; a separate column of dates comes first.
+    ``position``: column of the stamps. ``expected``: description of a stamp for messages.
+    ``as_text``: ISO 8601 is read as text, not by pyarrow.
     """
 
     _text: TextStamps | None = None
 
     def __init__(self, file: LogFile, layout: TextLayout, *, as_text: bool = False) -> None:
-        assert file.log.time is not None  # made where there are stamps
+        assert file.log.time is not None  # constructed only for logs with stamps
         source = file.log.time
         self._source = source
         positions = [layout.position(column, "time") for column in time_columns(source)]
@@ -295,7 +301,7 @@ class TextTime:
     def _type(self, stamps: list[str], *, as_text: bool) -> pa.DataType:
         if self._source.format is None:
             # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
-            whole = self._source.unit == "ns" and all(_WHOLE.fullmatch(s.strip()) for s in stamps)
+            whole = self._source.unit == "ns" and all(_INTEGER.fullmatch(s.strip()) for s in stamps)
             return pa.int64() if whole else pa.float64()
         if self._source.format == "iso8601" and self._source.date is None and not as_text:
             kind = arrow_type(stamps)
@@ -306,7 +312,7 @@ class TextTime:
 
     @property
     def leap_seconds(self) -> int:
-        """How many there were, among stamps that were read as text."""
+        """Number of leap seconds in stamps that were read as text."""
         return 0 if self._text is None else self._text.leap_seconds
 
     def seconds(self, part: pa.RecordBatch) -> NDArray[np.float64]:
@@ -323,7 +329,7 @@ class TextTime:
         return self._clock.seconds(*self._stamps(columns))
 
     def _stamps(self, columns: list[pa.Array]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Return the stamps as numbers, and which of them are there."""
+        """Return the stamps as numbers, and a mask of the stamps that are present."""
         if self._text is not None:
             texts = columns[0] if len(columns) == 1 else pc.binary_join_element_wise(*columns, " ")
             return self._text.nanoseconds(texts)
@@ -343,7 +349,7 @@ class TextTime:
 
 
 def time_columns(source: TimeSource | None) -> list[str | int]:
-    """Return the columns that stamps are taken from."""
+    """Return the columns of the stamps: a separate date, if any, and the time."""
     if source is None:
         return []
     return [column for column in (source.date, source.column) if column is not None]
