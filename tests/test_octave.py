@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes, of_blocks
-from imubench_pipeline.allan.octave import SECTION, SHORTEST, STEPS, octave_sizes
+from imubench_pipeline.allan.octave import (
+    MIN_DECIMATED_SAMPLES,
+    MIN_STARTS_PER_CLUSTER,
+    SECTION_SAMPLES,
+    octave_sizes,
+)
 from tests.conftest import few
 
 
@@ -22,7 +27,9 @@ def make(rng: np.random.Generator, kind: str, samples: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", ["white", "walk", "both"])
-@pytest.mark.parametrize("samples", few([300, SECTION, SECTION + 6145], [3000, 5 * SECTION + 17]))
+@pytest.mark.parametrize(
+    "samples", few([300, SECTION_SAMPLES, SECTION_SAMPLES + 6145], [3000, 5 * SECTION_SAMPLES + 17])
+)
 @pytest.mark.parametrize("loss", [0.0, 0.02])
 def test_equal_to_full_overlap_within_a_tenth_of_its_error(rng, kind, samples, loss) -> None:
     log = make(rng, kind, samples)
@@ -35,13 +42,13 @@ def test_equal_to_full_overlap_within_a_tenth_of_its_error(rng, kind, samples, l
     difference = np.abs(octave.deviation - full.deviation[:together])
     assert (difference < 0.1 * standard_error(full)[:together]).all()
     np.testing.assert_allclose(octave.averaged, full.averaged[:together], rtol=2e-3)
-    if samples < SHORTEST:  # all clusters are used
+    if samples < MIN_DECIMATED_SAMPLES:  # all clusters are used
         np.testing.assert_array_equal(octave.variance, full.variance)
 
 
 def test_short_clusters_overlap_fully(rng: np.random.Generator) -> None:
     log = 9.81 + rng.standard_normal(200_000)
-    sizes = np.arange(1, 2 * STEPS)
+    sizes = np.arange(1, 2 * MIN_STARTS_PER_CLUSTER)
     full = allan_variance(log, 10.0, cluster_sizes=sizes)
     octave = allan_variance(log, 10.0, cluster_sizes=sizes, overlap="octave")
     np.testing.assert_allclose(octave.variance, full.variance, rtol=1e-9)
@@ -57,7 +64,12 @@ def test_blocks_and_threads_do_not_change_a_bit(rng: np.random.Generator, missin
     holes = missing != "none"
     whole = of_blocks([log], len(log), 1.0, holes=holes)
     random = np.sort(rng.integers(0, len(log), 200))
-    for cuts in ([5, 100_000, 100_001, 333_333], [SECTION + 6000], [SECTION + 6144], random):
+    for cuts in (
+        [5, 100_000, 100_001, 333_333],
+        [SECTION_SAMPLES + 6000],
+        [SECTION_SAMPLES + 6144],
+        random,
+    ):
         for threads in (1, 3):
             parts = np.split(log, cuts)
             again = of_blocks(parts, len(log), 1.0, holes=holes, threads=threads)
@@ -123,11 +135,11 @@ def test_no_difference_spans_segments(rng: np.random.Generator) -> None:
 def test_sizes_are_rounded_to_the_stride_of_their_octave() -> None:
     sizes = cluster_sizes(10_000_000)
     rounded = octave_sizes(sizes)
-    assert np.isin(rounded, sizes)[rounded < 2 * STEPS].all()
+    assert np.isin(rounded, sizes)[rounded < 2 * MIN_STARTS_PER_CLUSTER].all()
     nearest = sizes[np.abs(np.log(sizes[:, None] / rounded)).argmin(axis=0)]
-    assert (np.abs(rounded / nearest - 1) <= 0.5 / STEPS).all()
+    assert (np.abs(rounded / nearest - 1) <= 0.5 / MIN_STARTS_PER_CLUSTER).all()
     for n in rounded:
-        stride = 1 << max(0, int(np.log2(n / STEPS)))
+        stride = 1 << max(0, int(np.log2(n / MIN_STARTS_PER_CLUSTER)))
         assert n % stride == 0
     np.testing.assert_array_equal(octave_sizes(rounded), rounded)
 

@@ -1,4 +1,4 @@
-"""How sure an Allan variance is: its noise type, degrees of freedom and chi-squared limits."""
+"""Confidence limits of an Allan variance: noise type, degrees of freedom, chi-squared limits."""
 
 from __future__ import annotations
 
@@ -12,39 +12,39 @@ from scipy.special import gammaincinv, ndtri
 from imubench_pipeline.allan.quadratic_forms import LOWER_TAIL
 from imubench_pipeline.typing import Array
 
-_FEWEST_CLUSTERS = 30
-_MOST_CLUSTERS = 1 << 12
-_ALL_LAGS = 2048
-_TOWARDS_TAIL = 1.4
+_MIN_CLUSTERS = 30
+_MAX_CLUSTERS = 1 << 12
+_MAX_SINGLE_LAGS = 2048
+_CONFIDENCE_EXPONENT = 1.4
 
 
 def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: int) -> int | None:
-    """Tell the noise type from the lag-1 autocorrelation of adjacent cluster means.
+    """Return the noise type from the lag-1 autocorrelation of adjacent cluster means.
 
-    ``theta``, shape (m + 1,), are cumulative sums of the samples at the edges of m adjacent
-    clusters of n, ``present`` the counts of samples there (None: all are). The exponent goes from 2
-    to -2 (see `imubench_pipeline.allan.variance.AllanCurve`); None where fewer than 30 clusters are
-    left.
+    ``theta``, shape (m + 1,): cumulative sums of the samples at the edges of m adjacent clusters of
+    n samples. ``present``: cumulative counts of samples there (None: no sample is missing). The
+    exponent is 2 to -2 (see `imubench_pipeline.allan.variance.AllanCurve`), or None if there are
+    fewer than 30 clusters.
 
     References
     ----------
     W. Riley and C. Greenhall, "Power law noise identification using the lag 1
     autocorrelation", EFTF 2004.
     """
-    theta = theta[: _MOST_CLUSTERS + 1]
+    theta = theta[: _MAX_CLUSTERS + 1]
     if present is None:
         means = np.diff(theta) / n
     else:
-        counts = np.diff(present[: _MOST_CLUSTERS + 1])
+        counts = np.diff(present[: _MAX_CLUSTERS + 1])
         enough = counts >= 0.9 * n
         means = np.where(enough, np.diff(theta) / np.maximum(counts, 1), np.nan)
     good = np.isfinite(means)
-    if good.sum() < _FEWEST_CLUSTERS:
+    if good.sum() < _MIN_CLUSTERS:
         return None
-    # A missing mean is 0 after the line is taken out, and its products are not counted.
-    series = np.where(good, _without_line(means, good), 0.0)
+    # A missing mean is set to 0 after subtracting the line, and its products are not counted.
+    series = np.where(good, _subtract_line(means, good), 0.0)
     for differenced in range(3):
-        correlation = _lag_one(series, good)
+        correlation = _correlate_lag_one(series, good)
         if correlation is None:
             return None
         delta = correlation / (1.0 + correlation)
@@ -56,7 +56,7 @@ def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: in
     raise AssertionError("the loop returns at its last turn")
 
 
-def _without_line(values: Array, good: NDArray[np.bool_]) -> Array:
+def _subtract_line(values: Array, good: NDArray[np.bool_]) -> Array:
     time = np.arange(len(values), dtype=np.float64)
     time -= time[good].mean()
     level = values[good].mean()
@@ -64,10 +64,10 @@ def _without_line(values: Array, good: NDArray[np.bool_]) -> Array:
     return np.asarray(values - level - slope * time)
 
 
-def _lag_one(values: Array, good: NDArray[np.bool_]) -> float | None:
+def _correlate_lag_one(values: Array, good: NDArray[np.bool_]) -> float | None:
     pairs = int(np.count_nonzero(good[1:] & good[:-1]))
     number = int(np.count_nonzero(good))
-    if pairs < _FEWEST_CLUSTERS - 3:
+    if pairs < _MIN_CLUSTERS - 3:
         return None
     centred = np.where(good, values - values.sum() / number, 0.0)
     power = float(centred @ centred) / number
@@ -80,27 +80,27 @@ def _lag_one(values: Array, good: NDArray[np.bool_]) -> float | None:
 def equivalent_degrees(exponent: int, n: int, terms: int) -> float:
     """Return the equivalent degrees of freedom of a fully overlapping Allan variance.
 
-    edf = M / (1 + 2 sum_k (1 - k/M) r_k^2) with r_k the autocorrelation, at lag k, of the second
-    differences of power-law noise, and M = L - 2n + 1 the number of these ``terms``. The exponent,
-    the noise type, is 2 to -2, and ``n`` samples are in a cluster.
+    edf = M / (1 + 2 sum_k (1 - k/M) r_k^2), where r_k is the autocorrelation at lag k of the second
+    differences of power-law noise, and M = L - 2n + 1 is the number of these ``terms``. The
+    exponent is the noise type, 2 to -2; ``n`` is the number of samples in a cluster.
 
     References
     ----------
     C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
-    differences", PTTI 2003 (there with tables in place of the long sums).
+    differences", PTTI 2003 (with tables instead of the long sums).
     """
-    lags = _lags(n, min(terms - 1, 3 * n))
+    lags = _choose_lags(n, min(terms - 1, 3 * n))
     if not len(lags):
         return 1.0
-    at_zero = _second_difference(np.zeros(1), exponent, n)[0]
-    correlation = _second_difference(lags.astype(np.float64), exponent, n) / at_zero
+    at_zero = _evaluate_difference_covariance(np.zeros(1), exponent, n)[0]
+    correlation = _evaluate_difference_covariance(lags.astype(np.float64), exponent, n) / at_zero
     weighted = (1.0 - lags / terms) * correlation**2
-    return float(terms / (1.0 + 2.0 * _sum_of_all(lags, weighted)))
+    return float(terms / (1.0 + 2.0 * _sum_all_lags(lags, weighted)))
 
 
-def _lags(n: int, longest: int) -> NDArray[np.int64]:
-    """Return lags from 1 to ``longest``: all of them, or crowded where the correlation bends."""
-    if longest <= _ALL_LAGS:
+def _choose_lags(n: int, longest: int) -> NDArray[np.int64]:
+    """Return lags from 1 to ``longest``: all, or a grid refined where the correlation bends."""
+    if longest <= _MAX_SINGLE_LAGS:
         return np.arange(1, longest + 1, dtype=np.int64)
     near = np.unique(np.rint(np.geomspace(1, n / 2 + 1, 160)).astype(np.int64))
     offsets = np.concatenate((-near[::-1], [0], near))
@@ -108,39 +108,43 @@ def _lags(n: int, longest: int) -> NDArray[np.int64]:
     return np.union1d(lags[(lags >= 1) & (lags <= longest)], [longest])
 
 
-def _sum_of_all(lags: NDArray[np.int64], values: Array) -> float:
-    """Sum over every whole lag of a function given at some, linear in between."""
+def _sum_all_lags(lags: NDArray[np.int64], values: Array) -> float:
+    """Return the sum over all integer lags of a function with linear interpolation between lags."""
     between = np.diff(lags) * (values[1:] + values[:-1]) / 2.0
     return float(between.sum() + (values[0] + values[-1]) / 2.0)
 
 
-def _second_difference(lags: Array, exponent: int, n: int) -> Array:
-    """Return the autocovariance of theta_{i+2n} - 2 theta_{i+n} + theta_i, to a factor."""
+def _evaluate_difference_covariance(lags: Array, exponent: int, n: int) -> Array:
+    """Return the autocovariance of theta_{i+2n} - 2 theta_{i+n} + theta_i, up to a factor."""
     total = np.zeros(len(lags))
     for shift, weight in ((-2, 1.0), (-1, -4.0), (0, 6.0), (1, -4.0), (2, 1.0)):
-        total += weight * _phase_covariance(np.abs(lags + shift * n), exponent, n)
+        total += weight * _evaluate_phase_covariance(np.abs(lags + shift * n), exponent, n)
     return total
 
 
-def _phase_covariance(lags: Array, exponent: int, n: int) -> Array:
-    """Return the generalised autocovariance of the phase of power-law noise, to a factor."""
+def _evaluate_phase_covariance(lags: Array, exponent: int, n: int) -> Array:
+    """Return the generalised autocovariance of the phase of power-law noise, up to a factor."""
     t = lags / n
     if exponent == 2:  # white phase
         return np.asarray(lags == 0, dtype=np.float64)
     if exponent == 1:  # flicker phase, sampled: averaged over one sampling interval
         far = lags > 1000.0
         k = np.where(far, 1.0, lags)
-        near = -(_square_log(k + 1) + _square_log(np.abs(k - 1)) - 2 * _square_log(k))
+        near = -(
+            _evaluate_square_log(k + 1)
+            + _evaluate_square_log(np.abs(k - 1))
+            - 2 * _evaluate_square_log(k)
+        )
         return np.where(far, -2.0 * np.log(np.where(far, lags, 1.0)) - 3.0, near)
     if exponent == 0:
         return -t
     if exponent == -1:
-        return _square_log(t)
+        return _evaluate_square_log(t)
     return np.asarray(t**3)
 
 
-def _square_log(t: Array) -> Array:
-    """Return t^2 ln t, 0 at 0."""
+def _evaluate_square_log(t: Array) -> Array:
+    """Return t^2 ln t, with the limit 0 at 0."""
     return np.asarray(t**2 * np.log(np.where(t > 0, t, 1.0)))
 
 
@@ -153,22 +157,24 @@ def deviation_limits(
     ----------
     deviation, edf : ndarray, shape (m,)
     confidence : float
-        Such as 0.95: half of the rest lies beyond each limit.
+        Confidence level, such as 0.95; the two tails are equal.
     edf_upper : ndarray, shape (m,), optional
-        Degrees of freedom of the upper limit at 95 %; by default ``edf``. Where few differences
-        remain, an Allan variance is less often far too small than a chi-squared variate of its
-        variance (`imubench_pipeline.allan.quadratic_forms`).
+        Degrees of freedom of the upper limit at 95 %; by default ``edf``. With few differences an
+        Allan variance is less often far too small than a chi-squared variate with the same variance
+        (`imubench_pipeline.allan.quadratic_forms`).
 
     Notes
     -----
-    At another confidence the degrees of the upper limit lie between: (z / 1.96)^1.4 of the way
-    from ``edf`` to ``edf_upper``, z being the normal quantile. That is so for white, flicker,
-    random walk and Gauss-Markov noise alike, to 0.4 % in the coverage of 68 % limits.
+    At another confidence the degrees of freedom of the upper limit are interpolated: from ``edf``
+    to ``edf_upper`` by (z / 1.96)^1.4, with z the normal quantile. The coverage of 68 % limits is
+    then exact to 0.4 % for white, flicker, random walk and Gauss-Markov noise.
     """
     tail = (1.0 - confidence) / 2.0
     below = edf
     if edf_upper is not None:
-        below = edf + (edf_upper - edf) * (-ndtri(tail) / -ndtri(LOWER_TAIL)) ** _TOWARDS_TAIL
+        below = (
+            edf + (edf_upper - edf) * (-ndtri(tail) / -ndtri(LOWER_TAIL)) ** _CONFIDENCE_EXPONENT
+        )
     high = 2.0 * gammaincinv(edf / 2.0, 1.0 - tail)
     low = 2.0 * gammaincinv(below / 2.0, tail)
     return deviation * np.sqrt(edf / high), deviation * np.sqrt(below / low)

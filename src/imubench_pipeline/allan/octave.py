@@ -1,9 +1,9 @@
-"""The multi-octave Allan variance: one pass over the log for every tau, in bounded memory.
+"""The multi-octave Allan variance: one pass over the log for all tau, in bounded memory.
 
 Clusters of n samples need not start at every sample: starts n/48 apart, or closer, cost no
-measurable efficiency. So the phase is decimated as n grows, and the work is O(L). Inside a
-section of the log that fits the cache the phase is decimated up to `DECIMATION`; longer clusters
-are taken from the phase of the whole log at that stride.
+measurable efficiency. The phase (cumulative sum) is therefore decimated as n grows, and the work is
+O(L). Within a section of the log that fits the cache, the phase is decimated up to `DECIMATION`.
+Longer clusters use the phase of the whole log at that stride.
 """
 
 from __future__ import annotations
@@ -34,50 +34,51 @@ Integers = NDArray[np.int64]
 Samples = NDArray[np.floating[Any]]
 
 Grid = tuple[Integers, Integers, Integers, Integers]
-"""Ascending sizes of short clusters, in samples, in strides of their level, and in strides of all
-lanes; and at which of them each level begins."""
+"""Ascending sizes of short clusters in samples, in strides of their level, and in strides of all
+lanes; and the index of the first size of each level."""
 
-Room = tuple[Array, Array, Integers]
-"""Arrays that a thread uses again and again."""
+Buffers = tuple[Array, Array, Integers]
+"""Arrays that a thread reuses."""
 
-STEPS = 48
-"""Starts of clusters within a cluster's length, at least."""
+MIN_STARTS_PER_CLUSTER = 48
+"""Least number of starts of clusters per cluster length."""
 
 DECIMATION = 64
-"""Stride of the phase that is kept of the whole log."""
+"""Stride of the stored phase of the whole log."""
 
-SECTION = 1 << 16
-"""Samples that are summed together: their phase fits the L2 cache."""
+SECTION_SAMPLES = 1 << 16
+"""Samples that are summed together, so that their phase fits the L2 cache."""
 
-FIRST = 1 << 17
-"""Samples at the beginning whose phase is kept whole: it tells the noise type of short clusters."""
+FULL_PHASE_SAMPLES = 1 << 17
+"""Samples at the beginning with a fully stored phase, for the noise type of short clusters."""
 
-SHORTEST = 1 << 16
-"""Samples of a log that is worth a decimation; the clusters of a shorter one overlap fully."""
+MIN_DECIMATED_SAMPLES = 1 << 16
+"""Least length of a log that is decimated, samples; shorter logs use fully overlapping clusters."""
 
-_LEVELS = 6  # strides 1, 2 ... 32 inside a section
-_REACH = 4 * STEPS  # points of any stride that the two longest clusters span
-_AHEAD = _REACH * DECIMATION // 2
-_LANES = 4  # parts of a section whose phases are interleaved
-_INNER = 1 << 11  # starts whose clusters of all sizes are summed while they are in the L1 cache
+_LEVELS_IN_SECTION = 6  # strides 1, 2 ... 32 inside a section
+_POINTS_OF_LONGEST_PAIR = (
+    4 * MIN_STARTS_PER_CLUSTER
+)  # points, at any stride, of the longest pair of clusters
+_OVERLAP_SAMPLES = _POINTS_OF_LONGEST_PAIR * DECIMATION // 2
+_NUMBER_OF_LANES = 4  # parts of a section whose phases are interleaved
+_STARTS_PER_BLOCK = 1 << 11  # starts that are summed for all sizes while they are in the L1 cache
 
 
 def octave_sizes(sizes: Integers) -> Integers:
     """Round cluster sizes to multiples of the stride of their octave (by 1 % at most)."""
-    stride = np.left_shift(1, _level(sizes))
+    stride = np.left_shift(1, _find_level(sizes))
     return np.unique(np.rint(sizes / stride).astype(np.int64) * stride)
 
 
-def _level(sizes: Integers) -> Integers:
-    return np.maximum(0, np.floor(np.log2(sizes / STEPS) + 1e-12)).astype(np.int64)
+def _find_level(sizes: Integers) -> Integers:
+    return np.maximum(0, np.floor(np.log2(sizes / MIN_STARTS_PER_CLUSTER) + 1e-12)).astype(np.int64)
 
 
 class OctaveSums:
     """Sums of squared differences of cluster means of one segment of a log.
 
-    The sizes, shape (m,), are as `octave_sizes` gives them; the sums have the same bits for any
-    number of threads. With ``holes`` samples may be missing (NaN); ``gaps``
-    says where.
+    The sizes, shape (m,), are those of `octave_sizes`; the sums have the same bits for any number
+    of threads. With ``holes`` samples may be missing (NaN); ``gaps`` are the lengths of the gaps.
 
     Attributes
     ----------
@@ -99,11 +100,16 @@ class OctaveSums:
         threads: int = 1,
     ) -> None:
         self._sizes, self._holes, self._threads = sizes, holes, max(1, threads)
-        self._short = _level(sizes) < _LEVELS
+        self._short = _find_level(sizes) < _LEVELS_IN_SECTION
         short = sizes[self._short]
-        level = _level(short)
+        level = _find_level(short)
         steps = short >> level
-        self._grid = (short, steps, _LANES * steps, np.searchsorted(level, np.arange(_LEVELS + 1)))
+        self._grid = (
+            short,
+            steps,
+            _NUMBER_OF_LANES * steps,
+            np.searchsorted(level, np.arange(_LEVELS_IN_SECTION + 1)),
+        )
         self._gaps, self._enough = gaps, gaps.enough(short)
         self._sums = np.zeros((4, len(short)))
         # The end of the log is a point of the grid only if it falls on it.
@@ -115,31 +121,33 @@ class OctaveSums:
         self._begin: list[Samples] = []
         self._bias = 0.0
         self._rest: Samples = np.empty(0, dtype=np.float32)
-        self._rooms: SimpleQueue[Room] = SimpleQueue()
+        self._rooms: SimpleQueue[Buffers] = SimpleQueue()
         for _ in range(self._threads):
-            self._rooms.put(_room(holes))
+            self._rooms.put(_allocate_buffers(holes))
         self.received = 0
 
     def push(self, block: Samples) -> None:
-        """Take the next samples, in SI; NaN where one is missing."""
+        """Add the next samples, in SI; NaN where one is missing."""
         block = np.ascontiguousarray(block)
-        if self.received < FIRST:
-            self._begin.append(block[: FIRST - self.received].copy())
+        if self.received < FULL_PHASE_SAMPLES:
+            self._begin.append(block[: FULL_PHASE_SAMPLES - self.received].copy())
         self.received += len(block)
         rest = self._rest
-        ready = max(0, (len(rest) + len(block) - _AHEAD) // SECTION)
-        used = ready * SECTION - len(rest)
+        ready = max(0, (len(rest) + len(block) - _OVERLAP_SAMPLES) // SECTION_SAMPLES)
+        used = ready * SECTION_SAMPLES - len(rest)
         if ready:
-            # Only sections that begin in the rest are copied, with the samples they need.
-            heads = min(ready, -(-len(rest) // SECTION))
-            head = np.concatenate((rest, block[: heads * SECTION + _AHEAD - len(rest)]))
-            body = block[heads * SECTION - len(rest) :] if ready > heads else block[:0]
+            # Only sections that begin in the remainder are copied, with the samples they need.
+            heads = min(ready, -(-len(rest) // SECTION_SAMPLES))
+            head = np.concatenate(
+                (rest, block[: heads * SECTION_SAMPLES + _OVERLAP_SAMPLES - len(rest)])
+            )
+            body = block[heads * SECTION_SAMPLES - len(rest) :] if ready > heads else block[:0]
             self._sum(head, heads, body, ready)
         self._rest = block[used:].copy() if used >= 0 else np.concatenate((rest[used:], block))
 
     def finish(self) -> None:
-        """Sum up what is left."""
-        sections = -(-len(self._rest) // SECTION)
+        """Sum the remaining samples."""
+        sections = -(-len(self._rest) // SECTION_SAMPLES)
         if sections:
             self._sum(self._rest, sections, self._rest[:0], sections)
         self._rest = self._rest[:0]
@@ -162,7 +170,7 @@ class OctaveSums:
 
     @property
     def results(self) -> list[NDArray[Any]]:
-        """Sum of squares, sum of mean inverse counts, differences, and the most there could be."""
+        """Sum of squares, sum of mean inverse counts, number of differences, and their maximum."""
         steps = self._sizes[~self._short] // DECIMATION
         long = full_sums(self.phase, steps, self._threads, stride=DECIMATION, gaps=self._gaps)
         return [
@@ -171,13 +179,13 @@ class OctaveSums:
         ]
 
     def _sum(self, head: Samples, heads: int, body: Samples, sections: int) -> None:
-        """Sum the short clusters that begin in complete sections, and keep the decimated phase.
+        """Sum the short clusters that begin in complete sections, and store the decimated phase.
 
-        The first sections are those of ``head``, the others follow in ``body``.
+        The first sections are in ``head``, the others in ``body``.
         """
         if not self._filled:
-            self._bias = finite_mean((head if heads else body)[:SECTION])
-        # Of one type, whatever the blocks were: the kernel is compiled once.
+            self._bias = finite_mean((head if heads else body)[:SECTION_SAMPLES])
+        # Converted to one type, so that the kernel is compiled only once.
         head, body = head.view(), body.astype(head.dtype, copy=False).view()
         head.flags.writeable = body.flags.writeable = False
 
@@ -190,10 +198,10 @@ class OctaveSums:
 
         sums, totals, edges, counts = in_threads(work, sections, self._threads)
         for row in sums:
-            self._sums += row  # one by one: the order must not depend on the blocks
-        # What begins in the last section may be less than a section, at the end of the log.
-        samples = len(head) if heads == sections else sections * SECTION
-        points = -(-min(sections * SECTION, samples) // DECIMATION)
+            self._sums += row  # one by one, so that the order does not depend on the blocks
+        # At the end of the log the last section may be shorter.
+        samples = len(head) if heads == sections else sections * SECTION_SAMPLES
+        points = -(-min(sections * SECTION_SAMPLES, samples) // DECIMATION)
         filled = slice(self._filled, self._filled + points)
         before = np.cumsum(np.concatenate(([self._at], totals)))
         edges += before[:-1, None]
@@ -207,17 +215,17 @@ class OctaveSums:
         self._filled += points
 
     def _sections(
-        self, low: int, high: int, head: Samples, heads: int, body: Samples, room: Room
+        self, low: int, high: int, head: Samples, heads: int, body: Samples, room: Buffers
     ) -> tuple[Array, Array, Array, Integers]:
         """Sum the clusters that begin in sections ``low`` to ``high``.
 
         Returned are sums, shape (sections, 4, sizes), as `results`; totals, the sum of the samples
-        less the bias by section; edges, shape (sections, SECTION / DECIMATION), cumulative sums
-        within the section; and counts, cumulative numbers of samples present at the edges, and of
-        the section (empty: all are).
+        less the bias by section; edges, shape (sections, SECTION_SAMPLES / DECIMATION), cumulative
+        sums within the section; and counts, cumulative numbers of samples present at the edges, and
+        of the section (empty: all are).
         """
         theta, tail, present = room
-        number, points = high - low, SECTION // DECIMATION
+        number, points = high - low, SECTION_SAMPLES // DECIMATION
         sums, totals = np.zeros((number, 4, len(self._grid[0]))), np.zeros(number)
         edges = np.zeros((number, points))
         counts = np.zeros((number, points + 1 if self._holes else 0), dtype=np.int64)
@@ -226,10 +234,12 @@ class OctaveSums:
         _sum_sections(low, head, heads, body, *common, tail, sums, totals, edges, whole)
         for section in range(number):
             in_head = low + section < heads
-            begin = (low + section - (0 if in_head else heads)) * SECTION
-            samples = (head if in_head else body)[begin : begin + SECTION + _AHEAD]
+            begin = (low + section - (0 if in_head else heads)) * SECTION_SAMPLES
+            samples = (head if in_head else body)[
+                begin : begin + SECTION_SAMPLES + _OVERLAP_SAMPLES
+            ]
             of_section = (*common, sums[section], edges[section])
-            if len(samples) < SECTION + _AHEAD:
+            if len(samples) < SECTION_SAMPLES + _OVERLAP_SAMPLES:
                 totals[section], whole[section] = _sum_end(samples, *of_section)
             if self._holes and whole[section]:
                 counts[section] = np.minimum(np.arange(points + 1) * DECIMATION, len(samples))
@@ -240,15 +250,15 @@ class OctaveSums:
         return sums, totals, edges, counts
 
 
-def _room(holes: bool) -> Room:
-    """Return room for the phase of a section, of what follows it, and for counts."""
-    points = SECTION + _AHEAD + 1
+def _allocate_buffers(holes: bool) -> Buffers:
+    """Return buffers for the phase of a section, for the samples after it, and for counts."""
+    points = SECTION_SAMPLES + _OVERLAP_SAMPLES + 1
     phase = np.empty(points + 8)
-    # It begins a cache line: a load that lies across two takes twice the time.
+    # Aligned to a cache line: a load across two lines takes twice the time.
     start = -phase.ctypes.data % 64 // 8
     return (
         phase[start : start + points],
-        np.empty(_AHEAD + 1),
+        np.empty(_OVERLAP_SAMPLES + 1),
         np.empty(points if holes else 0, dtype=np.int64),
     )
 
@@ -268,82 +278,89 @@ def _sum_sections(
     edges: Array,
     whole: NDArray[np.bool_],
 ) -> None:
-    """Do what `OctaveSums._sections` does, for sections with all samples that their clusters need.
+    """Do the work of `OctaveSums._sections` for sections without missing samples.
 
-    They are told as whole.
+    Sets ``whole`` for these sections.
     """
-    offsets = np.empty(_LANES + 1)
+    offsets = np.empty(_NUMBER_OF_LANES + 1)
     for section in range(totals.size):
-        begin = (low + section) * SECTION
+        begin = (low + section) * SECTION_SAMPLES
         source = head
         if low + section >= heads:
-            begin -= heads * SECTION
+            begin -= heads * SECTION_SAMPLES
             source = body
-        samples = source[begin : min(begin + SECTION + _AHEAD, source.size)]
-        if samples.size == SECTION + _AHEAD:
-            _phase_in_lanes(samples, bias, theta, tail, offsets)
-            totals[section] = offsets[_LANES]
-            whole[section] = np.isfinite(offsets[_LANES] + tail[_AHEAD])
+        samples = source[begin : min(begin + SECTION_SAMPLES + _OVERLAP_SAMPLES, source.size)]
+        if samples.size == SECTION_SAMPLES + _OVERLAP_SAMPLES:
+            _integrate_lanes(samples, bias, theta, tail, offsets)
+            totals[section] = offsets[_NUMBER_OF_LANES]
+            whole[section] = np.isfinite(offsets[_NUMBER_OF_LANES] + tail[_OVERLAP_SAMPLES])
             if whole[section]:
-                _lanes(offsets, theta, tail, grid, sums[section], edges[section])
+                _sum_lanes(offsets, theta, tail, grid, sums[section], edges[section])
 
 
 @njit(cache=True, nogil=True)
-def _phase_in_lanes(
+def _integrate_lanes(
     samples: Samples, bias: float, theta: Array, tail: Array, offsets: Array
 ) -> None:
-    """Sum up a section in four lanes, interleaved, and what follows it; set where each begins.
+    """Integrate a section in four interleaved lanes, and the samples after it; set the offsets.
 
-    One sum alone would wait for each addition; and of interleaved lanes the loads that sum
-    differences are aligned, for any size.
+    A single sum would wait for each addition. With interleaved lanes, the loads for the differences
+    are aligned for any size.
     """
-    rows = SECTION // _LANES
-    # Slices first, of one length: the loop then has no check left.
+    rows = SECTION_SAMPLES // _NUMBER_OF_LANES
+    # Slices of equal length first, so that the loop needs no bounds checks.
     first, second = samples[:rows], samples[rows : 2 * rows]
     third, fourth = samples[2 * rows : 3 * rows], samples[3 * rows : 4 * rows]
     a = b = c = d = 0.0
     for i in range(rows):
-        theta[_LANES * i] = a
-        theta[_LANES * i + 1] = b
-        theta[_LANES * i + 2] = c
-        theta[_LANES * i + 3] = d
+        theta[_NUMBER_OF_LANES * i] = a
+        theta[_NUMBER_OF_LANES * i + 1] = b
+        theta[_NUMBER_OF_LANES * i + 2] = c
+        theta[_NUMBER_OF_LANES * i + 3] = d
         a += first[i] - bias
         b += second[i] - bias
         c += third[i] - bias
         d += fourth[i] - bias
     tail[0] = 0.0
-    accumulate(samples[SECTION:], bias, tail)
+    accumulate(samples[SECTION_SAMPLES:], bias, tail)
     offsets[0], offsets[1] = 0.0, a
     offsets[2], offsets[3], offsets[4] = a + b, a + b + c, a + b + c + d
 
 
 @njit(cache=True, nogil=True)
-def _lanes(
+def _sum_lanes(
     offsets: Array, theta: Array, tail: Array, grid: Grid, sums: Array, edges: Array
 ) -> None:
     """Sum the clusters that begin in a section in lanes, and decimate its phase."""
     sizes, _, steps, begins = grid
-    rows = SECTION // _LANES
-    lengths = np.empty(_LANES)
-    for lane in range(_LANES):
+    rows = SECTION_SAMPLES // _NUMBER_OF_LANES
+    lengths = np.empty(_NUMBER_OF_LANES)
+    for lane in range(_NUMBER_OF_LANES):
         lengths[lane] = offsets[lane + 1] - offsets[lane]
-    for level in range(_LEVELS):
-        # A lane goes on where the next one begins.
-        for i in range(_REACH):
-            for lane in range(_LANES - 1):
-                theta[(rows + i) * _LANES + lane] = lengths[lane] + theta[i * _LANES + lane + 1]
-            theta[(rows + i) * _LANES + _LANES - 1] = lengths[_LANES - 1] + tail[i]
-        starts, points = _LANES * rows, _LANES * (rows + _REACH)
+    for level in range(_LEVELS_IN_SECTION):
+        # Each lane is continued with the beginning of the next one.
+        for i in range(_POINTS_OF_LONGEST_PAIR):
+            for lane in range(_NUMBER_OF_LANES - 1):
+                theta[(rows + i) * _NUMBER_OF_LANES + lane] = (
+                    lengths[lane] + theta[i * _NUMBER_OF_LANES + lane + 1]
+                )
+            theta[(rows + i) * _NUMBER_OF_LANES + _NUMBER_OF_LANES - 1] = (
+                lengths[_NUMBER_OF_LANES - 1] + tail[i]
+            )
+        starts, points = (
+            _NUMBER_OF_LANES * rows,
+            _NUMBER_OF_LANES * (rows + _POINTS_OF_LONGEST_PAIR),
+        )
         _sum_level(theta, starts, points, sizes, steps, begins[level], begins[level + 1], sums)
         rows //= 2
         for i in range(rows):
-            for lane in range(_LANES):
-                theta[i * _LANES + lane] = theta[2 * i * _LANES + lane]
-        for i in range((_REACH << (_LEVELS - 1 - level)) // 2):
+            for lane in range(_NUMBER_OF_LANES):
+                theta[i * _NUMBER_OF_LANES + lane] = theta[2 * i * _NUMBER_OF_LANES + lane]
+        for i in range((_POINTS_OF_LONGEST_PAIR << (_LEVELS_IN_SECTION - 1 - level)) // 2):
             tail[i] = tail[2 * i]
-    for lane in range(_LANES):
+    for lane in range(_NUMBER_OF_LANES):
         for i in range(rows):
-            edges[lane * rows + i] = offsets[lane] + theta[i * _LANES + lane]
+            edges[lane * rows + i] = offsets[lane] + theta[i * _NUMBER_OF_LANES + lane]
 
 
 @njit(cache=True, nogil=True)
@@ -352,17 +369,17 @@ def _sum_end(
 ) -> tuple[float, bool]:
     """Sum the clusters that begin in a section at the end of the log, and decimate its phase.
 
-    Returned are the sum of its samples less the bias, and whether it is whole; nothing is set if
-    not.
+    Returns the sum of its samples less the bias, and whether no sample is missing; otherwise
+    nothing is set.
     """
     sizes, steps, _, begins = grid
-    own, points = min(SECTION, samples.size), samples.size + 1
+    own, points = min(SECTION_SAMPLES, samples.size), samples.size + 1
     theta[0] = 0.0
     accumulate(samples, bias, theta)
     total = theta[own]
     if not np.isfinite(theta[samples.size]):
         return total, False
-    for level in range(_LEVELS):
+    for level in range(_LEVELS_IN_SECTION):
         starts = (own + (1 << level) - 1) >> level
         _sum_level(theta, starts, points, sizes, steps, begins[level], begins[level + 1], sums)
         points = (points + 1) // 2
@@ -385,8 +402,8 @@ def _sum_level(
     sums: Array,
 ) -> None:
     """Sum the differences of the clusters of sizes ``low`` to ``high``, of one level."""
-    for block in range(0, starts, _INNER):
-        stop = min(block + _INNER, starts)
+    for block in range(0, starts, _STARTS_PER_BLOCK):
+        stop = min(block + _STARTS_PER_BLOCK, starts)
         sum_sizes(theta[:points], block, stop, steps[low:high], sums[0, low:high])
     for j in range(low, high):
         most = max(0, min(starts, points - 2 * steps[j]))
@@ -413,12 +430,12 @@ def _sum_present(
     Returned is the sum of the samples less the bias.
     """
     _, steps, _, begins = grid
-    own, points = min(SECTION, samples.size), samples.size + 1
+    own, points = min(SECTION_SAMPLES, samples.size), samples.size + 1
     theta[0] = 0.0
     present[0] = 0
     accumulate_present(samples, bias, theta, present)
     total, counts[counts.size - 1] = theta[own], present[own]
-    for level in range(_LEVELS):
+    for level in range(_LEVELS_IN_SECTION):
         starts = (own + (1 << level) - 1) >> level
         for j in range(begins[level], begins[level + 1]):
             most = max(0, min(starts, points - 2 * steps[j]))

@@ -1,4 +1,4 @@
-"""Cumulative sums of a log, and of their differences: what every Allan variance is taken from."""
+"""Cumulative sums of a log and sums of their squared differences, for the Allan variance."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.threads import in_threads
 from imubench_pipeline.typing import Array
 
-BLOCK = 1 << 14
-"""Differences summed together: three blocks of float64 stay in the L2 cache."""
+BLOCK_DIFFERENCES = 1 << 14
+"""Differences that are summed together, so that three blocks of float64 stay in the L2 cache."""
 
-PRESENT = 0.9
-"""Part of a cluster's samples that must be there for its mean to count; of a log with many short
-gaps, part of those that are there as a rule."""
+MIN_PRESENT_SHARE = 0.9
+"""Least share of the samples of a cluster for a valid mean; in a log with many short gaps, relative
+to the usual share."""
 
-_SHORT = 4
-"""A gap is short in a cluster that is this many times longer."""
+_MIN_CLUSTER_OVER_SHORT_GAP = 4
+"""Least ratio of a cluster to a gap that counts as short in it."""
 
 
 Span = tuple[int, int]
@@ -36,65 +36,65 @@ def spans_of(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...]:
 
 @dataclass(frozen=True)
 class Gaps:
-    """How many samples of a log are missing, by the length of the gap that they are in.
+    """Numbers of missing samples of a log, by the length of their gap.
 
-    The mean of a cluster represents all of it if the missing samples are spread evenly
-    over it, as where every fifth is lost. It does not if they are missing in one piece. So clusters
-    are compared with the usual share of samples between gaps that are long for their size.
+    The mean of a cluster represents all of it if the missing samples are spread evenly over it, for
+    example if every fifth is lost. It does not if they are missing in one piece. Clusters are
+    therefore compared with the usual share of samples between gaps that are long for their size.
     """
 
     samples: int
     """Points of the grid."""
     missing: NDArray[np.int64]
-    """Shape (64,): samples in gaps of 1, of 2 to 3, of 4 to 7 and so on."""
+    """Number of samples in gaps of length 1, 2 to 3, 4 to 7 and so on, shape (64,)."""
 
     def enough(self, sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return how many samples a cluster must have for its mean to count, by size."""
+        """Return the least number of samples of a cluster with a valid mean, by size."""
         longest = (1 << np.arange(1, 33)) - 1  # in each octave
-        octaves = np.searchsorted(longest, sizes // _SHORT, side="right")
+        octaves = np.searchsorted(longest, sizes // _MIN_CLUSTER_OVER_SHORT_GAP, side="right")
         short = np.concatenate(([0], np.cumsum(self.missing)))[octaves]
         between = self.samples - (self.missing.sum() - short)
         usual = 1.0 - short / np.maximum(between, 1)
-        return np.maximum(np.ceil(PRESENT * usual * sizes - 1e-9), 1).astype(np.int64)
+        return np.maximum(np.ceil(MIN_PRESENT_SHARE * usual * sizes - 1e-9), 1).astype(np.int64)
 
 
 NO_GAPS = Gaps(0, np.zeros(64, dtype=np.int64))
-"""Of a log with none, or none but long ones."""
+"""Gaps of a log without gaps, or with long gaps only."""
 
 
 @dataclass
 class GapCount:
-    """Counts the gaps of a log as its blocks go by."""
+    """Counts the gaps of a log that is given in blocks."""
 
     _samples: int = 0
     _open: int = 0
     _missing: NDArray[np.int64] = field(default_factory=lambda: np.zeros(64, dtype=np.int64))
 
     def add(self, block: NDArray[np.floating[Any]]) -> None:
-        """Take the next samples; NaN where one is missing."""
+        """Add the next samples; NaN where one is missing."""
         self._samples += len(block)
         there = np.flatnonzero(np.isfinite(block))
         if not len(there):
             self._open += len(block)
             return
         inside = np.diff(there) - 1
-        self._missing += _by_octave(np.concatenate(([self._open + there[0]], inside)))
+        self._missing += _count_by_octave(np.concatenate(([self._open + there[0]], inside)))
         self._open = len(block) - 1 - int(there[-1])
 
     def gaps(self) -> Gaps:
         """Return the gaps so far."""
-        return Gaps(self._samples, self._missing + _by_octave(np.array([self._open])))
+        return Gaps(self._samples, self._missing + _count_by_octave(np.array([self._open])))
 
 
 def gaps_of(blocks: Iterable[NDArray[np.floating[Any]]]) -> Gaps:
-    """Return the gaps of a log that comes in consecutive blocks, NaN where a sample is missing."""
+    """Return the gaps of a log in consecutive blocks; NaN where a sample is missing."""
     count = GapCount()
     for block in blocks:
         count.add(block)
     return count.gaps()
 
 
-def _by_octave(lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+def _count_by_octave(lengths: NDArray[np.int64]) -> NDArray[np.int64]:
     lengths = lengths[lengths > 0]
     octaves = np.frexp(lengths.astype(np.float64))[1] - 1
     return np.bincount(octaves, weights=lengths, minlength=64).astype(np.int64)
@@ -105,14 +105,14 @@ class Phase:
     """Cumulative sums of a log on its uniform grid."""
 
     theta: Array
-    """(L + 1,): cumulative sum of the samples less a constant; missing samples add nothing."""
+    """Cumulative sum of the samples less a constant, shape (L + 1,); missing samples add 0."""
     present: NDArray[np.integer[Any]] | None
-    """(L + 1,): cumulative number of samples present; None: all are."""
+    """Cumulative number of samples present, shape (L + 1,); None: no sample is missing."""
     segments: tuple[Span, ...]  # grid points that begin and end each segment
 
     @property
     def samples(self) -> int:
-        """L, the points of the grid."""
+        """L, the number of grid points."""
         return len(self.theta) - 1
 
     def every(
@@ -130,10 +130,10 @@ def integrate(
     holes: bool,
     segments: Sequence[Span] | None = None,
 ) -> Phase:
-    """Sum consecutive blocks of samples up, in bounded memory beyond the result.
+    """Return the cumulative sums of consecutive blocks; memory beyond the result is bounded.
 
-    The blocks are the log in order, NaN where a sample is missing; without ``holes`` no counts are
-    in memory.
+    The blocks are the log in order, NaN where a sample is missing. Without ``holes`` no counts are
+    stored.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def integrate(
         if stop > samples:
             raise ValueError(f"the blocks hold more than the {samples} samples stated")
         if level is None and not np.isnan(values).all():
-            # A constant drops out of the variance, but 9.81 would eat the digits of the sum.
+            # A constant cancels in the variance, but 9.81 would cost digits of the sum.
             level = finite_mean(values)
         if present is None:
             accumulate(values, level or 0.0, theta[reached : stop + 1])
@@ -191,7 +191,7 @@ def split(
 
 
 def finite_mean(samples: NDArray[np.floating[Any]]) -> float:
-    """Return the mean of the samples that are finite; 0 where none is."""
+    """Return the mean of the finite samples; 0 if there are none."""
     with np.errstate(invalid="ignore"):
         mean = float(samples.mean(dtype=np.float64))
     if not np.isfinite(mean):
@@ -237,7 +237,7 @@ def _sum_squares(first: Array, middle: Array, last: Array) -> float:
 def _sum_squares_twice(
     first: Array, middle: Array, last: Array, longer_middle: Array, longer_last: Array
 ) -> tuple[float, float]:
-    """Return what `_sum_squares` does, for two sizes at once: the loads are what takes the time."""
+    """Return the result of `_sum_squares` for two sizes at once, which saves loads."""
     total = 0.0
     longer_total = 0.0
     for i in range(first.size):
@@ -253,13 +253,13 @@ def _sum_squares_twice(
 def sum_sizes(theta: Array, start: int, stop: int, sizes: NDArray[np.int64], sums: Array) -> None:
     """Add the squared second differences that begin at points ``start`` to ``stop``, by size.
 
-    ``sizes`` are points in a cluster; ``sums`` is what is added to.
+    ``sizes``: points in a cluster. ``sums``: changed in place.
     """
     j = 0
     while j < sizes.size:
         n = sizes[j]
         end = max(start, min(stop, theta.size - 2 * n))
-        # Slices first: an index i + 2 n inside the loop would keep it scalar.
+        # Slices first: an index i + 2 n inside the loop would prevent vectorisation.
         first, middle, last = (
             theta[start:end],
             theta[start + n : end + n],
@@ -288,16 +288,16 @@ def sum_present(
 ) -> tuple[float, float, int]:
     """Sum squared differences of adjacent means over the samples present.
 
-    ``theta`` and ``present`` are cumulative sums and numbers of samples at one stride, ``m`` steps
-    of that in a cluster, which must have ``enough`` samples; the first of a pair begins at points
-    ``start`` to ``stop``. Returned are the sum of squares, the sum of the mean inverse numbers of
+    ``theta`` and ``present`` are cumulative sums and numbers of samples at one stride. A cluster
+    has ``m`` strides, and must have ``enough`` samples. The first cluster of a pair begins at
+    points ``start`` to ``stop``. Returns the sum of squares, the sum of the mean inverse numbers of
     samples, and the number of pairs.
     """
     total = 0.0
     thinned = 0.0
     number = 0
     length = max(0, stop - start)
-    # Slices first and no branch: the loop then becomes vector instructions.
+    # Slices first and no branches, so that the loop is vectorised.
     theta_0, present_0 = theta[start:][:length], present[start:][:length]
     theta_1, present_1 = theta[start + m :][:length], present[start + m :][:length]
     theta_2, present_2 = theta[start + 2 * m :][:length], present[start + 2 * m :][:length]
@@ -325,18 +325,18 @@ def full_sums(
     stride: int = 1,
     gaps: Gaps = NO_GAPS,
 ) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
-    """Sum over the differences of means, by size.
+    """Return sums over the differences of cluster means, by size.
 
     Parameters
     ----------
     sizes : ndarray of int
         Points of the phase in a cluster.
     threads : int
-        The sums have the same bits for any number.
+        Number of threads; the sums have the same bits for any number.
     stride : int
         Samples from one point of the phase to the next.
     gaps : Gaps
-        Which samples are missing.
+        Gaps of the log.
 
     Returns
     -------
@@ -344,27 +344,27 @@ def full_sums(
         Sums of the squared differences, and of the mean inverse numbers of samples that the two
         clusters average.
     terms, possible : ndarray of int
-        Number of differences, and what it would be without holes.
+        Number of differences, and their number without missing samples.
     """
     total = np.zeros(len(sizes))
     thinned = np.zeros(len(sizes))
     terms = np.zeros(len(sizes), dtype=np.int64)
     possible = np.zeros(len(sizes), dtype=np.int64)
     samples = sizes * stride
-    sizes = sizes.copy()  # so that it may be written to: the kernels are compiled for that
+    sizes = sizes.copy()  # writable, since the kernels are compiled for writable arrays
     for start, stop in phase.segments:
         theta = phase.theta[start : stop + 1]
-        blocks = -(-len(theta) // BLOCK)
+        blocks = -(-len(theta) // BLOCK_DIFFERENCES)
         most = np.maximum(stop - start - 2 * sizes + 1, 0)
         possible += most
         if phase.present is None:
-            (sums,) = in_threads(partial(_full, theta, sizes), blocks, threads)
+            (sums,) = in_threads(partial(_sum_full, theta, sizes), blocks, threads)
             total += sums.sum(axis=0) / samples.astype(np.float64) ** 2
             thinned += most / samples
             terms += most
         else:
             counts = phase.present[start : stop + 1]
-            work = partial(_full_with_holes, theta, counts, sizes, gaps.enough(samples))
+            work = partial(_sum_full_with_holes, theta, counts, sizes, gaps.enough(samples))
             sums, inverse, numbers = in_threads(work, blocks, threads)
             total += sums.sum(axis=0)
             thinned += inverse.sum(axis=0)
@@ -372,7 +372,7 @@ def full_sums(
     return total, thinned, terms, possible
 
 
-def _full(theta: Array, sizes: NDArray[np.int64], low: int, high: int) -> tuple[Array]:
+def _sum_full(theta: Array, sizes: NDArray[np.int64], low: int, high: int) -> tuple[Array]:
     """Return the sum of squared second differences of each block and size."""
     sums = np.zeros((high - low, len(sizes)))
     _sum_blocks(theta, sizes, low, sums)
@@ -382,11 +382,11 @@ def _full(theta: Array, sizes: NDArray[np.int64], low: int, high: int) -> tuple[
 @njit(cache=True, nogil=True)
 def _sum_blocks(theta: Array, sizes: NDArray[np.int64], low: int, sums: Array) -> None:
     for block in range(sums.shape[0]):
-        start = (low + block) * BLOCK
-        sum_sizes(theta, start, start + BLOCK, sizes, sums[block])
+        start = (low + block) * BLOCK_DIFFERENCES
+        sum_sizes(theta, start, start + BLOCK_DIFFERENCES, sizes, sums[block])
 
 
-def _full_with_holes(
+def _sum_full_with_holes(
     theta: Array,
     present: NDArray[np.integer[Any]],
     sizes: NDArray[np.int64],
@@ -394,7 +394,7 @@ def _full_with_holes(
     low: int,
     high: int,
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return, by block and size, what `full_sums` adds up, over the samples present."""
+    """Return the terms of `full_sums` over the samples present, by block and size."""
     shape = (high - low, len(sizes))
     rows = np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.int64)
     _sum_blocks_present(theta, present, sizes, enough, low, *rows)
@@ -413,9 +413,9 @@ def _sum_blocks_present(
     numbers: NDArray[np.int64],
 ) -> None:
     for block in range(sums.shape[0]):
-        start = (low + block) * BLOCK
+        start = (low + block) * BLOCK_DIFFERENCES
         for j in range(sizes.size):
             n = sizes[j]
-            stop = min(start + BLOCK, theta.size - 2 * n)
+            stop = min(start + BLOCK_DIFFERENCES, theta.size - 2 * n)
             of_size = sum_present(theta, present, n, enough[j], start, stop)
             sums[block, j], inverse[block, j], numbers[block, j] = of_size

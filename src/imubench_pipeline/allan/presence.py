@@ -1,4 +1,4 @@
-"""Which samples of a log are there, at two resolutions and in bounded memory."""
+"""Record the missing samples of a log at two resolutions, in bounded memory."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from imubench_pipeline.allan.phase import GapCount, Gaps, Span, spans_of
 
 Counts = NDArray[np.int64]
 
-_POINTS = 1 << 15
-_FEWEST_CLUSTERS = 16
-_STEPS = 32
+_MAX_COARSE_POINTS = 1 << 15
+_MIN_CLUSTERS = 16
+_STARTS_PER_CLUSTER = 32
 
 
 @dataclass(frozen=True)
@@ -30,19 +30,19 @@ class Presence:
     gaps: Gaps
 
     def differences(self, n: int) -> tuple[NDArray[np.bool_], int] | None:
-        """Tell which differences of two adjacent cluster means of n samples there are.
+        """Return a mask of the valid differences of adjacent cluster means, and their stride.
 
-        For differences that begin a stride apart, and the stride; of the whole log, or of its
-        beginning where that has clusters enough. None: neither is fine enough.
+        ``n``: samples in a cluster. The mask is for differences that begin a stride apart, in the
+        whole log, or in its beginning if that has enough clusters. None: no resolution is enough.
         """
-        if n >= _STEPS // 2 * self.stride:
+        if n >= _STARTS_PER_CLUSTER // 2 * self.stride:
             counts, base = self.coarse, self.stride
-        elif len(self.first) - 1 >= min(2 * _FEWEST_CLUSTERS * n, self.samples):
+        elif len(self.first) - 1 >= min(2 * _MIN_CLUSTERS * n, self.samples):
             counts, base = self.first, 1
         else:
             return None
         size = round(n / base)
-        begin = np.arange(0, len(counts) - 2 * size, max(1, size // _STEPS))
+        begin = np.arange(0, len(counts) - 2 * size, max(1, size // _STARTS_PER_CLUSTER))
         if not len(begin):
             return np.zeros(0, dtype=np.bool_), base
         enough = self.gaps.enough(np.array([size * base]))[0]
@@ -55,7 +55,7 @@ class Presence:
             points = begin * base
             which = np.minimum(np.searchsorted(ends, points, side="right"), len(ends) - 1)
             complete &= (points >= starts[which]) & (points + 2 * size * base <= ends[which])
-        return complete, base * max(1, size // _STEPS)
+        return complete, base * max(1, size // _STARTS_PER_CLUSTER)
 
 
 def presence(
@@ -63,14 +63,14 @@ def presence(
     samples: int,
     segments: Sequence[Span] | None = None,
 ) -> Presence:
-    """Count the samples that are present in a log, NaN where one is missing.
+    """Count the samples that are present in a log; NaN where one is missing.
 
-    ``segments`` are the grid points that begin and end each; one by default.
+    ``segments``: first and last grid point of each segment; one segment by default.
     """
     stride = 1
-    while samples // stride > _POINTS:
+    while samples // stride > _MAX_COARSE_POINTS:
         stride *= 2
-    first = np.zeros(min(samples, 2 * _POINTS) + 1, dtype=np.int64)
+    first = np.zeros(min(samples, 2 * _MAX_COARSE_POINTS) + 1, dtype=np.int64)
     coarse = np.zeros(samples // stride + 1, dtype=np.int64)
     gaps = GapCount()
     reached = total = 0

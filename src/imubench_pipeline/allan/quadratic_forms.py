@@ -1,9 +1,9 @@
-"""The distribution of a sum of squares of correlated Gaussian numbers, for its limits.
+"""Distribution of a sum of squares of correlated Gaussian variates, for confidence limits.
 
-Such a sum over its mean is sum_i w_i x_i with x_i chi-squared of one degree of freedom each, and
-w_i the eigenvalues of the covariance over their sum. With equal w_i it is chi-squared; else a
-chi-squared variate of as many degrees of freedom as give its variance, 1 / sum w_i^2, has too
-long a tail at its lower end, from which an upper limit follows.
+The sum over its mean is sum_i w_i x_i, where each x_i is chi-squared with one degree of freedom,
+and w_i are the eigenvalues of the covariance over their sum. For equal w_i it is chi-squared.
+Otherwise the chi-squared variate with the same variance, which has 1 / sum w_i^2 degrees of
+freedom, has too long a lower tail. The lower tail determines the upper confidence limit.
 """
 
 from __future__ import annotations
@@ -17,10 +17,13 @@ from scipy.special import gammaincinv, ndtr
 from imubench_pipeline.typing import Array
 
 LOWER_TAIL = 0.025
-"""Chance at which the degrees of freedom of the lower tail are those of the quantile."""
+"""Probability of the quantile that defines the degrees of freedom of the lower tail."""
 
-_FEWEST, _MOST = 1e-3, 1e4
-_STEEPEST = 1e8
+_MIN_DEGREES, _MAX_DEGREES = 1e-3, 1e4
+"""Range of the search for the degrees of freedom of the lower tail."""
+
+_MAX_SADDLEPOINT = 1e8
+"""Largest magnitude of the saddlepoint in the search for a quantile."""
 
 
 def variance_degrees(weights: Array) -> float:
@@ -31,7 +34,8 @@ def variance_degrees(weights: Array) -> float:
 def tail_degrees(weights: Array) -> float:
     """Return the degrees of freedom of the chi-squared variate with the same lower tail.
 
-    Over its mean it has the same quantile of chance 2.5 %. The weights w_i >= 0 are to a factor.
+    Relative to its mean it has the same 2.5 % quantile. The weights w_i >= 0 have any common
+    factor.
     """
     if len(weights) == 1:
         return 1.0
@@ -40,14 +44,15 @@ def tail_degrees(weights: Array) -> float:
     def over(degrees: float) -> float:
         return float(2.0 * gammaincinv(degrees / 2.0, LOWER_TAIL) / degrees - quantile)
 
-    return float(brentq(over, _FEWEST, _MOST, rtol=1e-6))
+    return float(brentq(over, _MIN_DEGREES, _MAX_DEGREES, rtol=1e-6))
 
 
 def lower_quantile(weights: Array, chance: float) -> float:
     """Return a quantile below the mean of a weighted sum of chi-squared variates over its mean.
 
-    The saddlepoint approximation is within a tenth of the chance, which is below a third; the
-    quantile within 1 % where more than three weights count. The weights w_i >= 0 are to a factor.
+    The relative error of the probability in the saddlepoint approximation is below a tenth, for
+    probabilities below a third. The error of the quantile is below 1 % if more than three weights
+    are significant. The weights w_i >= 0 have any common factor.
 
     References
     ----------
@@ -57,14 +62,14 @@ def lower_quantile(weights: Array, chance: float) -> float:
     w = weights / weights.sum()
 
     def below(log_s: float) -> float:
-        return _lower_tail(w, -math.exp(log_s))[1] - chance
+        return _evaluate_lower_tail(w, -math.exp(log_s))[1] - chance
 
-    log_s = float(brentq(below, math.log(1e-2), math.log(_STEEPEST), rtol=1e-8))
-    return _lower_tail(w, -math.exp(log_s))[0]
+    log_s = float(brentq(below, math.log(1e-2), math.log(_MAX_SADDLEPOINT), rtol=1e-8))
+    return _evaluate_lower_tail(w, -math.exp(log_s))[0]
 
 
-def _lower_tail(w: Array, s: float) -> tuple[float, float]:
-    """Return the point whose saddle is at s < 0, and the chance below it."""
+def _evaluate_lower_tail(w: Array, s: float) -> tuple[float, float]:
+    """Return the point with its saddlepoint at s < 0, and the probability below it."""
     gap = 1.0 - 2.0 * s * w
     share = w / gap
     x = float(share.sum())

@@ -1,4 +1,4 @@
-"""Work on numbered pieces shared between threads, with a result that does not depend on them."""
+"""Distribute work on numbered pieces to threads; the result is independent of their number."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_SHARES = 4
-"""Shares of the work a thread takes, one after the other: no thread waits long for the last."""
+_SHARES_PER_THREAD = 4
+"""Shares of the work per thread, so that no thread waits long for the last share."""
 
 
 def available(threads: int | None) -> int:
-    """Return a number of threads; None: one for each core that this process may use.
+    """Return the number of threads; None: one for each core available to this process.
 
     Raises
     ------
     ValueError
-        If it is below 1.
+        If the number is below 1.
     """
     if threads is None:
         return (
@@ -36,15 +36,15 @@ def available(threads: int | None) -> int:
 def in_threads(
     work: Callable[[int, int], tuple[NDArray[Any], ...]], pieces: int, threads: int
 ) -> tuple[NDArray[Any], ...]:
-    """Do work on pieces 0 to ``pieces``, a few at a time, and join the rows of all in order.
+    """Return the results of work on all pieces, computed in threads and joined in order.
 
-    The work takes the first and one-past-last piece, and returns arrays with one row a piece. It
-    must let other threads run.
+    ``work`` receives the first and one-past-last piece, and returns arrays with one row per piece.
+    It must release the global interpreter lock.
     """
     threads = max(1, min(threads, pieces))
     if threads == 1:
         return work(0, pieces)
-    shares = min(pieces, threads * _SHARES)
+    shares = min(pieces, threads * _SHARES_PER_THREAD)
     cuts = [pieces * share // shares for share in range(shares + 1)]
     with ThreadPoolExecutor(threads) as pool:
         parts = list(pool.map(work, cuts[:-1], cuts[1:]))
@@ -52,7 +52,7 @@ def in_threads(
 
 
 def read_ahead(blocks: Iterable[NDArray[Any]]) -> Iterator[NDArray[Any]]:
-    """Yield blocks while the next one is made in another thread: one block more is in memory."""
+    """Yield blocks while another thread computes the next one, which takes additional memory."""
     coming = iter(blocks)
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(next, coming, None)

@@ -1,4 +1,4 @@
-"""The Allan variance: grid of cluster sizes, kernels over holes and segments.
+"""The Allan variance: grid of cluster sizes, missing samples and segments.
 
 With theta the cumulative sum of the samples (L + 1 points, starting at 0) the fully
 overlapping Allan variance at n samples a cluster is
@@ -20,10 +20,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
-from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
+from imubench_pipeline.allan.octave import (
+    DECIMATION,
+    MIN_DECIMATED_SAMPLES,
+    OctaveSums,
+    octave_sizes,
+)
 from imubench_pipeline.allan.phase import (
+    MIN_PRESENT_SHARE,
     NO_GAPS,
-    PRESENT,
     Gaps,
     Phase,
     Span,
@@ -36,15 +41,16 @@ from imubench_pipeline.allan.phase import (
 from imubench_pipeline.allan.threads import available, read_ahead
 from imubench_pipeline.typing import Array
 
-_MANY_CLUSTERS = 100
-_FEW_STEPS = 2  # strides in a cluster: for shorter ones the noise type needs every sample
+_MAX_UNCERTAIN_CLUSTERS = 100
+_MIN_STRIDES_IN_CLUSTER = 2  # for shorter clusters the noise type needs every sample
 
 POWER_LAW = "power law"
 FITTED = "fitted spectrum"
-"""What degrees of freedom come from."""
+"""Sources of the degrees of freedom."""
 
 Edges = Callable[[int], tuple[Array, NDArray[Any] | None, int]]
-"""Cumulative sums and counts at the edges of adjacent clusters of about a size, and the size."""
+"""Returns cumulative sums and counts at the edges of adjacent clusters of approximately the given
+size, and the actual size."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,7 +60,7 @@ class AllanCurve:
     Attributes
     ----------
     tau : ndarray, shape (m,)
-        Cluster length in s: ``cluster_size / rate`` of the cluster size really used.
+        Cluster length in s: ``cluster_size / rate``, with the actual cluster size.
     cluster_size : ndarray of int, shape (m,)
         n, samples in a cluster.
     variance : ndarray, shape (m,)
@@ -67,14 +73,15 @@ class AllanCurve:
         Noise type at each tau: the power of frequency, 2 to -2, in the spectrum of fractional
         frequency (0: white noise of the samples, -1: flicker, -2: random walk). By default 0.
     averaged : ndarray, shape (m,)
-        Samples that a cluster really averages: n, by default, or fewer (their harmonic mean)
-        where samples are missing. The variance of white noise goes with 1 / averaged.
+        Effective number of samples in a cluster: n by default, or the harmonic mean of the numbers
+        if samples are missing. The variance of white noise is proportional to 1 / averaged.
     edf_upper : ndarray, shape (m,)
-        Those of the upper limit, which are more where few clusters remain. By default ``edf``.
+        Degrees of freedom of the upper limit, which are larger for few clusters. By default
+        ``edf``.
     edf_source : sequence of str
-        Where they come from at each tau: the identified power law, or the fitted spectrum.
+        Source of the degrees of freedom at each tau: `POWER_LAW` or `FITTED`.
     share : ndarray, shape (m,)
-        Part of the differences that missing samples leave. By default 1.
+        Share of the differences that are not lost to missing samples. By default 1.
     """
 
     tau: Array
@@ -89,7 +96,7 @@ class AllanCurve:
     share: Array = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        # The class is frozen: defaults that follow from other fields go this way.
+        # Defaults that depend on other fields; the class is frozen.
         if not self.samples:
             object.__setattr__(self, "samples", 2 * int(np.max(self.cluster_size)))
         if not len(self.exponent):
@@ -134,9 +141,9 @@ def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -
     samples : int
         L.
     per_decade : int
-        Sizes per decade, where whole numbers allow.
+        Sizes per decade, as far as integers allow.
     longest : float
-        The largest size as a part of the log, at most 1/2.
+        Largest size as a share of the log, at most 1/2.
     """
     largest = int(samples * min(longest, 0.5) * (1 + 1e-12))
     if largest < 1:
@@ -168,8 +175,8 @@ def allan_variance(
         n of each tau; by default `cluster_sizes` of the length.
     overlap : {"full", "octave"}
         Use every cluster of every size; or clusters that start 1/48 of their length apart, or
-        closer, which is as sure and many times faster (sizes are then rounded by up to 1 %,
-        see `imubench_pipeline.allan.octave.octave_sizes`).
+        closer, which is as accurate and many times faster (sizes are then rounded by up to 1 %, see
+        `imubench_pipeline.allan.octave.octave_sizes`).
     valid : array_like of bool, shape (L,), optional
         False where the sample is missing.
     segments : sequence of (int, int), optional
@@ -224,8 +231,8 @@ def allan_variance(
     if not len(curve.tau) and holes:
         raise ValueError(
             f"{int(present.sum())} of {number} samples are finite numbers, and no two adjacent "
-            f"clusters have {PRESENT:.0%} of those between long gaps; expected a log with fewer "
-            "missing"
+            f"clusters have {MIN_PRESENT_SHARE:.0%} of those between long gaps; expected a log "
+            "with fewer missing"
         )
     return curve
 
@@ -241,9 +248,9 @@ def of_blocks(
     segments: Sequence[Span] | None = None,
     threads: int = 1,
 ) -> AllanCurve:
-    """Return the multi-octave Allan variance of a log that comes in blocks.
+    """Return the multi-octave Allan variance of a log that is given in blocks.
 
-    One pass, in memory that grows with L/64 only. The result has the same bits for any number of
+    One pass; the memory grows with L/64 only. The result has the same bits for any number of
     threads and any blocks.
 
     Parameters
@@ -251,26 +258,26 @@ def of_blocks(
     blocks : iterable of ndarray
         The log in order, in SI; NaN where a sample is missing. Blocks of float32 are not copied.
     samples : int
-        L, the length of all blocks together.
+        L, the total length of all blocks.
     rate, sizes, segments : as in `allan_variance`
         The sizes are rounded to the stride of their octave.
     holes : bool
         Samples may be missing.
     gaps : Gaps
-        Which are (`imubench_pipeline.allan.phase.gaps_of`): where many short gaps are spread over
-        the log, clusters count all the same.
+        Gaps of the log (`imubench_pipeline.allan.phase.gaps_of`). With many short gaps, clusters
+        with the usual share of samples are valid.
     threads : int
-        With more than one, the next block is made while the last is summed.
+        With more than one, the next block is computed while the last one is summed.
 
     Raises
     ------
     ValueError
-        As `allan_variance`.
+        See `allan_variance`.
     """
     spans = spans_of(segments, samples)
-    wanted = _checked(rate, sizes, samples, spans)
+    wanted = _check_arguments(rate, sizes, samples, spans)
     wanted = octave_sizes(wanted)
-    if samples < SHORTEST:
+    if samples < MIN_DECIMATED_SAMPLES:
         phase = integrate(blocks, samples, holes=holes, segments=spans)
         return of_phase(phase, rate, wanted, gaps=gaps, threads=threads)
     longest: OctaveSums | None = None
@@ -294,13 +301,13 @@ def of_blocks(
         raise ValueError(f"the blocks end before sample {spans[done][1]}")
 
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
-        if n < _FEW_STEPS * DECIMATION:
+        if n < _MIN_STRIDES_IN_CLUSTER * DECIMATION:
             return *longest.first.every(n), n
         # The noise type is the same at the nearest multiple of the stride.
         step = round(n / DECIMATION)
         return *longest.phase.every(step), step * DECIMATION
 
-    return _curve(rate, wanted, samples, spans, sums, edges)
+    return _make_curve(rate, wanted, samples, spans, sums, edges)
 
 
 def of_phase(
@@ -315,20 +322,20 @@ def of_phase(
 
     The result has the same bits for any number of threads.
     """
-    wanted = _checked(rate, sizes, phase.samples, phase.segments)
+    wanted = _check_arguments(rate, sizes, phase.samples, phase.segments)
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
 
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
         return *phase.every(n, start, stop), n
 
     sums = full_sums(phase, wanted, threads, gaps=gaps)
-    return _curve(rate, wanted, phase.samples, phase.segments, sums, edges)
+    return _make_curve(rate, wanted, phase.samples, phase.segments, sums, edges)
 
 
-def _checked(
+def _check_arguments(
     rate: float, sizes: ArrayLike | None, samples: int, segments: Sequence[Span]
 ) -> NDArray[np.int64]:
-    """Check the arguments that all kernels share, and return the sizes."""
+    """Check the common arguments, and return the sizes."""
     if not rate > 0:
         raise ValueError(f"the rate is {rate}, expected a frequency above zero")
     reached = 0
@@ -345,7 +352,7 @@ def _checked(
     return wanted
 
 
-def _curve(
+def _make_curve(
     rate: float,
     sizes: NDArray[np.int64],
     samples: int,
@@ -353,14 +360,14 @@ def _curve(
     sums: Sequence[NDArray[Any]],
     edges: Edges,
 ) -> AllanCurve:
-    """Make the curve of the sums over differences of means (see `full_sums`)."""
+    """Return the curve from the sums over differences of means (see `full_sums`)."""
     shown = sums[2] > 0
     n = sizes[shown]
     total, thinned, terms, possible = (column[shown] for column in sums)
-    exponent = np.array(_exponents(edges, n), dtype=np.int64)
+    exponent = np.array(_find_exponents(edges, n), dtype=np.int64)
     edf = np.array(
         [
-            _degrees(segments, int(alpha), int(size)) * done / most
+            _sum_degrees(segments, int(alpha), int(size)) * done / most
             for alpha, size, done, most in zip(exponent, n, terms, possible, strict=True)
         ]
     )
@@ -376,10 +383,10 @@ def _curve(
     )
 
 
-def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
-    """Return the noise type at each size; where too few clusters are left, the last one told.
+def _find_exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
+    """Return the noise type at each size; with too few clusters, the type of the size before.
 
-    With few clusters white noise often looks blue: then no bluer type than before is believed.
+    With few clusters white noise often looks blue. A bluer type than before is then not accepted.
     """
     exponents: list[int] = []
     for n in sizes:
@@ -388,12 +395,12 @@ def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
         before = exponents[-1] if exponents else 0
         if exponent is None:
             exponent = before
-        elif len(theta) <= _MANY_CLUSTERS:
+        elif len(theta) <= _MAX_UNCERTAIN_CLUSTERS:
             exponent = min(exponent, max(before, 0))
         exponents.append(exponent)
     return exponents
 
 
-def _degrees(segments: Sequence[Span], exponent: int, n: int) -> float:
+def _sum_degrees(segments: Sequence[Span], exponent: int, n: int) -> float:
     terms = [stop - start - 2 * n + 1 for start, stop in segments]
     return sum(equivalent_degrees(exponent, n, term) for term in terms if term > 0)
