@@ -1,4 +1,4 @@
-"""The state space of the means of blocks of samples, exactly."""
+"""Exact state space of the means of blocks of samples."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from imubench_pipeline.noise.state_space import StateSpace, repeat_step
 def of_block_means(space: StateSpace, size: int) -> StateSpace:
     """Return the state space of the means of adjacent blocks of samples.
 
-    The mean of a block is a state of its own, which is put out after the block has ended: the
-    states of the process are then already those of the next one.
+    The mean of a block is an additional state, which is output after the end of the block, when the
+    states of the process already belong to the next block.
 
     Parameters
     ----------
     space : StateSpace
-        Of the samples, with m states.
+        State space of the samples, with m states.
     size : int
         Samples in a block.
 
     Returns
     -------
     StateSpace
-        With m + 1 states; with m where ``size`` is 1 or m is 0. It starts a block earlier than
-        the samples do: its initial state stands before the first block.
+        It has m + 1 states, or m if ``size`` is 1 or m is 0. It starts one block before the
+        samples: its initial state precedes the first block.
     """
     m = len(space.output)
     if size == 1 or m == 0:
         return replace(space, measurement_noise=space.measurement_noise / size)
-    # One sample: the sum takes in the state, and the state goes on.
+    # One sample: the output is added to the sum, and the state advances.
     step = np.zeros((m + 1, m + 1))
     step[:m, :m] = space.transition
     step[m, :m] = space.output / size
@@ -39,7 +39,7 @@ def of_block_means(space: StateSpace, size: int) -> StateSpace:
     noise = np.zeros((m + 1, m + 1))
     noise[:m, :m] = space.process_noise
     transition, process_noise = repeat_step(step, noise, size)
-    transition[:, m] = 0.0  # each sum begins anew
+    transition[:, m] = 0.0  # each sum starts from 0
     mean, variance = np.zeros(m + 1), np.zeros((m + 1, m + 1))
     mean[:m], variance[:m, :m] = space.initial_mean, space.initial_variance
     output = np.zeros(m + 1)

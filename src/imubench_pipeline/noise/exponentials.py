@@ -1,4 +1,4 @@
-"""The functions of exponentials that the closed forms of Gauss-Markov processes and lines need."""
+"""Phi functions of exponentials for the closed forms of Gauss-Markov processes and lines."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.typing import Array
 
-_SERIES_BELOW = 2.0
-"""Below, the recurrence of phi and the sum of `squared_response` cancel; their series do not."""
+_MAX_ARGUMENT_FOR_SERIES = 2.0
+"""Series are used below this magnitude, where the recurrence of phi and the sum of
+`squared_response` cancel."""
 
-_LONGEST_SERIES = 48
-_NO_MORE = 1e-18
-"""Part of a sum that is below its last digit, as all are that follow."""
+_MAX_SERIES_TERMS = 48
+_SERIES_TOLERANCE = 1e-18
+"""Relative size of a term at which a series is truncated, below the last digit."""
 
-_ARRAY_SERIES = 28
-"""Terms for arrays: the next is below 2^28 / 28! = 9e-22 of the first."""
+_ARRAY_SERIES_TERMS = 28
+"""Number of terms for arrays; the next term is below 2^28 / 28! = 9e-22 of the first."""
 
 ComplexArray = NDArray[np.complex128]
 
@@ -39,14 +40,14 @@ def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray
     M. Hochbruck and A. Ostermann, "Exponential integrators", Acta Numerica 19, 2010.
     """
     if isinstance(z, np.ndarray):
-        return _phi_of_array(order, z)
-    if abs(z) < _SERIES_BELOW:
+        return _evaluate_phi_array(order, z)
+    if abs(z) < _MAX_ARGUMENT_FOR_SERIES:
         term: complex = 1.0 / math.factorial(order)
         total = term
-        for n in range(1, _LONGEST_SERIES):
+        for n in range(1, _MAX_SERIES_TERMS):
             term *= z / (n + order)
             total += term
-            if abs(term) < _NO_MORE * abs(total):
+            if abs(term) < _SERIES_TOLERANCE * abs(total):
                 break
         return total
     value = cmath.exp(z)
@@ -55,14 +56,14 @@ def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray
     return value
 
 
-def _phi_of_array(order: int, z: Array | ComplexArray) -> ComplexArray:
-    small = np.abs(z) < _SERIES_BELOW
-    far = np.where(small, _SERIES_BELOW, z)
+def _evaluate_phi_array(order: int, z: Array | ComplexArray) -> ComplexArray:
+    small = np.abs(z) < _MAX_ARGUMENT_FOR_SERIES
+    far = np.where(small, _MAX_ARGUMENT_FOR_SERIES, z)
     value = np.exp(far)
     for j in range(order):
         value = (value - 1.0 / math.factorial(j)) / far
     if small.any():
-        series = [1.0 / math.factorial(n + order) for n in range(_ARRAY_SERIES)]
+        series = [1.0 / math.factorial(n + order) for n in range(_ARRAY_SERIES_TERMS)]
         near = np.polynomial.polynomial.polyval(np.where(small, z, 0.0), series)
         value = np.where(small, near, value)
     return np.asarray(value, dtype=np.complex128)
@@ -73,7 +74,7 @@ def decay(order: int, x: float) -> float: ...
 @overload
 def decay(order: int, x: Array) -> Array: ...
 def decay(order: int, x: float | Array) -> float | Array:
-    """Return phi_k(-x) for a real x from 0: 1/k! at 0, and then falling."""
+    """Return phi_k(-x) for a real x from 0: it is 1/k! at 0 and decreases."""
     return phi(order, -x).real
 
 
@@ -84,41 +85,43 @@ def squared_response(order: int, x: Array) -> Array: ...
 def squared_response(order: int, x: float | Array) -> float | Array:
     """Return x^-(2m+3) times the integral of E(v)^2 from 0 to x, E(v) = v^(m+1) phi_{m+1}(-v).
 
-    E is what a pulse grows to through a Gauss-Markov process of unit correlation time and m + 1
+    E is the response to a pulse of a Gauss-Markov process with unit correlation time and m + 1
     integrations. With E_k(x) = x^k phi_k(-x), for which E_k' = E_{k-1} = x^(k-1) / (k-1)! - E_k,
-    the integral is by parts
+    integration by parts gives
 
         sum_{j=0..m} (-1)^j x^(m-j) / (m-j)! E_{m+2+j}(x) - E_{m+1}(x)^2 / 2.
     """
     if isinstance(x, np.ndarray):
-        small = x < _SERIES_BELOW
-        response = _squared_sum(order, np.where(small, _SERIES_BELOW, x))
+        small = x < _MAX_ARGUMENT_FOR_SERIES
+        response = _sum_squared_response(order, np.where(small, _MAX_ARGUMENT_FOR_SERIES, x))
         if not small.any():
             return response
-        series = np.polynomial.polynomial.polyval(np.where(small, x, 0.0), _squared_series(order))
+        series = np.polynomial.polynomial.polyval(
+            np.where(small, x, 0.0), _expand_squared_response(order)
+        )
         return np.where(small, series, response)
-    if x < _SERIES_BELOW:
+    if x < _MAX_ARGUMENT_FOR_SERIES:
         near = 0.0
-        for coefficient in reversed(_squared_series(order)):
+        for coefficient in reversed(_expand_squared_response(order)):
             near = near * x + coefficient
         return near
-    return _squared_sum(order, x)
+    return _sum_squared_response(order, x)
 
 
 @overload
-def _squared_sum(order: int, x: float) -> float: ...
+def _sum_squared_response(order: int, x: float) -> float: ...
 @overload
-def _squared_sum(order: int, x: Array) -> Array: ...
-def _squared_sum(order: int, x: float | Array) -> float | Array:
+def _sum_squared_response(order: int, x: Array) -> Array: ...
+def _sum_squared_response(order: int, x: float | Array) -> float | Array:
     m = order
     parts = [(-1) ** j * decay(m + 2 + j, x) / math.factorial(m - j) for j in range(m + 1)]
     return (sum(parts) - 0.5 * decay(m + 1, x) ** 2) / x
 
 
 @lru_cache(maxsize=8)
-def _squared_series(order: int) -> tuple[float, ...]:
+def _expand_squared_response(order: int) -> tuple[float, ...]:
     """Return the coefficients of the power series of `squared_response`."""
-    powers = np.arange(_LONGEST_SERIES)
+    powers = np.arange(_MAX_SERIES_TERMS)
     single = [(-1.0) ** n / math.factorial(n + order + 1) for n in powers]
-    square = np.convolve(single, single)[:_LONGEST_SERIES]
+    square = np.convolve(single, single)[:_MAX_SERIES_TERMS]
     return tuple((square / (2 * order + 3 + powers)).tolist())

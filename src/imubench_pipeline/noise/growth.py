@@ -1,4 +1,4 @@
-"""What the noise of one sensor axis has grown to after one, two or three integrations.
+"""Growth of the noise of one sensor axis through one, two or three integrations.
 
 The error of a channel at a time t after the start is
 
@@ -6,15 +6,15 @@ The error of a channel at a time t after the start is
 
 with m = 0 for the attitude from a gyro and the velocity from an accelerometer, m = 1 for the
 velocity from a gyro and the position from an accelerometer, m = 2 for the position from a gyro,
-and c = t^(m+1) / (m+1)!, what a constant error grows to. The estimated bias is the mean over a
+and c = t^(m+1) / (m+1)!, the growth of a constant error. The estimated bias is the mean over a
 static window of length W that ends at the start. So e weights the process by a kernel h(s): the
 weights of the integration on 0..t and -c/W on -W..0, and
 
     sigma^2 = integral of S(f) |H(f)|^2 df over all f,
 
-H the Fourier transform of h. The window and the motion see one process: what both see alike
-cancels, and H(0) = 0. Flicker noise (1/f) and a random walk (1/f^2) have no variance, but this
-integral of theirs is finite. Each term has it in closed form (`Term.growth`), with t the time, W
+with H the Fourier transform of h. The same process acts in the window and in the motion: common
+parts cancel, and H(0) = 0. Flicker noise (1/f) and a random walk (1/f^2) have no variance, but this
+integral is finite. Each term has it in closed form (`Term.growth`), with t the time, W
 the window and A the time since switch-on.
 
 References
@@ -31,13 +31,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Calibrated:
-    """The bias of a sensor is its mean over a static window that ends when the motion begins.
+    """The bias of a sensor is estimated as its mean over a static window before the motion.
 
-    A gyro's mean is its bias and the Earth's rate, both of which go. An accelerometer's is its
-    bias and gravity times the tilt: the two cannot be told apart at rest, and both go, be the
-    mean taken for a bias or the attitude be levelled by it. The sensor has been on for some time:
-    flicker noise that began with a window as long as the motion grows to 4 % less, and to 0.3 %
-    less if it began as long again before.
+    The mean of a gyro is its bias plus the Earth's rate; both are removed. The mean of an
+    accelerometer is its bias plus gravity times the tilt. The two are not distinguishable at rest,
+    and both are removed, by a bias correction or by levelling. The sensor is assumed to have been
+    on for some time. The error is 4 % smaller if flicker noise starts with a window as long as the
+    motion, and 0.3 % smaller if it starts this time earlier.
 
     Parameters
     ----------
@@ -59,16 +59,15 @@ class Calibrated:
 
 @dataclass(frozen=True, kw_only=True)
 class Uncalibrated:
-    """The bias of a sensor is not estimated: it is the turn-on bias, and what came after it.
+    """The bias of a sensor is not estimated: turn-on bias and the noise since switch-on remain.
 
-    Flicker noise, random walk and ramp have no level of their own; they count from switch-on,
-    where they are 0. What the sensor had before is the turn-on bias. Gauss-Markov processes are
-    stationary.
+    Flicker noise, random walk and ramp are 0 at switch-on. The bias at switch-on is the turn-on
+    bias. Gauss-Markov processes are stationary.
 
     Parameters
     ----------
     bias : float or None
-        Turn-on bias, 1 sigma, rad/s or m/s^2; None: it is a figure of the sensor (`in_use`).
+        Turn-on bias, 1 sigma, rad/s or m/s^2; None: from the data of the sensor (`in_use`).
     on_time : float
         Time from switch-on to the start, s.
 
@@ -92,22 +91,22 @@ SensorStart = Calibrated | Uncalibrated
 
 
 def of_constant(order: int, time: float) -> float:
-    """Return c = t^(m+1) / (m+1)!, what a constant error of 1 grows to."""
+    """Return c = t^(m+1) / (m+1)!, the growth of a constant error of 1."""
     return time ** (order + 1) / math.factorial(order + 1)
 
 
 def of_white(order: int, time: float) -> float:
-    """Return t^(2m+1) / ((2m+1) m!^2), the variance that white noise of N = 1 grows to."""
+    """Return t^(2m+1) / ((2m+1) m!^2), the variance of integrated white noise with N = 1."""
     return time ** (2 * order + 1) / ((2 * order + 1) * math.factorial(order) ** 2)
 
 
 def of_white_mean(order: int, time: float, start: SensorStart) -> float:
-    """Return c^2 / W, the variance that the mean of white noise of N = 1 grows to."""
+    """Return c^2 / W, the variance due to the estimated mean of white noise with N = 1."""
     if isinstance(start, Uncalibrated):
         return 0.0
     return of_constant(order, time) ** 2 / start.window
 
 
 def of_walk(order: int, time: float) -> float:
-    """Return t^(2m+3) / ((2m+3) (m+1)!^2), the variance of a walk of K = 1 that begins at 0."""
+    """Return t^(2m+3) / ((2m+3) (m+1)!^2), the variance for a random walk with K = 1 from 0."""
     return of_white(order + 1, time)

@@ -12,15 +12,15 @@ from scipy.linalg import block_diag
 
 from imubench_pipeline.typing import Array
 
-_HIGHEST_ORDER = 10
+_MAX_ORDER = 10
 
 
 @dataclass(frozen=True)
 class LowPass:
     """A low-pass filter of unit gain at rest: v' = F v + b u, y = c v.
 
-    It is a chain of sections of first and second order, so that its states have the size of the
-    signal, whatever the cut-off frequency.
+    It is a cascade of sections of first and second order, so that its states have the magnitude of
+    the signal at any cut-off frequency.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ class LowPass:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.cutoff) and self.cutoff > 0):
             raise ValueError(f"the cut-off is {self.cutoff}, expected a frequency above 0")
-        if not 1 <= self.order <= _HIGHEST_ORDER:
-            raise ValueError(f"the order is {self.order}, expected 1 to {_HIGHEST_ORDER}")
+        if not 1 <= self.order <= _MAX_ORDER:
+            raise ValueError(f"the order is {self.order}, expected 1 to {_MAX_ORDER}")
 
     @property
     def angular_cutoff(self) -> float:
@@ -56,7 +56,7 @@ class LowPass:
         matrix = np.asarray(block_diag(*sections), dtype=np.float64)
         begin = 0
         for section, following in pairwise(sections):
-            # The first state of a section is its output, and the last one takes its input.
+            # The first state of a section is its output, and the last one receives its input.
             matrix[begin + len(section) + len(following) - 1, begin] = 1.0
             begin += len(section)
         return self.angular_cutoff * matrix
@@ -86,7 +86,7 @@ class LowPass:
     def power(self, frequency: ArrayLike) -> Array:
         """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)), in the shape of the frequency, Hz."""
         square = np.square(np.asarray(frequency, dtype=np.float64) / self.cutoff)
-        # Products: numpy takes ten times as long for a power above 2.
+        # Products, since numpy takes ten times as long for a power above 2.
         return np.asarray(1.0 / (1.0 + math.prod([square] * (self.order - 1), start=square)))
 
     def response(self, frequency: float) -> complex:

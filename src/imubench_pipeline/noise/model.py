@@ -33,7 +33,7 @@ _OWN_PLACE = (Quantization, WhiteNoise, Flicker, RandomWalk, Deterministic)
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseModel:
-    """The stochastic error of one axis, the sum of its terms (000 eq. 2; IEEE Std 952, 647).
+    """The stochastic error of one axis, the sum of its terms (Maia et al., eq. 2; IEEE Std 952).
 
     Parameters
     ----------

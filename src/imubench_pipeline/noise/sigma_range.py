@@ -1,8 +1,8 @@
-"""How much a standard deviation is off because the noise model it comes from is an estimate.
+"""Uncertainty of a standard deviation that is computed from an estimated noise model.
 
-A filter, a bound or a standard error takes N, B, T_B and K as if they were known. Computed again
-for models drawn from what is known of the parameters it has a range: the true standard deviation
-lies in it as often as is said, as far as what is known of the parameters holds.
+A filter, a bound or a standard error assumes that N, B, T_B and K are known. Its range is computed
+from models that are drawn from the distribution of the parameters. The range has the stated
+coverage if this distribution is correct.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from imubench_pipeline.typing import Array
 Sigma = Callable[[NoiseModel], ArrayLike]
 """A standard deviation, or several, from a noise model; the same shape for every model."""
 
-_SCALED = ("Q", "N", "B", "T_B", "K")
+_SCALABLE_PARAMETERS = ("Q", "N", "B", "T_B", "K")
 
 
 @dataclass(frozen=True)
 class SigmaRange:
-    """Standard deviations, and the range that the noise parameters leave them.
+    """Standard deviations, and their range due to the uncertainty of the noise parameters.
 
     Attributes
     ----------
     value : ndarray, shape (...)
-        With the parameters as they are estimated.
+        With the estimated parameters.
     lower, upper : ndarray, shape (...)
-        Limits of those of the drawn models.
+        Limits from the drawn models.
     pooled : ndarray, shape (...)
-        Root of their mean square: the standard deviation of an error whose noise model is one of
-        these, no one knows which (law of total variance; the estimates are unbiased with each).
-        Weights that come of another model than the true one add to it, to the second order.
+        Root mean square over the drawn models: the standard deviation of an error with unknown
+        noise model (law of total variance; the estimates are unbiased for each model). Weights from
+        a wrong model add to it in second order.
     """
 
     value: Array
@@ -56,12 +56,12 @@ def sigma_range(
     sigma : callable
         Such as ``lambda model: RateFilter(blocks, model).rate_sigma[-1]``.
     model : NoiseModel
-        As estimated.
+        Estimated model.
     drawn : sequence of NoiseModel
         From the limits of an estimate (`error_budget.draw_models`), from a covariance of its
         parameters (`drawn_from_covariance`), or from a posterior.
     level : float
-        Share of the draws between the limits.
+        Share of the drawn models between the limits.
 
     Raises
     ------
@@ -86,26 +86,26 @@ def sigma_range(
 def drawn_from_covariance(
     model: NoiseModel, names: Sequence[str], covariance: Array, draws: int, rng: np.random.Generator
 ) -> list[NoiseModel]:
-    """Return noise models whose parameters are log-normal about those of a model, together.
+    """Return noise models with jointly log-normal parameters about those of a model.
 
     Parameters
     ----------
     model : NoiseModel
         Its parameters are the medians.
     names : sequence of str
-        Of Q, N, B, T_B and K, those that are drawn; the others stay.
+        Parameters to draw, of Q, N, B, T_B and K; the others are not changed.
     covariance : ndarray, shape (p, p)
-        Of the natural logarithms of these: for small errors that of the relative errors.
+        Covariance of their natural logarithms; for small errors, of the relative errors.
 
     Raises
     ------
     ValueError
-        If a name is not known, the model has no such parameter, or the covariance has not its
-        shape, is not symmetric or not a covariance.
+        If a name is unknown, the model has no such parameter, or the covariance has a wrong shape,
+        is not symmetric or not positive semi-definite.
     """
     for name in names:
-        if name not in _SCALED:
-            raise ValueError(f"no parameter {name!r}; expected {', '.join(_SCALED)}")
+        if name not in _SCALABLE_PARAMETERS:
+            raise ValueError(f"no parameter {name!r}; expected {', '.join(_SCALABLE_PARAMETERS)}")
         if not getattr(model, name):
             raise ValueError(f"the model {model.name} has no {name}")
     if covariance.shape != (len(names), len(names)) or not np.allclose(covariance, covariance.T):

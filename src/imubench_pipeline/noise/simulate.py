@@ -1,9 +1,9 @@
-"""Logs from a noise model: full length, or just the Allan variances of many.
+"""Simulate logs from a noise model, or only the Allan variances of an ensemble of logs.
 
-A full-length log comes from the discrete state-space model, block by block. The Allan
-variances of an ensemble need no full-length logs: at long tau they follow from sums over
-blocks of samples, which are drawn jointly with the state (exact); at short tau, where a
-thousand clusters and more are averaged, from their covariance.
+A full-length log is simulated with the discrete state-space model, block by block. The Allan
+variances of an ensemble do not need full-length logs. At long tau they follow from sums over blocks
+of samples, which are drawn jointly with the state (exact). At short tau, with a thousand clusters
+or more, they are drawn from their covariance.
 """
 
 from __future__ import annotations
@@ -23,21 +23,22 @@ from imubench_pipeline.noise.state_space import root_of
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
 
-_BLOCK = 1 << 16
-"""Samples at a time, which stay in the cache of a processor: a fourth faster than a million."""
+_BLOCK_SAMPLES = 1 << 16
+"""Samples of a block, which fits the cache: a quarter faster than a million."""
 
-_SUMS = 1 << 12
-"""Blocks that a member of the ensemble is made of, at most."""
+_MAX_BLOCK_SUMS = 1 << 12
+"""Largest number of blocks of a member of the ensemble."""
 
-_BLOCKS_IN_CLUSTER = 16
-"""Clusters of fewer blocks are drawn from the covariance of the Allan variances."""
+_MIN_BLOCKS_IN_CLUSTER = 16
+"""Least number of blocks in a cluster; the Allan variances of shorter ones are drawn from their
+covariance."""
 
 
 def channel_rng(seed: int, *names: str) -> np.random.Generator:
-    """Return the random stream of a channel: it depends on the seed and the texts only.
+    """Return the random generator of a channel, which depends on the seed and the names only.
 
-    Of a simulated log these are its names; of what is computed from a log, texts that its samples
-    decide (such as ``repr`` of a model), so that copies of a log have the same limits.
+    For a simulated log these are its names. For results from a log they are texts that depend on
+    its samples (such as ``repr`` of a model), so that copies of a log have the same limits.
     """
     digest = hashlib.sha256("/".join(names).encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
@@ -68,7 +69,11 @@ def simulate(model: NoiseModel, rate: float, samples: int, rng: np.random.Genera
 
 
 def simulate_blocks(
-    model: NoiseModel, rate: float, samples: int, rng: np.random.Generator, block: int = _BLOCK
+    model: NoiseModel,
+    rate: float,
+    samples: int,
+    rng: np.random.Generator,
+    block: int = _BLOCK_SAMPLES,
 ) -> Iterator[Array]:
     """Yield a simulated log in blocks; the log does not depend on their size (see `simulate`)."""
     interval = 1.0 / rate
@@ -85,7 +90,7 @@ def simulate_blocks(
                 driven = np.flatnonzero(np.diag(space.process_noise))
                 root = root_of(space.process_noise)[np.ix_(driven, driven)]
                 drive = stream.standard_normal((size, len(driven)))
-                if len(driven) == 1:  # a product of matrices takes four times as long
+                if len(driven) == 1:  # a matrix product takes four times as long
                     drive *= root[0, 0]
                 else:
                     drive = drive @ root.T
@@ -102,7 +107,7 @@ def _add_states(
     drive: Array,
     output: Array,
 ) -> None:
-    """Add the output of states to a log, and leave the states as they are after its last sample."""
+    """Add the output of states to a log; the states advance to the end of the log in place."""
     if state.size == 1 and driven.size == 1:
         x, phi, h = state[0], transition[0, 0], output[0]
         for i in range(log.size):
@@ -159,20 +164,22 @@ def ensemble(
     ndarray, shape (members, m)
         (rad/s)² or (m/s²)².
     """
-    width = max(1, -(-samples // _SUMS))
-    long = sizes >= (_BLOCKS_IN_CLUSTER * width if width > 1 else 1)
+    width = max(1, -(-samples // _MAX_BLOCK_SUMS))
+    long = sizes >= (_MIN_BLOCKS_IN_CLUSTER * width if width > 1 else 1)
     result = np.empty((members, len(sizes)))
     for_short, for_long = rng.spawn(2)
     if not long.all():
-        result[:, ~long] = _from_covariance(model, rate, samples, sizes[~long], members, for_short)
+        result[:, ~long] = _draw_from_covariance(
+            model, rate, samples, sizes[~long], members, for_short
+        )
     if long.any():
-        result[:, long] = _from_block_sums(
+        result[:, long] = _draw_from_block_sums(
             model, rate, samples, sizes[long], width, members, for_long
         )
     return result
 
 
-def _from_block_sums(
+def _draw_from_block_sums(
     model: NoiseModel,
     rate: float,
     samples: int,
@@ -184,7 +191,7 @@ def _from_block_sums(
     blocks = samples // width
     in_blocks = np.maximum(1, np.rint(sizes / width).astype(np.int64))
     in_blocks = np.minimum(in_blocks, blocks // 2)
-    # A cluster of whole blocks is a few per cent shorter or longer than the one wanted.
+    # A cluster of complete blocks differs from the requested one by a few per cent.
     scale = model.allan_variance(sizes / rate, rate) / model.allan_variance(
         in_blocks * width / rate, rate
     )
@@ -193,13 +200,13 @@ def _from_block_sums(
     for member in range(members):
         sums = block_sums(model, rate, blocks, width, rng)
         phase = integrate([sums / width], blocks, holes=False)
-        variance = _variances(phase.theta, distinct)
+        variance = _sum_variances(phase.theta, distinct)
         result[member] = variance[place] * scale
     return result
 
 
 @njit(cache=True, nogil=True)
-def _variances(theta: Array, sizes: NDArray[np.int64]) -> Array:
+def _sum_variances(theta: Array, sizes: NDArray[np.int64]) -> Array:
     """Return Allan variances without limits, for the members of an ensemble."""
     variances = np.empty(sizes.size)
     for j in range(sizes.size):
@@ -224,7 +231,7 @@ def block_sums(
     return sums
 
 
-def _from_covariance(
+def _draw_from_covariance(
     model: NoiseModel,
     rate: float,
     samples: int,
@@ -234,7 +241,7 @@ def _from_covariance(
 ) -> Array:
     mean = model.allan_variance(sizes / rate, rate)
     relative = variance_covariance(model, rate, samples, sizes) / np.outer(mean, mean)
-    # Wilson and Hilferty: the cube root of a chi-squared variate is very nearly normal.
+    # Wilson and Hilferty (1931): the cube root of a chi-squared variate is nearly normal.
     spread = np.sqrt(np.diag(relative))
     correlation = relative / np.outer(spread, spread)
     values, vectors = np.linalg.eigh(correlation)

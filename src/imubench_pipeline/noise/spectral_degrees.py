@@ -1,9 +1,9 @@
-"""The degrees of freedom of an Allan variance, from the noise model of the log.
+"""Degrees of freedom of an Allan variance from the noise model of the log.
 
-The Allan variance at n samples a cluster is the mean square of M second differences of cumulative
-sums, Gaussian numbers of covariance r_k at lag k. Its variance is 2 / M^2 times the sum of r_k^2
-over all pairs: exact, whatever the spectrum, and at the ends of a log. Of ramps and lines, which
-are no noise, the products with the noise vary.
+The Allan variance at n samples per cluster is the mean square of M second differences of cumulative
+sums, which are Gaussian with covariance r_k at lag k. Its variance is 2 / M^2 times the sum of
+r_k^2 over all pairs. This is exact for any spectrum, including the ends of a log. Ramps and lines
+are deterministic; only their products with the noise contribute to the variance.
 """
 
 from __future__ import annotations
@@ -22,28 +22,29 @@ from imubench_pipeline.noise.model import NoiseModel
 from imubench_pipeline.noise.terms import Deterministic, Quantization
 from imubench_pipeline.typing import Array
 
-_STEPS = 32
-"""Lags in a cluster's length at which the covariance is taken; linear in between."""
+_LAGS_PER_CLUSTER = 32
+"""Lags per cluster length at which the covariance is evaluated; linear in between."""
 
-_REACH = 10
-"""Clusters beyond which the differences of any noise are as good as independent."""
+_MAX_LAG_CLUSTERS = 10
+"""Largest lag, in clusters; the differences of all noise types are nearly independent beyond it."""
 
-_TAIL_STEPS = 12
-_MOST_WITH_TAIL = 30.0
-"""Degrees of freedom up to which the lower tail is sought from the eigenvalues."""
+_TAIL_LAGS_PER_CLUSTER = 12
+_MAX_DEGREES_WITH_TAIL = 30.0
+"""Largest number of degrees of freedom for which the lower tail is computed from eigenvalues."""
 
-_MOST_EIGENVALUES = 320
+_MAX_EIGENVALUES = 320
 
-_ROUNDED = ((0, 6.0), (1, -4.0), (2, 1.0))
-"""Clusters of lag at which rounded sums are correlated, and the factor of their variance."""
+_ROUNDING_COVARIANCE = ((0, 6.0), (1, -4.0), (2, 1.0))
+"""Lags, in clusters, at which the differences of rounding errors are correlated, and the covariance
+over the variance of a rounding error."""
 
 
 @dataclass(frozen=True)
 class Degrees:
     """Degrees of freedom of an Allan variance over tau."""
 
-    edf: Array  # (m,): of the chi-squared variate with the same relative variance
-    upper: Array  # (m,): of that with the same lower tail, from which the upper limit follows
+    edf: Array  # (m,): chi-squared variate with the same relative variance
+    upper: Array  # (m,): chi-squared variate with the same lower tail, for the upper limit
 
 
 def degrees_of_model(
@@ -60,7 +61,7 @@ def degrees_of_model(
     Parameters
     ----------
     model : NoiseModel
-        Its ramp and lines add to the variance, but are no noise.
+        Its ramp and lines add to the Allan variance, but are not noise.
     rate : float
         Hz.
     sizes : ndarray of int, shape (m,)
@@ -70,9 +71,9 @@ def degrees_of_model(
     segments : sequence of (int, int), optional
         First and one-past-last sample of each; no difference spans two.
     presence : Presence, optional
-        Of the samples, where some are missing.
+        Presence of the samples, if some are missing.
     share : ndarray, shape (m,), optional
-        Part of the differences that the holes leave; all by default.
+        Share of the differences that is not lost to holes; 1 by default.
 
     References
     ----------
@@ -83,14 +84,14 @@ def degrees_of_model(
     spans = spans_of(segments, samples)
     left = np.ones(len(sizes)) if share is None else share
     pairs = [
-        _degrees(model, 1.0 / rate, int(n), spans, presence, float(part))
+        _find_degrees(model, 1.0 / rate, int(n), spans, presence, float(part))
         for n, part in zip(sizes, left, strict=True)
     ]
     edf, upper = (np.array(column, dtype=np.float64) for column in zip(*pairs, strict=True))
     return Degrees(edf, upper)
 
 
-def _degrees(
+def _find_degrees(
     model: NoiseModel,
     interval: float,
     n: int,
@@ -119,14 +120,14 @@ def _degrees(
         counted, differences = float(present.sum()) * stride, share * float(terms.sum())
         square, product = noise.masked_sums(present, stride)
         relative, crossed = square / counted / differences, product / counted / differences
-    # Variance over squared mean: 2 / edf.
+    # edf follows from variance over squared mean = 2 / edf.
     mean = noise.at_zero + noise.ramp**2 + noise.lines
     varied = 2.0 * noise.at_zero**2 * relative
     varied += (
         4.0 * noise.ramp**2 * noise.at_zero * crossed + 4.0 * noise.line_products / differences
     )
     edf = max(2.0 * mean**2 / varied, 1.0)
-    if edf > _MOST_WITH_TAIL:
+    if edf > _MAX_DEGREES_WITH_TAIL:
         return edf, edf
     weights = noise.eigenvalues(terms, mask)
     if weights is None:
@@ -135,11 +136,11 @@ def _degrees(
 
 
 class _Covariance:
-    """The covariance of the second differences of a model's cumulative sums, by lag."""
+    """Covariance of the second differences of the cumulative sums of a model, by lag."""
 
     def __init__(self, model: NoiseModel, n: int, interval: float) -> None:
         self._n, self._interval = n, interval
-        # Roundings are correlated at single lags, which the steps of a smooth covariance miss.
+        # Rounding errors are correlated at single lags, which interpolation would miss.
         self._noise = [t for t in model.terms if not isinstance(t, Quantization | Deterministic)]
         self._rounding = model.Q**2 / interval**2
         self.at_zero = float(self._smooth(np.zeros(1))[0]) + 6.0 * self._rounding
@@ -167,24 +168,28 @@ class _Covariance:
         return total
 
     def _at(self, lags: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Return the covariance over that at 0 without rounding, and of rounding alone."""
+        """Return covariances without rounding, and of rounding only, over the total at lag 0."""
         smooth = self._smooth(lags.astype(np.float64))
         rounding = np.zeros(len(lags))
-        for place, factor in _ROUNDED:
+        for place, factor in _ROUNDING_COVARIANCE:
             rounding[lags == place * self._n] = factor * self._rounding
         return smooth / self.at_zero, rounding / self.at_zero
 
     def sums(self, terms: int) -> tuple[float, float]:
         """Return the sums of r_k^2 and r_k over all pairs of consecutive differences."""
         n = self._n
-        steps = np.arange(_REACH * _STEPS + 1)
-        lags = np.unique(steps * n // _STEPS) if n > _STEPS else np.arange(_REACH * n + 1)
+        steps = np.arange(_MAX_LAG_CLUSTERS * _LAGS_PER_CLUSTER + 1)
+        lags = (
+            np.unique(steps * n // _LAGS_PER_CLUSTER)
+            if n > _LAGS_PER_CLUSTER
+            else np.arange(_MAX_LAG_CLUSTERS * n + 1)
+        )
         longest = terms - 1
         lags = np.append(lags[lags < longest], longest) if lags[-1] > longest else lags
         smooth, rounding = self._at(lags)
         pairs = (terms - lags).astype(np.float64)
         width = np.diff(lags, prepend=lags[0], append=lags[-1])
-        # Between the lags the sum is that of a line; each end of it counts as a whole lag.
+        # Trapezoidal sums between the lags; each end counts as a whole lag.
         weight = (width[1:] + width[:-1]) / 2.0
         weight[-1] += 0.5
         if len(lags) > 1:
@@ -197,16 +202,16 @@ class _Covariance:
         return float(square), float(both @ smooth + sharp.sum())
 
     def masked_sums(self, mask: NDArray[np.bool_], stride: int) -> tuple[float, float]:
-        """Return the same sums over the pairs of differences that are there, a stride apart."""
-        reach = min(len(mask), _REACH * self._n // stride + 2)
+        """Return the same sums over the valid differences, which begin a stride apart."""
+        reach = min(len(mask), _MAX_LAG_CLUSTERS * self._n // stride + 2)
         size = 1 << (len(mask) + reach).bit_length()
         pairs = np.fft.irfft(np.abs(np.fft.rfft(mask.astype(np.float64), size)) ** 2, size)[:reach]
         lags = np.arange(reach) * stride
         smooth, _ = self._at(lags)
         both = np.where(lags == 0, 1.0, 2.0) * pairs * stride**2
-        # Rounding counts at single lags, wherever the stride meets them.
+        # Rounding contributes at single lags, at the nearest multiple of the stride.
         square, product = float(both @ smooth**2), float(both @ smooth)
-        for place, factor in _ROUNDED:
+        for place, factor in _ROUNDING_COVARIANCE:
             index = min(round(place * self._n / stride), reach - 1)
             sharp = factor * self._rounding / self.at_zero
             count = pairs[index] * stride * (1.0 if place == 0 else 2.0)
@@ -217,21 +222,25 @@ class _Covariance:
     def eigenvalues(
         self, terms: NDArray[np.int64], mask: tuple[NDArray[np.bool_], int] | None
     ) -> Array | None:
-        """Return those of the covariance of the differences, thinned; None where too many."""
+        """Return the eigenvalues of the covariance of thinned differences; None if too many."""
         eigenvalues = []
         if mask is not None:
             present, stride = mask
-            thinning = max(1, round(self._n / _TAIL_STEPS / stride))
+            thinning = max(1, round(self._n / _TAIL_LAGS_PER_CLUSTER / stride))
             places = np.flatnonzero(present[::thinning])
             if not len(places):
                 places = np.flatnonzero(present)[:1]
             layouts = [(places, float(thinning * stride))]
         else:
             thinned = [
-                min(int(M), max(2 * _TAIL_STEPS, round(M * _TAIL_STEPS / self._n))) for M in terms
+                min(
+                    int(M),
+                    max(2 * _TAIL_LAGS_PER_CLUSTER, round(M * _TAIL_LAGS_PER_CLUSTER / self._n)),
+                )
+                for M in terms
             ]
             layouts = [(np.arange(m), float(M) / m) for m, M in zip(thinned, terms, strict=True)]
-        if sum(len(places) for places, _ in layouts) > _MOST_EIGENVALUES:
+        if sum(len(places) for places, _ in layouts) > _MAX_EIGENVALUES:
             return None
         for places, step in layouts:
             lags = np.rint(np.arange(places[-1] - places[0] + 1) * step).astype(np.int64)

@@ -1,7 +1,7 @@
-"""The covariance of the Allan variance estimates of one log, at all cluster sizes.
+"""Covariance of the Allan variance estimates of one log, at all cluster sizes.
 
-Estimates at different tau come of the same samples: neighbours go together. For a Gaussian log
-their covariance follows from the spectrum of the samples.
+Estimates at different tau use the same samples, so that neighbours are correlated. For a Gaussian
+log their covariance follows from the spectrum of the samples.
 """
 
 from __future__ import annotations
@@ -14,26 +14,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.typing import Array
 
-_STRATA_IN_DECADE = 640
-_BELOW_LARGEST = 1e-3
-"""Lowest frequency, rad a sample, times the largest cluster: below, all integrands are flat."""
+_STRATA_PER_DECADE = 640
+_MIN_PHASE_OF_LARGEST = 1e-3
+"""Lowest frequency of the strata, rad per sample, times the largest cluster; all integrands are
+flat below it."""
 
-_GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+_GOLDEN_SECTION = (np.sqrt(5.0) - 1.0) / 2.0
 
-_ENDS = 1.5
-"""Clusters that the ends of a log cost an estimate.
+_CLUSTERS_LOST_AT_ENDS = 1.5
+"""Effective loss of clusters at the ends of a log.
 
-Two are lost because a difference spans them; half a one is won back, because correlated
-differences have fewer neighbours near the ends. Exact double sums over white noise, random
-walks and Gauss-Markov processes of any T_B give 1.2 to 1.7.
+Two are lost because a difference spans two clusters. Half a cluster is gained, because correlated
+differences have fewer neighbours near the ends. Exact double sums over white noise, random walks
+and Gauss-Markov processes of any T_B give 1.2 to 1.7.
 """
 
 
 class Spectrum(Protocol):
-    """What knows the spectrum of the samples of a log."""
+    """A model with a spectrum of the samples of a log."""
 
     def sampled_spectrum(self, omega: ArrayLike, rate: float) -> Array:
-        """Return the spectrum at angular frequencies in rad a sample, SI^2."""
+        """Return the spectrum at angular frequencies in rad per sample, SI^2."""
 
 
 def variance_covariance(
@@ -45,8 +46,8 @@ def variance_covariance(
 
         cov(n, m) = 1/(2 M) 1/(2 pi) int P^2 |H_n|^2 |H_m|^2 dw,   M = L - 3/2 min(n, m) + 1,
 
-    integrated by strata of log w, a point in each. Within 1.5 % in standard deviation up to
-    the ninth of a log, 5 % up to a quarter.
+    integrated with stratified sampling in log w, one point per stratum. The error of the standard
+    deviation is below 1.5 % for tau up to a ninth of the log, and 5 % up to a quarter.
 
     Parameters
     ----------
@@ -71,28 +72,32 @@ def variance_covariance(
     sums.
     """
     n = np.asarray(sizes, dtype=np.float64)
-    omega, width = _strata(int(sizes.max()))
+    omega, width = _make_strata(int(sizes.max()))
     half = omega / 2.0
     spectrum = model.sampled_spectrum(omega, rate) / np.sin(half) ** 2
     shaped = np.sin(np.outer(n, half))
     shaped *= shaped
     shaped *= shaped
-    # The integral over both signs of frequency is twice that over the positive ones.
+    # The integral over all frequencies is twice the integral over the positive ones.
     shaped *= 4.0 * spectrum * np.sqrt(width / np.pi)
     shaped /= (n**2)[:, None]
-    return np.asarray(shaped @ shaped.T / (2.0 * (samples - _ENDS * np.minimum.outer(n, n) + 1.0)))
+    return np.asarray(
+        shaped
+        @ shaped.T
+        / (2.0 * (samples - _CLUSTERS_LOST_AT_ENDS * np.minimum.outer(n, n) + 1.0))
+    )
 
 
 @lru_cache(maxsize=16)
-def _strata(largest: int) -> tuple[Array, Array]:
-    """Return a frequency in each stratum, rad a sample, and the widths of the strata.
+def _make_strata(largest: int) -> tuple[Array, Array]:
+    """Return a frequency in each stratum, rad per sample, and the widths of the strata.
 
-    The factors sin^4(n w/2) turn many times inside a stratum of high frequency: points at
-    uneven places, the multiples of the golden section, give their mean.
+    The factors sin^4(n w/2) oscillate many times within a stratum of high frequency. Points at
+    multiples of the golden section (a low-discrepancy sequence) give their mean.
     """
-    lowest = _BELOW_LARGEST / largest
-    number = int(np.ceil(_STRATA_IN_DECADE * np.log10(np.pi / lowest)))
+    lowest = _MIN_PHASE_OF_LARGEST / largest
+    number = int(np.ceil(_STRATA_PER_DECADE * np.log10(np.pi / lowest)))
     edges = np.concatenate(([0.0], np.geomspace(lowest, np.pi, number)))
     width = np.diff(edges)
-    place = np.modf((np.arange(number) + 0.5) * _GOLDEN)[0]
+    place = np.modf((np.arange(number) + 0.5) * _GOLDEN_SECTION)[0]
     return edges[:-1] + place * width, width

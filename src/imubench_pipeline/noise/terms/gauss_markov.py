@@ -1,4 +1,4 @@
-"""A first-order Gauss-Markov process, which stands for the bias instability."""
+"""A first-order Gauss-Markov process, as a model of the bias instability."""
 
 from __future__ import annotations
 
@@ -35,32 +35,35 @@ FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)
 """Bias instability plateau over B: 0.664."""
 
 BIAS_INSTABILITY = TermParameter("B", "bias instability", 1.0, 0.0)
-"""Of a Gauss-Markov process, and of flicker noise, which is as high."""
+"""B of a Gauss-Markov process, and of flicker noise with an equally high Allan deviation."""
 
 CORRELATION_TIMES = SearchRange(samples=20.0, of_log=1 / 5)
-"""A shorter correlation is that of a filter, not a bias instability; a longer one cannot be told
-from a random walk."""
+"""Search range: a shorter correlation is due to a filter, not to bias instability; a longer one is
+indistinguishable from a random walk."""
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+_QUADRATURE_NODES, _QUADRATURE_WEIGHTS = np.polynomial.legendre.leggauss(24)
 
-_PIECES = (0.0, 0.003, 0.03, 0.2, 1.0)
-"""Ends of the pieces of an integral: the response of a short process bends early."""
+_INTEGRATION_LIMITS = (0.0, 0.003, 0.03, 0.2, 1.0)
+"""Limits of the pieces of an integral; the response of a process with short T_B bends early."""
 
-_SERIES_BELOW = 0.5
-_SERIES = [(-1) ** (k + 1) * (2.0**k - 4.0) / (2.0 * math.factorial(k)) for k in range(3, 24)]
-"""The bracket of 000 eq. 26 cancels for tau << T_B; its power series over tau/T_B does not."""
+_MAX_RATIO_FOR_SERIES = 0.5
+_SERIES_COEFFICIENTS = [
+    (-1) ** (k + 1) * (2.0**k - 4.0) / (2.0 * math.factorial(k)) for k in range(3, 24)
+]
+"""Power series in tau/T_B, used for small ratios, where the bracket of Maia et al., eq. 26,
+cancels."""
 
-_WALK_BELOW = 1e-3
-"""Cluster length over T_B below which a Gauss-Markov process is a random walk to a thousandth, and
-the second differences of its sum's covariance begin to cancel."""
+_MAX_RATIO_FOR_WALK = 1e-3
+"""Largest ratio of cluster length to T_B for the random walk approximation, with an error of a
+thousandth; for smaller ratios the second differences of the covariance of sums cancel."""
 
-_ROWS = 256
-"""Rows of a covariance that are made at a time."""
+_ROWS_PER_BLOCK = 256
+"""Rows of a covariance that are computed together."""
 
 
 @dataclass(frozen=True)
 class GaussMarkov(Term):
-    """First-order Gauss-Markov process that stands for the bias instability B (000 eq. 4-8)."""
+    """First-order Gauss-Markov process as a model of bias instability (Maia et al., eq. 4-8)."""
 
     B: float
     T_B: float
@@ -82,7 +85,7 @@ class GaussMarkov(Term):
 
     @property
     def _variance(self) -> float:
-        """V = S_B T_B / 2, of the process where it is stationary."""
+        """V = S_B T_B / 2, variance of the stationary process."""
         return self.density * self.T_B / 2.0
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
@@ -90,11 +93,11 @@ class GaussMarkov(Term):
         return self.density * self.T_B**2 / (1.0 + (2.0 * np.pi * frequency * self.T_B) ** 2)
 
     def allan_variance(self, tau: Array) -> Array:
-        """000 eq. 26 with the sign mended: e^(-tau/T_B)."""
+        """Maia et al., eq. 26, with the sign corrected: e^(-tau/T_B)."""
         return self.density * gauss_markov_shape(tau, self.T_B)
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """Exact for samples of the process: sum of its covariances."""
+        """Exact for samples of the process, from the sum of its covariances."""
         return self.density * sampled_gauss_markov_shape(n, interval, self.T_B)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
@@ -108,7 +111,7 @@ class GaussMarkov(Term):
 
         v = S_B T_B / 2. For clusters that are short for T_B the process is a random walk.
         """
-        if n * interval < _WALK_BELOW * self.T_B:
+        if n * interval < _MAX_RATIO_FOR_WALK * self.T_B:
             return RandomWalk(math.sqrt(self.density)).sum_covariance(lags, n, interval)
         k, p, rest = np.abs(lags), math.exp(-interval / self.T_B), -math.expm1(-interval / self.T_B)
         decayed = p / rest**2 * np.exp(-k * (interval / self.T_B))
@@ -143,14 +146,14 @@ class GaussMarkov(Term):
         d_y = y phi_2(-y) are what is lost of the state at the start, forward and backward. Where
         not calibrated S_B (T_B^(2m+3) P_m(x) + c^2 T_B (1 - d_x)^2 / 2).
         """
-        return self.density * _grown(order, time, self.T_B, start)
+        return self.density * _grow_variance(order, time, self.T_B, start)
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
         """S_B times the integral of h^2 from 0 to t.
 
         h = T_B (1 - e^(-s/T_B)) and h = T_B s - T_B^2 (1 - e^(-s/T_B)).
         """
-        first, second = _squared_responses(time / self.T_B)
+        first, second = _integrate_squared_responses(time / self.T_B)
         return self.density * self.T_B**3 * first, self.density * self.T_B**5 * second
 
     def block_covariance(self, lags: Array, block: float) -> Array:
@@ -174,11 +177,15 @@ class GaussMarkov(Term):
         decayed = -np.expm1(-n * x)
         gain, variance = decayed / (n * lost), self._variance
         covariance = np.empty((len(n), len(n)))
-        for first in range(0, len(n), _ROWS):  # there may be thousands, and one matrix is enough
-            rows = slice(first, first + _ROWS)
+        for first in range(
+            0, len(n), _ROWS_PER_BLOCK
+        ):  # with thousands of rows, the temporary matrices would be large
+            rows = slice(first, first + _ROWS_PER_BLOCK)
             after = np.subtract.outer(blocks.start[rows] + 1.0, blocks.stop)
             before = np.subtract.outer(blocks.start + 1.0, blocks.stop[rows]).T
-            lag = np.maximum(np.maximum(after, before), 0.0)  # 0 on the diagonal, which is below
+            lag = np.maximum(
+                np.maximum(after, before), 0.0
+            )  # 0 on the diagonal, which is set below
             covariance[rows] = variance * np.outer(gain[rows], gain) * np.exp(-x * lag)
         p = math.exp(-x)
         own = (n * (1.0 + p) / lost - 2.0 * p * decayed / lost**2) / n**2
@@ -186,7 +193,7 @@ class GaussMarkov(Term):
         return covariance
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Draw them with the states at their ends."""
+        """Drawn jointly with the states at the ends of the blocks."""
         interval = 1.0 / rate
         space = self.state_space(interval)
         return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)
@@ -202,35 +209,35 @@ class GaussMarkov(Term):
 
     @property
     def source(self) -> str:
-        """Its correlation time tells it from another one."""
+        """Name with the correlation time, which distinguishes several processes."""
         return f"{self.word} {self.T_B:.4g} s"
 
 
 def driving_density(B: float, T_B: float) -> float:
-    """Return S_B of a bias instability B with correlation time T_B (000 eq. 8)."""
+    """Return S_B of a bias instability B with correlation time T_B (Maia et al., eq. 8)."""
     return 2.0 * B**2 * math.log(2.0) / (math.pi * PEAK**2 * T_B)
 
 
 def bias_instability(density: float, T_B: float) -> float:
-    """Return B of a Gauss-Markov process with driving density S_B (000 eq. 8 solved for B)."""
+    """Return B of a Gauss-Markov process with driving density S_B (Maia et al., eq. 8)."""
     return math.sqrt(density * T_B * math.pi * PEAK**2 / (2.0 * math.log(2.0)))
 
 
 def gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
-    """Return the Allan variance of a Gauss-Markov process over S_B, s (000 eq. 26, Farrell 63).
+    """Return the Allan variance of a Gauss-Markov process over S_B, s.
 
-    Tau and T_B may be arrays that broadcast.
+    Maia et al., eq. 26; Farrell et al. 2022, eq. 63. Tau and T_B may be arrays that broadcast.
 
     (T_B^2/tau) (1 - (T_B/(2 tau)) (3 - 4 e^(-tau/T_B) + e^(-2 tau/T_B)))
     """
     ratio = np.asarray(tau, dtype=np.float64) / T_B
-    small = ratio < _SERIES_BELOW
+    small = ratio < _MAX_RATIO_FOR_SERIES
     x = np.where(small, 1.0, ratio)
     decayed = np.exp(-x)
     shape = np.asarray((1.0 - (3.0 - decayed * (4.0 - decayed)) / (2.0 * x)) / x)
     if small.any():
         r = ratio[small]
-        shape[small] = r * np.polynomial.polynomial.polyval(r, _SERIES)
+        shape[small] = r * np.polynomial.polynomial.polyval(r, _SERIES_COEFFICIENTS)
     return np.asarray(T_B * shape)
 
 
@@ -244,19 +251,19 @@ def sampled_gauss_markov_shape(n: ArrayLike, interval: float, T_B: float) -> Arr
     p = math.exp(-interval / T_B)
     q = -math.expm1(-interval / T_B)
     x = n * interval / T_B
-    # 3 - 4 p^n + p^2n = 2 (1 - p^n) + (1 - p^n)^2 with the sign of its parts kept.
+    # 3 - 4 p^n + p^2n = 2 (1 - p^n) + (1 - p^n)^2, a sum without cancellation.
     decay = -np.expm1(-x)
     closed = (n * (1.0 + p) / q - p * decay * (2.0 + decay) / q**2) / n**2
-    # For clusters far shorter than T_B this cancels; the continuous form does not, and the
-    # moments sum_ij w_i w_j |i - j|^m of the samples tell what sampling adds to it.
+    # For clusters far shorter than T_B this cancels. The continuous form does not; the effect of
+    # sampling is added from the moments sum_ij w_i w_j |i - j|^m of the samples.
     h = interval / T_B
     added = h / (3.0 * n) - h**3 / 6.0 * (n / 3.0 + 1.0 / (15.0 * n))
     continuous = 2.0 / T_B * gauss_markov_shape(n * interval, T_B) + added
     return T_B / 2.0 * np.where(x < 3e-3, continuous, closed)
 
 
-def _grown(order: int, time: float, T_B: float, start: SensorStart) -> float:
-    """Return the variance that a process of S_B = 1 has grown to (`GaussMarkov.growth`)."""
+def _grow_variance(order: int, time: float, T_B: float, start: SensorStart) -> float:
+    """Return the variance of the integrated process for S_B = 1 (`GaussMarkov.growth`)."""
     x = time / T_B
     constant = of_constant(order, time)
     driven = time ** (2 * order + 3) * squared_response(order, x)
@@ -264,27 +271,26 @@ def _grown(order: int, time: float, T_B: float, start: SensorStart) -> float:
         remaining = math.factorial(order + 1) * decay(order + 1, x)
         return driven + (constant * remaining) ** 2 * T_B / 2.0
     y = start.window / T_B
-    # Differences from 1 of what is kept: the difference of the two itself would cancel for
-    # long T_B.
+    # The losses are subtracted, not the retained parts, which would cancel for long T_B.
     lost = math.factorial(order + 1) * x * decay(order + 2, x) - y * decay(2, y)
     in_window = start.window * squared_response(0, y)
     return driven + constant**2 * (in_window + T_B * lost**2 / 2.0)
 
 
-def _squared_responses(time: Array) -> tuple[Array, Array]:
-    """Integrate the squares of 1 - e^(-x) and x - 1 + e^(-x) from 0 to each time, in T_B."""
+def _integrate_squared_responses(time: Array) -> tuple[Array, Array]:
+    """Integrate the squares of 1 - e^(-x) and x - 1 + e^(-x) from 0 to each time over T_B."""
     first, second = np.zeros_like(time), np.zeros_like(time)
-    for start, stop in pairwise(_PIECES):
+    for start, stop in pairwise(_INTEGRATION_LIMITS):
         half = (stop - start) / 2.0
-        x = time[:, None] * (start + half * (1.0 + _NODES))
+        x = time[:, None] * (start + half * (1.0 + _QUADRATURE_NODES))
         decayed = np.expm1(-x)
-        first += time * half * (decayed**2 @ _WEIGHTS)
-        second += time * half * (_second_response(x, decayed) ** 2 @ _WEIGHTS)
+        first += time * half * (decayed**2 @ _QUADRATURE_WEIGHTS)
+        second += time * half * (_evaluate_second_response(x, decayed) ** 2 @ _QUADRATURE_WEIGHTS)
     return first, second
 
 
-def _second_response(x: Array, decayed: Array) -> Array:
-    """Return x - 1 + e^(-x), which cancels for small x; `decayed` is e^(-x) - 1."""
+def _evaluate_second_response(x: Array, decayed: Array) -> Array:
+    """Return x - 1 + e^(-x), as a series for small x; ``decayed`` is e^(-x) - 1."""
     small = x < 1e-2
     if not small.any():
         return x + decayed

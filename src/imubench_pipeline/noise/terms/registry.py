@@ -1,4 +1,4 @@
-"""The check that a kind of term has all that is asked of it, when it is put into the registry."""
+"""Check that the kinds of terms are complete when they are registered."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from dataclasses import fields
 from imubench_pipeline.noise.terms.base import Term
 from imubench_pipeline.noise.terms.traits import Role, TermParameter
 
-_STATED = ("symbol", "label", "standard_name", "word", "role", "parameters", "states")
-"""Class variables that every kind gives a value."""
+_REQUIRED_VARIABLES = ("symbol", "label", "standard_name", "word", "role", "parameters", "states")
+"""Class variables that every kind must define."""
 
 
 def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
-    """Return the kinds of terms, each of which lacks nothing.
+    """Return the kinds of terms, after checking that each is complete.
 
     Raises
     ------
     TypeError
-        If a kind has an abstract method left, lacks a class variable, its parameters are not the
-        fields of its dataclass, a time constant has no range in which it is looked for, two
-        kinds share a symbol or a word, or mean different parameters by one symbol.
+        If a kind has an abstract method, lacks a class variable, or has parameters other than the
+        fields of its dataclass; if a time constant has no search range; or if two kinds share a
+        symbol or a word, or use one symbol for different parameters.
     """
     for kind in kinds:
         _check(kind)
@@ -42,7 +42,7 @@ def _check(kind: type[Term]) -> None:
     if inspect.isabstract(kind):
         missing = ", ".join(sorted(kind.__abstractmethods__))
         raise TypeError(f"the noise term {name} lacks {missing}")
-    lacking = [variable for variable in _STATED if not hasattr(kind, variable)]
+    lacking = [variable for variable in _REQUIRED_VARIABLES if not hasattr(kind, variable)]
     if lacking:
         raise TypeError(f"the noise term {name} lacks the class variable {', '.join(lacking)}")
     symbols = [parameter.symbol for parameter in kind.parameters]
