@@ -24,16 +24,18 @@ from imubench_pipeline.noise.terms import (
 )
 from imubench_pipeline.typing import Array
 
-_LONGEST_FLICKER = 1e5
-"""Tau in s up to which a state space follows flicker noise, where nothing else is asked."""
+_MAX_FLICKER_TAU = 1e5
+"""Default longest tau, s, up to which a state space approximates flicker noise."""
 
-_OWN_PLACE = (Quantization, WhiteNoise, Flicker, RandomWalk, Deterministic)
-"""Kinds of terms that a model has in a parameter of their own."""
+_KINDS_WITH_PARAMETER = (Quantization, WhiteNoise, Flicker, RandomWalk, Deterministic)
+"""Kinds of terms with a parameter of their own in a model."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseModel:
-    """The stochastic error of one axis, the sum of its terms (Maia et al., eq. 2; IEEE Std 952).
+    """The stochastic error of one axis: the sum of its terms.
+
+    See Maia et al., eq. 2; IEEE Std 952 and 647.
 
     Parameters
     ----------
@@ -77,7 +79,7 @@ class NoiseModel:
         if self.T_B is not None:
             PARAMETERS["T_B"].check(self.T_B)
         for term in self.further:
-            if isinstance(term, _OWN_PLACE):
+            if isinstance(term, _KINDS_WITH_PARAMETER):
                 raise ValueError(f"{term} is no further term, expected it in its own parameter")
         for term in (*self.further, *self.sinusoids):
             for parameter in term.parameters:
@@ -196,11 +198,11 @@ class NoiseModel:
             terms.extend(term.realised(interval, longest))
         return terms
 
-    def state_space(self, rate: float, longest: float = _LONGEST_FLICKER) -> StateSpace:
+    def state_space(self, rate: float, longest: float = _MAX_FLICKER_TAU) -> StateSpace:
         """Return the discrete state space with exact noise covariances.
 
-        The states are those of the terms in their order; N is the measurement noise (000 eq.
-        18-23; the printed first entry of Q_d, S_B T, is an approximation).
+        The states are those of the terms in their order; N is the measurement noise (Maia et
+        al., eq. 18-23; the printed first entry of Q_d, S_B T, is an approximation).
 
         Parameters
         ----------

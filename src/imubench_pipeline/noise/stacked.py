@@ -1,4 +1,4 @@
-"""Many noise models at once: their terms, each kind as one whose parameters are arrays."""
+"""Evaluate many noise models at once, with one term of array parameters for each kind."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from imubench_pipeline.typing import Array
 
 
 def stacked(models: Sequence[NoiseModel]) -> Iterator[tuple[NDArray[np.intp], Term]]:
-    """Yield terms whose parameters are arrays, each with the numbers of the models that have it.
+    """Yield terms with array parameters, each with the indices of the models that have the term.
 
-    What a closed form says of such a term, as `Term.growth` or `Term.allan_variance`, it says of
-    all these models. A model with several terms of a kind has a part in as many.
+    Closed forms such as `Term.growth` or `Term.allan_variance` of such a term hold for all these
+    models. A model with several terms of a kind occurs in as many stacked terms.
     """
     groups: dict[tuple[type[Term], int], list[tuple[int, Term]]] = {}
     for number, model in enumerate(models):
@@ -36,16 +36,16 @@ def stacked(models: Sequence[NoiseModel]) -> Iterator[tuple[NDArray[np.intp], Te
 def summed(
     models: Sequence[NoiseModel], figure: Callable[[Term], Array], places: int | None = None
 ) -> Array:
-    """Return a figure of each model that is the sum over its terms, such as a variance.
+    """Return a quantity of each model that is the sum over its terms, such as a variance.
 
     Parameters
     ----------
     models : sequence of NoiseModel
     figure : callable
-        Given a term whose parameters are arrays of shape (k,), returns an array of shape (k,), or
+        Function of a term with array parameters of shape (k,); returns an array of shape (k,), or
         (places, k).
     places : int, optional
-        As many figures are returned of each model.
+        Number of values for each model.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The discrete state space of a noise process: what simulates it, and what a filter loads."""
+"""Discrete state space of a noise process, for simulations and filters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class StateSpace:
-    """A discrete model x' = transition x + w, z = output x + v (000 eq. 18-23, exact).
+    """A discrete model x' = transition x + w, z = output x + v (Maia et al., eq. 18-23, exact).
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class StateSpace:
     initial_mean : ndarray, shape (m,)
         Mean of the first x.
     initial_variance : ndarray, shape (m, m)
-        Its covariance: the stationary one, 0 for a random walk.
+        Covariance of the first x: the stationary one, or 0 for a random walk.
     """
 
     transition: Array
@@ -42,7 +42,7 @@ class StateSpace:
 
     @classmethod
     def scalar(cls, transition: float, process_noise: float, initial_variance: float) -> StateSpace:
-        """Return a model of one state that is seen as it is."""
+        """Return a model of one state, which is the output."""
         return cls(
             np.array([[transition]]),
             np.array([[process_noise]]),
@@ -54,24 +54,24 @@ class StateSpace:
 
     @classmethod
     def without_states(cls, measurement_noise: float) -> StateSpace:
-        """Return a model of white noise alone."""
+        """Return a model of white noise only."""
         none = np.zeros((0, 0))
         return cls(none, none, np.zeros(0), measurement_noise, np.zeros(0), none)
 
     @classmethod
     def together(cls, spaces: Sequence[StateSpace]) -> StateSpace:
-        """Return the model of the sum of independent ones, their states in order."""
+        """Return the model of the sum of independent models, with their states in order."""
         return cls(
-            _block_diagonal([space.transition for space in spaces]),
-            _block_diagonal([space.process_noise for space in spaces]),
+            _build_block_diagonal([space.transition for space in spaces]),
+            _build_block_diagonal([space.process_noise for space in spaces]),
             np.concatenate([space.output for space in spaces]),
             sum(space.measurement_noise for space in spaces),
             np.concatenate([space.initial_mean for space in spaces]),
-            _block_diagonal([space.initial_variance for space in spaces]),
+            _build_block_diagonal([space.initial_variance for space in spaces]),
         )
 
     def of_either_sign(self) -> StateSpace:
-        """Return the model whose first state has no mean, and its square in the variance."""
+        """Return the model with the mean of the first state replaced by its square as variance."""
         squares = np.diag([mean**2 for mean in self.initial_mean.tolist()])
         return replace(
             self,
@@ -100,13 +100,13 @@ class ContinuousSpace:
 
     @classmethod
     def without_states(cls) -> ContinuousSpace:
-        """Return a model of nothing but its measurement noise."""
+        """Return a model without states."""
         none = np.zeros((0, 0))
         return cls(none, none, np.zeros(0))
 
 
-def _block_diagonal(parts: Sequence[Array]) -> Array:
-    """Return square matrices along a diagonal; scipy's takes long."""
+def _build_block_diagonal(parts: Sequence[Array]) -> Array:
+    """Return a block-diagonal matrix of square matrices; faster than scipy's function."""
     ends = np.cumsum([len(part) for part in parts])
     whole = np.zeros((ends[-1], ends[-1]))
     for part, end in zip(parts, ends, strict=True):
@@ -117,9 +117,9 @@ def _block_diagonal(parts: Sequence[Array]) -> Array:
 def root_of(covariance: Array) -> Array:
     """Return the lower triangular root of a covariance, shape (m, m).
 
-    What does not vary has a row of zeros.
+    Components without variance have rows of zeros.
     """
-    if len(covariance) == 1:  # of most terms, and asked for by each log of an ensemble
+    if len(covariance) == 1:  # frequent: most terms, for each log of an ensemble
         return np.sqrt(covariance)
     varying = np.flatnonzero(np.diag(covariance))
     root, own = np.zeros_like(covariance), np.ix_(varying, varying)
@@ -128,10 +128,10 @@ def root_of(covariance: Array) -> Array:
 
 
 def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
-    """Return what a step does when it is done several times, from 0, by powers of two.
+    """Return transition and noise covariance of a repeated step, by powers of two.
 
-    ``noise`` is the covariance that a step adds, both shape (m, m). Returned are Phi^times, and the
-    sum of Phi^i noise (Phi^i)^T over i from 0 to times - 1.
+    ``noise``: covariance that a step adds, shape (m, m). Returns Phi^times, and the sum of
+    Phi^i noise (Phi^i)^T over i from 0 to times - 1.
     """
     whole, added = np.eye(len(transition)), np.zeros_like(noise)
     while times:
@@ -149,22 +149,24 @@ def draw_block_sums(
     """Draw the sums over blocks of samples, exactly, shape (blocks,).
 
     The sum over a block and the state after it are jointly Gaussian, given the state before. The
-    space has one state, seen as it is, without measurement noise; ``start``, shape (1,), is the
-    first; a block has ``width`` samples.
+    space has one state, which is the output, and no measurement noise. ``start``, shape (1,): first
+    state. ``width``: samples in a block.
     """
-    step = _over_block(float(space.transition[0, 0]), float(space.process_noise[0, 0]), width)
+    step = _propagate_block(float(space.transition[0, 0]), float(space.process_noise[0, 0]), width)
     normal = rng.standard_normal((2, blocks))
     sums = np.empty(blocks)
-    _add_up(sums, float(start[0]), normal[0], normal[1], *step)
+    _accumulate_sums(sums, float(start[0]), normal[0], normal[1], *step)
     return sums
 
 
-@lru_cache(maxsize=64)  # an ensemble asks some hundred times for the same
-def _over_block(p: float, drive: float, width: int) -> tuple[float, float, float, float, float]:
-    """Return what a state does in a block.
+@lru_cache(maxsize=64)  # an ensemble repeats the same call some hundred times
+def _propagate_block(
+    p: float, drive: float, width: int
+) -> tuple[float, float, float, float, float]:
+    """Return the coefficients by which a block changes the state and its sum.
 
-    Decay and reach of the state before; the noise in the state after, that of the sum with it, and
-    that of the sum alone.
+    Factors of the state before the block in the state after it and in the sum; then the noise of
+    the state, the noise of the sum that is common with it, and the independent noise of the sum.
     """
     # The sample i of a block is p^i x + sum_{j<i} p^(i-1-j) w_j.
     powers = p ** np.arange(width + 1)
@@ -181,7 +183,7 @@ def _over_block(p: float, drive: float, width: int) -> tuple[float, float, float
 
 
 @njit(cache=True, nogil=True)
-def _add_up(
+def _accumulate_sums(
     sums: Array,
     state: float,
     first: Array,

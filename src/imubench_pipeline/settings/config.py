@@ -30,8 +30,8 @@ from imubench_pipeline.settings.validation import (
 from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
-_SIMULATED = Path("config/simulated.yaml")
-_OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
+_SIMULATED_RECORDINGS_FILE = Path("config/simulated.yaml")
+_SECTIONS_WITHOUT_RECORDING = {"held_back", "exports", "limits", "report"}
 
 
 _difference = checked("temperature", "a difference, such as 10 K", to_si=difference_to_si)
@@ -292,11 +292,11 @@ class ReportSettings(Strict):
     )
 
 
-_NO_PATH = {"false", "no", "off", "none", "null", ""}
+_NO_PATH_WORDS = {"false", "no", "off", "none", "null", ""}
 
 
 def _path_or_none(value: object) -> object:
-    return None if str(value).strip().lower() in _NO_PATH else value
+    return None if str(value).strip().lower() in _NO_PATH_WORDS else value
 
 
 class Run(Strict):
@@ -312,7 +312,8 @@ class Run(Strict):
     simulated: Annotated[
         NamedPath | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
     ] = Field(
-        _SIMULATED, description="simulated recordings; false, or no such file by default: none"
+        _SIMULATED_RECORDINGS_FILE,
+        description="simulated recordings; false, or no such file by default: none",
     )
     requirements: Annotated[
         Folders | None,
@@ -341,7 +342,9 @@ class Run(Strict):
     @property
     def to_simulate(self) -> Path | None:
         """The list of simulated recordings; a folder of logs need not have that of a checkout."""
-        by_default = self.simulated == _SIMULATED and not _SIMULATED.exists()
+        by_default = (
+            self.simulated == _SIMULATED_RECORDINGS_FILE and not _SIMULATED_RECORDINGS_FILE.exists()
+        )
         return None if by_default else self.simulated
 
 
@@ -375,7 +378,7 @@ def given_beside(run: Run, file: Path) -> list[str]:
     except ConfigError:
         written = Run()
     in_run, in_file = (
-        run_settings.model_dump(mode="json", exclude=_OF_NO_RECORDING)
+        run_settings.model_dump(mode="json", exclude=_SECTIONS_WITHOUT_RECORDING)
         for run_settings in (run, written)
     )
     return [f"{key}={_as_given(value)}" for key, value in _differing(in_run, in_file).items()]

@@ -15,8 +15,8 @@ from imubench_pipeline.units import quantity_to_si
 
 Gyro = Literal["gyro_x", "gyro_y", "gyro_z"]
 
-_NO_EARTH = 1e-9
-"""rad/s of the Earth's rate that may be open."""
+_MAX_UNKNOWN_EARTH_RATE = 1e-9
+"""Largest uncertainty of the Earth's rate about an axis without a heading, rad/s."""
 
 
 def _from_zero(dimension: str) -> AfterValidator:
@@ -185,7 +185,7 @@ class OnRateTable(Strict):
     def _heading_where_it_counts(self) -> Self:
         if self.axis is None or self.axis.heading is not None:
             return self
-        if self.axis.pointing.half_width > _NO_EARTH:
+        if self.axis.pointing.half_width > _MAX_UNKNOWN_EARTH_RATE:
             raise ValueError(
                 "axis.heading is missing; expected where the axis of the table points, such as "
                 "heading: 0 deg (north), as it is not vertical (elevation: 90 deg or -90 deg); or "

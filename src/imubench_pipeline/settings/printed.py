@@ -257,7 +257,8 @@ IN_USE = (
 )
 """Figures of errors that come in use and are in no static log."""
 
-_LARGEST_ACCELERATION_NOISE = 1.0
+_MAX_ACCELERATION_NOISE = 1.0
+"""Largest printed noise density of an accelerometer, SI."""
 
 
 class Datasheet(Strict):
@@ -319,8 +320,8 @@ class Datasheet(Strict):
 
 
 def _check_micro(value: float, unit: str, dimension: str, key: str) -> None:
-    """Refuse 400 g/√Hz, which a document has where its text lost the sign of micro."""
-    if to_si(value, unit, dimension) > _LARGEST_ACCELERATION_NOISE:
+    """Raise for values such as 400 g/√Hz, where a document lost the sign of micro."""
+    if to_si(value, unit, dimension) > _MAX_ACCELERATION_NOISE:
         raise ValueError(
             f"{key}: found {value:g} {unit}, which no accelerometer has; was the sign of micro or "
             f"milli lost? expected such as {value:g} u{unit.removeprefix('m')}"

@@ -166,8 +166,8 @@ Reader = Literal["csv", "vectornav", "ubx", "rosbag", "matlab", "numpy", "arrow"
 """The formats of log files; each is declared in a module of this name in ``readers/formats``."""
 
 
-_SLOWEST, _FASTEST = 1e-6, 1e9
-"""Hz; of any sensor."""
+_MIN_RATE, _MAX_RATE = 1e-6, 1e9
+"""Range of valid sampling rates, Hz."""
 
 
 class LogFormat(Strict):
@@ -227,8 +227,10 @@ class LogFormat(Strict):
             _check_unit(self.table_rate.unit, "angular_rate", "table_rate.unit")
         beside = (self.temperature, self.position, self.table_rate)
         sources = [*self.channels.values(), *(source for source in beside if source is not None)]
-        if self.rate_hz is not None and not _SLOWEST <= self.rate_hz <= _FASTEST:
-            raise ValueError(f"rate: found {self.rate!r}; expected {_SLOWEST:g} to {_FASTEST:g} Hz")
+        if self.rate_hz is not None and not _MIN_RATE <= self.rate_hz <= _MAX_RATE:
+            raise ValueError(
+                f"rate: found {self.rate!r}; expected {_MIN_RATE:g} to {_MAX_RATE:g} Hz"
+            )
         if any(source.file for source in sources) and not all(source.file for source in sources):
             raise ValueError("some channels name a 'file' and others do not; expected all or none")
         return self

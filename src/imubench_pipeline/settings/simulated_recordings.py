@@ -47,8 +47,8 @@ from imubench_pipeline.units import naming, quantity_to_si
 _Around = TypeVar("_Around", bound=Surroundings)
 
 _Rate = Annotated[Text, checked("angular_rate")]
-_NAMES = r"^sim_[A-Za-z0-9_.-]+$"
-_MOST_SAMPLES = 1e10  # 80 GB a channel: whoever states more has mistaken a unit
+_NAME_PATTERN = r"^sim_[A-Za-z0-9_.-]+$"
+_MAX_SAMPLES = 1e10  # 80 GB per channel; more is due to a wrong unit
 
 
 class PublishedRate(Strict):
@@ -211,8 +211,8 @@ class OfASensor(ImuSettings):
     @model_validator(mode="after")
     def _samples_and_units(self) -> Self:
         length = quantity_to_si(self.duration, "time") * quantity_to_si(self.rate, "frequency")
-        if not 0.5 < length <= _MOST_SAMPLES:
-            content = "no sample" if length < 1.0 else f"more than {_MOST_SAMPLES:g} samples"
+        if not 0.5 < length <= _MAX_SAMPLES:
+            content = "no sample" if length < 1.0 else f"more than {_MAX_SAMPLES:g} samples"
             raise ValueError(f"duration: {self.duration} at {self.rate} hold {content}")
         check_axes(self.channels, "channels")
         return self
@@ -236,7 +236,7 @@ class Specimens(Strict):
 class SimulatedRecording(OfASensor, Surroundings):
     """A recording that is made before the run, from known figures."""
 
-    recording: str = Field(pattern=_NAMES, description="starts with sim_")
+    recording: str = Field(pattern=_NAME_PATTERN, description="starts with sim_")
     seed: int
     specimens: Specimens | None = Field(None, description="fused to this log; left out: one sensor")
     two_position: SimulatedTurns | None = None
@@ -380,7 +380,7 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor | ConfigError
         board = _board(path.parent / file, sensors)
         if file.stem in boards:
             raise ConfigError(f"{path}: boards: two are named {file.stem}; expected other names")
-        if not re.match(_NAMES, f"sim_{file.stem}"):
+        if not re.match(_NAME_PATTERN, f"sim_{file.stem}"):
             raise ConfigError(
                 f"{path}: boards: found {str(file)!r}; expected a name of letters, digits and . _ -"
             )

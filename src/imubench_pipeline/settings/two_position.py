@@ -19,7 +19,7 @@ def _deviation(dimension: str) -> AfterValidator:
 _from_zero = checked("time", "a time from 0", from_zero=True)
 TimeFromZero = Annotated[Text, _from_zero, Field(examples=["2 s"])]
 
-_NEEDED = {
+_REQUIRED_KEYS = {
     "latitude": "where the log was recorded, such as latitude: 45.1 deg (south: negative)",
     "dwell": "the time from one turn to the next, such as dwell: 30 s",
 }
@@ -69,7 +69,7 @@ class TwoPosition(Strict):
     @classmethod
     def _said(cls, data: Any) -> Any:
         if isinstance(data, dict):
-            for key, needed in _NEEDED.items():
+            for key, needed in _REQUIRED_KEYS.items():
                 if data.get(key) is None:
                     raise ValueError(f"{key} is missing; expected {needed}")
         return data

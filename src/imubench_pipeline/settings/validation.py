@@ -1,4 +1,4 @@
-"""Settings checked against typed models, with errors that say what to mend."""
+"""Validate settings with typed models; errors state the fault and the correction."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from imubench_pipeline.units import quantity_to_si
 
 
 class ConfigError(ValueError):
-    """A setting that cannot be used; the text names file, key, value and what was expected."""
+    """An invalid setting; the message states file, key, value and the expected value."""
 
 
 class UnavailableSettingsError(ConfigError):
-    """A file of settings that cannot be read now, for a reason outside of it."""
+    """A file of settings that cannot be read now, for a reason outside of the file."""
 
 
 class Strict(BaseModel):
@@ -34,7 +34,7 @@ class Strict(BaseModel):
     )
 
 
-def _fraction(value: object) -> float:
+def _parse_fraction(value: object) -> float:
     try:
         number = float(Fraction(str(value).strip()))
     except (ValueError, ZeroDivisionError) as error:
@@ -44,21 +44,23 @@ def _fraction(value: object) -> float:
     return number
 
 
-_SHORT, _LONG = 100, 1000
-"""Letters of what a file holds, and of an error, that are printed at most."""
+_MAX_SHOWN_LENGTH, _MAX_ERROR_LENGTH = 100, 1000
+"""Largest number of characters of a value, and of an error, that are shown."""
 
-_MOST_FAULTS = 20
-"""Faults of one file that are printed."""
+_MAX_SHOWN_FAULTS = 20
+"""Largest number of faults of a file that are shown."""
 
-_BRIEF = reprlib.Repr()
-_BRIEF.maxstring = _BRIEF.maxother = _BRIEF.maxlong = _SHORT
+_SHORT_REPR = reprlib.Repr()
+_SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_LENGTH
 
 
-def cut(value: object, words: Callable[[object], str] = _BRIEF.repr, most: int = _SHORT) -> str:
-    """Return what a file holds as it may be printed: a line of it at most.
+def cut(
+    value: object, words: Callable[[object], str] = _SHORT_REPR.repr, most: int = _MAX_SHOWN_LENGTH
+) -> str:
+    """Return a value of a file as text for messages, shortened to one line.
 
-    `words` makes text of it; by default, as Python writes it, the beginning of each list alone.
-    `most`: letters.
+    ``words``: converts the value to text; by default a shortened `repr`. ``most``: largest number
+    of characters.
     """
     text = words(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
@@ -71,18 +73,18 @@ def checked(
     from_zero: bool = False,
     to_si: Callable[[str, str], float] = quantity_to_si,
 ) -> AfterValidator:
-    """Return a check that a text is a figure with a unit of a dimension, and in its range.
+    """Return a validator for a number with a unit of a dimension, and its range.
 
     Parameters
     ----------
     dimension : str
         A key of `imubench_pipeline.units.SI_UNITS`.
     expected : str, optional
-        What the error says of a figure that is not above 0; by default it may be any.
+        Expected value in the error for a number that is not above 0; by default all are valid.
     from_zero : bool
-        0 itself is in the range.
+        0 is valid, too.
     to_si : callable
-        How a text is read.
+        Converts a text to SI.
     """
 
     def check(text: str) -> str:
@@ -95,44 +97,48 @@ def checked(
 
 
 def of_size(dimension: str) -> AfterValidator:
-    """Return a check that a text is a number above zero with a unit of a dimension."""
+    """Return a validator for a number above zero with a unit of a dimension."""
     return checked(dimension, f"more than zero, with its unit of {dimension}")
 
 
-def _between(ends: tuple[str, str]) -> tuple[str, str]:
+def _check_order(ends: tuple[str, str]) -> tuple[str, str]:
     low, high = (quantity_to_si(end, "temperature") for end in ends)
     if not low < high:
         raise ValueError(f"found {ends[0]} to {ends[1]}; expected the lower temperature first")
     return ends
 
 
-def _as_written(value: object) -> object:
+def _keep_as_written(value: object) -> object:
     return str(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
-NamedPath = Annotated[Path, BeforeValidator(_as_written, json_schema_input_type=Path)]
+NamedPath = Annotated[Path, BeforeValidator(_keep_as_written, json_schema_input_type=Path)]
 """A path; it may look like a number, such as a folder 0017."""
 
-FractionOfLog = Annotated[float, BeforeValidator(_fraction, json_schema_input_type=float | str)]
-_LONGEST_TEXT = 1000
-_UNSEEN = re.compile("[\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\x7f-\\x9f\\u2028-\\u202e\\u2066-\\u2069]")
-"""What moves a cursor, ends a line or turns the direction of what follows."""
+FractionOfLog = Annotated[
+    float, BeforeValidator(_parse_fraction, json_schema_input_type=float | str)
+]
+_MAX_TEXT_LENGTH = 1000
+_INVISIBLE_CHARACTERS = re.compile(
+    "[\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\x7f-\\x9f\\u2028-\\u202e\\u2066-\\u2069]"
+)
+"""Characters that move the cursor, end a line, or change the direction of text."""
 
 
-def _shown(text: str) -> str:
-    if len(text) > _LONGEST_TEXT:
-        raise ValueError(f"{len(text)} letters; expected at most {_LONGEST_TEXT}")
-    if unseen := _UNSEEN.search(text):
+def _check_visible(text: str) -> str:
+    if len(text) > _MAX_TEXT_LENGTH:
+        raise ValueError(f"{len(text)} letters; expected at most {_MAX_TEXT_LENGTH}")
+    if unseen := _INVISIBLE_CHARACTERS.search(text):
         raise ValueError(f"holds U+{ord(unseen[0]):04X}; expected what can be seen")
     return text
 
 
-Text = Annotated[str, AfterValidator(_shown)]
-"""A text that stands in tables and on pages."""
+Text = Annotated[str, AfterValidator(_check_visible)]
+"""A text that is shown in tables and on pages."""
 Frequency = Annotated[
     Text, checked("frequency", "a frequency above zero"), Field(examples=["100 Hz"])
 ]
-Between = Annotated[tuple[Text, Text], AfterValidator(_between)]
+Between = Annotated[tuple[Text, Text], AfterValidator(_check_order)]
 """A lower and an upper temperature, with their units."""
 Duration = Annotated[Text, checked("time", "a time above 0"), Field(examples=["10 h"])]
 
@@ -153,25 +159,27 @@ def parse(model: type[_Model], data: object, file: str) -> _Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        faults = _first_faults(error.errors())
-        lines = [_fault(file, fault, model) for fault in faults[:_MOST_FAULTS]]
-        if len(faults) > _MOST_FAULTS:
-            lines.append(f"{file}: and {len(faults) - _MOST_FAULTS} more")
+        faults = _select_faults(error.errors())
+        lines = [_describe_fault(file, fault, model) for fault in faults[:_MAX_SHOWN_FAULTS]]
+        if len(faults) > _MAX_SHOWN_FAULTS:
+            lines.append(f"{file}: and {len(faults) - _MAX_SHOWN_FAULTS} more")
         raise ConfigError("\n".join(lines)) from None
 
 
-def _first_faults(faults: list[Any]) -> list[Any]:
-    """Leave out that a list is too short where its elements cannot be used, which is said too."""
+def _select_faults(faults: list[Any]) -> list[Any]:
+    """Return the faults, without a too short list whose elements are reported as well."""
     inside = {fault["loc"][:n] for fault in faults for n in range(len(fault["loc"]))}
     return [f for f in faults if f["type"] != "too_short" or f["loc"] not in inside]
 
 
-def _fault(file: str, fault: Any, model: type[BaseModel]) -> str:
+def _describe_fault(file: str, fault: Any, model: type[BaseModel]) -> str:
     key = ".".join(cut(part, str) for part in fault["loc"]) or "(top level)"
     value = fault["input"]
-    message = cut(re.sub(r"^(Value error|Assertion failed), ", "", fault["msg"]), str, _LONG)
+    message = cut(
+        re.sub(r"^(Value error|Assertion failed), ", "", fault["msg"]), str, _MAX_ERROR_LENGTH
+    )
     if fault["type"] == "extra_forbidden":
-        known_keys = _known_keys(model, fault["loc"][:-1])
+        known_keys = _list_known_keys(model, fault["loc"][:-1])
         close = difflib.get_close_matches(cut(fault["loc"][-1], str), known_keys, n=1)
         hint = f"did you mean {close[0]!r}? " if close else ""
         return f"{file}: {key}: unknown key; {hint}expected one of {', '.join(known_keys)}"
@@ -182,14 +190,14 @@ def _fault(file: str, fault: Any, model: type[BaseModel]) -> str:
     return f"{file}: {key}: found {cut(value)}; {message[0].lower()}{message[1:]}"
 
 
-def _known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
-    """Return the keys that the schema allows at ``path``."""
+def _list_known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
+    """Return the keys that the schema of a model allows at a path."""
     schema = model.model_json_schema()
     node: dict[str, Any] = schema
     for part in path:
         node = _resolve(schema, node)
         if isinstance(part, int) and "properties" in node:
-            continue  # an element of a list that may also stand alone
+            continue  # an element of a list that may also be given without the list
         nested = node.get("properties", {}).get(part)
         node = nested or node.get("items") or node.get("additionalProperties") or {}
     node = _resolve(schema, node)

@@ -1,12 +1,12 @@
-"""The one way in which a file of YAML is read; such files come from strangers, too.
+"""Read YAML files, which may be untrusted.
 
-What is read is bounded before anything is built of it: size, depth, and nodes, those that stand
-behind aliases counted each time. A key that stands twice is an error, whichever would win.
+Limits are checked before any object is built: size, depth, and number of nodes, where the nodes of
+an alias count at each use. A duplicate key is an error.
 
-Text stays text. YAML 1.1 takes 0017 for 15, 12:30:45 for 45045, 2026-01-01 for a date and ``no``
-for false. Here a plain word is a text, unless it is null or a decimal or hexadecimal number, and a
-number keeps how it is written: a setting that is declared as text gets that (`validation.Strict`).
-Where a setting is true or false, pydantic makes it of the word. A key is a text.
+Text is not converted. YAML 1.1 reads 0017 as 15, 12:30:45 as 45045, 2026-01-01 as a date and ``no``
+as false. Here a plain word is a text, unless it is null or a decimal or hexadecimal number. A
+number keeps its notation, which a setting of type text receives (`validation.Strict`). For settings
+that are true or false, pydantic converts the word. A key is a text.
 """
 
 from __future__ import annotations
@@ -28,33 +28,33 @@ from imubench_pipeline.settings.validation import (
     parse,
 )
 
-LARGEST = 4 << 20
-"""Bytes of a file."""
+MAX_BYTES = 4 << 20
+"""Largest size of a file, bytes."""
 
-DEEPEST = 40
-"""Lists and mappings in each other."""
+MAX_DEPTH = 40
+"""Largest depth of nested lists and mappings."""
 
-MOST = 200_000
-"""Keys and values of a file; what an alias stands for counts where it stands."""
+MAX_NODES = 200_000
+"""Largest number of keys and values of a file; the nodes of an alias count at each use."""
 
-LONGEST_FIGURE = 100
-"""Letters of a number."""
+MAX_NUMBER_LENGTH = 100
+"""Largest number of characters of a number."""
 
 if TYPE_CHECKING:
     _SAFE = yaml.SafeLoader
 else:
-    # The same loader, ten times as fast where it is compiled.
+    # The same loader in C, which is ten times as fast.
     _SAFE = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
-_TAG = "tag:yaml.org,2002:"
-_MERGED = f"{_TAG}merge"
-_TEXTS = {f"{_TAG}str", f"{_TAG}binary"}
+_TAG_PREFIX = "tag:yaml.org,2002:"
+_MERGE_TAG = f"{_TAG_PREFIX}merge"
+_TEXT_TAGS = {f"{_TAG_PREFIX}str", f"{_TAG_PREFIX}binary"}
 
 
 class Integer(int):
-    """A whole number that keeps how it is written."""
+    """An integer that keeps its notation."""
 
     written: str
 
@@ -65,7 +65,7 @@ class Integer(int):
 
 
 class Decimal(float):
-    """A number with decimals that keeps how it is written."""
+    """A number with decimals that keeps its notation."""
 
     written: str
 
@@ -76,12 +76,12 @@ class Decimal(float):
 
 
 class _Loader(_SAFE):
-    """Builds plain values; refuses a key that stands twice."""
+    """Builds plain values; rejects duplicate keys."""
 
     yaml_implicit_resolvers = {}  # noqa: RUF012  # PyYAML declares it as one of an instance
 
     def construct_integer(self, node: yaml.ScalarNode) -> Integer:
-        """Return a whole number in base 10 or 16."""
+        """Return an integer in base 10 or 16."""
         text = node.value.replace("_", "")
         number = Integer(text, 16 if text.lstrip("+-")[:2] == "0x" else 10)
         number.written = node.value
@@ -96,35 +96,37 @@ class _Loader(_SAFE):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
         seen: set[Hashable] = set()
         for key_node, _ in node.value:
-            if key_node.tag == _MERGED:
+            if key_node.tag == _MERGE_TAG:
                 continue
             if isinstance(key_node, yaml.ScalarNode):
-                key_node.tag = f"{_TAG}str"
+                key_node.tag = f"{_TAG_PREFIX}str"
             key = self.construct_object(key_node, deep=True)
             if isinstance(key, Hashable):
                 if key in seen:
-                    raise _fault(key_node, f"the key {cut(key)} stands twice; remove one")
+                    raise _make_fault(key_node, f"the key {cut(key)} stands twice; remove one")
                 seen.add(key)
         return super().construct_mapping(node, deep=deep)
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
-        figure = isinstance(node, yaml.ScalarNode) and node.tag not in _TEXTS
-        if figure and len(node.value) > LONGEST_FIGURE:
+        figure = isinstance(node, yaml.ScalarNode) and node.tag not in _TEXT_TAGS
+        if figure and len(node.value) > MAX_NUMBER_LENGTH:
             kind = cut(node.tag.rpartition(":")[2], str)
-            raise _fault(node, f"{len(node.value)} letters are no {kind}; expected a shorter one")
+            raise _make_fault(
+                node, f"{len(node.value)} letters are no {kind}; expected a shorter one"
+            )
         try:
             return super().construct_object(node, deep=deep)
         except (ValueError, LookupError, AttributeError) as error:
-            # What the constructors make of a text that is not what its tag says.
+            # Errors of the constructors for a text that does not match its tag.
             if not isinstance(node, yaml.ScalarNode):
                 raise
             kind = node.tag.rpartition(":")[2]
             problem = f"{cut(node.value)} is no {cut(kind, str)}"
-            raise _fault(node, problem) from error
+            raise _make_fault(node, problem) from error
 
 
-_Loader.add_constructor(f"{_TAG}int", _Loader.construct_integer)
-_Loader.add_constructor(f"{_TAG}float", _Loader.construct_decimal)
+_Loader.add_constructor(f"{_TAG_PREFIX}int", _Loader.construct_integer)
+_Loader.add_constructor(f"{_TAG_PREFIX}float", _Loader.construct_decimal)
 for _kind, _pattern, _first in (
     ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
     ("int", r"[-+]?(0x[0-9a-fA-F_]+|[0-9][0-9_]*)", list("-+0123456789")),
@@ -136,10 +138,10 @@ for _kind, _pattern, _first in (
     ),
     ("merge", "<<", ["<"]),
 ):
-    _Loader.add_implicit_resolver(f"{_TAG}{_kind}", re.compile(rf"^(?:{_pattern})$"), _first)
+    _Loader.add_implicit_resolver(f"{_TAG_PREFIX}{_kind}", re.compile(rf"^(?:{_pattern})$"), _first)
 
 
-def _fault(at: Any, problem: str) -> yaml.MarkedYAMLError:
+def _make_fault(at: Any, problem: str) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=problem, problem_mark=at.start_mark)
 
 
@@ -149,16 +151,16 @@ def read_yaml(path: Path) -> object:
     Raises
     ------
     ConfigError
-        If it is not there, no regular file, not YAML, too large, too deep, or has a key twice; the
-        text names the line.
+        If the file is missing, no regular file, not YAML, too large, nested too deeply, or has a
+        duplicate key; the message states the line.
     """
     try:
-        text = _text_of(path)
+        text = _read_text(path)
         if unseen := yaml.reader.Reader.NON_PRINTABLE.search(text):
             line = text.count("\n", 0, unseen.start()) + 1
             problem = f"U+{ord(unseen[0]):04X} is no printable character; remove it"
             raise ConfigError(f"{path}, line {line}: not readable as YAML: {problem}")
-        _check(text)
+        _check_size(text)
         return yaml.load(text, Loader=_Loader)
     except ConfigError:
         raise
@@ -183,20 +185,20 @@ def read_settings(model: type[_Model], path: Path) -> _Model:
 def read_folder(
     model: type[_Model], folders: Path | Iterable[Path], each: str
 ) -> dict[str, _Model | ConfigError]:
-    """Read every ``.yaml`` file of a folder, by name; of one that is of no use return why.
+    """Return all ``.yaml`` files of folders as models by name, with errors for invalid ones.
 
-    Of several folders, a file takes the place of one of its name in a folder before.
+    A file replaces a file of the same name in an earlier folder.
 
     Raises
     ------
     ConfigError
-        If there is no folder.
+        If a folder does not exist.
     """
-    return {name: _read(model, path) for name, path in files_in(folders, each).items()}
+    return {name: _read_or_error(model, path) for name, path in files_in(folders, each).items()}
 
 
 def files_in(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
-    """Return the ``.yaml`` files that `read_folder` reads, by name; raises `ConfigError`."""
+    """Return the paths of the files of `read_folder` by name; raises `ConfigError`."""
     files: dict[str, Path] = {}
     for folder in [folders] if isinstance(folders, Path) else folders:
         if not folder.is_dir():
@@ -205,7 +207,7 @@ def files_in(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
     return dict(sorted(files.items(), key=lambda file: file[1].name))
 
 
-def _read(model: type[_Model], path: Path) -> _Model | ConfigError:
+def _read_or_error(model: type[_Model], path: Path) -> _Model | ConfigError:
     try:
         return read_settings(model, path)
     except ConfigError as error:
@@ -213,7 +215,7 @@ def _read(model: type[_Model], path: Path) -> _Model | ConfigError:
 
 
 def usable(read: Mapping[str, _Model | ConfigError]) -> dict[str, _Model]:
-    """Return what `read_folder` has read, if all of it is of use; else raise the first error."""
+    """Return the models of `read_folder` if all are valid; else raise the first error."""
     models = {}
     for name, model in read.items():
         if isinstance(model, ConfigError):
@@ -222,17 +224,18 @@ def usable(read: Mapping[str, _Model | ConfigError]) -> dict[str, _Model]:
     return models
 
 
-def _text_of(path: Path) -> str:
-    """Return the text of a regular file; what else there may be never ends, or does something."""
+def _read_text(path: Path) -> str:
+    """Return the text of a regular file; devices and pipes are rejected, since they may block."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
         raise ConfigError(f"{path}: no regular file; expected one of YAML")
     with os.fdopen(descriptor, "rb") as file:
-        content = file.read(LARGEST + 1)
-    if len(content) > LARGEST:
+        content = file.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
         raise ConfigError(
-            f"{path}: larger than {LARGEST >> 20} MB; expected settings, not a log: check its name"
+            f"{path}: larger than {MAX_BYTES >> 20} MB; expected settings, not a log: check its "
+            "name"
         )
     try:
         return content.decode("utf-8-sig")
@@ -244,21 +247,21 @@ def _text_of(path: Path) -> str:
         ) from None
 
 
-def _check(text: str) -> None:
-    """Refuse YAML that is deeper or larger than settings are, from its events alone."""
+def _check_size(text: str) -> None:
+    """Raise if YAML exceeds the limits of depth or size; only its events are parsed."""
     sizes: dict[str, int] = {}
     open_nodes: list[tuple[str | None, int]] = []  # anchor and nodes before it
     nodes = 0
     for event in yaml.parse(text, Loader=_SAFE):
         if isinstance(event, yaml.AliasEvent):
             if event.anchor in (anchor for anchor, _ in open_nodes):
-                raise _fault(event, f"*{cut(event.anchor, str)} holds itself")
+                raise _make_fault(event, f"*{cut(event.anchor, str)} holds itself")
             nodes += sizes.get(event.anchor or "", 1)
         elif isinstance(event, yaml.CollectionStartEvent):
             open_nodes.append((event.anchor, nodes))
             nodes += 1
-            if len(open_nodes) > DEEPEST:
-                raise _fault(event, f"more than {DEEPEST} lists and mappings in each other")
+            if len(open_nodes) > MAX_DEPTH:
+                raise _make_fault(event, f"more than {MAX_DEPTH} lists and mappings in each other")
         elif isinstance(event, yaml.CollectionEndEvent):
             anchor, before = open_nodes.pop()
             if anchor is not None:
@@ -267,5 +270,5 @@ def _check(text: str) -> None:
             nodes += 1
             if event.anchor is not None:
                 sizes[event.anchor] = 1
-        if nodes > MOST:
-            raise _fault(event, f"more than {MOST} keys and values, aliases counted")
+        if nodes > MAX_NODES:
+            raise _make_fault(event, f"more than {MAX_NODES} keys and values, aliases counted")
