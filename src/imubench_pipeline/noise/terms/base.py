@@ -1,4 +1,4 @@
-"""What is asked of every noise term, and what several put into a filter together."""
+"""Interface of the noise terms, and the joint input of several terms to a filter."""
 
 from __future__ import annotations
 
@@ -88,11 +88,11 @@ class Term(ABC):
     @property
     @abstractmethod
     def drive(self) -> Drive | None:
-        """What it puts into a filter behind it; None: it has no density, or stands behind it."""
+        """Input to a filter after it; None if it has no density, or arises after the filter."""
 
     @abstractmethod
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """Return the variance of the error that it has grown to (`noise.growth`).
+        """Return the variance of its integrated error (`noise.growth`).
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class Term(ABC):
 
     @abstractmethod
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """Return the variances of its first and second integral since its state was known.
+        """Return the variances of its first and second integral from a known state.
 
         0 for what does not grow as noise does.
         """
@@ -160,7 +160,7 @@ class Term(ABC):
 
     @property
     def values(self) -> dict[str, float]:
-        """Its parameters by symbol, SI."""
+        """Parameters by symbol, SI."""
         return {parameter.symbol: getattr(self, parameter.symbol) for parameter in self.parameters}
 
     @property
@@ -175,18 +175,18 @@ class Term(ABC):
 
     @property
     def gauss_markov(self) -> GaussMarkov | None:
-        """The first-order Gauss-Markov process that it is, where its role is that."""
+        """The term as a first-order Gauss-Markov process, if this is its role; else None."""
         return None
 
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
-        """Return terms of a finite state space that stand for it, by default itself.
+        """Return terms with a finite state space that approximate it, by default itself.
 
         Up to a tau ``longest`` it is followed; the sampling interval, too, is in s.
         """
         return [self]
 
     def scaled(self, factor: float) -> Self:
-        """Return the term of a signal that is a factor larger; times stay."""
+        """Return the term of a signal that is larger by a factor; times do not change."""
         scaled = {
             parameter.symbol: getattr(self, parameter.symbol) * factor**parameter.signal
             for parameter in self.parameters
@@ -203,7 +203,7 @@ class Term(ABC):
         return 1.0, self
 
     def sources(self, order: int, time: float, start: SensorStart) -> Iterator[tuple[str, float]]:
-        """Yield name and standard deviation of what it adds to an error, see `growth`."""
+        """Yield name and standard deviation of its contribution to an error, see `growth`."""
         yield self.source, math.sqrt(self.growth(order, time, start))
 
     def mean_variance(self, time: float, on_time: float) -> float:
@@ -230,7 +230,7 @@ class Term(ABC):
 
 @dataclass(frozen=True)
 class Deterministic(Term):
-    """A term that is no noise: a course that goes on for ever."""
+    """A deterministic term: a signal of unlimited duration."""
 
     @abstractmethod
     def swing(self, weights: Array, block: float) -> tuple[float, float]:
@@ -241,19 +241,19 @@ class Deterministic(Term):
 
     @property
     def drive(self) -> Drive | None:
-        """None: no density."""
+        """None: it has no density."""
         return None
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
-        """0: no density."""
+        """0: it has no density."""
         return np.zeros_like(omega)
 
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """0: nothing varies."""
+        """0: it has no variance."""
         return np.zeros_like(lags)
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """0: a filter that knows it predicts it."""
+        """0: a filter with the term predicts it exactly."""
         return np.zeros_like(time), np.zeros_like(time)
 
     def reading(self, lowest_tau: float) -> Reading | None:
@@ -261,13 +261,13 @@ class Deterministic(Term):
         return None
 
     def block_covariance(self, lags: Array, block: float) -> Array:
-        """Raise TypeError: it has a course instead (`swing`)."""
+        """Raise TypeError: it is deterministic (see `swing`)."""
         raise TypeError(f"{self} is deterministic")
 
 
 @dataclass(frozen=True)
 class Drives:
-    """The sum of what terms put into a filter."""
+    """The joint input of terms to a filter."""
 
     white: float  # density N^2, SI^2/Hz
     flicker: float  # B^2 of flicker noise, SI^2
@@ -276,7 +276,7 @@ class Drives:
 
 
 def drives_of(terms: Iterable[Term]) -> Drives:
-    """Return what terms put into a filter; those without a density have no part in it."""
+    """Return the joint input of terms to a filter; terms without a density are left out."""
     drives = [term.drive for term in terms if term.drive is not None]
     processes = [drive.process for drive in drives if drive.process is not None]
     return Drives(

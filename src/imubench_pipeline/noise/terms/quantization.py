@@ -1,4 +1,4 @@
-"""Quantization: what a sensor that rounds its increments leaves."""
+"""Quantization noise of a sensor that rounds its increments."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Quantization(Term):
         return 3.0 * self.Q**2 / tau**2
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """3 Q^2 / tau^2: only the first and the last rounding of a cluster are left."""
+        """3 Q^2 / tau^2: only the rounding errors at the ends of a cluster remain."""
         return 3.0 * self.Q**2 / (n * interval) ** 2
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
@@ -52,11 +52,11 @@ class Quantization(Term):
         return self.Q**2 / interval**2 * 4.0 * np.sin(omega / 2.0) ** 2
 
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """Q^2 / T^2 at lag 0: the sum is what was rounded last."""
+        """Q^2 / T^2 at lag 0: the sum is the last rounding error."""
         return self.Q**2 / interval**2 * (lags == 0.0)
 
     def state_space(self, interval: float) -> StateSpace:
-        """Give the states: the present rounding and the one before."""
+        """States: the current rounding error and the previous one."""
         return StateSpace(
             np.array([[0.0, 0.0], [1.0, 0.0]]),
             np.diag([self.Q**2, 0.0]),
@@ -67,12 +67,12 @@ class Quantization(Term):
         )
 
     def continuous_space(self) -> ContinuousSpace | None:
-        """None: it comes of the sampling."""
+        """None: it is caused by the sampling."""
         return None
 
     @property
     def drive(self) -> Drive | None:
-        """None: a converter that counts increments stands behind every filter."""
+        """None: a converter that counts increments follows every filter."""
         return None
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
@@ -107,7 +107,7 @@ class Quantization(Term):
         return (self.Q / (1.0 / blocks.rate)) ** 2 * (touching + np.diag(2.0 / n**2))
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Draw the roundings at the ends of the blocks."""
+        """Drawn from the rounding errors at the ends of the blocks."""
         return np.diff(rng.standard_normal(blocks + 1)) * self.Q * rate
 
     def reading(self, lowest_tau: float) -> Reading | None:

@@ -1,4 +1,4 @@
-"""What a noise term says of itself: role, parameters, drive, reading."""
+"""Properties of a noise term: role, parameters, drive, reading."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from imubench_pipeline.typing import Array
 
 
 class Role(Enum):
-    """What filters and simulators, most of which know few terms, make of a term."""
+    """Representation of a term in filters and simulators, most of which have few terms."""
 
     WHITE = "white noise"
     RANDOM_WALK = "a random walk"
@@ -26,7 +26,7 @@ class Role(Enum):
 
 @dataclass(frozen=True)
 class SearchRange:
-    """The times between which a fit looks for a time constant."""
+    """Range of a time constant in a fit."""
 
     samples: float  # shortest, sampling intervals
     of_log: float  # longest, as a part of the log
@@ -58,12 +58,12 @@ class TermParameter:
     search: SearchRange | None = None
 
     def check(self, value: float) -> None:
-        """Refuse a value that a model cannot have.
+        """Raise for an invalid value.
 
         Raises
         ------
         ValueError
-            If it is not finite, negative without a sign of its own, or no time above 0.
+            If the value is not finite, negative for an unsigned parameter, or no time above 0.
         """
         time = (self.signal, self.seconds) == (0.0, 1.0)
         if math.isfinite(value) and (self.signed or value > 0.0 or (value == 0.0 and not time)):
@@ -84,7 +84,7 @@ class Process:
 
 @dataclass(frozen=True)
 class Drive:
-    """What a term puts into a filter behind it."""
+    """Input of a term to a filter after it."""
 
     white: float = 0.0  # density N^2, SI^2/Hz
     flicker: float = 0.0  # B of flicker noise, SI
@@ -93,35 +93,35 @@ class Drive:
 
 @dataclass(frozen=True)
 class Reading:
-    """Where a curve shows a parameter."""
+    """The point of a curve that shows a parameter."""
 
     tau: float
     level: float
-    """s, and Allan deviation, SI."""
+    """Position, s, and Allan deviation, SI."""
     symbol: str
     factor: float = 1.0  # level over the parameter
     peak: bool = False  # the term is nowhere higher
 
 
 class SampleBlocks(Protocol):
-    """Blocks of samples of a log, b of them."""
+    """Blocks of samples of a log; b is their number."""
 
     @property
     def rate(self) -> float:
-        """Hz."""
+        """Sampling rate, Hz."""
 
     @property
     def start(self) -> NDArray[np.int64]:
-        """First sample of each."""
+        """First sample of each block, shape (b,)."""
 
     @property
     def stop(self) -> NDArray[np.int64]:
-        """The one past the last of each."""
+        """One-past-last sample of each block, shape (b,)."""
 
     @property
     def count(self) -> NDArray[np.int64]:
-        """Samples of each that are present."""
+        """Number of samples present in each block, shape (b,)."""
 
     @property
     def middle(self) -> Array:
-        """Mean time of each, s from the first sample of the first."""
+        """Mean time of each block, s from the first sample of the first block."""
