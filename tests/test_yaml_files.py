@@ -24,9 +24,9 @@ from imubench_pipeline.settings.config import Run
 from imubench_pipeline.settings.sensor import ColumnSource, RecordingNotes, Sensor
 from imubench_pipeline.settings.validation import ConfigError, Strict, parse
 from imubench_pipeline.settings.yaml_files import (
-    DEEPEST,
-    LARGEST,
-    MOST,
+    MAX_BYTES,
+    MAX_DEPTH,
+    MAX_NODES,
     read_folder,
     read_settings,
     read_yaml,
@@ -40,22 +40,22 @@ def bomb(levels: int, each: int) -> str:
 
 
 HOSTILE = {
-    "an alias bomb": (bomb(10, 9), f"line 6.*more than {MOST} keys and values"),
-    "brackets": (200_000 * "[", f"more than {DEEPEST} lists"),
-    "braces": (200_000 * "{", f"more than {DEEPEST} lists"),
+    "an alias bomb": (bomb(10, 9), f"line 6.*more than {MAX_NODES} keys and values"),
+    "brackets": (200_000 * "[", f"more than {MAX_DEPTH} lists"),
+    "braces": (200_000 * "{", f"more than {MAX_DEPTH} lists"),
     "nested maps": (
         "\n".join(" " * k + f"k{k}:" for k in range(2000)),
-        f"more than {DEEPEST} lists",
+        f"more than {MAX_DEPTH} lists",
     ),
     "a list that holds itself": ("a: &a [1, *a]", r"line 1.*\*a holds itself"),
-    "many keys": ("\n".join(f"k{k}: 1" for k in range(MOST)), f"more than {MOST} keys"),
+    "many keys": ("\n".join(f"k{k}: 1" for k in range(MAX_NODES)), f"more than {MAX_NODES} keys"),
     "a key twice": ("rate: 100 Hz\nunit: g\nrate: 50 Hz\n", "line 3.*'rate' stands twice"),
     "a key twice inside": ("a:\n  - {b: 1, b: 2}\n", "line 2.*'b' stands twice"),
     "an object": ("a: !!python/object/apply:os.system ['true']", "line 1: not readable as YAML"),
     "a number of many digits": ("a: " + 10_000 * "9", "not readable as YAML"),
     "a day that is none": ("a: !!timestamp 2021-13-45", "not readable as YAML"),
     "a list as a key": ("? [1, 2]\n: 3\n", "unhashable key"),
-    "too large": ("#" * (LARGEST + 1), "larger than 4 MB"),
+    "too large": ("#" * (MAX_BYTES + 1), "larger than 4 MB"),
     "a letter that is none": ("a: \x00", "not readable as YAML"),
 }
 
