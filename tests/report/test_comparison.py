@@ -1,4 +1,5 @@
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -50,8 +51,9 @@ def test_each_quantity_has_a_table_with_the_channels_of_all_sensors() -> None:
 
 def test_the_papers_model_stands_once_where_it_is_the_recommended_one() -> None:
     rows = recording_rows("a", "r")
-    for row in rows["parameters"]:
-        row["recommended"] = row["method"] == "likelihood_gm"
+    rows["parameters"] = [
+        replace(row, recommended=row.method == "likelihood_gm") for row in rows["parameters"]
+    ]
     assert [line["asked"] for line in lines(rows)] == ["recommended"]
 
 

@@ -30,7 +30,7 @@ FAULTS = """
 IN_OUTLOOK = """
     if sensor == "two":
         raise ZeroDivisionError("no rest")
-    rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}
+    rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}
 """
 IN_INGEST = """
     if recording == "unread":
@@ -78,7 +78,7 @@ def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[s
         'names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}'
     )
     put_fault(copy / "recordings/ingest.py", names, IN_INGEST)
-    rows = 'rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}'
+    rows = 'rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}'
     put_fault(copy / "steps/outlook.py", rows, IN_OUTLOOK)
     project.environment = os.environ | {"PYTHONPATH": str(place)}
     kernels = ("whittle_kernels", "posterior_kernels", "importance_kernels")
