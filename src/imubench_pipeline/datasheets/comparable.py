@@ -28,14 +28,14 @@ from imubench_pipeline.settings.printed import (
 )
 from imubench_pipeline.units import dimension_of, to_si
 
-_READINGS: dict[str, tuple[Sidedness, ...]] = {
+_SIDEDNESS_READINGS: dict[str, tuple[Sidedness, ...]] = {
     "one-sided": ("one-sided",),
     "two-sided": ("two-sided",),
     "unknown": ("one-sided", "two-sided"),
 }
 
-_NO_BANDWIDTH = "an rms without its bandwidth says nothing of the density"
-_NOT_OF_ONE_LOG = {
+_NO_BANDWIDTH_REASON = "an rms without its bandwidth says nothing of the density"
+_ONE_LOG_OBSTACLES = {
     "bias_repeatability": "a spread between runs: the table repeatability",
     "drift": "the document does not say what drift is meant",
     "temperature_total": "a total over the range of the datasheet; a log has its own",
@@ -110,7 +110,7 @@ class PrintedAxis:
         ]
         logged = [f for f in listed if f.option is None or f.option in self.options]
         rows = [self._row(name, figure, like, convert) for figure in logged or listed]
-        return [_with_interval(row, rows) for row in rows]
+        return [_add_interval(row, rows) for row in rows]
 
     def _row(
         self,
@@ -142,7 +142,7 @@ class PrintedAxis:
         if figure.kind == "min":
             return "a least value is printed"
         if name == "rms_noise" and figure.bandwidth is None:
-            return _NO_BANDWIDTH
+            return _NO_BANDWIDTH_REASON
         if name == "allan_deviation" and figure.tau is None:
             return "an Allan deviation without its averaging time"
         return None
@@ -154,7 +154,7 @@ class PrintedAxis:
         return replace(like, reason=reason, looked_up=looked_up)
 
 
-def _with_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
+def _add_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
     """Return a row with the least and the largest figure of the rows of its option."""
     option = row.figure.option if row.figure else None
     values = [
@@ -173,7 +173,7 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     Without a figure where none is published, or nobody looked it up.
     """
     axis = PrintedAxis.of(datasheet, channel)
-    noise = [*_densities(axis), *_random_walks(axis), *_rms(axis)]
+    noise = [*_read_densities(axis), *_read_random_walks(axis), *_read_rms(axis)]
     names = ("noise_density", "random_walk", "rms_noise")
     yield from noise or [axis.unpublished(Comparable("N", "N", None), *names)]
     for name, quantity, statistic, reason in (
@@ -200,7 +200,7 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
     yield from offsets or [axis.unpublished(like, "offset")]
     name = "temperature_coefficient"
     yield from axis.read(name, Comparable(name, SENSITIVITY, None), axis.si(name))
-    for name, obstacle in _NOT_OF_ONE_LOG.items():
+    for name, obstacle in _ONE_LOG_OBSTACLES.items():
         like = Comparable(name, "mean", None, obstacle=obstacle)
         yield from axis.read(name, like, axis.si(name))
 
@@ -214,11 +214,11 @@ def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Co
     yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
 
 
-def _densities(axis: PrintedAxis) -> Iterator[Comparable]:
+def _read_densities(axis: PrintedAxis) -> Iterator[Comparable]:
     dimensions = FIGURE_DIMENSIONS[axis.quantity]["noise_density"]
     figures = axis.sheet.printed("noise_density")
     for stated in dict.fromkeys(figure.sidedness for figure in figures):
-        for sidedness in _READINGS[stated]:
+        for sidedness in _SIDEDNESS_READINGS[stated]:
 
             def convert(value: float, figure: PrintedFigure, side: Sidedness = sidedness) -> float:
                 unit = figure.unit or ""
@@ -239,12 +239,12 @@ def _densities(axis: PrintedAxis) -> Iterator[Comparable]:
             )
 
 
-def _random_walks(axis: PrintedAxis) -> list[Comparable]:
+def _read_random_walks(axis: PrintedAxis) -> list[Comparable]:
     like = Comparable("N", "N", None, reason="random walk as printed is N")
     return axis.read("random_walk", like, axis.si("random_walk"))
 
 
-def _rms(axis: PrintedAxis) -> list[Comparable]:
+def _read_rms(axis: PrintedAxis) -> list[Comparable]:
     si = axis.si("rms_noise")
 
     def convert(value: float, figure: PrintedFigure) -> float:

@@ -12,7 +12,7 @@ from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 
 Published = Literal["yes", "no", "other convention", "not looked up"]
 
-_FIGURES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+_KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "N": (("noise_density", "random_walk"), ("rms_noise",)),
     "B": (("bias_instability",), ("allan_deviation", "drift")),
     "K": (("rate_random_walk",), ()),
@@ -64,11 +64,11 @@ def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
     One row a sensor, quantity that it has, and figure, in the order of the sensors.
     """
     return [
-        _row(name, sensor, quantity, figure)
+        _make_row(name, sensor, quantity, figure)
         for name, sensor in sensors.items()
         for quantity in QUANTITIES
         if getattr(sensor.datasheet, quantity) is not None
-        for figure in _FIGURES
+        for figure in _KEYS_OF_FIGURE
     ]
 
 
@@ -87,18 +87,18 @@ def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
             no=count["no"],
             not_looked_up=count["not looked up"],
         )
-        for key, count in sorted(counts.items(), key=lambda item: _place(*item[0]))
+        for key, count in sorted(counts.items(), key=lambda item: _make_sort_key(*item[0]))
     ]
 
 
-def _place(vendor: str, quantity: str, figure: str) -> tuple[str, int, int]:
-    return vendor.lower(), list(QUANTITIES).index(quantity), list(_FIGURES).index(figure)
+def _make_sort_key(vendor: str, quantity: str, figure: str) -> tuple[str, int, int]:
+    return vendor.lower(), list(QUANTITIES).index(quantity), list(_KEYS_OF_FIGURE).index(figure)
 
 
-def _row(name: str, sensor: Sensor, quantity: str, figure: str) -> Coverage:
+def _make_row(name: str, sensor: Sensor, quantity: str, figure: str) -> Coverage:
     datasheet = sensor.datasheet
     sheet: QuantityDatasheet = getattr(datasheet, quantity)
-    plain, akin = _FIGURES[figure]
+    plain, akin = _KEYS_OF_FIGURE[figure]
     printed = [each for key in (*plain, *akin) for each in sheet.printed(key)]
     revision = f", revision {datasheet.revision}" if datasheet.revision else ""
     sources = dict.fromkeys(each.source or datasheet.source or "" for each in printed)
@@ -108,14 +108,14 @@ def _row(name: str, sensor: Sensor, quantity: str, figure: str) -> Coverage:
         model=sensor.model,
         quantity=quantity,
         figure=figure,
-        published=_published(sheet, plain, akin),
-        as_printed="; ".join(map(_as_printed, printed)) or None,
+        published=_classify_publication(sheet, plain, akin),
+        as_printed="; ".join(map(_format_figure, printed)) or None,
         document=f"{datasheet.document}{revision}" if datasheet.document else None,
         source=" and ".join(filter(None, sources)) or datasheet.source,
     )
 
 
-def _published(
+def _classify_publication(
     sheet: QuantityDatasheet, plain: tuple[str, ...], akin: tuple[str, ...]
 ) -> Published:
     if any(each.kind != "derived" for key in plain for each in sheet.printed(key)):
@@ -125,11 +125,13 @@ def _published(
     return "no" if any(sheet.looked_up(key) for key in plain) else "not looked up"
 
 
-def _as_printed(figure: PrintedFigure) -> str:
-    return " ".join(filter(None, (" ".join(_numbers(figure)), figure.unit, *_qualified(figure))))
+def _format_figure(figure: PrintedFigure) -> str:
+    return " ".join(
+        filter(None, (" ".join(_format_numbers(figure)), figure.unit, *_format_qualifiers(figure)))
+    )
 
 
-def _numbers(figure: PrintedFigure) -> Iterator[str]:
+def _format_numbers(figure: PrintedFigure) -> Iterator[str]:
     if isinstance(figure.value, dict):
         yield ", ".join(f"{axes} {value:g}" for axes, value in figure.value.items())
     elif isinstance(figure.value, tuple):
@@ -138,7 +140,7 @@ def _numbers(figure: PrintedFigure) -> Iterator[str]:
         yield f"{figure.value:g}"
 
 
-def _qualified(figure: PrintedFigure) -> Iterator[str]:
+def _format_qualifiers(figure: PrintedFigure) -> Iterator[str]:
     yield figure.kind
     if figure.option:
         yield f"({figure.option})"

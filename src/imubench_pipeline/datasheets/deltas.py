@@ -20,7 +20,7 @@ from imubench_pipeline.datasheets.comparable import (
     bias_comparables,
     comparables,
 )
-from imubench_pipeline.datasheets.measured import NO_READINGS, fixed_bias, measured
+from imubench_pipeline.datasheets.measured import NO_TEMPERATURE_READINGS, fixed_bias, measured
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.settings.printed import Datasheet
 
@@ -37,7 +37,7 @@ VERDICTS: dict[str, str] = {
 }
 """What a verdict says."""
 
-_TYPICAL = ("typ", "1sigma", "derived")
+_TYPICAL_KINDS = ("typ", "1sigma", "derived")
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def bias_deltas(
     bias = fixed_bias(channel, means)
     for entry in bias_comparables(datasheet, channel):
         if entry.statistic == SENSITIVITY:
-            yield compare(entry, sensitivity or NO_READINGS, tolerance)
+            yield compare(entry, sensitivity or NO_TEMPERATURE_READINGS, tolerance)
         elif entry.quantity != "offset":
             yield compare(entry, Parameter(None), tolerance)
         elif bias.value is None and entry.figure:
@@ -153,16 +153,16 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     if entry.value is None:
         return replace(row, verdict="not comparable (condition)", reason=entry.obstacle)
     if value is None:
-        verdict, reason = _without_a_value(entry, parameter, tolerance)
+        verdict, reason = _judge_without_value(entry, parameter, tolerance)
         return replace(row, verdict=verdict, reason=reason)
     row = replace(
         row,
-        delta=_relative(value, entry.value),
-        delta_lower=_relative(lower, entry.upper),
-        delta_upper=_relative(upper, entry.lower),
+        delta=_compute_relative_difference(value, entry.value),
+        delta_lower=_compute_relative_difference(lower, entry.upper),
+        delta_upper=_compute_relative_difference(upper, entry.lower),
     )
     low, high = (value, value) if lower is None or upper is None else (lower, upper)
-    least, largest = (_place(entry, end, tolerance) for end in (low, high))
+    least, largest = (_classify_value(entry, end, tolerance) for end in (low, high))
     reasons = [entry.reason, parameter.reason]
     if least != largest:
         reasons.append(f"the 95 % interval reaches from {least!r} to {largest!r}")
@@ -170,17 +170,19 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     return replace(row, verdict=least if least == largest else "not sure", reason=words or None)
 
 
-def _without_a_value(entry: Comparable, parameter: Parameter, tolerance: float) -> tuple[str, str]:
+def _judge_without_value(
+    entry: Comparable, parameter: Parameter, tolerance: float
+) -> tuple[str, str]:
     """Return verdict and reason where the log gives limits alone, or nothing."""
     reason = f"{parameter.status.replace('_', ' ')}: {parameter.reason}"
     if parameter.upper is not None:
-        least = _place(entry, parameter.lower or 0.0, tolerance)
-        if least == _place(entry, parameter.upper, tolerance) != "as printed":
+        least = _classify_value(entry, parameter.lower or 0.0, tolerance)
+        if least == _classify_value(entry, parameter.upper, tolerance) != "as printed":
             return least, f"{reason}; the limits alone decide"
     return "not measured", reason
 
 
-def _place(entry: Comparable, value: float, tolerance: float) -> str:
+def _classify_value(entry: Comparable, value: float, tolerance: float) -> str:
     """Return where one value lies beside a printed figure."""
     assert entry.figure is not None and entry.value is not None
     if entry.figure.kind in ("max", "range"):
@@ -192,7 +194,7 @@ def _place(entry: Comparable, value: float, tolerance: float) -> str:
     return "better than typ" if value < entry.value * (1.0 - tolerance) else "as printed"
 
 
-def _relative(value: float | None, printed: float | None) -> float | None:
+def _compute_relative_difference(value: float | None, printed: float | None) -> float | None:
     """Return the relative difference, where both are there and the printed figure is a size."""
     if value is None or printed is None or printed <= 0:
         return None
@@ -236,8 +238,8 @@ def curve_rms(
             f"tau of shape {tau.shape} and Allan deviations of shape {adev.shape}; expected as "
             "many, and deviations above 0"
         )
-    noises: list[Comparable | None] = [*_lines(printed, "N")]
-    floors: list[Comparable | None] = [*_lines(printed, "adev_minimum")]
+    noises: list[Comparable | None] = [*_select_typical(printed, "N")]
+    floors: list[Comparable | None] = [*_select_typical(printed, "adev_minimum")]
     distances = []
     for noise, floor in product(noises or [None], floors[:1] or [None]):
         if noise is None and floor is None:
@@ -251,8 +253,8 @@ def curve_rms(
     return distances
 
 
-def _lines(printed: Sequence[Comparable], statistic: str) -> list[Comparable]:
+def _select_typical(printed: Sequence[Comparable], statistic: str) -> list[Comparable]:
     """Return the typical figures of a statistic; the others where there are none."""
     with_value = [row for row in printed if row.statistic == statistic and row.value is not None]
-    typical = [row for row in with_value if row.figure and row.figure.kind in _TYPICAL]
+    typical = [row for row in with_value if row.figure and row.figure.kind in _TYPICAL_KINDS]
     return typical or with_value

@@ -17,14 +17,14 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR
 
-_LOCAL_GRAVITY = 0.027
+_MAX_GRAVITY_DEVIATION = 0.027
 """m/s²; gravity on the ground differs by less from its standard value."""
 
-NO_READINGS = Parameter(None, "not_shown", "the log has no readings of the temperature")
+NO_TEMPERATURE_READINGS = Parameter(None, "not_shown", "the log has no readings of the temperature")
 """What a log without them says of the sensitivity."""
 
-_VERTICAL = math.cos(math.radians(15.0))
-_AT_REST = 0.15
+_MIN_VERTICAL_COSINE = math.cos(math.radians(15.0))
+_MAX_NORM_ERROR_AT_REST = 0.15
 
 
 def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
@@ -40,14 +40,14 @@ def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) ->
         # An estimate that was made by hand has its terms alone.
         of_curve = estimate.curve or of_model(estimate.model, tau)
         if statistic == "plateau":
-            return _scaled(of_curve["B_curve"], FLOOR)
+            return _scale(of_curve["B_curve"], FLOOR)
         return of_curve["sigma_min"]
     if statistic == "adev":
-        return _ordinate(estimate, tau, entry.tau or math.nan)
+        return _evaluate_curve(estimate, tau, entry.tau or math.nan)
     return estimate.parameters[statistic]
 
 
-def _scaled(parameter: Parameter, factor: float) -> Parameter:
+def _scale(parameter: Parameter, factor: float) -> Parameter:
     value, lower, upper = (
         None if each is None else each * factor
         for each in (parameter.value, parameter.lower, parameter.upper)
@@ -55,22 +55,26 @@ def _scaled(parameter: Parameter, factor: float) -> Parameter:
     return replace(parameter, value=value, lower=lower, upper=upper)
 
 
-def _ordinate(estimate: Estimate, tau: NDArray[np.float64], at: float) -> Parameter:
+def _evaluate_curve(estimate: Estimate, tau: NDArray[np.float64], at: float) -> Parameter:
     if not len(tau) or not tau[0] <= at <= tau[-1]:
         return Parameter(None, "not_shown", f"the log does not show the curve at {at:g} s")
     where = np.array([at])
-    return _within(math.sqrt(float(estimate.model.allan_variance(where)[0])), estimate, where)
+    return _add_curve_limits(
+        math.sqrt(float(estimate.model.allan_variance(where)[0])), estimate, where
+    )
 
 
-def _within(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
+def _add_curve_limits(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
     """Give a point of a model's curve the limits that those of its parameters allow."""
-    points = [float(np.sqrt(end.model.allan_variance(tau)[0])) for end in _ends(estimate)]
+    points = [
+        float(np.sqrt(end.model.allan_variance(tau)[0])) for end in _list_interval_ends(estimate)
+    ]
     if not points:
         return Parameter(value)
     return Parameter(value, lower=min(value, *points), upper=max(value, *points))
 
 
-def _ends(estimate: Estimate) -> Iterator[Estimate]:
+def _list_interval_ends(estimate: Estimate) -> Iterator[Estimate]:
     """Yield the estimate at the ends of its intervals; nothing if one has no interval."""
     groups = [estimate.parameters, *estimate.further]
     in_model = [p for group in groups for p in group.values() if p.in_model]
@@ -99,25 +103,25 @@ def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
     """
     if channel.startswith("gyro"):
         reason = "mean of the recording; the Earth's rotation is in it, 15 °/h either way at most"
-        return _size(means[channel], EARTH_RATE, reason)
+        return _bound_size(means[channel], EARTH_RATE, reason)
     axes = [means.get(f"accel_{axis}") for axis in "xyz"]
     if any(value is None for value in axes):
         return Parameter(None, "not_shown", "gravity cannot be taken off: three axes are needed")
     norm = math.hypot(*(value or 0.0 for value in axes))
-    if abs(norm / STANDARD_GRAVITY - 1.0) > _AT_REST:
+    if abs(norm / STANDARD_GRAVITY - 1.0) > _MAX_NORM_ERROR_AT_REST:
         reason = f"the mean acceleration is {norm:.4g} m/s², and not gravity"
         return Parameter(None, "not_shown", reason)
-    if abs(means[channel]) < _VERTICAL * norm:
+    if abs(means[channel]) < _MIN_VERTICAL_COSINE * norm:
         reason = "the axis is not vertical: its offset cannot be told from a tilt"
         return Parameter(None, "not_shown", reason)
     reason = (
         "norm of the three axes less standard gravity, with the scale factor error; local gravity "
         "differs by 0.027 m/s² at most"
     )
-    return _size(norm - STANDARD_GRAVITY, _LOCAL_GRAVITY, reason)
+    return _bound_size(norm - STANDARD_GRAVITY, _MAX_GRAVITY_DEVIATION, reason)
 
 
-def _size(value: float, unknown: float, reason: str) -> Parameter:
+def _bound_size(value: float, unknown: float, reason: str) -> Parameter:
     size = abs(value)
     return Parameter(size, "ok", reason, max(size - unknown, 0.0), size + unknown)
 
@@ -135,7 +139,7 @@ def sensitivity(
     by_parameter = {row.parameter: row for row in rows}
     row = by_parameter.get("sensitivity")
     if row is None:
-        return NO_READINGS
+        return NO_TEMPERATURE_READINGS
     at = f"slope at {by_parameter['T_0'].value:.3g} °C"
     if lowest is not None and highest is not None:
         at += f", of readings from {lowest:.3g} to {highest:.3g} °C; the vendor has another range"

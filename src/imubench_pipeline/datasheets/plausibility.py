@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.datasheets.comparable import bias_comparables
-from imubench_pipeline.datasheets.suspicion import NEAR_PRINTED, printed_figures
+from imubench_pipeline.datasheets.suspicion import MAX_FACTOR_FROM_PRINTED, printed_figures
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.recordings.kept import Quality
@@ -26,80 +26,80 @@ from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import conversion, from_si, to_si
 
-_UNDER_PRINTED = 2.5
+_MAX_FACTOR_BELOW_PRINTED = 2.5
 """Times below a printed noise density that is usual: a low-pass hides nothing from
 `levels.density_of`."""
 
-_USUAL_GYRO = (math.radians(5e-4), math.radians(0.06))
+_USUAL_GYRO_DENSITY = (math.radians(5e-4), math.radians(0.06))
 """rad/s/√Hz: beyond the figures that the shipped sensor files print, 0.0015 to 0.035 °/s/√Hz."""
 
-_LARGEST_OFFSET = math.radians(30.0)
-_LEAST_OFFSET = math.radians(2.0)
-_OFFSET_OF_CLASS = {"industrial": math.radians(12.0), "tactical": _LEAST_OFFSET}
+_MAX_OFFSET = math.radians(30.0)
+_MIN_OFFSET_LIMIT = math.radians(2.0)
+_MAX_OFFSET_OF_CLASS = {"industrial": math.radians(12.0), "tactical": _MIN_OFFSET_LIMIT}
 """rad/s. The shipped sensor files print at most 3 °/s (typ) of industrial sensors, 0.2 °/s of
 tactical ones, and 20 °/s of others."""
 
-_OVER_PRINTED = {"max": 1.5}
-_OVER_TYPICAL = 4.0
+_OFFSET_FACTOR_OF_KIND = {"max": 1.5}
+_OFFSET_FACTOR_OF_TYPICAL = 4.0
 """Times the printed offset that one has: where typ and max are both printed, max is three times
 typ, and mounting adds to it."""
 
-MIN_RATE, MIN_RATE_STATED, _FASTEST = 1.05, 0.105, 1e4
+MIN_RATE, MIN_RATE_STATED, _MAX_RATE = 1.05, 0.105, 1e4
 """Limits of the sampling rate of any log, Hz. Stamps in ms that are read as s give at most 1 Hz for
 a log of 1 kHz, and 0.1 Hz for one of 100 Hz. A slower log is plausible if its rate is stated."""
 
-_READ_OVER = 100.0
-_SAMPLED_OVER = 10.0
+_MAX_LOG_RATE_PER_BANDWIDTH = 100.0
+_MAX_SAMPLING_RATE_PER_BANDWIDTH = 10.0
 """Times the bandwidth that a log is read at, at most; and that a sensor samples at, at most: those
 that the shipped sensor files print are sampled at 2 to 8 times theirs."""
 
-_USUAL = 100.0
-_FACTORS: Mapping[float, float] = {60.0: 1.0, 1e3: 0.0, 1e6: 0.0, 1e9: 0.0}
+_USUAL_RATE = 100.0
+_TIME_UNIT_PENALTIES: Mapping[float, float] = {60.0: 1.0, 1e3: 0.0, 1e6: 0.0, 1e9: 0.0}
 """Ratios of two units of time, and decades from the usual rate (Hz) that each is taken to be less
 likely: no sensor file can state minutes."""
 
 Level = Mapping[str, Any]
 """Of a channel, as `imubench_pipeline.recordings.quality.levels.kept_level` returns it."""
 
-_TOLERANCE = 0.15
+_GRAVITY_TOLERANCE = 0.15
 """Part of gravity that the mean of an accelerometer may be off."""
 
-_FAR = 2.5
+_SUSPICIOUS_NOISE_FACTOR = 2.5
 """Times beyond what is usual from which a noise is suspicious: above 10 times or below 0.16 times
 what a datasheet prints, and of a gyro without one above 0.15 °/s/√Hz or below 2e-4."""
 
-_EXPLAINED = 1.5
+_MAX_EXPLAINED_FACTOR = 1.5
 """Times beyond what is usual that a noise may be in the unit that is asked for instead."""
 
-_UNEVEN = 4.0
+_MIN_SUSPICIOUS_AXIS_RATIO = 4.0
 """Times the noise of both other axes of a sensor, either way, from which one is in doubt."""
 
-_EVEN = 2.5
+_MAX_RATIO_OF_OTHER_AXES = 2.5
 """Times by which those two may differ from each other for that."""
 
-_UNTIMED = 2.5
+_MAX_FACTOR_WITHOUT_STAMPS = 2.5
 """Times a printed noise, either way, from which it is in doubt where no stamps tell the rate: N
 goes with its root, and a stated rate that is ten times wrong is 3.2 times."""
 
-_SAME = 1.5
+_MAX_EXPLAINED_AXIS_RATIO = 1.5
 """Times by which its noise may be off theirs in the unit that is asked for instead."""
 
-_UNITS: Mapping[str, Sequence[str]] = {
+_LOGGER_UNITS: Mapping[str, Sequence[str]] = {
     "gyro": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h"),
     "accel": ("m/s^2", "g", "mg", "ug"),
 }
 """In which loggers write, the usual ones first."""
 
-_SHOWN = {"gyro": ("°/s/√Hz", "gyro_density"), "accel": ("µg/√Hz", "accel_density")}
+_DENSITY_UNITS = {"gyro": ("°/s/√Hz", "gyro_density"), "accel": ("µg/√Hz", "accel_density")}
 
-_TILTED = math.radians(10.0)
+_MIN_TURN_OF_GRAVITY = math.radians(10.0)
 """Turn of gravity over a log that no drift of an accelerometer makes: 0.17 g."""
 
-_TILTING = math.radians(1.0)
-_AGREES = 0.25
+_MIN_TURN_WITH_GYROS = math.radians(1.0)
+_MAX_RATE_DISAGREEMENT = 0.25
 """The same where gyros turn with it, and part of its rate that they may be off."""
 
-_MEND = "state the right 'unit' in the sensor file"
+_UNIT_ADVICE = "state the right 'unit' in the sensor file"
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Expected:
 
     noise: tuple[float, float] | None  # least and most white noise density, SI/√Hz, two-sided
     noise_from: str  # what says so
-    offset: float = _LARGEST_OFFSET  # largest mean of a gyro that an offset explains, rad/s
+    offset: float = _MAX_OFFSET  # largest mean of a gyro that an offset explains, rad/s
     offset_from: str = "of any gyro"
     bandwidth: float | None = None  # the widest that is printed, Hz
     printed: float | None = None  # white noise density that the datasheet prints, SI/√Hz, two-sided
@@ -116,19 +116,25 @@ class Expected:
 
 def expected(sensor: Sensor | None, quantity: str) -> Expected:
     """Return what is usual of a quantity of a sensor, by its file where that prints it."""
-    usual = _USUAL_GYRO if quantity == "gyro" else None
+    usual = _USUAL_GYRO_DENSITY if quantity == "gyro" else None
     if sensor is None:
         return Expected(usual, "of a gyro")
     printed = printed_figures(sensor, quantity).get("N")
-    noise = usual if printed is None else (printed / _UNDER_PRINTED, printed * NEAR_PRINTED)
+    noise = (
+        usual
+        if printed is None
+        else (printed / _MAX_FACTOR_BELOW_PRINTED, printed * MAX_FACTOR_FROM_PRINTED)
+    )
     noise_from = "of a gyro" if printed is None else "that its datasheet prints"
-    return Expected(noise, noise_from, *_offset(sensor), _bandwidth(sensor, quantity), printed)
+    return Expected(
+        noise, noise_from, *_find_max_offset(sensor), _find_max_bandwidth(sensor, quantity), printed
+    )
 
 
-def _offset(sensor: Sensor) -> tuple[float, str]:
+def _find_max_offset(sensor: Sensor) -> tuple[float, str]:
     """Return the largest offset of the gyro of a sensor, rad/s, and what says so."""
     printed = [
-        row.value * _OVER_PRINTED.get(row.figure.kind, _OVER_TYPICAL)
+        row.value * _OFFSET_FACTOR_OF_KIND.get(row.figure.kind, _OFFSET_FACTOR_OF_TYPICAL)
         for axis in "xyz"
         for row in bias_comparables(sensor.datasheet, f"gyro_{axis}")
         if row.quantity in ("offset", "bias_repeatability")
@@ -136,16 +142,16 @@ def _offset(sensor: Sensor) -> tuple[float, str]:
         and row.value is not None
     ]
     if printed:
-        largest = min(max(*printed, _LEAST_OFFSET), _LARGEST_OFFSET)
+        largest = min(max(*printed, _MIN_OFFSET_LIMIT), _MAX_OFFSET)
         return largest, "by the offset that its datasheet prints"
     words = (sensor.price_class or "").lower().replace(",", " ").split()
-    word = next((word for word in words if word in _OFFSET_OF_CLASS), None)
+    word = next((word for word in words if word in _MAX_OFFSET_OF_CLASS), None)
     if word is None:
-        return _LARGEST_OFFSET, "of any gyro"
-    return _OFFSET_OF_CLASS[word], f"of a gyro of price class {word}"
+        return _MAX_OFFSET, "of any gyro"
+    return _MAX_OFFSET_OF_CLASS[word], f"of a gyro of price class {word}"
 
 
-def _bandwidth(sensor: Sensor, quantity: str) -> float | None:
+def _find_max_bandwidth(sensor: Sensor, quantity: str) -> float | None:
     """Return the widest bandwidth that a sensor file prints, Hz."""
     assert quantity in QUANTITIES
     sheet = getattr(sensor.datasheet, quantity)
@@ -153,12 +159,12 @@ def _bandwidth(sensor: Sensor, quantity: str) -> float | None:
         to_si(value, figure.unit, "frequency")
         for figure in (sheet.printed("bandwidth") if sheet else ())
         for axis in "xyz"
-        for value in _values(figure.on_axis(axis))
+        for value in _list_values(figure.on_axis(axis))
     ]
     return max(widest, default=None)
 
 
-def _values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]:
+def _list_values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]:
     if printed is None:
         return ()
     return printed if isinstance(printed, tuple) else (printed,)
@@ -188,7 +194,7 @@ def implausible_rates(
     slowest = MIN_RATE if stated is None else MIN_RATE_STATED
     by_rate: dict[tuple[float, float], list[str]] = {}
     for name, rate in rates.items():
-        fastest = _fastest(bandwidths[name])
+        fastest = _compute_max_rate(bandwidths[name])
         if not slowest <= rate <= fastest:
             by_rate.setdefault((rate, fastest), []).append(name)
     findings = []
@@ -209,23 +215,28 @@ def implausible_rates(
     return findings
 
 
-def time_factor(rate: float, fastest: float = _FASTEST) -> float:
+def time_factor(rate: float, fastest: float = _MAX_RATE) -> float:
     """Return by what times are to be multiplied, so that a rate, Hz, is likely.
 
     ``fastest`` is what the sensor can do, Hz.
     """
     sign = 1.0 if rate > fastest else -1.0
     return min(
-        (factor**sign for factor in _FACTORS),
-        key=lambda factor: abs(math.log10(rate / factor / _USUAL)) + _FACTORS[round(factor**sign)],
+        (factor**sign for factor in _TIME_UNIT_PENALTIES),
+        key=lambda factor: (
+            abs(math.log10(rate / factor / _USUAL_RATE)) + _TIME_UNIT_PENALTIES[round(factor**sign)]
+        ),
     )
 
 
-def _fastest(bandwidth: float | None) -> float:
+def _compute_max_rate(bandwidth: float | None) -> float:
     """Return the highest rate of a log of a sensor, Hz."""
     if bandwidth is None:
-        return _FASTEST
-    return min(max(_FASTEST, _SAMPLED_OVER * bandwidth), _READ_OVER * bandwidth)
+        return _MAX_RATE
+    return min(
+        max(_MAX_RATE, _MAX_SAMPLING_RATE_PER_BANDWIDTH * bandwidth),
+        _MAX_LOG_RATE_PER_BANDWIDTH * bandwidth,
+    )
 
 
 def implausible(
@@ -248,10 +259,10 @@ def implausible(
         sensor.log.rate_hz if sensor else None,
     )
     if not findings:  # else the density is that of another time
-        findings += _noise(channels, of)
-        findings += _unlike(channels, of, {f.channel for f in findings})
-    if gravity is None or gravity.swept < _TILTED:  # its mean is not gravity then
-        findings += _gravity(channels)
+        findings += _check_noise(channels, of)
+        findings += _compare_noise(channels, of, {f.channel for f in findings})
+    if gravity is None or gravity.swept < _MIN_TURN_OF_GRAVITY:  # its mean is not gravity then
+        findings += _check_gravity(channels)
     if static:
         mending = {f.channel: f.value for f in findings if f.finding == "suspicious_unit"}
         means = {
@@ -259,7 +270,9 @@ def implausible(
             for name, level in channels.items()
             if quantity_of(name) == "gyro"
         }
-        findings += [*_turning(means, of["gyro"])] or [*_tilting(means, gravity)]
+        findings += [*_check_mean_rates(means, of["gyro"])] or [
+            *_check_gravity_turn(means, gravity)
+        ]
     return findings
 
 
@@ -275,26 +288,26 @@ def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:
     """Yield the units that may be meant instead of one, and the factor that mends the figures."""
     dimension = QUANTITIES[quantity]
     stated = conversion(unit, dimension)[0]
-    for other in _UNITS[quantity]:
+    for other in _LOGGER_UNITS[quantity]:
         factor = conversion(other, dimension)[0] / stated
         if not math.isclose(factor, 1.0):
             yield other, factor
 
 
-def _gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
+def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
     """Yield what the mean of three accelerometers tells, which is gravity."""
     axes = [f"accel_{axis}" for axis in "xyz"]
     if not set(axes) <= channels.keys():
         return
     norm = math.hypot(*(channels[name]["mean"] for name in axes))
-    if abs(norm / STANDARD_GRAVITY - 1.0) <= _TOLERANCE:
+    if abs(norm / STANDARD_GRAVITY - 1.0) <= _GRAVITY_TOLERANCE:
         return
     units = {channels[name]["unit"] for name in axes}
     unit = units.pop()
     detail = f"the mean acceleration has a norm of {norm:.4g} m/s², expected {STANDARD_GRAVITY:.4g}"
     for other, factor in mistakes(unit, "accel") if not units else ():
-        if abs(norm * factor / STANDARD_GRAVITY - 1.0) <= _TOLERANCE:
-            question = f"{detail}: are the figures in {other}, and not {unit}? {_MEND}"
+        if abs(norm * factor / STANDARD_GRAVITY - 1.0) <= _GRAVITY_TOLERANCE:
+            question = f"{detail}: are the figures in {other}, and not {unit}? {_UNIT_ADVICE}"
             for name in axes:
                 yield Finding("suspicious_unit", "warning", question, factor, name)
             return
@@ -304,7 +317,7 @@ def _gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
     yield Finding("gravity_norm", "warning", f"{detail}: {advice}", norm)
 
 
-def _noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:
+def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:
     """Yield the channels whose noise is usual in another unit alone."""
     weighed = {f"accel_{axis}" for axis in "xyz"} <= channels.keys()
     for name, level in channels.items():
@@ -313,28 +326,31 @@ def _noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterato
         if usual is None or (quantity == "accel" and weighed):
             continue  # gravity tells better
         low, high = level["density"]
-        if low > _FAR * usual[1]:
+        if low > _SUSPICIOUS_NOISE_FACTOR * usual[1]:
             shown = low
-        elif high is not None and high < usual[0] / _FAR:
+        elif high is not None and high < usual[0] / _SUSPICIOUS_NOISE_FACTOR:
             shown = high
         else:
             continue
         high = math.inf if high is None else high
         for unit, factor in mistakes(level["unit"], quantity):
-            if low * factor <= _EXPLAINED * usual[1] and high * factor >= usual[0] / _EXPLAINED:
-                sign, dimension = _SHOWN[quantity]
+            if (
+                low * factor <= _MAX_EXPLAINED_FACTOR * usual[1]
+                and high * factor >= usual[0] / _MAX_EXPLAINED_FACTOR
+            ):
+                sign, dimension = _DENSITY_UNITS[quantity]
                 figures = [from_si(x, sign, dimension) for x in (shown, shown * factor, *usual)]
                 detail = (
                     f"{name} has a noise of {figures[0]:.3g} {sign}; usual "
                     f"{of[quantity].noise_from} are {figures[2]:.3g} to {figures[3]:.3g}: are the "
                     f"figures in {unit}, and not {level['unit']}? It would be {figures[1]:.3g} "
-                    f"then; {_MEND}"
+                    f"then; {_UNIT_ADVICE}"
                 )
                 yield Finding("suspicious_unit", "warning", detail, factor, name)
                 break
 
 
-def _unlike(
+def _compare_noise(
     channels: Mapping[str, Level], of: Mapping[str, Expected], doubted: Collection[str | None]
 ) -> Iterator[Finding]:
     """Yield the channels whose noise is far from what is printed, or from both other axes.
@@ -347,12 +363,12 @@ def _unlike(
         if name in doubted:
             continue
         quantity = quantity_of(name)
-        sign, dimension = _SHOWN[quantity]
+        sign, dimension = _DENSITY_UNITS[quantity]
         low, high = level["density"]
         high = math.inf if high is None else high
         printed = of[quantity].printed
         timed = level.get("timed", True)
-        near = NEAR_PRINTED if timed else _UNTIMED
+        near = MAX_FACTOR_FROM_PRINTED if timed else _MAX_FACTOR_WITHOUT_STAMPS
         if printed is not None and (low > near * printed or near * high < printed):
             shown = low if low > printed else high
             figures = [from_si(x, sign, dimension) for x in (shown, printed)]
@@ -362,7 +378,9 @@ def _unlike(
                 f"{figures[1]:.3g} that its datasheet prints: check {rate}scale, range and column "
                 "of the channel, and whether it is this sensor"
             )
-            far = low > NEAR_PRINTED * printed or NEAR_PRINTED * high < printed
+            far = (
+                low > MAX_FACTOR_FROM_PRINTED * printed or MAX_FACTOR_FROM_PRINTED * high < printed
+            )
             if far or not untimed:  # a wrong rate is that of all channels: it is told once
                 untimed = untimed or not timed
                 of_channel = name if timed or far else None
@@ -371,13 +389,13 @@ def _unlike(
                 )
             continue
         others = [f"{quantity}_{axis}" for axis in "xyz" if f"{quantity}_{axis}" != name]
-        ratio = _ratio(level, [channels[axis] for axis in others if axis in channels])
+        ratio = _compute_axis_ratio(level, [channels[axis] for axis in others if axis in channels])
         if ratio is not None:
             shown = low if ratio > 1.0 else high
             explained = (
                 f"is it in {unit}, and not {level['unit']}? Check"
                 for unit, factor in mistakes(level["unit"], quantity)
-                if 1.0 / _SAME < ratio * factor < _SAME
+                if 1.0 / _MAX_EXPLAINED_AXIS_RATIO < ratio * factor < _MAX_EXPLAINED_AXIS_RATIO
             )
             detail = (
                 f"the noise of {name} is {ratio:.3g} times that of {' and '.join(others)}, "
@@ -387,23 +405,23 @@ def _unlike(
             yield Finding("axis_unlike", "warning", detail, ratio, name)
 
 
-def _ratio(level: Level, others: Sequence[Level]) -> float | None:
+def _compute_axis_ratio(level: Level, others: Sequence[Level]) -> float | None:
     """Return how many times the noise of two axes alike a third has; None: not far off."""
     if len(others) < 2 or any(axis["density"][1] is None for axis in (level, *others)):
         return None
     least = min(axis["density"][0] for axis in others)
     most = max(axis["density"][1] for axis in others)
     low, high = level["density"]
-    if not (least > 0.0 and high > 0.0) or most > _EVEN * least:
+    if not (least > 0.0 and high > 0.0) or most > _MAX_RATIO_OF_OTHER_AXES * least:
         return None
-    if low > _UNEVEN * most:
+    if low > _MIN_SUSPICIOUS_AXIS_RATIO * most:
         return float(low / max(axis["density"][0] for axis in others))
-    if _UNEVEN * high < least:
+    if _MIN_SUSPICIOUS_AXIS_RATIO * high < least:
         return float(high / min(axis["density"][1] for axis in others))
     return None
 
 
-def _turning(means: Mapping[str, float], usual: Expected) -> Iterator[Finding]:
+def _check_mean_rates(means: Mapping[str, float], usual: Expected) -> Iterator[Finding]:
     """Yield the gyros whose mean no offset explains."""
     for name, mean in means.items():
         if abs(mean) > usual.offset:
@@ -415,17 +433,19 @@ def _turning(means: Mapping[str, float], usual: Expected) -> Iterator[Finding]:
             yield Finding("turning", "warning", detail, mean, name)
 
 
-def _tilting(means: Mapping[str, float], gravity: GravityTurn | None) -> Iterator[Finding]:
+def _check_gravity_turn(
+    means: Mapping[str, float], gravity: GravityTurn | None
+) -> Iterator[Finding]:
     """Yield a turn that gravity shows, alone or together with the gyros."""
-    if gravity is None or gravity.swept < _TILTING:
+    if gravity is None or gravity.swept < _MIN_TURN_WITH_GYROS:
         return
     seen = np.array(gravity.rate)
     rate = float(np.linalg.norm(seen))
     gyro = np.array([means.get(f"gyro_{axis}", np.nan) for axis in "xyz"])
     # The accelerometers do not show what turns about the vertical.
     along = float(gyro @ seen) / rate
-    together = abs(along / rate - 1.0) < _AGREES
-    if gravity.swept < _TILTED and not together:
+    together = abs(along / rate - 1.0) < _MAX_RATE_DISAGREEMENT
+    if gravity.swept < _MIN_TURN_OF_GRAVITY and not together:
         return
     beside = f", and the gyros {math.degrees(along):.3g} °/s about that axis" if together else ""
     detail = (

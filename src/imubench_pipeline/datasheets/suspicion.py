@@ -17,37 +17,37 @@ from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import from_si
 
-_FAR = 20.0
-_FEWEST = 5
-_DEGREES = math.degrees(1.0)
-_THOUSANDS = (
+_SUSPICIOUS_FACTOR = 20.0
+_MIN_SENSORS = 5
+_DEGREES_PER_RADIAN = math.degrees(1.0)
+_PREFIX_MISTAKES = (
     (1e-3, "thousandths of its unit"),
     (1e3, "thousands of its unit"),
     (1e-6, "millionths of its unit"),
     (1e6, "millions of its unit"),
 )
-_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
+_UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
     "gyro": (
-        (1.0 / _DEGREES, "degrees, and not rad"),
-        (_DEGREES, "rad, and not degrees"),
-        *_THOUSANDS,
+        (1.0 / _DEGREES_PER_RADIAN, "degrees, and not rad"),
+        (_DEGREES_PER_RADIAN, "rad, and not degrees"),
+        *_PREFIX_MISTAKES,
     ),
     "accel": (
         (STANDARD_GRAVITY, "g, and not m/s²"),
         (1.0 / STANDARD_GRAVITY, "m/s², and not g"),
-        *_THOUSANDS,
+        *_PREFIX_MISTAKES,
     ),
 }
 """Units that are mixed up: the factor that mends a figure, and what it would be in."""
 
-NEAR_PRINTED = 4.0
+MAX_FACTOR_FROM_PRINTED = 4.0
 """Times a printed figure that is usual of its sensor, either way: behind a low-pass, of a bad
 specimen, in another sidedness."""
 
-_NEAR_OTHERS = 2.0
+_MAX_FACTOR_BEYOND_CATALOGUE = 2.0
 """Times the least and the most of a catalogue that is usual."""
 
-_SHOWN: dict[tuple[str, str], tuple[str, str]] = {
+_DISPLAY_UNITS: dict[tuple[str, str], tuple[str, str]] = {
     ("gyro", "N"): ("°/s/√Hz", "gyro_density"),
     ("gyro", "B"): ("°/h", "angular_rate"),
     ("accel", "N"): ("µg/√Hz", "accel_density"),
@@ -90,7 +90,7 @@ def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]
     return {
         key: Usual(median(values), min(values), max(values), len(values))
         for key, values in by_figure.items()
-        if len(values) >= _FEWEST
+        if len(values) >= _MIN_SENSORS
     }
 
 
@@ -105,14 +105,16 @@ def printed_figures(sensor: Sensor, quantity: str) -> dict[str, float]:
         with_value = [(row, row.value) for row in rows if row.value is not None]
         for figure, statistic in (("N", "N"), ("B", "adev_minimum")):
             values = [
-                value for row, value in with_value if row.statistic == statistic and _plain(row)
+                value
+                for row, value in with_value
+                if row.statistic == statistic and _has_single_value(row)
             ]
             if values:
                 figures.setdefault(figure, values[0])
     return figures
 
 
-def _plain(row: Comparable) -> bool:
+def _has_single_value(row: Comparable) -> bool:
     return row.figure is not None and row.figure.kind != "range"
 
 
@@ -137,43 +139,48 @@ def suspicious(
         typical = usual.get((quantity, figure))
         if typical is None:
             continue
-        least, most = typical.least / _NEAR_OTHERS, typical.most * _NEAR_OTHERS
+        least, most = (
+            typical.least / _MAX_FACTOR_BEYOND_CATALOGUE,
+            typical.most * _MAX_FACTOR_BEYOND_CATALOGUE,
+        )
         if own := (printed or {}).get(figure):
-            least, most = own / NEAR_PRINTED, own * NEAR_PRINTED
+            least, most = own / MAX_FACTOR_FROM_PRINTED, own * MAX_FACTOR_FROM_PRINTED
             if least <= value <= most:
                 continue
-        if value > _FAR * typical.median:
+        if value > _SUSPICIOUS_FACTOR * typical.median:
             how = f"{value / typical.median:.3g} times the median of {typical.sensors} sensors, "
             other = typical.median
-        elif 0 < value < typical.least / _FAR:
+        elif 0 < value < typical.least / _SUSPICIOUS_FACTOR:
             how = (
                 f"{typical.least / value:.3g} times below the least of {typical.sensors} sensors, "
             )
             other = typical.least
         else:
             continue
-        doubt = _explained(quantity, figure, value, least, most)
-        shown = (written or {}).get(figure) or f"{figure} = {_text(quantity, figure, value)}"
-        than = _text(quantity, figure, other)
+        doubt = _ask_about_unit(quantity, figure, value, least, most)
+        shown = (written or {}).get(
+            figure
+        ) or f"{figure} = {_format_figure(quantity, figure, value)}"
+        than = _format_figure(quantity, figure, other)
         sentences.append(f"{quantity} {shown} is {how}{than}: {doubt}")
     return sentences
 
 
-def _explained(quantity: str, figure: str, value: float, least: float, most: float) -> str:
+def _ask_about_unit(quantity: str, figure: str, value: float, least: float, most: float) -> str:
     """Return the question whether it is in another unit, which is named if that explains it."""
-    for factor, unit in _MISTAKES[quantity]:
+    for factor, unit in _UNIT_MISTAKES[quantity]:
         if least <= value * factor <= most:
-            mended = _text(quantity, figure, value * factor)
+            mended = _format_figure(quantity, figure, value * factor)
             return f"is it in {unit}? It would be {mended} then"
     return "is its unit right?"
 
 
-def _text(quantity: str, figure: str, value: float, digits: int = 3) -> str:
-    unit, dimension = _SHOWN[quantity, figure]
+def _format_figure(quantity: str, figure: str, value: float, digits: int = 3) -> str:
+    unit, dimension = _DISPLAY_UNITS[quantity, figure]
     return f"{float(f'{from_si(value, unit, dimension):.{digits}g}'):g} {unit}"
 
 
-_NAMES = {"N": "N", "B": "σ_min"}
+_SYMBOLS = {"N": "N", "B": "σ_min"}
 """What estimates are compared by, with what vendors print."""
 
 
@@ -192,13 +199,13 @@ def unusual_rows(
             continue
         quantity, sensor = quantity_of(row.channel), sensors.get(row.sensor)
         printed = printed_figures(sensor, quantity) if sensor else None
-        unit, dimension = _SHOWN[quantity, figure]
+        unit, dimension = _DISPLAY_UNITS[quantity, figure]
         figures = [value]
         if row.lower is not None and row.upper is not None:
             figures += [row.lower, row.upper]
         size, *limits = (from_si(number, unit, dimension) for number in figures)
         digits = digits_by(size, *(limits or (None, None)))
-        text = f"{_NAMES[figure]} = {_text(quantity, figure, value, digits)}"
+        text = f"{_SYMBOLS[figure]} = {_format_figure(quantity, figure, value, digits)}"
         for sentence in suspicious(quantity, {figure: value}, usual, printed, {figure: text}):
             finding = Finding("unusual_figure", "warning", sentence, value, row.channel)
             yield finding.row(row.sensor, row.recording)
