@@ -11,7 +11,7 @@ from scipy import stats
 from imubench_pipeline.model.comparisons import DriftRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.drift import LEVEL, drift_rows, order_of, series_of
+from imubench_pipeline.navigation.drift import SIGNIFICANCE_LEVEL, drift_rows, order_of, series_of
 from tests.conftest import few
 
 Z = 1.959963984540054
@@ -258,7 +258,10 @@ def test_a_spread_that_grows_is_learnt(rng: np.random.Generator) -> None:
 def test_the_level_is_shared_by_the_tests_of_a_recording() -> None:
     values = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0]
     alone = of_biases([*values, 5.0])[-1]
-    assert LEVEL / 12 < alone["p_value"] < LEVEL and alone["verdict"] == "changed"
+    assert (
+        SIGNIFICANCE_LEVEL / 12 < alone["p_value"] < SIGNIFICANCE_LEVEL
+        and alone["verdict"] == "changed"
+    )
     listed = names(8)
     rows = [
         bias(name, value, f"{axis}_{n}")
@@ -284,7 +287,7 @@ def test_b_of_a_single_term_and_that_of_the_curve_are_one_test(model: str, verdi
     ]
     found = list(drift_rows(rows, [], [recording(name) for name in listed]))
     last = [row for row in found if row["recording"] == listed[7]]
-    assert all(LEVEL / 2 < row["p_value"] < LEVEL for row in last)
+    assert all(SIGNIFICANCE_LEVEL / 2 < row["p_value"] < SIGNIFICANCE_LEVEL for row in last)
     assert [row["verdict"] for row in last] == [verdict] * 2
 
 

@@ -1,24 +1,26 @@
-"""Recordings of one device over time: what earlier ones lead one to expect, and what has changed.
+"""Change detection over the recordings of one device: expected value and changes.
 
-A noise parameter is followed on the logarithm, y_k = ln p_k = mu + u_k + e_k, as in `pooled`: a
-spread tau between recordings (from turn-on to turn-on) and the error of each, from its limits. A
-bias is followed as it is: it has no limits, and all its scatter is spread.
+The model of a noise parameter is y_k = ln p_k = mu + u_k + e_k, as in `pooled`: u_k has the
+standard deviation tau between recordings (from turn-on to turn-on), and e_k follows from the limits
+of recording k. A bias is not transformed: it has no limits, and all its scatter is spread.
 
-mu and tau are those of a level, the recordings since the last change, weighted by 1 / (v + tau^2).
-tau^2 is what their squares about mu have beyond the errors v (moments, DerSimonian and Kacker, in
-three steps); from 8 recordings on, the squares about a straight line: about mu a slow drift would
-pass for spread and hide itself for ever. The distance of the next estimate from mu, over the root
-of v + tau^2 + var mu (v is its own half towards mu), is Student's t (of a bias exactly) with
-Satterthwaite's degrees of freedom, at most n - 1, about a line n - 2.
+mu and tau are estimated from a level, the recordings since the last change, weighted by
+1 / (v + tau^2). tau^2 is the excess of the squared residuals from mu over the errors v (method of
+moments of DerSimonian and Kacker, in three steps). From 8 recordings on, the residuals are from a
+straight line: otherwise a slow drift would increase tau and never be detected. The distance of the
+next estimate from mu, over the root of v + tau^2 + var mu (v from the half of its interval towards
+mu), follows Student's t (exactly for a bias) with Satterthwaite's degrees of freedom, at most
+n - 1, or n - 2 about a line.
 
-A recording is ``changed`` where p is below `LEVEL` over its number of tests (Bonferroni). B of a
-single term and ``B_curve`` are one quantity and one test, that of ``B_curve``. It begins
-a new level, so a step is flagged once. If the next recording is nearer to the old level, the
-flagged one stood alone, and the old level goes on without it.
+A recording is ``changed`` if p is below `SIGNIFICANCE_LEVEL` over its number of tests
+(Bonferroni). B of a single term and ``B_curve`` are one quantity with one test, on ``B_curve``. A
+changed recording begins a new level, so that a step is flagged once. If the next recording is
+nearer to the old level, the flagged one was an outlier, and the old level continues without it.
 
-Fewer than three do not tell tau and judge nothing: were it taken for 0, each turn-on would be a
-change. Of 42 tests one flags what exceeds, in standard deviations of a recording: 75 after 3; 14
-after 5; 6.6 after 10; 4.7 after 20; 4.0 after 50. A lesser change joins the level.
+Fewer than three recordings do not determine tau, so nothing is tested: with tau = 0, each turn-on
+would be a change. With 42 tests, the smallest change that is flagged, in standard deviations of a
+recording, is 75 after 3 recordings; 14 after 5; 6.6 after 10; 4.7 after 20; 4.0 after 50. A smaller
+change joins the level.
 
 References
 ----------
@@ -41,27 +43,35 @@ from scipy.special import stdtr, stdtrit
 from imubench_pipeline.model.comparisons import DriftRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.pooled import POOLED, bounded_exp, points_about_median, usable
+from imubench_pipeline.navigation.pooled import (
+    POOLED_PARAMETERS,
+    bounded_exp,
+    points_about_median,
+    usable,
+)
 from imubench_pipeline.noise import PARAMETERS, TERMS
 
 Order = Literal["started", "name"]
 
-LEVEL = 0.01
-"""Probability that a recording of an unchanged device is flagged in anything, at most."""
+SIGNIFICANCE_LEVEL = 0.01
+"""Maximum probability that any test flags a recording of an unchanged device."""
 
 Estimated = ParameterRow | FixedBiasRow
-"""What is compared: a parameter, or the mean of a channel."""
+"""A compared row: a noise parameter, or the mean of a channel."""
 
-_FEWEST = 3  # recordings that tell the spread between them
-_LINE_FROM = 8  # recordings; a line takes one degree of freedom more
-_EACH, _GROWTH = 32, 1.05  # tau is found anew with each of 32 recordings, then with each 5 % more
-_NAMES = (*POOLED, "bias")
-_OF_BIAS = {kind.symbol for kind in TERMS if PARAMETERS["B"] in kind.parameters}
-_NOTHING = (math.nan, math.nan, math.nan, math.nan, 0.0, -1.0, -1.0)
+_MIN_RECORDINGS = 3  # to estimate the spread between recordings
+_MIN_RECORDINGS_FOR_LINE = 8  # a line takes one degree of freedom more
+_RECORDINGS_UPDATED_EACH, _UPDATE_GROWTH = (
+    32,
+    1.05,
+)  # tau is found anew with each of 32 recordings, then with each 5 % more
+_COMPARED_NAMES = (*POOLED_PARAMETERS, "bias")
+_BIAS_TERMS = {kind.symbol for kind in TERMS if PARAMETERS["B"] in kind.parameters}
+_EMPTY_RESULT = (math.nan, math.nan, math.nan, math.nan, 0.0, -1.0, -1.0)
 
 
 class Series(NamedTuple):
-    """The analysed recordings of one device, the first one first."""
+    """The analysed recordings of one device, in order of time."""
 
     sensor: str
     device: str
@@ -71,15 +81,15 @@ class Series(NamedTuple):
 
 
 def order_of(recordings: Iterable[RecordingRow]) -> tuple[list[RecordingRow], Order]:
-    """Order the recordings of one device in time, and say by what.
+    """Return the recordings of one device in order of time, and the key of that order.
 
-    By ``started`` where each has one that is ISO 8601 and not all are the same (a clock that was
-    never set); equal ones by name. Else by the name, its numbers as numbers: run_2 before run_10.
-    A stamp without a zone is UTC, as the readers write it.
+    The key is ``started`` if each recording has an ISO 8601 stamp and not all are the same (a clock
+    that was never set); equal stamps are ordered by name. Else it is the name, with its numbers as
+    numbers: run_2 before run_10. A stamp without a zone is UTC, as the readers write it.
     """
-    by_name = sorted(recordings, key=lambda row: _natural(row.recording))
+    by_name = sorted(recordings, key=lambda row: _split_numbers(row.recording))
     try:
-        stamps = [_stamp(row.started or "") for row in by_name]
+        stamps = [_parse_stamp(row.started or "") for row in by_name]
     except ValueError:
         return by_name, "name"
     if len(set(stamps)) < 2:
@@ -88,18 +98,18 @@ def order_of(recordings: Iterable[RecordingRow]) -> tuple[list[RecordingRow], Or
     return [by_name[index] for _, index in pairs], "started"
 
 
-def _stamp(started: str) -> datetime:
+def _parse_stamp(started: str) -> datetime:
     stamp = datetime.fromisoformat(started.strip())
     return stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)
 
 
-def _natural(name: str) -> tuple[list[tuple[str, int]], str]:
+def _split_numbers(name: str) -> tuple[list[tuple[str, int]], str]:
     parts = re.findall(r"(\D*)(\d*)", name)
     return [(text.casefold(), int(digits or -1)) for text, digits in parts], name
 
 
 def series_of(recordings: Iterable[RecordingRow]) -> Iterator[Series]:
-    """Yield each device's recordings of status ``ok``, if two or more; simulated ones apart."""
+    """Yield devices with two or more recordings of status ``ok``; simulated ones separately."""
     groups: dict[tuple[str, str, bool], list[RecordingRow]] = {}
     for row in recordings:
         if row.status == "ok":
@@ -116,56 +126,61 @@ def drift_rows(
 ) -> Iterator[DriftRow]:
     """Yield the rows of the table ``drift``.
 
-    One for each recording of a series, and channel and parameter that any recording of it has;
-    those of the gyro come first, those of a parameter follow one another in time. The limits of
-    ``expected`` are 95 %, of this recording's estimate. Where there is no verdict (``changed`` or
-    ``as before``), ``reason`` says why.
+    There is one row for each recording of a series and each channel and parameter that any of its
+    recordings has. Rows of the gyro come first; rows of one parameter are in order of time. The
+    limits of ``expected`` are the 95 % prediction interval for the estimate of this recording.
+    Without a verdict (``changed`` or ``as before``), ``reason`` explains why.
 
     Parameters
     ----------
     parameters : iterable of ParameterRow
-        Of the recommended method. Used are component 1 and the
-        parameters of `navigation.pooled.POOLED`; only a value with status ``ok`` is an estimate. B
-        and T_B are compared with those of the same terms: B of flicker noise and of a Gauss-Markov
-        process are different quantities; that of the curve is the same of all models.
+        Rows of the recommended method. Component 1 of the parameters in
+        `navigation.pooled.POOLED_PARAMETERS` is used; only a value with status ``ok`` is an
+        estimate. B and T_B are compared only between models with the same terms: B of flicker noise
+        and B of a Gauss-Markov process are different quantities. ``B_curve`` does not depend on the
+        model.
     fixed_bias : iterable of FixedBiasRow
     recordings : iterable of RecordingRow
     """
     cells: dict[tuple[str, str], dict[tuple[str, str], Estimated]] = {}
     for row in parameters:
-        if row.parameter in _NAMES and row.component == 1:
+        if row.parameter in _COMPARED_NAMES and row.component == 1:
             cells.setdefault((row.sensor, row.recording), {})[row.channel, row.parameter] = row
     for bias in fixed_bias:
         cells.setdefault((bias.sensor, bias.recording), {})[bias.channel, "bias"] = bias
     for series in series_of(recordings):
         keys = [(series.sensor, row.recording) for row in series.recordings]
-        yield from _rows(series, [cells.get(key, {}) for key in keys])
+        yield from _make_rows(series, [cells.get(key, {}) for key in keys])
 
 
-def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Estimated]]) -> Iterator[DriftRow]:
+def _make_rows(
+    series: Series, cells: Sequence[dict[tuple[str, str], Estimated]]
+) -> Iterator[DriftRow]:
     points: dict[tuple[str, ...], dict[int, tuple[float, ...]]] = {}
     units: dict[tuple[str, str], str] = {}
     for place, cell in enumerate(cells):
         for key, row in cell.items():
-            if _status(row) != "absent":
+            if _get_status(row) != "absent":
                 units[key] = row.unit
-                points.setdefault((*key, _kind(row)), {})[place] = _point(row)
+                points.setdefault((*key, _get_bias_terms(row)), {})[place] = _make_point(row)
     columns = {column: index for index, column in enumerate(sorted(points))}
     data = np.full((3, len(cells), len(columns)), np.nan)
     for column, index in columns.items():
         data[:, list(points[column]), index] = np.transpose(list(points[column].values()))
-    tested_as = [columns.get(_tested_as(key), index) for key, index in columns.items()]
+    tested_as = [columns.get(_find_tested_column(key), index) for key, index in columns.items()]
     levels = np.moveaxis(_Levels(data, np.array(tested_as, dtype=int)).results, 0, 2).tolist()
-    for key in sorted(units, key=lambda key: (key[0][0] != "g", key[0], _NAMES.index(key[1]))):
+    for key in sorted(
+        units, key=lambda key: (key[0][0] != "g", key[0], _COMPARED_NAMES.index(key[1]))
+    ):
         noise = key[1] != "bias"
         for place, recording in enumerate(series.recordings):
             own = cells[place].get(key)
-            index = columns.get((*key, _kind(own)), -1)
-            *y, p, changed, count, alone = _NOTHING if index < 0 else levels[place][index]
+            index = columns.get((*key, _get_bias_terms(own)), -1)
+            *y, p, changed, count, alone = _EMPTY_RESULT if index < 0 else levels[place][index]
             expected = [None if math.isnan(x) else bounded_exp(x) if noise else x for x in y]
-            value = own.value if own is not None and _status(own) == "ok" else None
+            value = own.value if own is not None and _get_status(own) == "ok" else None
             change = value / expected[0] - 1.0 if noise and value and expected[0] else None
-            reasons = [_unjudged(own, count)] if math.isnan(p) else []
+            reasons = [_explain_no_verdict(own, count)] if math.isnan(p) else []
             if alone >= 0.0:
                 reasons.append(f"{series.recordings[int(alone)].recording} stood alone")
             if changed:
@@ -198,29 +213,29 @@ def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Estimated]]) -> 
             )
 
 
-def _status(row: Estimated | None) -> str:
-    """Return whether there is a value; a mean always is one."""
+def _get_status(row: Estimated | None) -> str:
+    """Return the status of an estimate; a mean is always ``ok``."""
     if row is None:
         return "absent"
     return row.status if isinstance(row, ParameterRow) else "ok"
 
 
-def _kind(row: Estimated | None) -> str:
-    """Return what B and T_B are parameters of, such as ``F`` or ``GM``; of others nothing."""
+def _get_bias_terms(row: Estimated | None) -> str:
+    """Return the terms of B and T_B, such as ``F`` or ``GM``; empty for other parameters."""
     if not isinstance(row, ParameterRow) or row.parameter not in ("B", "T_B"):
         return ""
     terms = row.model.split("+")
-    return "+".join(term for term in terms if term in _OF_BIAS)
+    return "+".join(term for term in terms if term in _BIAS_TERMS)
 
 
-def _tested_as(column: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the channel, parameter and kind that say whether this one has changed."""
+def _find_tested_column(column: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the channel, parameter and terms whose test decides for this column."""
     channel, parameter, kind = column
-    return (channel, "B_curve", "") if parameter == "B" and kind in _OF_BIAS else column
+    return (channel, "B_curve", "") if parameter == "B" and kind in _BIAS_TERMS else column
 
 
-def _point(row: Estimated) -> tuple[float, ...]:
-    """Return y and the variances of its error, where the truth lies below and above; or NaN."""
+def _make_point(row: Estimated) -> tuple[float, ...]:
+    """Return y and the variances of its error, for a truth below and above; or NaN."""
     if isinstance(row, FixedBiasRow):
         return row.value, 0.0, 0.0
     triple = (row.value if row.status == "ok" else None, row.lower, row.upper)
@@ -230,16 +245,16 @@ def _point(row: Estimated) -> tuple[float, ...]:
     return y, *points[0][1:]
 
 
-def _unjudged(row: Estimated | None, count: float) -> str:
-    status = _status(row).replace("_", " ")
+def _explain_no_verdict(row: Estimated | None, count: float) -> str:
+    status = _get_status(row).replace("_", " ")
     reason = row.reason if isinstance(row, ParameterRow) else None
     if status != "ok":
         return f"{status}: {reason}" if reason else status
     if count < 0.0:
         return "no value with limits"
     if count == 0.0:
-        return "the first value" + f" with {_kind(row)}" * bool(_kind(row))
-    if count < _FEWEST:
+        return "the first value" + f" with {_get_bias_terms(row)}" * bool(_get_bias_terms(row))
+    if count < _MIN_RECORDINGS:
         return f"{count:.0f} before it at this level: the spread between recordings is not known"
     return (
         "limits far narrower than before"
@@ -251,18 +266,18 @@ def _unjudged(row: Estimated | None, count: float) -> str:
 class _Levels:
     """The levels of c columns through n recordings.
 
-    ``points`` (3, n, c) are y, and the variances of its error where the truth lies below and above;
-    NaN is no value. ``results`` (7, n, c) are the expected y and its limits, p-value (NaN: not
-    judged), 1 or -1 where changed, how many the level has before it (-1: no value), and the flagged
-    recording that this one shows to have stood alone (-1: none). A column has the p-value and the
-    verdict of the one that it is ``tested_as`` (c,), wherever that is judged.
+    ``points`` (3, n, c): y, and the variances of its error for a truth below and above; NaN means
+    no value. ``results`` (7, n, c): the expected y and its two limits; p-value (NaN: not tested);
+    1 or -1 for a change, else 0; number of earlier recordings in the level (-1: no value); index
+    of the flagged recording that this one shows to be an outlier (-1: none). ``tested_as`` (c,):
+    index of the column that gives a column its p-value and verdict, if that one is tested.
     """
 
     def __init__(self, points: NDArray[np.float64], tested_as: NDArray[np.int64]) -> None:
         _, recordings, columns = points.shape
         self._points = points
         self._tested_as = tested_as
-        self.results = np.tile(np.reshape(_NOTHING, (-1, 1, 1)), (recordings, columns))
+        self.results = np.tile(np.reshape(_EMPTY_RESULT, (-1, 1, 1)), (recordings, columns))
         self._member = np.zeros((recordings, columns), dtype=bool)
         self._state = np.zeros((7, columns))
         self._aside: dict[int, tuple[int, NDArray[np.bool_], NDArray[np.float64]]] = {}
@@ -276,19 +291,19 @@ class _Levels:
         for column in [column for column in self._aside if present[column]]:
             self._resume(place, column)
         self._settle()
-        # Recordings, of them used for tau; mu, 1 / var mu, tau^2, its degrees of freedom times
-        # their mean 1 / (v + tau^2), and these.
+        # Number of recordings; how many of them gave tau; mu; 1 / var mu; tau^2; its degrees of
+        # freedom times the mean of 1 / (v + tau^2); the degrees of freedom.
         count, _, mean, weight, spread, information, freedom = self._state
         own = spread + np.stack([np.where(y < mean, above, below), above, below])
         error = np.sqrt(own + 1.0 / weight)
         degrees = np.minimum((own * information) ** 2 / freedom, freedom)
-        judged = present & (count >= _FEWEST) & (own[0] > 0.0) & (degrees[0] >= 1.0)
+        judged = present & (count >= _MIN_RECORDINGS) & (own[0] > 0.0) & (degrees[0] >= 1.0)
         p_value = 2.0 * stdtr(degrees[0], -np.abs(y - mean) / error[0])
         half = stdtrit(np.maximum(degrees[1:], 1.0), 0.975) * error[1:]
         here = np.arange(len(y))
         test = np.where(judged[self._tested_as], self._tested_as, here)
         p_value = p_value[test]
-        changed = judged & (p_value < LEVEL / max((judged & (test == here)).sum(), 1))
+        changed = judged & (p_value < SIGNIFICANCE_LEVEL / max((judged & (test == here)).sum(), 1))
         of_judged = np.stack([mean - half[0], mean + half[1], p_value, changed * np.sign(y - mean)])
         self.results[1:5, place, judged] = of_judged[:, judged]
         self.results[5, place, present] = count[present]
@@ -304,7 +319,7 @@ class _Levels:
         mean += np.where(present, added / weight * (y - mean), 0.0)
 
     def _resume(self, place: int, column: int) -> None:
-        """Go on with the level put aside, if a value is nearer to it than to the flagged one."""
+        """Restore the previous level if a value is nearer to it than to the flagged one."""
         flagged, member, state = self._aside.pop(column)
         y, below, above = self._points[:, place, column]
         new, new_below, new_above = self._points[:, flagged, column]
@@ -316,16 +331,19 @@ class _Levels:
             self.results[6, place, column] = flagged
 
     def _settle(self) -> None:
-        """Find mu and tau of the levels that have grown."""
+        """Update mu and tau of the levels that have grown (Satterthwaite; DerSimonian-Kacker)."""
         count, settled = self._state[:2]
-        due = np.flatnonzero((count > settled) & ((count <= _EACH) | (count >= _GROWTH * settled)))
+        due = np.flatnonzero(
+            (count > settled)
+            & ((count <= _RECORDINGS_UPDATED_EACH) | (count >= _UPDATE_GROWTH * settled))
+        )
         if not due.size:
             return
         rows = np.flatnonzero(self._member[:, due].any(axis=1))[:, np.newaxis]
         member = self._member[rows, due]
         y, below, above = np.where(member, self._points[:, rows, due], 0.0)
         y = np.where(member, y - self._state[2, due], 0.0)  # keeps the digits of narrow limits
-        line = count[due] >= _LINE_FROM
+        line = count[due] >= _MIN_RECORDINGS_FOR_LINE
         weight = member.astype(np.float64)
         for _ in range(3):
             total = weight.sum(axis=0)

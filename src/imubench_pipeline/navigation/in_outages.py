@@ -16,13 +16,13 @@ from scipy.special import ndtr
 from imubench_pipeline.model import table
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, NavigationRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.pooled import NORMAL
+from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
 from imubench_pipeline.settings.requirements import DIMENSIONS, Limit, Requirement
 from imubench_pipeline.units import SI_UNITS
 
-_AXES = {"position": math.sqrt(2.0), "velocity": math.sqrt(2.0), "heading": 1.0}
+_AXIS_FACTORS = {"position": math.sqrt(2.0), "velocity": math.sqrt(2.0), "heading": 1.0}
 
-_MEANT = "simulated drives; the limits are those of the runs, not of the estimate"
+_LIMITS_NOTE = "simulated drives; the limits are those of the runs, not of the estimate"
 
 
 @table.row
@@ -58,10 +58,10 @@ def outage_rows(
         for limit in requirement.in_outages:
             for sensor, about in of_sensors.items():
                 found = runs.get((sensor, limit.trajectory, limit.seconds))
-                yield _row(name, requirement, limit, found or about, found)
+                yield _make_row(name, requirement, limit, found or about, found)
 
 
-def _row(
+def _make_row(
     name: str,
     requirement: Requirement,
     limit: Limit,
@@ -90,11 +90,11 @@ def _row(
             f"the filter of this sensor goes astray: NEES is inside in {inside:.0f} % instead of 95"
         )
         return replace(unknown, reason=reason)
-    found = _error(run, limit.error)
+    found = _get_error(run, limit.error)
     if found is None:
         return replace(unknown, reason=f"the runs do not tell the error of the {limit.error}")
-    sigma, lower, upper = (size / _AXES[limit.error] for size in found)
-    spread = math.log(upper / lower) / (2.0 * NORMAL)
+    sigma, lower, upper = (size / _AXIS_FACTORS[limit.error] for size in found)
+    spread = math.log(upper / lower) / (2.0 * NORMAL_QUANTILE)
     assumed = f"; assumed: {run.assumed}" if run.assumed else ""
     return replace(
         unknown,
@@ -102,11 +102,11 @@ def _row(
         lower=lower,
         upper=upper,
         within=float(ndtr(math.log(allowed / sigma) / spread)),
-        reason=_MEANT + assumed,
+        reason=_LIMITS_NOTE + assumed,
     )
 
 
-def _error(run: NavigationRow, error: str) -> tuple[float, float, float] | None:
+def _get_error(run: NavigationRow, error: str) -> tuple[float, float, float] | None:
     """Return the root mean square of an error with its limits."""
     value, lower, upper = {
         "position": (run.position, run.position_lower, run.position_upper),

@@ -1,22 +1,24 @@
-"""Several recordings of one sensor or device: the pooled value, the spread, and whether they agree.
+"""Pooled value, spread and agreement of several recordings of one sensor or device.
 
-A noise parameter is pooled on the logarithm, y_k = ln p_k = mu + u_k + e_k, with variances tau^2
-between recordings and v_k from the 95 % limits of each. Of asymmetric limits the half towards mu
-counts, v = (ln upper - y)^2 / z^2 where mu > y (the likelihood of a split normal, whose sum is
-convex in mu), no narrower than a quarter of the mean half: a narrower one would be a wall.
+The random-effects model of a noise parameter is y_k = ln p_k = mu + u_k + e_k. The variance is
+tau^2 between recordings and v_k from the 95 % limits of each. If the limits are asymmetric, the
+half towards mu counts: v = (ln upper - y)^2 / z^2 for mu > y (the likelihood of a split normal,
+whose sum is convex in mu). The half is at least a quarter of the mean half: a narrower one would
+bound mu on that side.
 
-A recording without a value inside positive limits is left out and counted. The limits of what is
-not identified are made by the prior as much as by the log: twenty of their middles would make a
-confident wrong value. They serve against the selection that leaving out makes, of small values
-less often identified: `Pool.contradicting`.
+A recording without a value inside positive limits is left out and counted. The limits of a
+parameter that is not determined depend as much on the prior as on the log: the mean of twenty such
+intervals would be precise and wrong. They are used only to detect selection bias, since small
+values are less often determined: `Pool.contradicting`.
 
-The interval of the pool is Hartung and Knapp's, t with K - 1 degrees of freedom, but never narrower
-than the errors of the recordings allow (Jackson et al.). It covers, in 8,000 simulated pools a case
-(errors equal-within a factor 3), for K = 2; 3; 5; 20: without spread 99; 99; 98; 96-97 %, with a
-spread of one error 98-96; 97-94; 96-94; 95, of three 96-93; 96-93; 95; 95; where errors differ
-tenfold about the spread, down to 79; 86; 89; 93. With K = 2 it is wide (t = 12.7): two values do
-not know their spread. What is shorter fails: the normal interval covers 70-76 % at a large spread,
-and Hartung and Knapp's alone (95 %) has no width where two values happen to meet.
+The interval of the pool is from Hartung and Knapp, t with K - 1 degrees of freedom, but never
+narrower than the errors of the recordings allow (Jackson et al.). Its coverage was simulated with
+8,000 pools a case (errors equal to errors within a factor 3), for K = 2; 3; 5; 20. Without spread
+it is 99; 99; 98; 96-97 %. With a spread of one error it is 98-96; 97-94; 96-94; 95 %, with a
+spread of three errors 96-93; 96-93; 95; 95 %. If errors differ tenfold about the spread, it falls
+to 79; 86; 89; 93 %. With K = 2 the interval is wide (t = 12.7), since two values hardly determine
+their spread. Shorter intervals fail: the normal interval covers 70-76 % at a large spread, and the
+interval of Hartung and Knapp alone (95 %) has no width if two values happen to be equal.
 
 References
 ----------
@@ -41,20 +43,20 @@ from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 
 Verdict = Literal["agree", "differ"]
 
-LEVEL = 0.01
-"""Probability, where recordings agree, of saying that they differ."""
+SIGNIFICANCE_LEVEL = 0.01
+"""Significance level of Cochran's Q: probability of ``differ`` if recordings agree."""
 
-POOLED = ("N", "B_curve", "sigma_min", "K", "B", "T_B", "Q", "R")
-"""The parameters that are pooled, in their order in the table."""
+POOLED_PARAMETERS = ("N", "B_curve", "sigma_min", "K", "B", "T_B", "Q", "R")
+"""Pooled parameters, in their order in the table."""
 
-NORMAL = 1.959963984540054
-"""97.5 % of the standard normal."""
+NORMAL_QUANTILE = 1.959963984540054
+"""97.5 % quantile of the standard normal distribution."""
 
-_NARROWEST_HALF = 0.25
+_MIN_HALF_WIDTH_RATIO = 0.25
 
 E = TypeVar("E", ParameterRow, FixedBiasRow)
 
-_Point = tuple[float, float, float]  # y, and its variance where the truth lies below and above
+_Point = tuple[float, float, float]  # y, and its variance for a truth below and above
 _Group = tuple[str, str | None, str, str]  # sensor, device, channel and parameter
 
 
@@ -62,13 +64,13 @@ _Group = tuple[str, str | None, str, str]  # sensor, device, channel and paramet
 class Pool:
     """One noise parameter of several recordings."""
 
-    # value, lower, upper: pooled value and its 95 % limits, in the unit of the values; None where
-    # no recording has a value with limits. Of one recording its own
+    # value, lower, upper: pooled value and its 95 % limits, in the unit of the values; None if no
+    # recording has a value with limits. With one recording, its own value and limits
     value: float | None
     lower: float | None
     upper: float | None
-    # recordings, left_out, contradicting: used; left out; of those, the ones whose limits lie
-    # outside what the others predict
+    # recordings, left_out, contradicting: number used; number left out; number of those left out
+    # whose limits lie outside the range that the others predict
     recordings: int
     left_out: int
     contradicting: int = 0
@@ -80,14 +82,14 @@ class Pool:
     spread_lower: float | None = None
     spread_upper: float | None = None
     # p_value, verdict: of Cochran's Q, chi-squared with K - 1 degrees of freedom where recordings
-    # agree; ``differ`` where it is below `LEVEL`, else ``agree``: no difference is shown
+    # agree; ``differ`` if it is below `SIGNIFICANCE_LEVEL`, else ``agree``: not significant
     p_value: float | None = None
     verdict: Verdict | None = None
 
 
 @dataclass(frozen=True)
 class TurnOnBias:
-    """The fixed bias of a channel, of d(u) in equation 1 of paper 000, over recordings."""
+    """The fixed bias of a channel over recordings: d(u) in equation 1 of Maia et al."""
 
     recordings: int
     left_out: int
@@ -107,7 +109,8 @@ def pool(
 ) -> Pool:
     """Pool the estimates of a positive parameter (model and sources: see the module).
 
-    tau is by Paule and Mandel, Q(tau^2) = K - 1; its limits by Viechtbauer's Q-profile.
+    tau is the estimate of Paule and Mandel, Q(tau^2) = K - 1; its limits are from the Q-profile
+    method of Viechtbauer.
 
     Parameters
     ----------
@@ -127,18 +130,20 @@ def pool(
         return Pool(None, None, None, 0, len(others))
     if len(used) == 1:
         value, low, high = used[0]
-        return Pool(value, low, high, 1, len(others), _outside(others, low, high))
+        return Pool(value, low, high, 1, len(others), _count_outside(others, low, high))
     middle, points = points_about_median(used)
     freedom = len(used) - 1
-    low_q, high_q, t = _quantiles(freedom)
-    spread_squared = _spread_squared(points, float(freedom))
-    mean, q, _, weight = _minimum(points, spread_squared)
+    low_q, high_q, t = _compute_quantiles(freedom)
+    spread_squared = _solve_spread_squared(points, float(freedom))
+    mean, q, _, weight = _minimise_q(points, spread_squared)
     centre = middle + mean
     error = 1.0 / math.sqrt(weight)
-    half = max(t * math.sqrt(q / freedom), NORMAL) * error
+    half = max(t * math.sqrt(q / freedom), NORMAL_QUANTILE) * error
     predicted = t * math.hypot(math.sqrt(spread_squared), error)
-    outside = _outside(others, bounded_exp(centre - predicted), bounded_exp(centre + predicted))
-    p_value = float(chdtrc(freedom, _minimum(points, 0.0)[1]))
+    outside = _count_outside(
+        others, bounded_exp(centre - predicted), bounded_exp(centre + predicted)
+    )
+    p_value = float(chdtrc(freedom, _minimise_q(points, 0.0)[1]))
     return Pool(
         value=math.exp(centre),
         lower=bounded_exp(centre - half),
@@ -148,34 +153,34 @@ def pool(
         contradicting=outside,
         error=error,
         spread=math.sqrt(spread_squared),
-        spread_lower=math.sqrt(_spread_squared(points, high_q)),
-        spread_upper=math.sqrt(_spread_squared(points, low_q)),
+        spread_lower=math.sqrt(_solve_spread_squared(points, high_q)),
+        spread_upper=math.sqrt(_solve_spread_squared(points, low_q)),
         p_value=p_value,
-        verdict="differ" if p_value < LEVEL else "agree",
+        verdict="differ" if p_value < SIGNIFICANCE_LEVEL else "agree",
     )
 
 
 def usable(triple: tuple[float | None, ...]) -> TypeGuard[tuple[float, float, float]]:
-    """Return whether value and limits are known, positive and in their order."""
+    """Return whether value and limits are known, positive and in order."""
     value, lower, upper = triple
     if value is None or lower is None or upper is None:
         return False
     return 0.0 < lower < value < upper < math.inf  # False for NaN
 
 
-def _outside(limits: Iterable[Sequence[float | None]], low: float, high: float) -> int:
-    """Count the limits that lie wholly outside a range; a limit that is None says nothing."""
+def _count_outside(limits: Iterable[Sequence[float | None]], low: float, high: float) -> int:
+    """Count the intervals that lie wholly outside a range; a limit of None is open."""
     return sum((b is not None and b < low) or (a is not None and a > high) for a, b in limits)
 
 
 def bounded_exp(exponent: float) -> float:
-    """Return e to a power, at most the largest float."""
+    """Return the exponential of a number, at most the largest float."""
     return math.exp(min(exponent, 709.0))
 
 
 @lru_cache(maxsize=4096)
-def _quantiles(freedom: int) -> tuple[float, float, float]:
-    """Return chi-squared at 2.5 and 97.5 %, and Student's t at 97.5 %."""
+def _compute_quantiles(freedom: int) -> tuple[float, float, float]:
+    """Return the 2.5 and 97.5 % quantiles of chi-squared, and 97.5 % of Student's t."""
     low, high = (float(chdtri(freedom, tail)) for tail in (0.975, 0.025))
     return low, high, float(stdtrit(freedom, 0.975))
 
@@ -183,23 +188,23 @@ def _quantiles(freedom: int) -> tuple[float, float, float]:
 def points_about_median(used: Iterable[tuple[float, float, float]]) -> tuple[float, list[_Point]]:
     """Return the median of ln value, and the points about it, ascending."""
     logs = sorted((math.log(v), math.log(low), math.log(high)) for v, low, high in used)
-    middle = logs[len(logs) // 2][0]  # taken out, to keep the digits of narrow limits
+    middle = logs[len(logs) // 2][0]  # subtracted, to keep the precision of narrow limits
     points = []
     for y, low, high in logs:
-        narrowest = _NARROWEST_HALF * (high - low) / 2.0
+        narrowest = _MIN_HALF_WIDTH_RATIO * (high - low) / 2.0
         below, above = max(y - low, narrowest), max(high - y, narrowest)
-        points.append((y - middle, (below / NORMAL) ** 2, (above / NORMAL) ** 2))
+        points.append((y - middle, (below / NORMAL_QUANTILE) ** 2, (above / NORMAL_QUANTILE) ** 2))
     return middle, points
 
 
-def _minimum(points: list[_Point], spread_squared: float) -> tuple[float, float, float, float]:
+def _minimise_q(points: list[_Point], spread_squared: float) -> tuple[float, float, float, float]:
     """Return the mu that minimises Q = sum (y - mu)^2 / (v + tau^2), Q, -dQ/dtau^2, sum 1/v."""
     weight = moment = 0.0
     for y, below, _ in points:
         weight += 1.0 / (below + spread_squared)
         moment += y / (below + spread_squared)
     mean = moment / weight
-    # dQ/dmu falls through 0 once: a point that mu has passed errs by its upper half.
+    # dQ/dmu has one root. For a point below mu, the upper half of its interval counts.
     for y, below, above in points:
         if mean <= y:
             break
@@ -216,22 +221,22 @@ def _minimum(points: list[_Point], spread_squared: float) -> tuple[float, float,
     return mean, q, decline, weight
 
 
-def _spread_squared(points: list[_Point], target: float) -> float:
-    """Return tau^2 at which Q falls to a target; 0 where it starts below it."""
-    _, q, decline, _ = _minimum(points, 0.0)
+def _solve_spread_squared(points: list[_Point], target: float) -> float:
+    """Return the tau^2 at which Q equals a target; 0 if Q(0) is below it."""
+    _, q, decline, _ = _minimise_q(points, 0.0)
     if q <= target:
         return 0.0
     average = math.fsum(y for y, _, _ in points) / len(points)
     low, high = 0.0, math.fsum((y - average) ** 2 for y, _, _ in points) / target
     spread_squared = 0.0
-    # Newton's steps on 1/Q, a straight line in tau^2 where errors are equal, kept in a bracket.
+    # Newton steps on 1/Q, which is linear in tau^2 for equal errors, inside a bracket.
     for _ in range(100):
         before, spread_squared = spread_squared, spread_squared + q * (q / target - 1.0) / decline
         if not low <= spread_squared <= high:
             spread_squared = (low + high) / 2.0
         if abs(spread_squared - before) <= 1e-12 * spread_squared:
             break
-        _, q, decline, _ = _minimum(points, spread_squared)
+        _, q, decline, _ = _minimise_q(points, spread_squared)
         low, high = (spread_squared, high) if q > target else (low, spread_squared)
     return spread_squared
 
@@ -239,9 +244,10 @@ def _spread_squared(points: list[_Point], target: float) -> float:
 def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     """Return the spread of the fixed bias from recording to recording.
 
-    Its limits: (K - 1) s^2 / sigma^2 is chi-squared. Whatever else a mean holds is in it too: the
-    slow noise of a recording and, of an accelerometer, gravity as it lay. The means are in rad/s or
-    m/s^2; None and NaN are left out. Of one mean it has only itself, of none only the counts.
+    Its limits follow from the chi-squared distribution of (K - 1) s^2 / sigma^2. The spread
+    includes the slow noise of a recording and, for an accelerometer, changes of its tilt. The means
+    are in rad/s or m/s^2; None and NaN are left out. With one mean only ``mean`` is set, with none
+    only the counts.
     """
     listed = list(means)
     present = [mean for mean in listed if mean is not None and math.isfinite(mean)]
@@ -253,19 +259,19 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     if not freedom:
         return TurnOnBias(*counts, mean)
     squares = math.fsum((value - mean) ** 2 for value in present)
-    low_q, high_q, t = _quantiles(freedom)
+    low_q, high_q, t = _compute_quantiles(freedom)
     deviation = math.sqrt(squares / freedom)
     half = t * deviation / math.sqrt(len(present))
     limits = (math.sqrt(squares / high_q), math.sqrt(squares / low_q))
     return TurnOnBias(*counts, mean, mean - half, mean + half, deviation, *limits)
 
 
-def _same_devices(pairs: Sequence[tuple[float, str]]) -> float | None:
-    """Return the p-value that devices differ no more than the recordings of one device do.
+def _test_devices(pairs: Sequence[tuple[float, str]]) -> float | None:
+    """Return the p-value of equal device means (one-way analysis of variance).
 
-    One-way analysis of variance (Fisher 1925): F = [sum_d n_d (m_d - m)^2 / (D - 1)] /
-    [sum (y - m_d)^2 / (K - D)] of K recordings of D devices, of equal weight: their errors are
-    part of the spread within a device. None with one device, without repeats or scatter.
+    F = [sum_d n_d (m_d - m)^2 / (D - 1)] / [sum (y - m_d)^2 / (K - D)] for K recordings of D
+    devices (Fisher 1925). All recordings have equal weight: their errors are part of the spread
+    within a device. None with one device, without repeats or without scatter.
     """
     groups: dict[str, list[float]] = {}
     for value, device in pairs:
@@ -287,31 +293,31 @@ def pooled_rows(
 ) -> Iterator[PooledRow]:
     """Yield the rows of the table ``pooled``.
 
-    One (device None) for each sensor with two recordings or more and, where it has more than one
-    device, one for each device with two or more. None where no recording has the parameter, of
-    `POOLED` or ``bias``. All numbers are in ``unit``: of a noise parameter the spread is ``value``
-    times tau (see `Pool`), of a bias the deviation. A parameter that some recordings have and
-    others lack is never ``agree``; those without T_B (models without a Gauss-Markov term) do not
-    count for it. A bias has no verdict.
+    There is one row (device None) for each sensor with two recordings or more. If it has several
+    devices, there is also one for each device with two recordings or more. Parameters are those of
+    `POOLED_PARAMETERS`, and ``bias``; a parameter that no recording has gives no row. All numbers
+    are in ``unit``: the spread of a noise parameter is ``value`` times tau (see `Pool`), and of a
+    bias the standard deviation. A parameter that only some recordings have is never ``agree``;
+    recordings without T_B (no Gauss-Markov term) are not counted for it. A bias has no verdict.
 
     Parameters
     ----------
     parameters : iterable of ParameterRow
-        Used are those that are recommended, of component 1 and a parameter of `POOLED`. Only a
+        Recommended rows of component 1 and a parameter of `POOLED_PARAMETERS` are used. Only a
         value with status ``ok`` is an estimate.
     biases : iterable of FixedBiasRow
         The mean of each channel; one that is not finite is left out.
     devices : mapping of (sensor, recording) to str
-        The device; a recording that is not there is a device of its own.
+        The device; a recording that is not listed is a device of its own.
     """
-    # By channel, parameter and recording; under "" every recording, as one that lacks the term.
+    # By channel, parameter and recording; the key "" lists every recording, with or without it.
     estimates: dict[tuple[str, str], dict[str, dict[str, ParameterRow | None]]] = {}
     means: dict[tuple[str, str], dict[str, FixedBiasRow | None]] = {}
     for row in parameters:
         if row.recommended and row.component == 1:
             table = estimates.setdefault((row.sensor, row.channel), {})
             table.setdefault("", {})[row.recording] = None
-            if row.parameter in POOLED and row.status != "absent":
+            if row.parameter in POOLED_PARAMETERS and row.status != "absent":
                 table.setdefault(row.parameter, {})[row.recording] = row
     for bias in biases:
         means.setdefault((bias.sensor, bias.channel), {})[bias.recording] = bias
@@ -325,28 +331,28 @@ def pooled_rows(
     for sensor, channel in keys:
         table = estimates.get((sensor, channel), {})
         several = len(of_sensor[sensor]) > 1
-        for name in POOLED:
+        for name in POOLED_PARAMETERS:
             rows = table.get(name, {})
             if rows and name != "T_B":
                 rows = table[""] | rows
-            for device, present, count in _groups(sensor, rows, devices, several=several):
+            for device, present, count in _group_rows(sensor, rows, devices, several=several):
                 group = (sensor, device, channel, name)
-                yield _parameter_row(group, present, count - len(present), several)
+                yield _make_parameter_row(group, present, count - len(present), several)
         of_channel = means.get((sensor, channel), {})
-        for device, biased, _ in _groups(sensor, of_channel, devices, several=several):
-            yield _bias_row((sensor, device, channel, "bias"), biased, several)
+        for device, biased, _ in _group_rows(sensor, of_channel, devices, several=several):
+            yield _make_bias_row((sensor, device, channel, "bias"), biased, several)
 
 
-def _groups(
+def _group_rows(
     sensor: str,
     rows: Mapping[str, E | None],
     devices: Mapping[tuple[str, str], str],
     *,
     several: bool,
 ) -> Iterator[tuple[str | None, list[tuple[str, E]], int]]:
-    """Yield sensor (None) and devices with rows of several recordings, and how many they are.
+    """Yield the rows of the sensor (None) and of each device with several recordings.
 
-    The rows that are there come with the device of each.
+    Each group has its number of recordings; each row comes with its device.
     """
     groups: dict[str | None, list[tuple[str, E | None]]] = {}
     for recording, entry in rows.items():
@@ -359,7 +365,7 @@ def _groups(
             yield group, present, len(cells)
 
 
-def _parameter_row(
+def _make_parameter_row(
     group: _Group, present: Sequence[tuple[str, ParameterRow]], absent: int, several: bool
 ) -> PooledRow:
     sensor, device, channel, parameter = group
@@ -403,11 +409,11 @@ def _parameter_row(
         spread_upper=in_unit[2],
         p_value=pooled.p_value,
         verdict=None if absent and pooled.verdict == "agree" else pooled.verdict,
-        reason="; ".join(reasons + _device_reasons(logs, of_devices)) or None,
+        reason="; ".join(reasons + _describe_device_effects(logs, of_devices)) or None,
     )
 
 
-def _bias_row(
+def _make_bias_row(
     group: _Group, present: Sequence[tuple[str, FixedBiasRow]], several: bool
 ) -> PooledRow:
     sensor, device, channel, parameter = group
@@ -416,7 +422,7 @@ def _bias_row(
     reasons = [f"{bias.left_out} left out: no mean"] * (bias.left_out > 0)
     if channel.startswith("accel"):
         reasons.append("gravity is in it: the spread also shows how differently the sensor lay")
-    reasons += _device_reasons(pairs, several and device is None)
+    reasons += _describe_device_effects(pairs, several and device is None)
     return PooledRow(
         sensor=sensor,
         device=device,
@@ -435,11 +441,11 @@ def _bias_row(
     )
 
 
-def _device_reasons(pairs: Iterable[tuple[float | None, str]], several: bool) -> list[str]:
-    """Say whether devices or repeats make the spread, where that can be told."""
+def _describe_device_effects(pairs: Iterable[tuple[float | None, str]], several: bool) -> list[str]:
+    """Return how the spread between devices compares with repeats, if it can be tested."""
     finite = [(y, device) for y, device in pairs if y is not None and math.isfinite(y)]
-    p_value = _same_devices(finite) if several else None
+    p_value = _test_devices(finite) if several else None
     if p_value is None:
         return []
-    beyond = "beyond the" if p_value < LEVEL else "no more than their"
+    beyond = "beyond the" if p_value < SIGNIFICANCE_LEVEL else "no more than their"
     return [f"devices differ {beyond} spread from recording to recording (p = {p_value:.2g})"]

@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 
 from imubench_pipeline.model.comparisons import DriftRow, PooledRow, RankingRow, RepeatabilityRow
 from imubench_pipeline.model.published import CoverageRow
-from imubench_pipeline.navigation.drift import LEVEL
+from imubench_pipeline.navigation.drift import SIGNIFICANCE_LEVEL
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
 from imubench_pipeline.report.evidence import evidence
@@ -169,7 +169,9 @@ def _trends(
         outside = [
             row.recording + mark
             for row in series
-            if row.verdict == "as before" and row.p_value is not None and row.p_value < LEVEL
+            if row.verdict == "as before"
+            and row.p_value is not None
+            and row.p_value < SIGNIFICANCE_LEVEL
         ]
         trends.setdefault(channel, []).append(
             {

@@ -31,18 +31,18 @@ from statistics import variance
 from scipy.special import stdtr, stdtrit
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.navigation.pooled import NORMAL, Pool, bounded_exp, pool
+from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE, Pool, bounded_exp, pool
 
 Limits = tuple[float, float, float]  # value, lower, upper
 
-_LEAST_TAKEN = 0.5
+_MIN_VARIANCE_SHARE = 0.5
 """Part of the variance of the logarithms that the errors of the logs never explain away."""
 
-_FEWEST = 3
+_MIN_FREEDOM = 3
 """Degrees of freedom that a spread of other sensors needs; t = 3.2, of two it is 4.3."""
 
-_FURTHEST = 1e-4  # of a value: a lower limit of 0 is no logarithm
-_NARROWEST = 1e-9  # likewise, for a value that is its own limit
+_MIN_LOWER_RATIO = 1e-4  # of a value: a lower limit of 0 is no logarithm
+_MIN_RELATIVE_WIDTH = 1e-9  # likewise, for a value that is its own limit
 
 
 @dataclass(frozen=True)
@@ -80,33 +80,33 @@ def expected(
     without a figure do not count; the specimen of each recording; and the spread of other sensors,
     for one specimen.
     """
-    figures = [(row, figure) for row in totals if (figure := _figure(row)) is not None]
+    figures = [(row, figure) for row in totals if (figure := _read_limits(row)) is not None]
     if not figures:
         return Expected(None, None, None, None, 0, 0)
     groups: dict[str, list[Limits]] = {}
     for row, figure in figures:
-        groups.setdefault(devices[row.recording], []).append(_limits(*figure))
+        groups.setdefault(devices[row.recording], []).append(_clip_limits(*figure))
     counts = (len(groups), len(figures))
     if any(sigma <= 0.0 for _, (sigma, _, _) in figures) or (len(figures) == 1 and usual is None):
         worst, figure = max(figures, key=lambda pair: pair[1][0])
         return Expected(*figure, worst.within, *counts)
     limit = figures[0][0].limit
     if len(groups) == 1 and usual is not None:
-        value, lower, upper = _of_device(*groups.values())
-        error = math.log(upper / lower) / (2.0 * NORMAL)
+        value, lower, upper = _pool_device(*groups.values())
+        error = math.log(upper / lower) / (2.0 * NORMAL_QUANTILE)
         # Of the specimen that is known, and of the next one.
         scale = math.sqrt(2.0 * usual.variance + error**2)
-        prediction = _predicted(math.log(value), scale, usual.freedom, limit)
+        prediction = _predict(math.log(value), scale, usual.freedom, limit)
         return Expected(*prediction, *counts, usual, "other sensors")
     if len(groups) == 1:
         (values,) = groups.values()
     else:
-        values = [_of_device(own) for own in groups.values()]
+        values = [_pool_device(own) for own in groups.values()]
     together = pool(*zip(*values, strict=True))
-    spread = _spread(values, together)
+    spread = _estimate_spread(values, together)
     assert together.value is not None and together.error is not None  # several, all usable
     scale = math.sqrt(spread.variance + together.error**2)
-    prediction = _predicted(math.log(together.value), scale, spread.freedom, limit)
+    prediction = _predict(math.log(together.value), scale, spread.freedom, limit)
     of = "specimens" if len(groups) > 1 else "recordings"
     return Expected(*prediction, *counts, spread, of)
 
@@ -118,41 +118,41 @@ def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
     """
     listed = list(spreads)
     freedom = sum(spread.freedom for spread in listed)
-    if freedom < _FEWEST:
+    if freedom < _MIN_FREEDOM:
         return None
     return Spread(
         math.fsum(spread.variance * spread.freedom for spread in listed) / freedom, freedom
     )
 
 
-def _figure(row: ErrorBudgetRow) -> Limits | None:
+def _read_limits(row: ErrorBudgetRow) -> Limits | None:
     if row.sigma is None or row.lower is None or row.upper is None:
         return None
     return row.sigma, row.lower, row.upper
 
 
-def _limits(value: float, lower: float, upper: float) -> Limits:
+def _clip_limits(value: float, lower: float, upper: float) -> Limits:
     """Return value and limits as `pool` takes them: positive, and on either side of the value."""
     return (
         value,
-        min(max(lower, _FURTHEST * value), value * (1.0 - _NARROWEST)),
-        max(upper, value * (1.0 + _NARROWEST)),
+        min(max(lower, _MIN_LOWER_RATIO * value), value * (1.0 - _MIN_RELATIVE_WIDTH)),
+        max(upper, value * (1.0 + _MIN_RELATIVE_WIDTH)),
     )
 
 
-def _of_device(recordings: Sequence[Limits]) -> Limits:
+def _pool_device(recordings: Sequence[Limits]) -> Limits:
     pooled = pool(*zip(*recordings, strict=True))
     assert pooled.value and pooled.lower and pooled.upper  # all are usable
     return pooled.value, pooled.lower, pooled.upper
 
 
-def _spread(values: Sequence[Limits], together: Pool) -> Spread:
-    least = _LEAST_TAKEN * variance([math.log(value) for value, _, _ in values])
+def _estimate_spread(values: Sequence[Limits], together: Pool) -> Spread:
+    least = _MIN_VARIANCE_SHARE * variance([math.log(value) for value, _, _ in values])
     assert together.spread is not None  # there are several
     return Spread(max(together.spread**2, least), len(values) - 1)
 
 
-def _predicted(
+def _predict(
     mean: float, scale: float, freedom: int, limit: float | None
 ) -> tuple[float, float, float, float | None]:
     """Return median, 95 % limits and the chance to be within a limit."""

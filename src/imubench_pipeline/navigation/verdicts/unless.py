@@ -17,7 +17,7 @@ from scipy.special import ndtr
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.navigation.pooled import NORMAL
+from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
 from imubench_pipeline.navigation.suitability.conditions import with_sigma
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.evidence import quantity_behind
@@ -25,7 +25,7 @@ from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, l
 
 Factors = Mapping[str, float]  # by quantity
 
-_MEANT = {
+_UNIT_OF_FACTOR = {
     "gyro": (
         (math.radians(1.0), "°/s, and not rad/s"),
         (math.degrees(1.0), "rad/s, and not °/s"),
@@ -68,7 +68,7 @@ def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless 
     devices = {name: basis.device((of, name)) for of, name in keys}
     logged = deciding(standings(own, devices))
     factors = {key: basis.factors(key) for key in doubted}
-    mended = deciding(standings(list(_mended(own, factors)), devices)) if factors else None
+    mended = deciding(standings(list(_correct_rows(own, factors)), devices)) if factors else None
     if mended is not None and not unjudged and mended.verdict == logged.verdict:
         mended = None
     if not logged.known or (mended is None and not unjudged):
@@ -78,7 +78,7 @@ def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless 
     return Unless(logged if unjudged else None, mended, together, doubts)
 
 
-def _mended(
+def _correct_rows(
     rows: Iterable[ErrorBudgetRow], factors: Mapping[tuple[str, str], Factors]
 ) -> Iterator[ErrorBudgetRow]:
     """Yield rows with the figures that recordings would have in the other unit."""
@@ -106,7 +106,7 @@ def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudge
     sigma = math.hypot(*(size for _, size in sources))
     by = sigma / total.sigma
     lower, upper = by * total.lower, by * total.upper
-    within = _within(total.limit, sigma, lower, upper)
+    within = _compute_chance_within(total.limit, sigma, lower, upper)
     return [
         replace(total, sigma=sigma, lower=lower, upper=upper, within=within, reached_after=None),
         *(replace(row, sigma=size) for row, size in sources),
@@ -114,7 +114,9 @@ def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudge
     ]
 
 
-def _within(limit: float | None, sigma: float, lower: float, upper: float) -> float | None:
+def _compute_chance_within(
+    limit: float | None, sigma: float, lower: float, upper: float
+) -> float | None:
     """Return the chance that an error is within its limit, log-normal on either side."""
     if limit is None:
         return None
@@ -125,37 +127,37 @@ def _within(limit: float | None, sigma: float, lower: float, upper: float) -> fl
     half = math.log(side)
     if half <= 0.0:
         return 1.0 if away >= 0.0 else 0.0
-    return float(ndtr(NORMAL * away / half))
+    return float(ndtr(NORMAL_QUANTILE * away / half))
 
 
 def unless_words(alternative: Unless) -> str:
     """Return in words what the verdict would be."""
     parts = []
     if alternative.logged is not None:
-        parts.append(f"as logged it {_outcome(alternative.logged)}")
+        parts.append(f"as logged it {_describe_outcome(alternative.logged)}")
     if alternative.mended is not None:
-        outcome = _outcome(alternative.mended)
+        outcome = _describe_outcome(alternative.mended)
         if (
             alternative.logged is not None
             and alternative.logged.verdict == alternative.mended.verdict
         ):
             outcome = outcome.replace(alternative.mended.verdict, "does so too")
-        parts.append(f"if {_units(alternative.factors)}, it {outcome}")
+        parts.append(f"if {_describe_units(alternative.factors)}, it {outcome}")
     return "; ".join(parts)
 
 
-def _outcome(standing: Standing) -> str:
+def _describe_outcome(standing: Standing) -> str:
     if standing.verdict == "not enough data":
         reason = "" if standing.known else f" ({standing.total.reason})"
         return f"cannot be judged{reason}"
     return f"{standing.verdict} (margin {standing.margin:.3g})"
 
 
-def _units(factors: Factors) -> str:
+def _describe_units(factors: Factors) -> str:
     named = []
     for quantity, factor in sorted(factors.items(), reverse=True):
         name = "gyro" if quantity == "gyro" else "accelerometer"
-        for size, units in _MEANT[quantity]:
+        for size, units in _UNIT_OF_FACTOR[quantity]:
             if math.isclose(factor, size, rel_tol=1e-6):
                 named.append(f"the {name} is in {units}")
                 break
