@@ -29,7 +29,11 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     of_squared_rise,
 )
 from imubench_pipeline.navigation.error_budget.parts import Quantity
-from imubench_pipeline.navigation.error_budget.printed_errors import PRINTED, in_use, of_datasheet
+from imubench_pipeline.navigation.error_budget.printed_errors import (
+    DATASHEET_KEY_OF_CAUSE,
+    in_use,
+    of_datasheet,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.settings.printed import IN_USE, Datasheet
@@ -40,7 +44,7 @@ DEGREE = math.pi / 180
 NOTHING = NoiseModel()
 QUANTITIES: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
 USE = Use(temperature_change=20.0, turns=2 * math.pi, speed_change=10.0, vibration=G, over=60.0)
-CAUSES: tuple[Cause, ...] = (*PRINTED, "temperature_squared")
+CAUSES: tuple[Cause, ...] = (*DATASHEET_KEY_OF_CAUSE, "temperature_squared")
 
 
 def figures(**sigmas: float) -> Any:
@@ -241,7 +245,7 @@ def test_what_is_not_printed_is_not_known_and_it_is_said_why() -> None:
     assert "does not publish" in reasons["nonlinearity"]
     assert "does not say" in reasons["scale_factor"]
     assert "grade A" in reasons["g_sensitivity"]
-    assert set(PRINTED.values()) == set(IN_USE)
+    assert set(DATASHEET_KEY_OF_CAUSE.values()) == set(IN_USE)
 
 
 def test_units_of_ratios_and_of_vibration() -> None:

@@ -299,7 +299,7 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
     for verdict in strings_in("navigation/verdicts/judgement.py", "_outside"):
         if "price class" in verdict:
             yield verdict, "verdict"
-    for verdict in (conditions.EXCLUDED, *conditions.CONDITIONAL.values()):
+    for verdict in (conditions.EXCLUDED, *conditions.CONDITIONAL_VERDICTS.values()):
         yield verdict, "verdict"
     for verdict in strings_in("estimators/goodness.py", "goodness", ast.IfExp):
         yield verdict, "verdict"

@@ -34,9 +34,9 @@ from imubench_pipeline.settings.requirements import DIMENSIONS
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS
 
-_TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-_TAIL = 0.025
+_STANDARD_TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+_STANDARD_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+_TAIL_PROBABILITY = 0.025
 """Beyond each 95 % limit."""
 
 
@@ -92,8 +92,10 @@ def growth_rows(
             total = total + at_rest / (start.window * STANDARD_GRAVITY) ** 2
         return total
 
-    for axis, at_rest in product(answerers := _answerers(axes), sorted({*_WINDOWS, window})):
-        for question in standard(sorted({*_TIMES, *times}), at_rest, 0.0, ["worst"]):
+    for axis, at_rest in product(
+        answerers := _map_answering_axes(axes), sorted({*_STANDARD_WINDOWS, window})
+    ):
+        for question in standard(sorted({*_STANDARD_TIMES, *times}), at_rest, 0.0, ["worst"]):
             if question.error == "north":
                 continue
             chosen = answering(question, answerers[axis])
@@ -115,13 +117,13 @@ def growth_rows(
                 time=question.time,
                 unit=SI_UNITS[DIMENSIONS[question.error]],
             )
-            lower, upper = _limits(budget, drawn)
+            lower, upper = _compute_limits(budget, drawn)
             yield row(source="total", sigma=budget.total, lower=lower, upper=upper)
             for part in sorted(budget.contributions, key=lambda one: -one.sigma):
                 yield row(source=part.source, sigma=part.sigma)
 
 
-def _answerers(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, AxisErrors]]:
+def _map_answering_axes(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, AxisErrors]]:
     """Return the channels that may answer for the worst axes, and for each axis alone."""
     letters = sorted({channel[-1] for channel in axes})
     alone = {
@@ -132,9 +134,9 @@ def _answerers(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, AxisErrors
     return {"worst": dict(axes), **alone}
 
 
-def _limits(budget: Budget, drawn: Array) -> tuple[float, float]:
+def _compute_limits(budget: Budget, drawn: Array) -> tuple[float, float]:
     """Return the limits of the total of a budget, by the variances that noise has drawn."""
     sure = math.fsum(part.sigma**2 for part in budget.contributions if part.cause != "noise")
-    lower, upper = np.quantile(np.sqrt(drawn + sure), [_TAIL, 1.0 - _TAIL])
+    lower, upper = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
     # The draws of what is absent lie above it: the value itself is inside.
     return min(float(lower), budget.total), max(float(upper), budget.total)

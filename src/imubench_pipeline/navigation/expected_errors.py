@@ -55,7 +55,7 @@ class AxisErrors:
     figures: Figures = field(default_factory=dict)
 
 
-_NOTHING = AxisErrors()
+_NO_AXIS_ERRORS = AxisErrors()
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def error_rows(
     def drawn_of(channel: str) -> list[AxisErrors]:
         stream = partial(channel_rng, seed, repr(estimates[channel].model), channel)
         models = draw_models(estimates[channel], draws, stream("budget"))
-        of_use = _drawn(axes[channel].figures, draws, stream("temperature of the budget"))
+        of_use = _draw_figures(axes[channel].figures, draws, stream("temperature of the budget"))
         return [AxisErrors(*pair) for pair in zip(models, of_use, strict=True)]
 
     drawn = {channel: drawn_of(channel) for channel in axes}
@@ -218,14 +218,14 @@ def error_rows(
         chosen = answering(question, axes)
         if chosen is None:
             missing = [
-                _missing(quantity, estimates)
+                _explain_missing_noise(quantity, estimates)
                 for quantity in question.needs
-                if not _of(quantity, axes)
+                if not _list_channels(quantity, axes)
             ]
             yield replace(asked, reason="; ".join(missing))
             continue
-        pair = [axes[c] if c else _NOTHING for c in chosen.values()]
-        many = [drawn[c] if c else [_NOTHING] * draws for c in chosen.values()]
+        pair = [axes[c] if c else _NO_AXIS_ERRORS for c in chosen.values()]
+        many = [drawn[c] if c else [_NO_AXIS_ERRORS] * draws for c in chosen.values()]
         nominal = question.answer(*pair)
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
         asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
@@ -235,9 +235,9 @@ def error_rows(
         apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
         reasons = (
             *nominal.assumptions,
-            *_doubts(chosen, estimates),
-            *_apart(apart, estimates),
-            *_unknown(question, estimates),
+            *_list_doubts(chosen, estimates),
+            *_list_independent_channels(apart, estimates),
+            *_list_unknown_axes(question, estimates),
         )
         yield replace(
             asked,
@@ -272,19 +272,19 @@ def axes_of(
 
 def answering(question: Question, axes: Mapping[str, AxisErrors]) -> dict[str, str | None] | None:
     """Return the channels of gyro and accelerometer that answer; None: one of them is missing."""
-    if not all(_of(quantity, axes) for quantity in question.needs):
+    if not all(_list_channels(quantity, axes) for quantity in question.needs):
         return None
     return {
-        quantity: _axis(question, quantity, axes) if quantity in question.needs else None
+        quantity: _select_axis(question, quantity, axes) if quantity in question.needs else None
         for quantity in ("gyro", "accel")
     }
 
 
-def _of(quantity: str, axes: Mapping[str, AxisErrors]) -> list[str]:
+def _list_channels(quantity: str, axes: Mapping[str, AxisErrors]) -> list[str]:
     return [channel for channel in axes if quantity_of(channel) == quantity]
 
 
-def _drawn(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
+def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
     """Return draws of what is known of an axis, as sure as its measured figures are."""
     spread = {
         cause: figure
@@ -304,41 +304,49 @@ def _drawn(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figur
     ]
 
 
-def _missing(quantity: str, estimates: Mapping[str, Estimate]) -> str:
+def _explain_missing_noise(quantity: str, estimates: Mapping[str, Estimate]) -> str:
     """Return why there is no noise of a quantity to answer with."""
     silent = [channel for channel in estimates if quantity_of(channel) == quantity]
     if not silent:
         return f"no {SENSORS[quantity]} in the recording"
-    return f"nothing is known of the noise of {', '.join(silent)}: {_why(estimates[silent[0]])}"
+    return (
+        f"nothing is known of the noise of {', '.join(silent)}: "
+        f"{_find_reason(estimates[silent[0]])}"
+    )
 
 
-def _unknown(question: Question, estimates: Mapping[str, Estimate]) -> Iterator[str]:
+def _list_unknown_axes(question: Question, estimates: Mapping[str, Estimate]) -> Iterator[str]:
     """Yield the axes that could not answer."""
     for channel, estimate in estimates.items():
         if quantity_of(channel) in question.needs and not estimate.model.terms:
-            yield f"{channel} does not count: nothing is known of its noise ({_why(estimate)})"
+            yield (
+                f"{channel} does not count: nothing is known of its noise "
+                f"({_find_reason(estimate)})"
+            )
 
 
-def _why(estimate: Estimate) -> str:
+def _find_reason(estimate: Estimate) -> str:
     reasons = (parameter.reason for parameter in estimate.parameters.values())
     return next((reason for reason in reasons if reason), "its log does not show it")
 
 
-def _axis(question: Question, quantity: str, axes: Mapping[str, AxisErrors]) -> str:
+def _select_axis(question: Question, quantity: str, axes: Mapping[str, AxisErrors]) -> str:
     """Return the channel of a quantity whose own part of the error is the worst, or the median."""
 
     def part(channel: str) -> float:
         own = axes[channel]
-        pair = (own, _NOTHING) if quantity == "gyro" else (_NOTHING, own)
+        pair = (own, _NO_AXIS_ERRORS) if quantity == "gyro" else (_NO_AXIS_ERRORS, own)
         return question.answer(*pair).total
 
-    ranked = sorted(_of(quantity, axes), key=part)
+    ranked = sorted(_list_channels(quantity, axes), key=part)
     # Of two axes the median is the worse one.
     return ranked[-1] if question.axis == "worst" else ranked[len(ranked) // 2]
 
 
-def _apart(channels: Sequence[str], estimates: Mapping[str, Estimate]) -> Iterator[str]:
-    """Yield the channels of which only limits of single parameters are known."""
+def _list_independent_channels(
+    channels: Sequence[str], estimates: Mapping[str, Estimate]
+) -> Iterator[str]:
+    """Yield a note on each channel whose parameters have no joint draws."""
     for channel in channels:
         yield (
             f"method {estimates[channel].method} tells the parameters of {channel} one by one: "
@@ -346,7 +354,9 @@ def _apart(channels: Sequence[str], estimates: Mapping[str, Estimate]) -> Iterat
         )
 
 
-def _doubts(chosen: Mapping[str, str | None], estimates: Mapping[str, Estimate]) -> Iterator[str]:
+def _list_doubts(
+    chosen: Mapping[str, str | None], estimates: Mapping[str, Estimate]
+) -> Iterator[str]:
     """Yield the parameters that the logs do not tell."""
     for channel in chosen.values():
         for _, name, parameter in estimates[channel].components() if channel else ():

@@ -31,10 +31,10 @@ from imubench_pipeline.typing import Array
 
 Verdict = Literal["lower", "higher", "not told apart", "not known"]
 
-_TAIL = 0.025
+_TAIL_PROBABILITY = 0.025
 """Beyond each 95 % limit."""
 
-_PER_DECADE = 2
+_TAUS_PER_DECADE = 2
 """Tau of the table ``drawn_deviations``."""
 
 
@@ -66,17 +66,21 @@ def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
     Where one has no value, but limits, the interval is from the lower limit of the first over the
     upper one of the second to the upper one over the lower one: it is wide.
     """
-    reason = "; ".join(dict.fromkeys(_doubts(first, second))) or None
+    reason = "; ".join(dict.fromkeys(_list_doubts(first, second))) or None
     a, b = first.value, second.value
     if not a or not b:
-        low = _over(first.lower or 0.0, second.upper)
-        high = _over(first.upper, second.lower)
+        low = _divide(first.lower or 0.0, second.upper)
+        high = _divide(first.upper, second.lower)
         if high is None and low in (None, 0.0):
             low = None
         return Ratio(None, low, high, reason)
     middle = math.log(a / b)
-    below = _hypot(_distance(first.lower, a), _distance(b, second.upper))
-    above = _hypot(_distance(a, first.upper), _distance(second.lower, b))
+    below = _add_in_quadrature(
+        _compute_log_ratio(first.lower, a), _compute_log_ratio(b, second.upper)
+    )
+    above = _add_in_quadrature(
+        _compute_log_ratio(a, first.upper), _compute_log_ratio(second.lower, b)
+    )
     return Ratio(
         a / b,
         None if below is None else math.exp(middle - below),
@@ -85,7 +89,7 @@ def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
     )
 
 
-def _doubts(first: Parameter, second: Parameter) -> list[str]:
+def _list_doubts(first: Parameter, second: Parameter) -> list[str]:
     words = ("the first", first), ("the second", second)
     return [
         f"{which} is {parameter.status.replace('_', ' ')}"
@@ -94,20 +98,20 @@ def _doubts(first: Parameter, second: Parameter) -> list[str]:
     ]
 
 
-def _over(numerator: float | None, denominator: float | None) -> float | None:
+def _divide(numerator: float | None, denominator: float | None) -> float | None:
     if numerator is None or not denominator:
         return None
     return numerator / denominator
 
 
-def _distance(low: float | None, high: float | None) -> float | None:
+def _compute_log_ratio(low: float | None, high: float | None) -> float | None:
     """Return the logarithm of one limit over the other; infinite down to 0, None: not known."""
     if low is None or high is None:
         return None
     return math.log(high / low) if low > 0.0 else math.inf
 
 
-def _hypot(*sides: float | None) -> float | None:
+def _add_in_quadrature(*sides: float | None) -> float | None:
     return None if None in sides else math.hypot(*(side for side in sides if side is not None))
 
 
@@ -140,21 +144,26 @@ def ratio_of_deviations(
     if not first.model.terms or not second.model.terms:
         return Ratio(None, None, None, "one has no noise model")
     value = math.sqrt(float(number_needed(first.variance(tau), 0.0, second.variance(tau))))
-    own, other = (_variances(_drawn(channel, draws, seed), [tau])[0] for channel in (first, second))
+    own, other = (
+        _compute_variances(_draw_models(channel, draws, seed), [tau])[0]
+        for channel in (first, second)
+    )
     ratios = np.sqrt(number_needed(own[:, None], 0.0, other[None, :]))
-    lower, upper = np.quantile(ratios, [_TAIL, 1.0 - _TAIL], method="inverted_cdf")
+    lower, upper = np.quantile(
+        ratios, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY], method="inverted_cdf"
+    )
     unknown = "; ".join(dict.fromkeys([*first.unknown(tau), *second.unknown(tau)])) or None
     # The draws of what is absent lie above it: the value itself is inside.
     limits = min(float(lower), value), max(float(upper), value)
     return Ratio(None if unknown else value, *limits, unknown)
 
 
-def _drawn(channel: FusionChannel, draws: int, seed: int) -> list[NoiseModel]:
+def _draw_models(channel: FusionChannel, draws: int, seed: int) -> list[NoiseModel]:
     stream = channel_rng(seed, repr(channel.model), channel.channel, "ratio")
     return channel.drawn(draws, stream)
 
 
-def _variances(models: Sequence[NoiseModel], tau: Sequence[float]) -> Array:
+def _compute_variances(models: Sequence[NoiseModel], tau: Sequence[float]) -> Array:
     """Return the Allan variances of models, shape (tau, models)."""
     times = np.asarray(tau, dtype=np.float64)[:, np.newaxis]
     return summed(models, lambda term: term.allan_variance(times), len(tau))
@@ -180,13 +189,13 @@ def deviation_rows(
     if not channel.model.terms:
         return
     first, last = (
-        _PER_DECADE * math.log10(end) for end in (1.0 / rate, longest * channel.duration)
+        _TAUS_PER_DECADE * math.log10(end) for end in (1.0 / rate, longest * channel.duration)
     )
     taus = [
-        10.0 ** (step / _PER_DECADE)
+        10.0 ** (step / _TAUS_PER_DECADE)
         for step in range(math.ceil(first - 1e-9), math.floor(last + 1e-9) + 1)
     ]
-    drawn = np.sqrt(_variances(_drawn(channel, draws, seed), taus))
+    drawn = np.sqrt(_compute_variances(_draw_models(channel, draws, seed), taus))
     row = partial(
         DrawnDeviationRow,
         sensor=channel.sensor,

@@ -39,7 +39,7 @@ def repeatability_rows(
             continue
         # The first recording of a device has none before it.
         unknown = sum(row.power_cycled is None for row, _ in several) > 1
-        spread = _spread(channel, [value for _, value in several], unknown)
+        spread = _estimate_spread(channel, [value for _, value in several], unknown)
         for entry in repeatability_comparables(sensors[sensor].datasheet, channel):
             found = compare(entry, spread, tolerance)
             unsaid = found.delta is None and spread.reason and entry.value is not None
@@ -63,7 +63,7 @@ def repeatability_rows(
             )
 
 
-def _spread(channel: str, values: Sequence[float], unknown: bool) -> Parameter:
+def _estimate_spread(channel: str, values: Sequence[float], unknown: bool) -> Parameter:
     """Return the standard deviation between turn-ons, with its conditions."""
     if channel.startswith("accel"):
         reason = "gravity is in the mean: how the sensor lay each time would be in the spread"

@@ -12,7 +12,7 @@ from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.navigation.verdicts.unless import unless_words
 
-_SHOWN = 3
+_MAX_NAMED_RECORDINGS = 3
 """Recordings whose doubts are named; of more the number."""
 
 
@@ -29,12 +29,12 @@ def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
         compared = {judgement.sensor: judgement for judgement in own if judgement.compared}
         for judgement in own:
             sensor = judgement.sensor
-            rank, tied = _rank(sensor, compared) if sensor in compared else (None, [])
+            rank, tied = _compute_rank(sensor, compared) if sensor in compared else (None, [])
             for standing, weak in zip(judgement.standings, judgement.weak, strict=True):
-                yield _row(judgement, standing, weak, rank, tied, basis)
+                yield _make_row(judgement, standing, weak, rank, tied, basis)
 
 
-def _row(
+def _make_row(
     judgement: Judgement,
     standing: Standing,
     weak: Sequence[str],
@@ -47,7 +47,7 @@ def _row(
     apart = [reason for (of, _), reason in basis.apart.items() if of == sensor]
     unless = None if judgement.outside else judgement.unless
     logged, mended = (unless.logged, unless.mended) if unless else (None, None)
-    tested = _backtest(judgement.name, standing, basis)
+    tested = _find_backtest(judgement.name, standing, basis)
     return RankingRow(
         requirement=judgement.name,
         sensor=sensor,
@@ -66,7 +66,7 @@ def _row(
         lower=expected.lower,
         upper=expected.upper,
         unit=total.unit,
-        margin=_margin(standing),
+        margin=_get_margin(standing),
         chance=standing.chance if known else None,
         limit_verdict=standing.verdict,
         source=standing.source,
@@ -75,7 +75,7 @@ def _row(
         conditions=judgement.conditions,
         parts=standing.parts,
         reason=total.reason,
-        doubts=_doubts(sensor, standing, basis),
+        doubts=_describe_doubts(sensor, standing, basis),
         left_out="; ".join(apart) or None,
         specimens=expected.specimens,
         recordings=expected.recordings,
@@ -86,9 +86,9 @@ def _row(
         evidence_reasons=", ".join(weak) or None,
         unless=unless_words(unless) if unless else None,
         unless_verdict=mended.verdict if mended else None,
-        unless_margin=_margin(mended),
+        unless_margin=_get_margin(mended),
         logged_verdict=logged.verdict if logged else None,
-        logged_margin=_margin(logged),
+        logged_margin=_get_margin(logged),
         backtest_channel=tested.channel if tested else None,
         backtest_ratio=tested.ratio if tested else None,
         backtest_ratio_lower=tested.ratio_lower if tested else None,
@@ -97,17 +97,17 @@ def _row(
     )
 
 
-def _doubts(sensor: str, standing: Standing, basis: Basis) -> str:
+def _describe_doubts(sensor: str, standing: Standing, basis: Basis) -> str:
     """Return what is doubted of the recordings that a standing rests on."""
     recordings = [row.recording for row in standing.totals]
     if len(recordings) < 2:
         return basis.doubted((sensor, standing.total.recording))
     doubts = [f"{name}: {words}" for name in recordings if (words := basis.doubted((sensor, name)))]
-    more = len(doubts) - _SHOWN
-    return "; ".join(doubts[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+    more = len(doubts) - _MAX_NAMED_RECORDINGS
+    return "; ".join(doubts[:_MAX_NAMED_RECORDINGS]) + (f"; and {more} more" if more > 0 else "")
 
 
-def _backtest(requirement: str, standing: Standing, basis: Basis) -> BacktestRow | None:
+def _find_backtest(requirement: str, standing: Standing, basis: Basis) -> BacktestRow | None:
     """Return what the log of the channel that an error mostly comes of shows of its part."""
     total = standing.total
     words = (standing.source or "").split()
@@ -117,11 +117,11 @@ def _backtest(requirement: str, standing: Standing, basis: Basis) -> BacktestRow
     return tested if tested is not None and tested.ratio is not None else None
 
 
-def _margin(standing: Standing | None) -> float | None:
+def _get_margin(standing: Standing | None) -> float | None:
     return standing.margin if standing is not None and standing.known else None
 
 
-def _rank(sensor: str, compared: Mapping[str, Judgement]) -> tuple[int, list[str]]:
+def _compute_rank(sensor: str, compared: Mapping[str, Judgement]) -> tuple[int, list[str]]:
     """Return the rank of a sensor, and the sensors that it is tied with."""
 
     def better(first: str, second: str) -> bool:

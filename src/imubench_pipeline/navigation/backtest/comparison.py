@@ -38,7 +38,7 @@ from imubench_pipeline.noise.growth import Calibrated
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-_LEAST_SCATTER = 0.3
+_MIN_SCATTER_SHARE = 0.3
 """Part of the scatter of the log that is left at least: where a model is known hardly better than
 the one error shows it, the difference is no number to rely on. On 600 logs with 7 errors each the
 ranges hold 94.3 % with 0.2, 95.5 % with 0.3 and 97.1 % with 0.5."""
@@ -46,7 +46,7 @@ ranges hold 94.3 % with 0.2, 95.5 % with 0.3 and 97.1 % with 0.5."""
 
 Verdict = Literal["as predicted", "more than predicted", "less than predicted"]
 
-SHORTEST = 3
+MIN_WINDOWS = 3
 """Windows, one after the other, that a log must hold."""
 
 
@@ -70,7 +70,7 @@ class Predicted:
         uncertainty = float(np.var(logarithms))
         left = scatter + uncertainty
         if self.efficient:
-            left = max(scatter - uncertainty, _LEAST_SCATTER * scatter)
+            left = max(scatter - uncertainty, _MIN_SCATTER_SHARE * scatter)
         centre = math.exp(float(np.mean(logarithms)))
         tail = (1.0 - level) / 2.0
         lower, upper = centre * left * gammaincinv(1.0 / left, [tail, 1.0 - tail])
@@ -100,7 +100,7 @@ class DeadReckoning:
     @property
     def duration_needed(self) -> float:
         """Length of a log that can be compared, s."""
-        return SHORTEST * (self.rest + self.time)
+        return MIN_WINDOWS * (self.rest + self.time)
 
     def sigma(self, model: NoiseModel) -> float:
         """Return the standard deviation of the error, by the error budget of a noise model."""
@@ -173,9 +173,11 @@ def compare(
     budget = (predicted, min(float(lower), predicted), max(float(upper), predicted))
     covariance = WindowCovariance(cut, asked.order, asked.factor)
     window_errors = errors(means, covariance.weights, covariance.lags)
-    if window_errors.count <= (SHORTEST - 1) * cut.blocks:
+    if window_errors.count <= (MIN_WINDOWS - 1) * cut.blocks:
         return Comparison(
-            window_errors.count, *budget, reason=_too_few(asked, cut, means, window_errors.count)
+            window_errors.count,
+            *budget,
+            reason=_explain_too_few_windows(asked, cut, means, window_errors.count),
         )
     possible = [candidate for candidate in drawn if candidate.terms] or [model]
     by_draws = Predicted(
@@ -193,11 +195,13 @@ def compare(
     )
 
 
-def _too_few(asked: DeadReckoning, cut: Window, means: Sequence[Array], count: int) -> str:
+def _explain_too_few_windows(
+    asked: DeadReckoning, cut: Window, means: Sequence[Array], count: int
+) -> str:
     """Return why a log has too few windows."""
     span, needed = asked.rest + asked.time, asked.duration_needed
     longest = cut.block * max(len(segment) for segment in means)
-    wanted = f"{SHORTEST} windows of {span:g} s, one after the other, need {needed:g} s"
+    wanted = f"{MIN_WINDOWS} windows of {span:g} s, one after the other, need {needed:g} s"
     if longest < needed:
         return f"log too short: {wanted}; its longest part without a break has {longest:.3g} s"
     return f"gaps leave {count} overlapping windows: {wanted} without a gap"

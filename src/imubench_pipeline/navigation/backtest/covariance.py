@@ -19,11 +19,11 @@ from imubench_pipeline.navigation.backtest.windows import Errors, Window, correl
 from imubench_pipeline.noise import Deterministic, NoiseModel, Term
 from imubench_pipeline.typing import Array
 
-SPANS = 4
+MAX_CORRELATED_SPANS = 4
 """Lags, in lengths of a window, up to which windows are taken for correlated: beyond, the squares
 of the correlations of flicker noise and of a process as slow add less than 1 % to their sum."""
 
-_ROUNDING = 1e-12
+_MIN_RELATIVE_VARIANCE = 1e-12
 """Least relative variance of a mean square: what is deterministic alone does not scatter."""
 
 
@@ -58,7 +58,7 @@ class WindowCovariance:
     @property
     def lags(self) -> int:
         """Lags that it is computed for, from 0."""
-        return SPANS * self.window.blocks
+        return MAX_CORRELATED_SPANS * self.window.blocks
 
     def of(self, model: NoiseModel) -> Array:
         """Return the covariance of the errors by lag in blocks, without what is deterministic.
@@ -79,7 +79,7 @@ class WindowCovariance:
         pairs of windows, which the errors say. A ramp adds its square; a line, at a random phase,
         half that of its amplitude, and both their products with the noise.
         """
-        covariance, share = self.of(model), _twofold(errors.pairs) / errors.count**2
+        covariance, share = self.of(model), _count_both_signs(errors.pairs) / errors.count**2
         mean, variance = float(covariance[0]), 2.0 * float(share @ covariance**2)
         distance = self.window.block * np.arange(self.lags)
         for power, frequency in self._deterministic(model):
@@ -89,8 +89,8 @@ class WindowCovariance:
             if frequency > 0.0:
                 # How much of it these windows see goes with its phase, unless they see all phases.
                 turn = 2.0 * math.pi * frequency * self.window.block
-                variance += 0.5 * power**2 * _coherence(2.0 * turn, errors.count)
-        return Spread(mean, max(variance, _ROUNDING * mean**2))
+                variance += 0.5 * power**2 * _compute_coherence(2.0 * turn, errors.count)
+        return Spread(mean, max(variance, _MIN_RELATIVE_VARIANCE * mean**2))
 
     def _deterministic(self, model: NoiseModel) -> Iterator[tuple[float, float]]:
         """Yield mean square and frequency, Hz, of what is no noise; the ramp has frequency 0."""
@@ -119,12 +119,12 @@ class WindowCovariance:
         return np.correlate(self.weights, self.weights, "full")
 
 
-def _twofold(pairs: Array) -> Array:
+def _count_both_signs(pairs: Array) -> Array:
     """Return the pairs of either sign of the lag."""
     return np.concatenate((pairs[:1], 2.0 * pairs[1:]))
 
 
-def _coherence(angle: float, count: int) -> float:
+def _compute_coherence(angle: float, count: int) -> float:
     """Return the square of the mean of that many phasors, an angle apart: 1 for whole turns."""
     half = math.remainder(0.5 * angle, math.pi)
     if abs(half) < 1e-9:

@@ -17,14 +17,14 @@ from imubench_pipeline.settings.requirements import DIMENSIONS, Error, Limit, Re
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import SI_UNITS, quantity_to_si
 
-SURE = 0.01
+CONTRADICTION_LEVEL = 0.01
 """Chance, for all rows of a recording together, below which its log contradicts its budget."""
 
-MATERIAL = 1.1
+MIN_CONTRADICTING_RATIO = 1.1
 """Ratio below which a log does not contradict its budget, however sure: a day at 1 Hz has 30,000
 windows of 10 s, which tell a ratio of 1.01 from 1, and no margin of a requirement hangs on that."""
 
-_ORDERS: Mapping[tuple[str, Error], tuple[int, float]] = {
+_INTEGRATIONS: Mapping[tuple[str, Error], tuple[int, float]] = {
     ("gyro", "attitude"): (0, 1.0),
     ("gyro", "heading"): (0, 1.0),
     ("gyro", "velocity"): (1, STANDARD_GRAVITY),
@@ -74,18 +74,20 @@ def backtest_rows(
         replace(row, taken_out=", ".join(apart.get(channel, ())) or None)
         for channel, log in logs.items()
         if channel in estimates
-        for row in _of_channel(names, channel, log, estimates[channel], requirements, draws, seed)
+        for row in _test_channel(names, channel, log, estimates[channel], requirements, draws, seed)
     ]
     compared = sum(row.chance is not None for row in rows)
     for row in rows:
         if row.chance is None or row.ratio is None:
             yield row
         else:
-            contradicted = row.chance * compared < SURE and row.ratio >= MATERIAL
+            contradicted = (
+                row.chance * compared < CONTRADICTION_LEVEL and row.ratio >= MIN_CONTRADICTING_RATIO
+            )
             yield replace(row, contradicted=contradicted)
 
 
-def _of_channel(
+def _test_channel(
     names: Mapping[str, str],
     channel: str,
     log: ChannelLog,
@@ -95,10 +97,13 @@ def _of_channel(
     seed: int,
 ) -> Iterator[BacktestRow]:
     listed = [
-        (_about(names, channel, name, limit), _asked(channel, requirement, limit, estimate))
+        (
+            _make_row(names, channel, name, limit),
+            _select_dead_reckoning(channel, requirement, limit, estimate),
+        )
         for name, requirement in requirements.items()
         for limit in requirement.by_dead_reckoning
-        if (quantity_of(channel), limit.error) in (*_ORDERS, ("gyro", "north"))
+        if (quantity_of(channel), limit.error) in (*_INTEGRATIONS, ("gyro", "north"))
     ]
     cuts = {
         asked: window(asked.rest, asked.time, log.rate)
@@ -121,10 +126,12 @@ def _of_channel(
             comparison = compare(
                 asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly
             )
-            yield _with_figures(about, asked, comparison)
+            yield _fill_row(about, asked, comparison)
 
 
-def _about(names: Mapping[str, str], channel: str, requirement: str, limit: Limit) -> BacktestRow:
+def _make_row(
+    names: Mapping[str, str], channel: str, requirement: str, limit: Limit
+) -> BacktestRow:
     return BacktestRow(
         sensor=names["sensor"],
         recording=names["recording"],
@@ -136,7 +143,7 @@ def _about(names: Mapping[str, str], channel: str, requirement: str, limit: Limi
     )
 
 
-def _asked(
+def _select_dead_reckoning(
     channel: str, requirement: Requirement, limit: Limit, estimate: Estimate
 ) -> DeadReckoning | str:
     """Return what a limit asks of a channel, or why its log cannot answer."""
@@ -146,12 +153,12 @@ def _asked(
         return "turn_on: a log shows one turn-on bias, not how these scatter"
     if not estimate.model.terms:
         return "nothing is known of the noise of this channel"
-    order, factor = _ORDERS[quantity_of(channel), limit.error]
+    order, factor = _INTEGRATIONS[quantity_of(channel), limit.error]
     rest = quantity_to_si(requirement.static_window, "time")
     return DeadReckoning(order, rest, limit.seconds, factor)
 
 
-def _with_figures(row: BacktestRow, asked: DeadReckoning, comparison: Comparison) -> BacktestRow:
+def _fill_row(row: BacktestRow, asked: DeadReckoning, comparison: Comparison) -> BacktestRow:
     predicted = comparison.predicted
     return replace(
         row,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.phase import finite_mean
 from imubench_pipeline.typing import Array
 
-BLOCKS = range(8, 25)
+BLOCK_COUNTS = range(8, 25)
 """Blocks in the shorter part of a window. With 8 the windows, which begin a block apart, tell of
 white noise 99 % of what windows at every sample would, and the weights of a double integration,
 level over a block, change its rms by 0.2 %; more are taken where they divide both parts evenly."""
@@ -28,7 +28,7 @@ level over a block, change its rms by 0.2 %; more are taken where they divide bo
 
 Span = tuple[int, int]
 
-PRESENT = 0.9
+MIN_PRESENT_SHARE = 0.9
 """Part of the samples of a block that must be there, as of a cluster of the Allan variance."""
 
 
@@ -77,14 +77,16 @@ def window(rest: float, time: float, rate: float) -> Window | None:
     most = math.floor(1.001 * shorter * rate)
     if most < 1:
         return None
-    counts = [number for number in BLOCKS if number <= most] or [most]
-    number = min(counts, key=lambda n: (round(_uneven(n, shorter, longer, rate), 4), n))
+    counts = [number for number in BLOCK_COUNTS if number <= most] or [most]
+    number = min(
+        counts, key=lambda n: (round(_estimate_variance_error(n, shorter, longer, rate), 4), n)
+    )
     other = round(number * longer / shorter)
     resting, moving = (number, other) if rest <= time else (other, number)
     return Window(shorter / number, resting, moving)
 
 
-def _uneven(number: int, shorter: float, longer: float, rate: float) -> float:
+def _estimate_variance_error(number: int, shorter: float, longer: float, rate: float) -> float:
     """Return about by how much a number of blocks puts the variance of an error off."""
     others, samples = number * longer / shorter, shorter * rate / number
     # Blocks have a sample more or less: the mean of 1 / size is above 1 / mean size.
@@ -127,7 +129,7 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
         whole = before[len(weights) :] == before[: -len(weights)]
         total += float(np.sum(window_errors[whole] ** 2))
         count += int(whole.sum())
-        pairs += _pairs(whole, lags)
+        pairs += _count_pairs(whole, lags)
     return Errors(total / count if count else math.nan, count, pairs)
 
 
@@ -142,7 +144,7 @@ def correlated(values: Array, weights: Array) -> Array:
     return np.fft.irfft(product, length)[: len(values) - len(weights) + 1]
 
 
-def _pairs(whole: NDArray[np.bool_], lags: int) -> Array:
+def _count_pairs(whole: NDArray[np.bool_], lags: int) -> Array:
     """Return how many pairs of whole windows begin so many blocks apart, by lag."""
     length = 1 << (2 * len(whole) - 1).bit_length()
     power = np.abs(np.fft.rfft(whole.astype(np.float64), length)) ** 2
@@ -179,19 +181,19 @@ def block_means(
         By length, of each segment: rad/s or m/s^2, less one constant of the log.
     """
     edges = {
-        length: [_edges(start, stop, length * rate) for start, stop in segments]
+        length: [_find_edges(start, stop, length * rate) for start, stop in segments]
         for length in lengths
     }
     if not edges:
         return {}
     every = np.concatenate([of_segment for each in edges.values() for of_segment in each])
-    sums = _sums(parts, np.unique(every))
+    sums = _sum_parts(parts, np.unique(every))
     return {
         length: [sums.means(of_segment) for of_segment in each] for length, each in edges.items()
     }
 
 
-def _edges(start: int, stop: int, samples: float) -> NDArray[np.int64]:
+def _find_edges(start: int, stop: int, samples: float) -> NDArray[np.int64]:
     """Return the first sample of each block of a segment, and the one after the last block."""
     blocks = math.floor((stop - start) / samples + 1e-9)
     return start + np.rint(np.arange(blocks + 1) * samples).astype(np.int64)
@@ -209,12 +211,12 @@ class _Sums:
         places = np.searchsorted(self.edges, edges)
         present, size = np.diff(self.present[places]), np.diff(edges)
         means = np.full(len(size), np.nan)
-        enough = (present >= PRESENT * size) & (present > 0)
+        enough = (present >= MIN_PRESENT_SHARE * size) & (present > 0)
         np.divide(np.diff(self.sums[places]), present, out=means, where=enough)
         return means
 
 
-def _sums(parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int64]) -> _Sums:
+def _sum_parts(parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int64]) -> _Sums:
     sums, present = np.zeros(len(edges)), np.zeros(len(edges), dtype=np.int64)
     reached, total, count = 0, 0.0, 0
     level: float | None = None

@@ -32,11 +32,11 @@ from scipy.optimize import brentq
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.navigation.error_budget.in_use import (
-    BIASES,
-    NAMES,
+    BIAS_CAUSES,
+    CAUSE_NAMES,
     NO_FIGURES,
     NO_USE,
-    STATED,
+    STATED_FIGURE,
     Cause,
     Figures,
     Use,
@@ -59,9 +59,9 @@ ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
 """Integrations but one, m of `growth`."""
 
 
-_SHORTEST = 1e-6
-_LONGEST = 1e9
-_POINTS = 4096
+_MIN_TIME = 1e-6
+_MAX_TIME = 1e9
+_CROSSING_POINTS = 4096
 """Where lines let the error swing, it is looked at so often."""
 
 
@@ -222,10 +222,10 @@ def budget(
         raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(Quantity)}")
     if not (math.isfinite(time) and time > 0):
         raise ValueError(f"time is {time}, expected a time above 0")
-    contributions = _sources(quantity, time, gyro, accel, start)
+    contributions = _list_sources(quantity, time, gyro, accel, start)
     missing: list[Missing] = []
     assumptions: list[str] = []
-    for measured, cause, source, lever in _levers(quantity, time, start, use):
+    for measured, cause, source, lever in _list_levers(quantity, time, start, use):
         figures = gyro_figures if measured == "gyro" else accel_figures
         part = of_figure(measured, cause, source, lever, figures)
         if isinstance(part, Contribution):
@@ -237,7 +237,7 @@ def budget(
     return Budget(time, quantity, contributions, assumptions, missing)
 
 
-def _sources(
+def _list_sources(
     quantity: Quantity, time: float, gyro: NoiseModel, accel: NoiseModel, start: Start
 ) -> list[Contribution]:
     order = GYRO_ORDER[quantity]
@@ -246,31 +246,33 @@ def _sources(
     if quantity in ACCEL_ORDER:
         contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
     if quantity == "heading":
-        contributions.append(Contribution("initial heading", start.heading, "start", STATED))
+        contributions.append(Contribution("initial heading", start.heading, "start", STATED_FIGURE))
     elif isinstance(start.tilt, Levelled):
         if quantity == "attitude" and isinstance(start.accel, Calibrated):
-            contributions.extend(_of_levelling(accel, start.accel.window, start.tilt))
+            contributions.extend(_list_levelling_errors(accel, start.accel.window, start.tilt))
     else:
         lever = gravity * of_constant(order - 1, time)
-        contributions.append(Contribution("initial tilt", start.tilt * lever, "start", STATED))
+        contributions.append(
+            Contribution("initial tilt", start.tilt * lever, "start", STATED_FIGURE)
+        )
     return contributions
 
 
-def _levers(
+def _list_levers(
     quantity: Quantity, time: float, start: Start, use: Use
 ) -> Iterator[tuple[Measured, Cause, str, float]]:
     """Yield sensor, cause, source and lever of what figures of the sensors add."""
     order = GYRO_ORDER[quantity]
     gravity = STANDARD_GRAVITY if order > 0 else 1.0
     for cause, lever in levers("gyro", order, time, start.gyro, use, seen=order == 0):
-        yield "gyro", cause, f"gyro {NAMES[cause]}", gravity * lever
+        yield "gyro", cause, f"gyro {CAUSE_NAMES[cause]}", gravity * lever
     if quantity in ACCEL_ORDER:
         of_accel = levers("accel", ACCEL_ORDER[quantity], time, start.accel, use, seen=True)
         for cause, lever in of_accel:
-            yield "accel", cause, f"accel {NAMES[cause]}", lever
+            yield "accel", cause, f"accel {CAUSE_NAMES[cause]}", lever
     if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:
-        for cause in BIASES:
-            source = f"initial tilt by accel {NAMES[cause]}"
+        for cause in BIAS_CAUSES:
+            source = f"initial tilt by accel {CAUSE_NAMES[cause]}"
             yield "accel", cause, source, 1.0 / STANDARD_GRAVITY
 
 
@@ -287,17 +289,19 @@ def of_sensor(
             yield Contribution(f"{sensor} {source}", factor * sigma)
     if isinstance(start, Uncalibrated) and start.bias is not None:
         grown = factor * start.bias * of_constant(order, time)
-        yield Contribution(f"{sensor} turn-on bias", grown, "turn_on_bias", STATED)
+        yield Contribution(f"{sensor} turn-on bias", grown, "turn_on_bias", STATED_FIGURE)
 
 
-def _of_levelling(accel: NoiseModel, window: float, levelled: Levelled) -> Iterator[Contribution]:
+def _list_levelling_errors(
+    accel: NoiseModel, window: float, levelled: Levelled
+) -> Iterator[Contribution]:
     for term in accel.terms:
         sigma = math.sqrt(term.mean_variance(window, levelled.on_time)) / STANDARD_GRAVITY
         yield Contribution(f"initial tilt by accel {term.source}", sigma)
     if levelled.bias is not None:
         sigma = levelled.bias / STANDARD_GRAVITY
         source = "initial tilt by accel turn-on bias"
-        yield Contribution(source, sigma, "turn_on_bias", STATED)
+        yield Contribution(source, sigma, "turn_on_bias", STATED_FIGURE)
 
 
 def time_until(
@@ -348,15 +352,15 @@ def time_until(
         after = budget(quantity, time, gyro=gyro, accel=accel, start=start, use=use, **figures)
         return after.total - limit
 
-    if excess(_SHORTEST) >= 0:
+    if excess(_MIN_TIME) >= 0:
         return 0.0
-    earlier, later = _SHORTEST, 2.0 * _SHORTEST
+    earlier, later = _MIN_TIME, 2.0 * _MIN_TIME
     while excess(later) < 0:
-        if later > _LONGEST:
+        if later > _MAX_TIME:
             return None
         earlier, later = later, 2.0 * later
     if gyro.sinusoids or accel.sinusoids:
-        times = np.linspace(0.0, later, _POINTS + 1)[1:]
+        times = np.linspace(0.0, later, _CROSSING_POINTS + 1)[1:]
         first = next(i for i, time in enumerate(times) if excess(float(time)) >= 0)
-        earlier, later = (float(times[first - 1]) if first else _SHORTEST), float(times[first])
+        earlier, later = (float(times[first - 1]) if first else _MIN_TIME), float(times[first])
     return float(brentq(excess, earlier, later, xtol=1e-12, rtol=1e-12))

@@ -19,18 +19,18 @@ from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.navigation.error_budget.in_use import (
-    BIASES,
-    NAMES,
-    STATED,
+    BIAS_CAUSES,
+    CAUSE_NAMES,
+    STATED_FIGURE,
     Figures,
     check_not_negative,
 )
 from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, of_figure
 from imubench_pipeline.noise import NoiseModel, Sinusoid, Term
 
-_BIAS_LEFT_OUT = "turn-on bias of the gyro: left out; the heading is no better than this"
+_BIAS_LEFT_OUT_NOTE = "turn-on bias of the gyro: left out; the heading is no better than this"
 
-_TIMES: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
+_WINDOW_LENGTHS: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ class Gyrocompass:
                 *self._of_noise(time, swings=True),
                 *(part for part in biases if isinstance(part, Contribution)),
             ],
-            [_BIAS_LEFT_OUT] if missing else [],
+            [_BIAS_LEFT_OUT_NOTE] if missing else [],
             missing,
         )
 
@@ -129,7 +129,7 @@ class Gyrocompass:
             sigmas = (part.sigma for part in self._of_noise(time, swings=False))
             return math.hypot(*sigmas, *biases) / accuracy - 1.0
 
-        at = np.log(_TIMES)
+        at = np.log(_WINDOW_LENGTHS)
         values = np.array([excess(float(x)) for x in at])
         reached = np.flatnonzero(values <= 0)
         if reached.size:
@@ -148,7 +148,7 @@ class Gyrocompass:
             if excess(after) > 0:
                 return None
         if first == 0:
-            return float(_TIMES[0])
+            return float(_WINDOW_LENGTHS[0])
         return math.exp(brentq(excess, float(at[first - 1]), after, xtol=1e-12))
 
     @property
@@ -162,10 +162,10 @@ class Gyrocompass:
             return []
         if self.bias is not None:
             sigma = self.bias / self._north
-            return [Contribution("gyro turn-on bias", sigma, "turn_on_bias", STATED)]
+            return [Contribution("gyro turn-on bias", sigma, "turn_on_bias", STATED_FIGURE)]
         parts = (
-            of_figure("gyro", cause, f"gyro {NAMES[cause]}", 1.0 / self._north, self.figures)
-            for cause in BIASES
+            of_figure("gyro", cause, f"gyro {CAUSE_NAMES[cause]}", 1.0 / self._north, self.figures)
+            for cause in BIAS_CAUSES
         )
         return [part for part in parts if part is not None]
 

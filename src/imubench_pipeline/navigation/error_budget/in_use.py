@@ -44,7 +44,7 @@ Cause = Literal[
 ]
 Origin = Literal["measured", "datasheet", "requirement", "not known"]
 
-NAMES: Mapping[Cause, str] = {
+CAUSE_NAMES: Mapping[Cause, str] = {
     "turn_on_bias": "turn-on bias",
     "repeatability": "repeatability",
     "temperature": "temperature",
@@ -56,17 +56,17 @@ NAMES: Mapping[Cause, str] = {
 }
 """What each cause is called in a source."""
 
-_OTHERWISE: Mapping[tuple[Measured, Cause], Cause] = {
+_SUBSTITUTE_CAUSES: Mapping[tuple[Measured, Cause], Cause] = {
     ("gyro", "turn_on_bias"): "repeatability",
     ("accel", "turn_on_bias"): "repeatability",
     ("gyro", "g_sensitivity"): "vibration_rectification",
 }
 """The figure that also tells how large an error may be, where one is not known."""
 
-BIASES: tuple[Cause, ...] = ("turn_on_bias", "repeatability")
+BIAS_CAUSES: tuple[Cause, ...] = ("turn_on_bias", "repeatability")
 """The causes of a bias that nothing has taken off."""
 
-_NEEDED: frozenset[Cause] = frozenset(
+_REQUIRED_CAUSES: frozenset[Cause] = frozenset(
     ("turn_on_bias", "temperature", "scale_factor", "g_sensitivity")
 )
 """The causes that are missed where nothing is known; of an accelerometer the last one, too."""
@@ -99,7 +99,7 @@ class Figure:
     reason: str | None = None
 
 
-STATED = Figure(origin="requirement", convention="as it is stated, 1 sigma")
+STATED_FIGURE = Figure(origin="requirement", convention="as it is stated, 1 sigma")
 """Of what a requirement states."""
 
 Figures = Mapping[Cause, Figure]
@@ -217,6 +217,6 @@ def needed(measured: Measured, cause: Cause, figures: Figures) -> bool:
     def has_figure(candidate: Cause) -> bool:
         return candidate in figures and figures[candidate].sigma is not None
 
-    asked = cause in _NEEDED or (measured, cause) == ("accel", "vibration_rectification")
-    otherwise = _OTHERWISE.get((measured, cause))
+    asked = cause in _REQUIRED_CAUSES or (measured, cause) == ("accel", "vibration_rectification")
+    otherwise = _SUBSTITUTE_CAUSES.get((measured, cause))
     return asked and not has_figure(cause) and not (otherwise and has_figure(otherwise))

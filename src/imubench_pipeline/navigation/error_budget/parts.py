@@ -17,7 +17,7 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     Figures,
     needed,
 )
-from imubench_pipeline.navigation.error_budget.printed_errors import PRINTED
+from imubench_pipeline.navigation.error_budget.printed_errors import DATASHEET_KEY_OF_CAUSE
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Measured
 from imubench_pipeline.units import SI_UNITS
 
@@ -192,7 +192,7 @@ class Largest:
     def _figure(
         self, row: ErrorBudgetRow, quantity: str, cause: str, lever: float
     ) -> ErrorBudgetRow:
-        dimension = FIGURE_DIMENSIONS[quantity][PRINTED[cause]][0]  # type: ignore[index]  # a cause
+        dimension = FIGURE_DIMENSIONS[quantity][DATASHEET_KEY_OF_CAUSE[cause]][0]  # type: ignore[index]  # a cause
         return replace(
             row,
             largest=self.room / lever if self.room else None,

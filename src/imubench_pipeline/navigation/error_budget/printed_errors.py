@@ -24,7 +24,7 @@ from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.navigation.error_budget.in_use import Cause, Figure
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet
 
-PRINTED: Mapping[Cause, str] = {
+DATASHEET_KEY_OF_CAUSE: Mapping[Cause, str] = {
     "turn_on_bias": "offset",
     "repeatability": "bias_repeatability",
     "temperature": "temperature_coefficient",
@@ -35,7 +35,7 @@ PRINTED: Mapping[Cause, str] = {
 }
 """The figure of a datasheet that each cause follows from."""
 
-_CONVENTIONS: Mapping[str, tuple[float, str]] = {
+_SIGMA_CONVENTIONS: Mapping[str, tuple[float, str]] = {
     "1sigma": (1.0, "1 sigma as printed"),
     "typ": (1.0, "typical taken as 1 sigma"),
     "derived": (1.0, "typical taken as 1 sigma"),
@@ -47,7 +47,10 @@ _CONVENTIONS: Mapping[str, tuple[float, str]] = {
 SIGMAS = 1.96
 """Half the width of a 95 % interval."""
 
-_MEASURED: Mapping[str, Cause] = {"sensitivity": "temperature", "quadratic": "temperature_squared"}
+_CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
+    "sensitivity": "temperature",
+    "quadratic": "temperature_squared",
+}
 
 
 def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
@@ -57,13 +60,17 @@ def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
     """
     axis = PrintedAxis.of(datasheet, channel)
     names = FIGURE_DIMENSIONS[axis.quantity]
-    return {cause: _figure(axis, name) for cause, name in PRINTED.items() if name in names}
+    return {
+        cause: _read_figure(axis, name)
+        for cause, name in DATASHEET_KEY_OF_CAUSE.items()
+        if name in names
+    }
 
 
-def _figure(axis: PrintedAxis, name: str) -> Figure:
+def _read_figure(axis: PrintedAxis, name: str) -> Figure:
     like = Comparable(name, name, None)
     rows = axis.read(name, like, axis.si(name))
-    for kind, (sigmas, convention) in _CONVENTIONS.items():
+    for kind, (sigmas, convention) in _SIGMA_CONVENTIONS.items():
         values = [row.value for row in rows if row.figure and row.figure.kind == kind]
         usable = [value for value in values if value is not None]
         if usable:
@@ -82,12 +89,12 @@ def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
     """
     figures: dict[Cause, Figure] = {}
     for row in rows:
-        if row.parameter not in _MEASURED or row.status != "ok" or row.value is None:
+        if row.parameter not in _CAUSE_OF_COEFFICIENT or row.status != "ok" or row.value is None:
             continue
         spread = 0.0
         if row.lower is not None and row.upper is not None:
             spread = (row.upper - row.lower) / (2.0 * SIGMAS)
-        figures[_MEASURED[row.parameter]] = Figure(
+        figures[_CAUSE_OF_COEFFICIENT[row.parameter]] = Figure(
             sigma=abs(row.value),
             origin="measured",
             convention="of this specimen, at the mean temperature of the log",

@@ -86,10 +86,12 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     side. What has no limits stays as it is.
     """
     if estimate.draws is None:
-        return [_drawn(estimate, rng) for _ in range(draws)]
+        return [_draw_model(estimate, rng) for _ in range(draws)]
     available, places = len(estimate.draws), np.arange(draws)
     rows = places % available if draws > available else places * available // draws
-    return [estimate.draws.model(int(row), _lines(estimate, rng)) for row in rng.permutation(rows)]
+    return [
+        estimate.draws.model(int(row), _draw_lines(estimate, rng)) for row in rng.permutation(rows)
+    ]
 
 
 def drawn_jointly(estimate: Estimate) -> bool:
@@ -97,14 +99,14 @@ def drawn_jointly(estimate: Estimate) -> bool:
     return estimate.draws is not None
 
 
-def _lines(estimate: Estimate, rng: np.random.Generator) -> list[Sinusoid]:
-    lines = [_values(group, rng) for group in estimate.lines]
+def _draw_lines(estimate: Estimate, rng: np.random.Generator) -> list[Sinusoid]:
+    lines = [_draw_values(group, rng) for group in estimate.lines]
     return [Sinusoid(line["amplitude"], line["frequency"]) for line in lines]
 
 
-def _drawn(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
-    first = _values(estimate.parameters, rng)
-    further = [_values(group, rng) for group in estimate.further]
+def _draw_model(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
+    first = _draw_values(estimate.parameters, rng)
+    further = [_draw_values(group, rng) for group in estimate.further]
     return NoiseModel(
         Q=first.get("Q", 0.0),
         N=first.get("N", 0.0),
@@ -117,18 +119,20 @@ def _drawn(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
             for process in further
             if process["B"] and process["T_B"]
         ],
-        sinusoids=_lines(estimate, rng),
+        sinusoids=_draw_lines(estimate, rng),
     )
 
 
-def _values(parameters: Mapping[str, Parameter], rng: np.random.Generator) -> dict[str, float]:
+def _draw_values(parameters: Mapping[str, Parameter], rng: np.random.Generator) -> dict[str, float]:
     """Return a draw of each parameter; 0 for what is not there."""
     # Every parameter takes its number, so that one more or less does not change the others.
     normal = {name: float(rng.standard_normal()) for name in parameters}
-    return {name: _value(name, parameter, normal[name]) for name, parameter in parameters.items()}
+    return {
+        name: _draw_value(name, parameter, normal[name]) for name, parameter in parameters.items()
+    }
 
 
-def _value(name: str, parameter: Parameter, normal: float) -> float:
+def _draw_value(name: str, parameter: Parameter, normal: float) -> float:
     value = parameter.in_model
     lower, upper = parameter.lower, parameter.upper
     if value is None or value == 0.0:

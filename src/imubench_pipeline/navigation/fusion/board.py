@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_WHOLE = 1e-9
+_RATIO_TOLERANCE = 1e-9
 """Relative distance of a ratio of rates from a whole number that is rounding alone."""
 
-_AMPLITUDES = ("N", "B", "K", "R")
+_SHARED_PARAMETERS = ("N", "B", "K", "R")
 """The parameters that sensors may have in common, each the root of a variance."""
 
 
@@ -95,7 +95,7 @@ class Board:
             raise ValueError(f"rates are {list(self.rates)}, expected numbers above 0")
         for rate in self.rates:
             ratio = rate / self.rate
-            if abs(ratio - round(ratio)) > _WHOLE * ratio:
+            if abs(ratio - round(ratio)) > _RATIO_TOLERANCE * ratio:
                 raise ValueError(
                     f"a rate of {rate:g} Hz is no whole multiple of the lowest, {self.rate:g} Hz; "
                     "resample that sensor first"
@@ -209,19 +209,19 @@ def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseM
         If a correlation is of another parameter, or not from 0 to 1.
     """
     for name, value in correlation.items():
-        if name not in _AMPLITUDES or not 0.0 <= value <= 1.0:
+        if name not in _SHARED_PARAMETERS or not 0.0 <= value <= 1.0:
             raise ValueError(f"correlation of {name} is {value}; expected 0 to 1, of N, B, K or R")
     parts = []
     for common in (False, True):
         share = {
             name: math.sqrt(correlation.get(name, 0.0) if common else 1 - correlation.get(name, 0))
-            for name in _AMPLITUDES
+            for name in _SHARED_PARAMETERS
         }
         parts.append(
             replace(
                 model,
                 Q=0.0 if common else model.Q,
-                **{name: getattr(model, name) * share[name] for name in _AMPLITUDES},
+                **{name: getattr(model, name) * share[name] for name in _SHARED_PARAMETERS},
                 further=[term.scaled(share["B"]) for term in model.further if share["B"] > 0],
                 sinusoids=() if common else model.sinusoids,
             )

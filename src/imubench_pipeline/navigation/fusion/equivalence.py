@@ -19,10 +19,10 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.typing import Array
 
-_MATTERS = 0.1
+_MIN_RELEVANT_SHARE = 0.1
 """Part of the Allan variance from which a parameter that is not known leaves no plain number."""
 
-_TAIL = 0.025
+_TAIL_PROBABILITY = 0.025
 """Beyond each 95 % limit."""
 
 
@@ -108,7 +108,7 @@ class FusionChannel:
                 if parameter.value is not None or parameter.status in ("absent", "not_shown"):
                     continue
                 part = _alone(name, group, tau)
-                if part > _MATTERS * total:
+                if part > _MIN_RELEVANT_SHARE * total:
                     status = parameter.status.replace("_", " ")
                     yield f"{name} of {self.sensor}/{self.recording} {self.channel} is {status}"
 
@@ -181,8 +181,8 @@ def answer(
         return f"no noise model of {sensor}"
     chosen = sorted(noisy, key=lambda channel: channel.variance(tau))[len(noisy) // 2]
     stream = channel_rng(seed, chosen.sensor, repr(chosen.model), chosen.channel, "fusion")
-    own, common = _parts([chosen.model], correlation, tau)
-    drawn_own, drawn_common = _parts(chosen.drawn(draws, stream), correlation, tau)
+    own, common = _compute_parts([chosen.model], correlation, tau)
+    drawn_own, drawn_common = _compute_parts(chosen.drawn(draws, stream), correlation, tau)
     if chosen.temperature is not None:
         common = common + chosen.of_temperature(tau)
         drawn_common = drawn_common + chosen.temperature.drawn(tau, draws, stream)
@@ -190,7 +190,7 @@ def answer(
     return Answer(chosen, float(own[0]), float(common[0]), drawn_own, drawn_common, unknown)
 
 
-def _parts(
+def _compute_parts(
     models: Sequence[NoiseModel], correlation: Mapping[str, float], tau: float
 ) -> tuple[Array, Array]:
     pairs = [divided(model, correlation) for model in models]
@@ -226,10 +226,10 @@ def equivalence_rows(
             }
             for a, b in permutations(answers, 2):
                 row = FusionRow(quantity=quantity, tau=tau, sensor=a, other=b)
-                yield _pair(row, answers[a], answers[b])
+                yield _compare_pair(row, answers[a], answers[b])
 
 
-def _pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow:
+def _compare_pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow:
     """Return the row of two sensors at a tau with what is found of them."""
     answers = [each if isinstance(each, str) else each.unknown for each in (a, b)]
     reasons = [reason for reason in answers if reason]
@@ -259,7 +259,9 @@ def _pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow:
     number = float(number_needed(a.own, a.common, b.own + b.common))
     drawn = number_needed(a.drawn_own, a.drawn_common, b.drawn_own + b.drawn_common)
     # Between infinite ones there is nothing to interpolate.
-    low, high = np.quantile(drawn, [_TAIL, 1.0 - _TAIL], method="inverted_cdf")
+    low, high = np.quantile(
+        drawn, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY], method="inverted_cdf"
+    )
     # The draws of what is absent lie above it: the value itself is inside.
     low, high = min(float(low), number), max(float(high), number)
     if math.isinf(number):

@@ -17,7 +17,7 @@ from imubench_pipeline.model.comparisons import GradeRow
 from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.settings.printed import Datasheet
 
-STATISTICS = {"N": "N", "adev_minimum": "sigma_min"}
+PARAMETER_OF_STATISTIC = {"N": "N", "adev_minimum": "sigma_min"}
 """What is compared, by the name of a printed figure's statistic."""
 
 
@@ -41,7 +41,7 @@ class Grade:
             chosen = self.datasheet.model_copy(update={"options": [option] if option else []})
             for one in comparables(chosen, channel):
                 of_option = one.figure is None or one.figure.option in (None, option)
-                if one.statistic in STATISTICS and of_option:
+                if one.statistic in PARAMETER_OF_STATISTIC and of_option:
                     yield option, one
 
 
@@ -55,12 +55,12 @@ def grade_rows(candidates: Iterable[FusionChannel], grades: Sequence[Grade]) -> 
         quantity = channel.channel.split("_")[0]
         by_sensor.setdefault((quantity, channel.sensor), []).append(channel)
     for (quantity, sensor), channels in sorted(by_sensor.items()):
-        chosen = _middle(channels)
+        chosen = _select_middle(channels)
         for grade in grades:
             if grade.sensor == sensor:
                 continue
             for option, printed in grade.printed(chosen.channel):
-                own = _own(chosen, printed.statistic)
+                own = _get_estimate(chosen, printed.statistic)
                 row = GradeRow(
                     quantity=quantity,
                     sensor=sensor,
@@ -70,29 +70,29 @@ def grade_rows(candidates: Iterable[FusionChannel], grades: Sequence[Grade]) -> 
                     grade=grade.sensor,
                     grade_name=grade.name,
                     option=option,
-                    statistic=STATISTICS[printed.statistic],
+                    statistic=PARAMETER_OF_STATISTIC[printed.statistic],
                     value=own.value,
                     lower=own.lower,
                     upper=own.upper,
                     printed=printed.value,
                 )
-                yield _compared(row, own, printed)
+                yield _compare(row, own, printed)
 
 
-def _middle(channels: Sequence[FusionChannel]) -> FusionChannel:
+def _select_middle(channels: Sequence[FusionChannel]) -> FusionChannel:
     measured = [channel for channel in channels if not channel.simulated] or list(channels)
     return sorted(measured, key=lambda channel: channel.model.N)[len(measured) // 2]
 
 
-def _own(channel: FusionChannel, statistic: str) -> Parameter:
+def _get_estimate(channel: FusionChannel, statistic: str) -> Parameter:
     estimate = channel.estimate
     of: Mapping[str, Parameter] = estimate.parameters
     if statistic == "adev_minimum":
         of = estimate.curve or {}
-    return of.get(STATISTICS[statistic], Parameter(None, "not_shown", "not estimated"))
+    return of.get(PARAMETER_OF_STATISTIC[statistic], Parameter(None, "not_shown", "not estimated"))
 
 
-def _compared(row: GradeRow, own: Parameter, printed: Comparable) -> GradeRow:
+def _compare(row: GradeRow, own: Parameter, printed: Comparable) -> GradeRow:
     if printed.value is None:
         return replace(row, reason=printed.obstacle or printed.reason)
 

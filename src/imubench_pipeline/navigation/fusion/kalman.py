@@ -20,15 +20,15 @@ from imubench_pipeline.noise import GaussMarkov, NoiseModel, bias_instability
 from imubench_pipeline.noise.block_means import of_block_means
 from imubench_pipeline.typing import Array
 
-_MOST_DOUBLINGS = 80
-_CONVERGED = 1e-13
+_MAX_DOUBLINGS = 80
+_CONVERGENCE_TOLERANCE = 1e-13
 """Relative change of the covariance in a doubling that ends the search."""
 
 
-_LONGEST = 1e5
+_MAX_FLICKER_TAU = 1e5
 """Tau in s up to which the filter follows flicker noise, where nothing else is asked."""
 
-_WALK = 100.0
+_WALK_SURROGATE_TIME_RATIO = 100.0
 """Correlation time of what stands for a random walk, over the longest tau.
 
 A walk that all sensors have in common cannot be seen in their differences and would have no steady
@@ -75,7 +75,7 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
     g = information * scale**2
     p = process_noise / scale**2
     identity = np.eye(len(transition))
-    for _ in range(_MOST_DOUBLINGS):
+    for _ in range(_MAX_DOUBLINGS):
         inner = np.linalg.solve((identity + p @ g).T, np.column_stack((a.T, g))).T
         # a (I + P G)^-1 and g (I + P G)^-1
         through, seen = inner[: len(a)], inner[len(a) :]
@@ -85,7 +85,7 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
         grown, g = (grown + grown.T) / 2.0, (g + g.T) / 2.0
         change = np.max(np.abs(grown - p), initial=0.0) / np.max(np.abs(grown), initial=1e-300)
         p = grown
-        if change < _CONVERGED:
+        if change < _CONVERGENCE_TOLERANCE:
             return np.asarray(p * scale**2)
     raise ValueError("the filter has no steady state: a process that grows is not seen")
 
@@ -122,15 +122,15 @@ class KalmanFusion:
 
     def __init__(self, board: Board) -> None:
         self.sensors = board.sensors
-        space = _space(board)
+        space = _build_state_space(board)
         if not np.all(np.diag(space.white) > 0.0):
             raise ValueError("a filter needs white noise, N, of every sensor")
-        inverse = _without_common(space.white)
+        inverse = _project_out_common(space.white)
         information = space.output.T @ inverse @ space.output
         covariance = steady_covariance(space.transition, space.process_noise, information)
         of_output = space.output @ covariance @ space.output.T + space.white
-        self.weights = _common(of_output)
-        gain = covariance @ space.output.T @ _without_common(of_output)
+        self.weights = _compute_common_weights(of_output)
+        gain = covariance @ space.output.T @ _project_out_common(of_output)
         self._output = space.output
         self._transition = space.transition
         # That the signal is not seen must hold to the last digit.
@@ -190,7 +190,7 @@ class KalmanFusion:
                     f"a block has the shape {block.shape}, expected {self.sensors} columns"
                 )
             fused = np.empty(len(block))
-            _run(
+            _run_filter(
                 np.ascontiguousarray(block, dtype=np.float64),
                 fused,
                 state,
@@ -212,7 +212,7 @@ class _Space:
     white: Array
 
 
-def _space(board: Board) -> _Space:
+def _build_state_space(board: Board) -> _Space:
     spaces, outputs = [], []
     white = np.zeros((board.sensors, board.sensors))
     members = [
@@ -223,7 +223,7 @@ def _space(board: Board) -> _Space:
         ),
     ]
     for model, rate, size, gains in members:
-        space = of_block_means(_steady(model).state_space(rate, _LONGEST), size)
+        space = of_block_means(_stabilise(model).state_space(rate, _MAX_FLICKER_TAU), size)
         spaces.append(space)
         outputs.append(np.outer(gains, space.output))
         white += space.measurement_noise * np.outer(gains, gains)
@@ -235,23 +235,23 @@ def _space(board: Board) -> _Space:
     )
 
 
-def _steady(model: NoiseModel) -> NoiseModel:
+def _stabilise(model: NoiseModel) -> NoiseModel:
     """Return a model without what is deterministic, its walk bound to 0 by a long time."""
     noise = stochastic(model)
     if not noise.K:
         return noise
-    time = _WALK * _LONGEST
+    time = _WALK_SURROGATE_TIME_RATIO * _MAX_FLICKER_TAU
     walk = GaussMarkov(bias_instability(noise.K**2, time), time)
     return replace(noise, K=0.0, further=[*noise.further, walk])
 
 
-def _common(covariance: Array) -> Array:
+def _compute_common_weights(covariance: Array) -> Array:
     """Return S^-1 1 / (1^T S^-1 1)."""
     solved = np.linalg.solve(covariance, np.ones(len(covariance)))
     return np.asarray(solved / solved.sum())
 
 
-def _without_common(covariance: Array) -> Array:
+def _project_out_common(covariance: Array) -> Array:
     """Return S^-1 - S^-1 1 1^T S^-1 / (1^T S^-1 1): the information of the differences."""
     inverse = np.linalg.inv(covariance)
     inverse = (inverse + inverse.T) / 2.0
@@ -260,7 +260,7 @@ def _without_common(covariance: Array) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _run(
+def _run_filter(
     samples: Array,
     fused: Array,
     state: Array,

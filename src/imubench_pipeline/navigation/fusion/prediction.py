@@ -20,18 +20,18 @@ from imubench_pipeline.navigation.fusion.weights import Constant, Weights
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_POINTS = 16
+_QUADRATURE_POINTS = 16
 """Of Gauss and Legendre in a panel."""
 
-_OCTAVES = 40
+_OCTAVE_PANELS = 40
 """Panels below the first zero of sin^4(n w/2): the rest is 1e-12 of a random walk's."""
 
-_PERIODS = 64
+_RESOLVED_PERIODS = 64
 """Periods of sin^4(n w/2) that are resolved; beyond, 3/8 stands for it, wrong by 4e-8 of white
 noise (the first term of the asymptotic series of the rest, 0.23/X^3 against pi/4)."""
 
 
-_SLOW = 1e-9
+_RAMP_FREQUENCY = 1e-9
 """rad a sample; the frequency of a ramp, for a filter."""
 
 
@@ -54,15 +54,15 @@ def nodes(n: int) -> tuple[Array, Array]:
         raise ValueError(f"a cluster has {n} samples, expected 1 or more")
     end = n * np.pi / 2.0  # of x = n w / 2
     first = min(np.pi, end)
-    x, dx = _octaves(first * 2.0**-_OCTAVES, first)
-    resolved = min(_PERIODS * np.pi, end)
+    x, dx = _make_octave_panels(first * 2.0**-_OCTAVE_PANELS, first)
+    resolved = min(_RESOLVED_PERIODS * np.pi, end)
     edges = np.append(np.arange(np.pi, resolved - 1e-9, np.pi), resolved)
     if len(edges) > 1:
-        more, width = _linear(edges)
+        more, width = _make_linear_panels(edges)
         x, dx = np.append(x, more), np.append(dx, width)
     fourth = np.sin(x) ** 4
     if end > resolved:
-        far, width = _octaves(resolved, end)
+        far, width = _make_octave_panels(resolved, end)
         x, dx = np.append(x, far), np.append(dx, width)
         fourth = np.append(fourth, np.full(len(far), 3.0 / 8.0))
     omega = 2.0 * x / n
@@ -84,22 +84,22 @@ def allan_of_spectrum(spectrum: Callable[[Array], NDArray[Any]], sizes: ArrayLik
 
 
 @lru_cache(maxsize=1)
-def _rule() -> tuple[Array, Array]:
-    points, weights = np.polynomial.legendre.leggauss(_POINTS)
+def _compute_rule() -> tuple[Array, Array]:
+    points, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
     return np.asarray(points), np.asarray(weights)
 
 
-def _linear(edges: Array) -> tuple[Array, Array]:
+def _make_linear_panels(edges: Array) -> tuple[Array, Array]:
     """Return points and weights in panels between edges."""
-    points, weights = _rule()
+    points, weights = _compute_rule()
     middle, half = (edges[1:] + edges[:-1]) / 2.0, np.diff(edges) / 2.0
     return (middle[:, None] + half[:, None] * points).ravel(), np.outer(half, weights).ravel()
 
 
-def _octaves(start: float, end: float) -> tuple[Array, Array]:
+def _make_octave_panels(start: float, end: float) -> tuple[Array, Array]:
     """Return points and weights in panels of about an octave, linear in the logarithm."""
     number = max(1, int(np.ceil(np.log2(end / start) - 1e-9)))
-    u, du = _linear(np.linspace(np.log(start), np.log(end), number + 1))
+    u, du = _make_linear_panels(np.linspace(np.log(start), np.log(end), number + 1))
     x = np.exp(u)
     return x, du * x
 
@@ -133,7 +133,7 @@ def fused_psd(board: Board, weights: Weights, frequency: ArrayLike) -> tuple[Arr
     array_like of shape (m,), in Hz, above 0 and up to half the fused rate.
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64)) / board.rate
-    spectra = _spectra(board, weights, omega) / board.rate
+    spectra = _compute_spectra(board, weights, omega) / board.rate
     return spectra[:, 0] + spectra[:, 1], spectra[:, 1]
 
 
@@ -161,17 +161,17 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
     if isinstance(weights, Constant):
         parts = board.allan_parts(tau).of_sum(np.tile(weights.values, (len(tau), 1)))
     else:
-        parts = allan_of_spectrum(lambda omega: _spectra(board, weights, omega), sizes)
-        parts = parts + _of_deterministic(board, weights, tau)
+        parts = allan_of_spectrum(lambda omega: _compute_spectra(board, weights, omega), sizes)
+        parts = parts + _compute_deterministic_variance(board, weights, tau)
     return FusedCurve(tau, parts.sum(axis=1), parts[:, 1])
 
 
-def _spectra(board: Board, weights: Weights, omega: Array) -> Array:
+def _compute_spectra(board: Board, weights: Weights, omega: Array) -> Array:
     """Return the fused spectra of what is alone and what is common, SI^2, shape (m, 2)."""
     return board.spectral_parts(omega).of_sum(weights.response(omega))
 
 
-def _of_deterministic(board: Board, weights: Weights, tau: Array) -> Array:
+def _compute_deterministic_variance(board: Board, weights: Weights, tau: Array) -> Array:
     """Return the Allan variances of ramps and lines, alone and common, shape (m, 2)."""
     # Each at its own rate: the means of the blocks of a faster sensor weaken its lines.
     alone = list(zip(board.models, board.rates, np.eye(board.sensors), strict=True))
@@ -183,15 +183,15 @@ def _of_deterministic(board: Board, weights: Weights, tau: Array) -> Array:
         for model, rate, gains in members:
             if model.R:
                 ramp = NoiseModel(R=model.R).allan_variance(tau, rate)
-                parts[:, column] += ramp * _power(weights, _SLOW, gains)
+                parts[:, column] += ramp * _compute_power(weights, _RAMP_FREQUENCY, gains)
             for line in model.sinusoids:
                 omega = 2.0 * np.pi * line.frequency / board.rate
                 alone_line = NoiseModel(sinusoids=[line]).allan_variance(tau, rate)
-                parts[:, column] += alone_line * _power(weights, omega, gains)
+                parts[:, column] += alone_line * _compute_power(weights, omega, gains)
     return parts
 
 
-def _power(weights: Weights, omega: float, gains: Array) -> float:
+def _compute_power(weights: Weights, omega: float, gains: Array) -> float:
     return float(np.abs(weights.response(np.array([omega]))[0] @ gains) ** 2)
 
 

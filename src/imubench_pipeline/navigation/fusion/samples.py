@@ -11,7 +11,7 @@ from imubench_pipeline.navigation.fusion.kalman import KalmanFusion
 from imubench_pipeline.navigation.fusion.weights import Constant
 from imubench_pipeline.typing import Array
 
-_BLOCK = 1 << 16
+_BLOCK_LENGTH = 1 << 16
 """Fused samples that are brought to one rate at a time."""
 
 
@@ -35,7 +35,7 @@ def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
     ValueError
         If the number of sensors differs.
     """
-    number = _length(board, samples)
+    number = _count_fused_samples(board, samples)
     fused = np.empty((number, board.sensors))
     for i, (log, size) in enumerate(zip(samples, board.blocks, strict=True)):
         fused[:, i] = np.asarray(log[: number * size]).reshape(number, size).mean(axis=1)
@@ -52,16 +52,16 @@ def fuse(board: Board, how: Constant | KalmanFusion, samples: Sequence[Array]) -
     ValueError
         If the number of sensors differs.
     """
-    number = _length(board, samples)
+    number = _count_fused_samples(board, samples)
     blocks = (
         at_fused_rate(
             board,
             [
-                log[start * size : min(start + _BLOCK, number) * size]
+                log[start * size : min(start + _BLOCK_LENGTH, number) * size]
                 for log, size in zip(samples, board.blocks, strict=True)
             ],
         )
-        for start in range(0, number, _BLOCK)
+        for start in range(0, number, _BLOCK_LENGTH)
     )
     if isinstance(how, Constant):
         parts = [block @ how.values for block in blocks]
@@ -70,7 +70,7 @@ def fuse(board: Board, how: Constant | KalmanFusion, samples: Sequence[Array]) -
     return np.concatenate(parts) if parts else np.empty(0)
 
 
-def _length(board: Board, samples: Sequence[Array]) -> int:
+def _count_fused_samples(board: Board, samples: Sequence[Array]) -> int:
     """Return how many fused samples the logs of all sensors make."""
     if len(samples) != board.sensors:
         raise ValueError(f"found samples of {len(samples)} sensors, expected {board.sensors}")

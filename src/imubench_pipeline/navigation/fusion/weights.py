@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.navigation.fusion.board import Board, Parts
 from imubench_pipeline.typing import Array
 
-_NEARLY = 1e-14
+_MIN_VARIANCE_RATIO = 1e-14
 """Variance of a perfect sensor over that of the poorest beside it."""
 
 
@@ -113,7 +113,9 @@ def least(parts: Parts) -> Array:
     """
     # What has nothing of its own is nearly perfect; where none has, all are alike.
     largest = parts.own.max(axis=1, keepdims=True)
-    own = np.where(parts.own > 0.0, parts.own, np.where(largest > 0.0, _NEARLY * largest, 1.0))
+    own = np.where(
+        parts.own > 0.0, parts.own, np.where(largest > 0.0, _MIN_VARIANCE_RATIO * largest, 1.0)
+    )
     root = np.sqrt(parts.shared)
     mean = parts.sensitivities.mean(axis=1)
     across = parts.sensitivities - mean[:, None]

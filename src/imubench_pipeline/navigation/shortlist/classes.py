@@ -12,7 +12,7 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.settings.sensor import quantity_of
 
-_TAKEN = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
+_FIGURE_OF_PARAMETER = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
 """Parameters of the estimates, and what stands for them here: B is that of the curve."""
 
 
@@ -88,7 +88,7 @@ def measured_ranges(
     shown: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
     absent: dict[tuple[str, str, str], list[float]] = {}
     for one in parameters:
-        figure = _TAKEN.get(one.parameter)
+        figure = _FIGURE_OF_PARAMETER.get(one.parameter)
         if figure is None or not one.recommended or one.component != 1:
             continue
         if (one.sensor, one.recording) not in real:

@@ -63,7 +63,7 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
     """Return what a datasheet allows of a quantity, or why nothing can be said."""
     if getattr(sensor.datasheet, quantity) is None:
         return f"it has no {SENSORS[quantity]}"
-    printed, options = _printed(sensor.datasheet, quantity)
+    printed, options = _read_printed(sensor.datasheet, quantity)
     of = SENSORS[quantity]
     assumed: list[str] = [f"{of}: any of {', '.join(options)}"] if options else []
     unknown: list[str] = []
@@ -71,8 +71,8 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
     def filled(figure: str, statistic: str) -> Span | None:
         own = [row for row in printed if row.statistic == statistic]
         if own:
-            assumed.extend(f"{of} {figure}: {words}" for words in _readings(own))
-            return _ends(own)
+            assumed.extend(f"{of} {figure}: {words}" for words in _describe_readings(own))
+            return _find_ends(own)
         span = ranges.span(sensor.price_class, quantity, figure)
         if span is None:
             unknown.append(figure)
@@ -112,21 +112,21 @@ def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple
         for quantity in SENSORS:
             if getattr(sensor.datasheet, quantity) is None:
                 continue
-            printed, _ = _printed(sensor.datasheet, quantity)
+            printed, _ = _read_printed(sensor.datasheet, quantity)
             own = [row for row in printed if row.statistic == "adev_minimum"]
             if own:
-                ends = _ends(own)
+                ends = _find_ends(own)
                 ranges[name, quantity] = (ends.low, ends.high / FLOOR)
     return ranges
 
 
-def _ends(rows: Sequence[Comparable]) -> Span:
+def _find_ends(rows: Sequence[Comparable]) -> Span:
     values = [row.value for row in rows if row.value is not None]
     least = [row.least for row in rows if row.least is not None]
     return Span(min([*values, *least]), max(values))
 
 
-def _readings(rows: Sequence[Comparable]) -> list[str]:
+def _describe_readings(rows: Sequence[Comparable]) -> list[str]:
     """Return what a printed figure leaves open, in words."""
     readings = []
     if any("assumed" in (row.reason or "") for row in rows):
@@ -136,14 +136,14 @@ def _readings(rows: Sequence[Comparable]) -> list[str]:
     return readings
 
 
-def _printed(datasheet: Datasheet, quantity: str) -> tuple[list[Comparable], list[str]]:
+def _read_printed(datasheet: Datasheet, quantity: str) -> tuple[list[Comparable], list[str]]:
     """Return what is printed of all axes of a quantity, and the options that are all taken."""
-    sheet, options = _of_every_option(datasheet, quantity)
+    sheet, options = _select_every_option(datasheet, quantity)
     rows = [row for axis in "xyz" for row in comparables(sheet, f"{quantity}_{axis}")]
     return [row for row in rows if row.value is not None], options
 
 
-def _of_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet, list[str]]:
+def _select_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet, list[str]]:
     """Return a datasheet with every option taken, where it does not say which one is meant."""
     sheet: QuantityDatasheet = getattr(datasheet, quantity)
     named = {

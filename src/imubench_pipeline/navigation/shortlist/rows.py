@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.error_budget.in_use import BIASES, Figure
+from imubench_pipeline.navigation.error_budget.in_use import BIAS_CAUSES, Figure
 from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
 from imubench_pipeline.navigation.error_budget.parts import Budget
 from imubench_pipeline.navigation.error_budget.printed_errors import of_datasheet
@@ -32,10 +32,10 @@ VERDICTS: Mapping[str, str] = {
 }
 """What a verdict says."""
 
-_NOTHING = AxisErrors()
+_NO_AXIS_ERRORS = AxisErrors()
 _QUANTITIES = ("gyro", "accel")
-_ALONE = dict.fromkeys(_QUANTITIES, _NOTHING)
-_CALIBRATED: InUse = dict.fromkeys(BIASES, Figure(sigma=0.0))
+_NO_ERRORS = dict.fromkeys(_QUANTITIES, _NO_AXIS_ERRORS)
+_CALIBRATED_BIASES: InUse = dict.fromkeys(BIAS_CAUSES, Figure(sigma=0.0))
 
 
 def shortlist_rows(
@@ -63,7 +63,7 @@ def shortlist_rows(
             continue  # no datasheet tells how a filter navigates
         rows = []
         for sensor, figures in by_sensor.items():
-            row = _judged((name, sensor), requirement, questions, sensors[sensor], figures)
+            row = _judge((name, sensor), requirement, questions, sensors[sensor], figures)
             standing = measured.get((name, sensor))
             if standing is not None and standing.margin is not None:
                 of_model = standing.recording and simulated.get((sensor, standing.recording), False)
@@ -77,7 +77,7 @@ def shortlist_rows(
         yield from sorted(rows, key=lambda row: (-(row.best_margin or 0.0), row.sensor))
 
 
-def _judged(
+def _judge(
     names: tuple[str, str],
     requirement: Requirement,
     questions: Sequence[Question],
@@ -89,7 +89,7 @@ def _judged(
     row = ShortlistRow(
         requirement=names[0], sensor=names[1], price_class=price_class, verdict="not judged"
     )
-    lacking, unknown = judge(requirement.must, _before_buying(sensor))
+    lacking, unknown = judge(requirement.must, _assume_all_axes(sensor))
     if lacking:
         return replace(row, verdict="cannot pass", reason="; ".join(lacking))
     needed = dict.fromkeys(quantity for question in questions for quantity in question.needs)
@@ -98,11 +98,11 @@ def _judged(
         why = "; ".join(entry for q in needed if isinstance(entry := figures[q], str))
         return replace(row, reason=why)
     in_use = {quantity: of_datasheet(sensor.datasheet, f"{quantity}_x") for quantity in published}
-    best, missing = _margins(questions, published, in_use, "best")
+    best, missing = _compute_margins(questions, published, in_use, "best")
     least = min(range(len(best)), key=best.__getitem__)
     worst = None
     if all(allowed.bounded for allowed in published.values()):
-        margins, missing = _margins(questions, published, in_use, "worst")
+        margins, missing = _compute_margins(questions, published, in_use, "worst")
         worst = min(margins) if not missing else None
     assumed = [words for allowed in published.values() for words in allowed.assumed] + missing
     row = replace(
@@ -115,10 +115,10 @@ def _judged(
     if not requirement.admits(price_class):
         why = "outside the price class" if price_class else "price class not stated"
         return replace(row, reason=why)
-    return replace(row, verdict=_verdict(best[least], worst))
+    return replace(row, verdict=_choose_verdict(best[least], worst))
 
 
-def _before_buying(sensor: Sensor) -> Abilities:
+def _assume_all_axes(sensor: Sensor) -> Abilities:
     """Return what a sensor has, logged or not: all axes of the quantities that it measures."""
     has = abilities(sensor)
     quantities = [name for name in _QUANTITIES if name not in has.without]
@@ -126,20 +126,20 @@ def _before_buying(sensor: Sensor) -> Abilities:
     return has.model_copy(update={"channels": channels, "logged_rate": None})
 
 
-def _verdict(best: float, worst: float | None) -> str:
+def _choose_verdict(best: float, worst: float | None) -> str:
     if best < 1.0:
         return "cannot pass"
     return "passes at its worst" if worst is not None and worst >= 1.0 else "worth logging"
 
 
-def _margins(
+def _compute_margins(
     questions: Sequence[Question],
     figures: Mapping[str, Figures],
     in_use: Mapping[str, InUse],
     end: End,
 ) -> tuple[list[float], list[str]]:
     """Return the limit over the error of each question, and what they all leave out, in words."""
-    budgets = [_budget(question, figures, in_use, end) for question in questions]
+    budgets = [_compute_budget(question, figures, in_use, end) for question in questions]
     margins = [
         question.limit / budget.total if budget.total > 0.0 else math.inf
         for question, budget in zip(questions, budgets, strict=True)
@@ -153,16 +153,16 @@ def _margins(
     return margins, list(dict.fromkeys(missing))
 
 
-def _budget(
+def _compute_budget(
     question: Question, figures: Mapping[str, Figures], in_use: Mapping[str, InUse], end: End
 ) -> Budget:
     pick = min if end == "best" else max
-    beside = _CALIBRATED if end == "best" else {}
-    chosen = dict.fromkeys(_QUANTITIES, _NOTHING)
+    beside = _CALIBRATED_BIASES if end == "best" else {}
+    chosen = dict.fromkeys(_QUANTITIES, _NO_AXIS_ERRORS)
     for quantity in question.needs:
         models = figures[quantity].models(end)
         axes = [AxisErrors(model, {**in_use[quantity], **beside}) for model in models]
         # The quantities are independent: each has its own extreme.
-        totals = [question.answer(**{**_ALONE, quantity: axis}).total for axis in axes]
+        totals = [question.answer(**{**_NO_ERRORS, quantity: axis}).total for axis in axes]
         chosen[quantity] = axes[totals.index(pick(totals))]
     return question.answer(**chosen)

@@ -20,9 +20,9 @@ from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import Strict
 from imubench_pipeline.units import from_si, quantity_to_si, to_si
 
-_UNITS: dict[Measured, str] = {"gyro": "deg/s", "accel": "g"}
+_FULL_SCALE_UNITS: dict[Measured, str] = {"gyro": "deg/s", "accel": "g"}
 
-_ROUNDED = 1.0 + 1e-9
+_ROUNDING_MARGIN = 1.0 + 1e-9
 """For what is as asked, but in another unit."""
 
 
@@ -61,7 +61,7 @@ def abilities(sensor: Sensor) -> Abilities:
         name: {
             quantity: largest
             for quantity in quantities
-            if (largest := _largest(sensor.datasheet, quantity, name)) is not None
+            if (largest := _find_largest(sensor.datasheet, quantity, name)) is not None
         }
         for name in ("full_scale", "bandwidth")
     }
@@ -70,7 +70,7 @@ def abilities(sensor: Sensor) -> Abilities:
         full_scale=printed["full_scale"],
         bandwidth=printed["bandwidth"],
         logged_rate=sensor.log.rate_hz,
-        rate=_si(sensor.rate, "frequency"),
+        rate=_convert_to_si(sensor.rate, "frequency"),
         temperature=(
             (quantity_to_si(ends[0], "temperature"), quantity_to_si(ends[1], "temperature"))
             if ends
@@ -80,16 +80,16 @@ def abilities(sensor: Sensor) -> Abilities:
         without=tuple(
             quantity for quantity in quantities if getattr(sensor.datasheet, quantity) is None
         ),
-        mass=_si(sensor.mass, "mass"),
-        power=_si(sensor.power, "power"),
+        mass=_convert_to_si(sensor.mass, "mass"),
+        power=_convert_to_si(sensor.power, "power"),
     )
 
 
-def _si(text: str | None, dimension: str) -> float | None:
+def _convert_to_si(text: str | None, dimension: str) -> float | None:
     return None if text is None else quantity_to_si(text, dimension)
 
 
-def _largest(datasheet: Datasheet, quantity: Measured, name: str) -> float | None:
+def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float | None:
     """Return the largest printed figure of the axis that has the least of it, SI."""
     sheet = getattr(datasheet, quantity)
     figures: list[PrintedFigure] = [
@@ -122,7 +122,7 @@ def judge(must: Must, has: Abilities) -> tuple[list[str], list[str]]:
     """
     lacking: list[str] = []
     unknown: list[str] = []
-    for point in _compared(must, has):
+    for point in _compare(must, has):
         if point.fulfilled is None:
             unknown.append(point.name)
         elif not point.fulfilled:
@@ -134,24 +134,24 @@ def judge(must: Must, has: Abilities) -> tuple[list[str], list[str]]:
     return list(dict.fromkeys(lacking)), list(dict.fromkeys(unknown))
 
 
-def _compared(must: Must, has: Abilities) -> Iterator[_Point]:
-    yield from _axes(must, has)
-    yield from _full_scales(must, has)
-    yield from _bandwidths(must, has)
+def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
+    yield from _compare_axes(must, has)
+    yield from _compare_full_scales(must, has)
+    yield from _compare_bandwidths(must, has)
     if must.rate is not None:
-        yield _rate(must.rate, has)
+        yield _compare_rate(must.rate, has)
     if must.temperature is not None:
-        yield _temperature(must.temperature, has)
+        yield _compare_temperature(must.temperature, has)
     for name, text, size, unit in (
         ("mass", must.mass, has.mass, "g"),
         ("power", must.power, has.power, "W"),
     ):
         if text is not None:
-            small = None if size is None else size <= quantity_to_si(text, name) * _ROUNDED
-            yield _Point(name, small, text, _shown(size, unit, name))
+            small = None if size is None else size <= quantity_to_si(text, name) * _ROUNDING_MARGIN
+            yield _Point(name, small, text, _format_value(size, unit, name))
 
 
-def _full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
+def _compare_full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
     asked: dict[Measured, str | None] = {
         "gyro": must.full_scale.gyro,
         "accel": must.full_scale.accel,
@@ -161,16 +161,18 @@ def _full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
             continue
         name = f"full scale of the {SENSORS[measured]}"
         dimension, largest = QUANTITIES[measured], has.full_scale.get(measured)
-        shown = _shown(largest, _UNITS[measured], dimension)
+        shown = _format_value(largest, _FULL_SCALE_UNITS[measured], dimension)
         if measured in has.without:
             yield _Point(SENSORS[measured], False, text)
         elif largest is None:
             yield _Point(name, None, text)
         else:
-            yield _Point(name, largest * _ROUNDED >= quantity_to_si(text, dimension), text, shown)
+            yield _Point(
+                name, largest * _ROUNDING_MARGIN >= quantity_to_si(text, dimension), text, shown
+            )
 
 
-def _bandwidths(must: Must, has: Abilities) -> Iterator[_Point]:
+def _compare_bandwidths(must: Must, has: Abilities) -> Iterator[_Point]:
     """Yield the bandwidth of the quantities whose axes must be there, or else of all."""
     if must.bandwidth is None:
         return
@@ -179,20 +181,20 @@ def _bandwidths(must: Must, has: Abilities) -> Iterator[_Point]:
         if measured in asked and measured not in has.without:
             width = has.bandwidth.get(measured)
             wide = None if width is None else width >= quantity_to_si(must.bandwidth, "frequency")
-            shown = _shown(width, "Hz", "frequency")
+            shown = _format_value(width, "Hz", "frequency")
             yield _Point(f"bandwidth of the {SENSORS[measured]}", wide, must.bandwidth, shown)
 
 
-def _rate(text: str, has: Abilities) -> _Point:
+def _compare_rate(text: str, has: Abilities) -> _Point:
     least = quantity_to_si(text, "frequency")
     if has.logged_rate is not None and has.logged_rate >= least:
         return _Point("rate", True, text)
     # A log at a lower rate is not all that a sensor can give.
     fast = None if has.rate is None else has.rate >= least
-    return _Point("rate", fast, text, _shown(has.rate, "Hz", "frequency"))
+    return _Point("rate", fast, text, _format_value(has.rate, "Hz", "frequency"))
 
 
-def _temperature(ends: tuple[str, str], has: Abilities) -> _Point:
+def _compare_temperature(ends: tuple[str, str], has: Abilities) -> _Point:
     name, text = "temperature range", " to ".join(ends)
     if has.temperature is None:
         return _Point(name, None, text)
@@ -202,7 +204,7 @@ def _temperature(ends: tuple[str, str], has: Abilities) -> _Point:
     return _Point(name, within, text, f"{covered[0]:.4g} to {covered[1]:.4g} degC")
 
 
-def _axes(must: Must, has: Abilities) -> Iterator[_Point]:
+def _compare_axes(must: Must, has: Abilities) -> Iterator[_Point]:
     for text in must.axes:
         quantity, axes = text.split("_")
         if quantity in has.without:
@@ -214,5 +216,5 @@ def _axes(must: Must, has: Abilities) -> Iterator[_Point]:
             yield _Point(f"axis {quantity}_{axis}", logged, text)
 
 
-def _shown(value: float | None, unit: str, dimension: str) -> str:
+def _format_value(value: float | None, unit: str, dimension: str) -> str:
     return "" if value is None else f"{from_si(value, unit, dimension):.4g} {unit}"

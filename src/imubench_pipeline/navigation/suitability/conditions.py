@@ -22,10 +22,10 @@ from imubench_pipeline.units import from_si
 
 EXCLUDED = "excluded"
 
-CONDITIONAL = {"passes": "passes if", "probably passes": "probably passes if"}
+CONDITIONAL_VERDICTS = {"passes": "passes if", "probably passes": "probably passes if"}
 """The verdicts that a condition changes: what fails without it fails with it, too."""
 
-_FIGURES = {
+_CONDITION_TEXTS = {
     "turn_on_bias": ("its {sensor}s are calibrated to {largest}", "deg/s", "mg"),
     "temperature": (
         "its {sensor} temperature coefficient is below {largest}",
@@ -42,7 +42,7 @@ _FIGURES = {
 }
 """By cause: the condition, and the unit of the figure of a gyro and of an accelerometer."""
 
-_NAMES = {
+_FIGURE_NAMES = {
     "temperature": "temperature coefficient",
     "scale_factor": "scale factor error",
     "g_sensitivity": "g-sensitivity",
@@ -50,7 +50,7 @@ _NAMES = {
 }
 """Of the figures that a datasheet can tell of every specimen."""
 
-_DIMENSIONS = {
+_DIMENSION_OF_UNIT = {
     "deg/s": "angular_rate",
     "mg": "acceleration",
     "deg/s/K": "gyro_temperature_coefficient",
@@ -84,7 +84,7 @@ class Rests:
         for row in conditions:
             if row.cause is None:
                 continue  # a condition has one
-            key = _measured(row), row.cause
+            key = _get_quantity(row), row.cause
             largest = row.largest or 0.0
             figures[key] = min(figures.get(key, largest), largest)
         return cls(tuple(lacking), tuple(unknown), figures)
@@ -94,30 +94,33 @@ class Rests:
         if self.lacking:
             return EXCLUDED, "; ".join(self.lacking)
         conditions = list(self._conditions())
-        if words not in CONDITIONAL or not conditions:
+        if words not in CONDITIONAL_VERDICTS or not conditions:
             return words, None
-        return CONDITIONAL[words], "; ".join(conditions)
+        return CONDITIONAL_VERDICTS[words], "; ".join(conditions)
 
     def unknown_figures(self) -> list[str]:
         """Return the names of the figures that its file does not say, but for turn-on biases."""
         causes = [
-            f"{SENSORS[measured]} {_NAMES[cause]}"
+            f"{SENSORS[measured]} {_FIGURE_NAMES[cause]}"
             for measured, cause in self.figures
-            if cause in _NAMES
+            if cause in _FIGURE_NAMES
         ]
         return [*causes, *self.unknown]
 
     def _conditions(self) -> Iterator[str]:
         for (measured, cause), largest in self.figures.items():
-            text, *units = _FIGURES[cause]
+            text, *units = _CONDITION_TEXTS[cause]
             unit = units[measured == "accel"]
-            size = f"{_down(from_si(largest, unit, _DIMENSIONS[unit])):g} {unit} (1 sigma)"
+            size = (
+                f"{_round_down(from_si(largest, unit, _DIMENSION_OF_UNIT[unit])):g} "
+                f"{unit} (1 sigma)"
+            )
             yield text.format(sensor=SENSORS[measured], largest=size)
         if self.unknown:
             yield f"it has what it must (not known: {', '.join(self.unknown)})"
 
 
-def _down(value: float) -> float:
+def _round_down(value: float) -> float:
     """Return a number above 0 cut to three digits: rounded up it would no more keep the limit."""
     step = Decimal(1).scaleb(Decimal(value).adjusted() - 2)
     return float(Decimal(value).quantize(step, rounding=ROUND_DOWN))
@@ -133,14 +136,14 @@ def in_words(verdict: str, conditions: str | None) -> str:
     return f"{verdict}{':' * (verdict == EXCLUDED)} {conditions}"
 
 
-def _measured(row: ErrorBudgetRow) -> str:
-    """Return whose figure a source is of."""
+def _get_quantity(row: ErrorBudgetRow) -> str:
+    """Return the quantity that a source belongs to: ``gyro`` or ``accel``."""
     return next(word for word in row.source.split() if word in SENSORS)
 
 
 def is_condition(row: ErrorBudgetRow) -> bool:
-    """Tell whether a limit rests on the figure of a source."""
-    return row.largest_unit is not None and row.cause in _FIGURES
+    """Return whether meeting a limit depends on the figure of a source."""
+    return row.largest_unit is not None and row.cause in _CONDITION_TEXTS
 
 
 def once_calibrated(
@@ -157,7 +160,7 @@ def once_calibrated(
     sources that the limit rests on.
     """
     squares = [size**2 for _, size in with_sigma(conditions)]
-    if not squares or words in CONDITIONAL or limit is None:
+    if not squares or words in CONDITIONAL_VERDICTS or limit is None:
         return words
     for size, better in ((upper, "passes"), (sigma, "probably passes")):
         if size is not None and size**2 - math.fsum(squares) < limit**2:

@@ -38,23 +38,25 @@ class Basis:
         backtests: Iterable[BacktestRow] = (),
     ) -> Basis:
         """Return it from the rows of a run; of parameters the recommended ones count."""
-        about = {_key(row): row for row in recordings}
+        about = {_make_key(row): row for row in recordings}
         doubted: dict[Key, list[DoubtRow]] = {}
         for doubt in doubts:
-            doubted.setdefault(_key(doubt), []).append(doubt)
+            doubted.setdefault(_make_key(doubt), []).append(doubt)
         channels: dict[Key, dict[str, bool]] = {}
         for row in parameters:
             if row.recommended:
-                of_log = channels.setdefault(_key(row), {})
+                of_log = channels.setdefault(_make_key(row), {})
                 of_log[row.channel] = of_log.get(row.channel, False) or row.value is not None
-        shown = {_backtested(test, test.requirement, test.channel): test for test in backtests}
+        shown = {
+            _make_backtest_key(test, test.requirement, test.channel): test for test in backtests
+        }
         return cls(about, doubted, channels, left_out(about.values()), shown)
 
     def backtest(
         self, of: ErrorBudgetRow, requirement: str, channel: str | None
     ) -> BacktestRow | None:
         """Return what the log of a channel shows of an error of a requirement; else nothing."""
-        return self.backtests.get(_backtested(of, requirement, channel))
+        return self.backtests.get(_make_backtest_key(of, requirement, channel))
 
     def device(self, key: Key) -> str:
         """Return the specimen: by default each recording is one of its own."""
@@ -68,7 +70,7 @@ class Basis:
 
     def longest(self, rows: Iterable[OfRecordingRow]) -> float | None:
         """Return the length of the longest recording of rows, s; None where none is known."""
-        durations = (self.duration(_key(row)) for row in rows)
+        durations = (self.duration(_make_key(row)) for row in rows)
         return max((duration for duration in durations if duration is not None), default=None)
 
     def simulated(self, key: Key) -> bool:
@@ -111,11 +113,11 @@ class Basis:
         return factors
 
 
-def _backtested(
+def _make_backtest_key(
     of: ErrorBudgetRow | BacktestRow, requirement: str, channel: str | None
 ) -> tuple[Any, ...]:
     return requirement, of.sensor, of.recording, channel, of.error, of.time
 
 
-def _key(row: OfRecordingRow | RecordingRow) -> Key:
+def _make_key(row: OfRecordingRow | RecordingRow) -> Key:
     return row.sensor, row.recording

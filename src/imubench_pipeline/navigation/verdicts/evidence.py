@@ -23,13 +23,13 @@ from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.units import quantity_to_si
 
 
-def _behind(kind: type[Term]) -> frozenset[str]:
+def _list_parameters(kind: type[Term]) -> frozenset[str]:
     symbols = frozenset(parameter.symbol for parameter in kind.parameters)
     raises_the_curve = "B" in symbols or kind.role is Role.GAUSS_MARKOV
     return symbols | frozenset(CURVE) if raises_the_curve else symbols
 
 
-_PARAMETERS = {kind.word: _behind(kind) for kind in TERMS}
+_PARAMETERS_OF_SOURCE = {kind.word: _list_parameters(kind) for kind in TERMS}
 """Parameters behind the first word of a term's name (`Term.source`); the lowest part of the curve
 is what its bias instability makes of it."""
 
@@ -37,13 +37,13 @@ is what its bias instability makes of it."""
 Reason = Literal["one_specimen", "short_log", "wide_interval", "few_axes"]
 """What makes evidence weak; beside these, the codes of doubts."""
 
-REASONS: tuple[str, ...] = get_args(Reason)
+WEAKNESS_REASONS: tuple[str, ...] = get_args(Reason)
 
-LONGEST_PART = 1 / 9
+MAX_TIME_SHARE = 1 / 9
 """Part of a log that tells an error of that length: there the Allan deviation of white noise has
 8 differences of clusters end to end, and is known to about a quarter."""
 
-_AXES = 3
+_AXIS_COUNT = 3
 
 
 def quantity_behind(source: str) -> str | None:
@@ -53,7 +53,7 @@ def quantity_behind(source: str) -> str | None:
     ``error_budget``. A turn-on bias is stated, and not of the log.
     """
     words = source.removeprefix("initial tilt by ").split()
-    noise = len(words) > 1 and words[0] in ("gyro", "accel") and words[1] in _PARAMETERS
+    noise = len(words) > 1 and words[0] in ("gyro", "accel") and words[1] in _PARAMETERS_OF_SOURCE
     return words[0] if noise else None
 
 
@@ -61,43 +61,44 @@ def parameters_behind(source: str) -> frozenset[str]:
     """Return the noise parameters that a source comes of; none where it is no noise of the log."""
     if quantity_behind(source) is None:
         return frozenset()
-    return _PARAMETERS[source.removeprefix("initial tilt by ").split()[1]]
+    return _PARAMETERS_OF_SOURCE[source.removeprefix("initial tilt by ").split()[1]]
 
 
 def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
     """Return what makes the evidence of a limit weak; nothing where it is strong.
 
-    `REASONS` and codes of the table ``doubts``. Axes and doubts count where they are those of half
-    the recordings or more, the length is that of the longest. The standing has a figure.
+    They are `WEAKNESS_REASONS` and codes of the table ``doubts``. Axes and doubts count if at least
+    half of the recordings have them; the longest recording gives the length. The standing must have
+    a figure.
     """
     reasons = []
     if standing.expected.specimens == 1:
         reasons.append("one_specimen")
     longest = basis.longest(standing.totals)
     asked = longest_asked(standing.total, requirement)
-    if longest is not None and asked > LONGEST_PART * longest:
+    if longest is not None and asked > MAX_TIME_SHARE * longest:
         reasons.append("short_log")
     if standing.wide:
         reasons.append("wide_interval")
     of_logs = Counter(
         reason
         for total in standing.totals
-        for reason in dict.fromkeys(_of_log(total, standing, requirement, basis))
+        for reason in dict.fromkeys(_list_log_weaknesses(total, standing, requirement, basis))
     )
     half = len(standing.totals) / 2.0
-    order = [*REASONS, *of_logs]
+    order = [*WEAKNESS_REASONS, *of_logs]
     reasons += [reason for reason, count in of_logs.items() if count >= half]
     return sorted(reasons, key=order.index)
 
 
-def _of_log(
+def _list_log_weaknesses(
     total: ErrorBudgetRow, standing: Standing, requirement: Requirement, basis: Basis
 ) -> Iterator[str]:
     key = total.sensor, total.recording
     answering = {"gyro": total.gyro, "accel": total.accel}
     for quantity, channel in answering.items():
         axes = basis.axes(key, quantity) if channel else None
-        if requirement.axis == "worst" and axes is not None and axes < _AXES:
+        if requirement.axis == "worst" and axes is not None and axes < _AXIS_COUNT:
             yield "few_axes"
     if standing.source is None:
         return

@@ -53,7 +53,7 @@ class Judgement:
     @property
     def _of_errors(self) -> str:
         """The verdict on what is known: of the limit that decides, or of all once calibrated."""
-        once = [_once_calibrated(standing) for standing in self.standings]
+        once = [_judge_once_calibrated(standing) for standing in self.standings]
         if self.decides.known and once != [standing.verdict for standing in self.standings]:
             return min(once, key=_WORST_FIRST.index)
         return self.decides.verdict
@@ -87,10 +87,10 @@ def judgements(
         of_sensors.setdefault(row.sensor, []).append(row)
     for name, requirement in requirements.items():
         of_sensors = by_requirement.get(name, {})
-        usual = {made: _usual(of_sensors, basis, simulated=made) for made in (False, True)}
+        usual = {made: _pool_spreads(of_sensors, basis, simulated=made) for made in (False, True)}
         for sensor, rows in of_sensors.items():
-            devices, made = _specimens(sensor, rows, basis)
-            by_limit = standings(_deciding_rows(rows, basis), devices, usual[made])
+            devices, made = _map_specimens(sensor, rows, basis)
+            by_limit = standings(_select_deciding_rows(rows, basis), devices, usual[made])
             decides = deciding(by_limit)
             yield Judgement(
                 name,
@@ -99,7 +99,7 @@ def judgements(
                 by_limit,
                 decides,
                 [weaknesses(each, requirement, basis) if each.known else [] for each in by_limit],
-                _outside(requirement, sensors[sensor]["price_class"]),
+                _explain_exclusion(requirement, sensors[sensor]["price_class"]),
                 Rests.of(
                     requirement.must,
                     Abilities.model_validate(sensors[sensor].get("abilities", {})),
@@ -109,7 +109,7 @@ def judgements(
             )
 
 
-def _specimens(
+def _map_specimens(
     sensor: str, rows: Iterable[ErrorBudgetRow], basis: Basis
 ) -> tuple[dict[str, str], bool]:
     """Return the specimen of each recording of rows, and whether all of these are simulated."""
@@ -118,45 +118,45 @@ def _specimens(
     return devices, all(basis.simulated(key) for key in keys)
 
 
-def _deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[ErrorBudgetRow]:
+def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[ErrorBudgetRow]:
     """Return rows without the figures of recordings that do not decide."""
     apart = [basis.apart.get((row.sensor, row.recording)) for row in rows]
     return [
-        row if reason is None else _without_figure(row, reason)
+        row if reason is None else _remove_figure(row, reason)
         for row, reason in zip(rows, apart, strict=True)
     ]
 
 
-def _without_figure(row: ErrorBudgetRow, reason: str) -> ErrorBudgetRow:
+def _remove_figure(row: ErrorBudgetRow, reason: str) -> ErrorBudgetRow:
     return replace(
         row, sigma=None, lower=None, upper=None, within=None, reached_after=None, reason=reason
     )
 
 
-def _usual(
+def _pool_spreads(
     of_sensors: Mapping[str, Sequence[ErrorBudgetRow]], basis: Basis, *, simulated: bool
 ) -> dict[tuple[Any, ...], Spread]:
     """Return the spread between specimens of all sensors that have several, by limit."""
     by_limit: dict[tuple[Any, ...], list[Spread]] = {}
     for sensor, rows in of_sensors.items():
-        devices, made = _specimens(sensor, rows, basis)
+        devices, made = _map_specimens(sensor, rows, basis)
         if made is not simulated:
             continue
-        for standing in standings(_deciding_rows(rows, basis), devices):
+        for standing in standings(_select_deciding_rows(rows, basis), devices):
             if standing.expected.spread is not None and standing.expected.spread_of == "specimens":
                 by_limit.setdefault(limit_of(standing.total), []).append(standing.expected.spread)
     usual = {key: usual_spread(spreads) for key, spreads in by_limit.items()}
     return {key: spread for key, spread in usual.items() if spread is not None}
 
 
-def _once_calibrated(standing: Standing) -> str:
+def _judge_once_calibrated(standing: Standing) -> str:
     error = standing.expected
     return once_calibrated(
         standing.verdict, standing.total.limit, error.sigma, error.upper, standing.conditions
     )
 
 
-def _outside(requirement: Requirement, price_class: str | None) -> str | None:
+def _explain_exclusion(requirement: Requirement, price_class: str | None) -> str | None:
     if requirement.admits(price_class):
         return None
     return "outside the price class" if price_class else "price class not stated"

@@ -11,7 +11,11 @@ from scipy.special import stdtrit
 
 from imubench_pipeline.model.comparisons import NextStepRow
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
-from imubench_pipeline.navigation.verdicts.evidence import LONGEST_PART, REASONS, longest_asked
+from imubench_pipeline.navigation.verdicts.evidence import (
+    MAX_TIME_SHARE,
+    WEAKNESS_REASONS,
+    longest_asked,
+)
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.specimens import Expected
 from imubench_pipeline.navigation.verdicts.standing import Standing
@@ -22,15 +26,15 @@ Action = Literal[
 ]
 """What can be done, the cheapest first."""
 
-_ORDER = get_args(Action)
+_ACTION_ORDER = get_args(Action)
 
-_LONGEST = 100.0
+_MAX_DURATION_FACTOR = 100.0
 """Times the length of a log beyond which none is advised: limits ten times as narrow."""
 
-_MOST_SPECIMENS = 20
+_MAX_SPECIMENS = 20
 """Of one sensor, beyond which no more are advised."""
 
-_ENOUGH_SPECIMENS = 3
+_MIN_SPECIMENS = 3
 """Specimens that know their spread at all: t of two degrees of freedom is 4.3, of one 12.7."""
 
 
@@ -52,22 +56,22 @@ def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRo
     groups: dict[tuple[Any, ...], list[_Step]] = {}
     for judgement in judged:
         if judgement.outside is None and not judgement.rests.lacking:
-            for step in _steps(judgement, basis):
+            for step in _list_steps(judgement, basis):
                 groups.setdefault((step.key, step.action), []).append(step)
-    rows = [_row(steps, basis) for steps in groups.values()]
+    rows = [_make_row(steps, basis) for steps in groups.values()]
     return sorted(
         rows,
         key=lambda row: (
             -row.verdicts_turned,
             -row.verdicts_strengthened,
-            _ORDER.index(row.action),
+            _ACTION_ORDER.index(row.action),
             row.sensor,
             row.recording or "",
         ),
     )
 
 
-def _steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
+def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     """Yield what would help one verdict: to turn it, and to make its evidence stronger."""
     unless, name = judgement.unless, judgement.name
     if unless is not None:
@@ -75,21 +79,21 @@ def _steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         either = unless.logged, unless.mended
         same = None not in either and len({each.verdict for each in either if each}) == 1
         for key, doubts in unless.doubts.items():
-            what = _quantities(basis.factors(key)) or doubts
+            what = _join_quantities(basis.factors(key)) or doubts
             yield _Step(action, key, name, turns=not same, what=what)
     if not judgement.decides.known:
-        yield from _to_know(judgement, basis)
+        yield from _find_missing_data(judgement, basis)
         return
     if judgement.decides.verdict not in ("passes", "surely fails"):
-        yield from _to_settle(judgement, basis)
+        yield from _find_settling_steps(judgement, basis)
     if judgement.compared and (unknown := judgement.rests.unknown_figures()):
         what = ", ".join(unknown)
         yield _Step("find_figures", (judgement.sensor, None), name, turns=False, what=what)
     for reason in judgement.reasons:
-        yield from _to_strengthen(judgement, reason, basis)
+        yield from _find_strengthening_steps(judgement, reason, basis)
 
 
-def _to_know(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
+def _find_missing_data(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     """Yield what a recording lacks of which nothing is known, or how long it is to be."""
     total = judgement.decides.total
     key = judgement.sensor, total.recording
@@ -98,12 +102,12 @@ def _to_know(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     needs = ("gyro",) if total.error in ("heading", "north") else ("gyro", "accel")
     missing = [name for name in needs if basis.lacks(key, name)]
     if missing:
-        yield _Step("add_channels", key, judgement.name, turns=True, what=_quantities(missing))
-    elif (needed := _duration_needed(judgement)) > (basis.duration(key) or math.inf):
+        yield _Step("add_channels", key, judgement.name, turns=True, what=_join_quantities(missing))
+    elif (needed := _compute_duration_needed(judgement)) > (basis.duration(key) or math.inf):
         yield _Step("log_longer", key, judgement.name, turns=True, duration=needed)
 
 
-def _to_settle(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
+def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     decides, sensor, name = judgement.decides, judgement.sensor, judgement.name
     away = abs(math.log(decides.margin))
     if decides.expected.spread is not None:
@@ -111,7 +115,7 @@ def _to_settle(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         if more:
             yield _Step("add_specimens", (sensor, None), name, True, specimens=more)
         return
-    key, duration = _longest(sensor, decides, basis)
+    key, duration = _find_longest(sensor, decides, basis)
     low, high = decides.margins
     if duration is None or not low or math.isinf(high):
         return
@@ -119,8 +123,8 @@ def _to_settle(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     half = (
         math.log(decides.margin / low) if decides.margin > 1.0 else math.log(high / decides.margin)
     )
-    if 0.0 < half <= away * math.sqrt(_LONGEST):
-        needed = max(duration * (half / away) ** 2, _duration_needed(judgement))
+    if 0.0 < half <= away * math.sqrt(_MAX_DURATION_FACTOR):
+        needed = max(duration * (half / away) ** 2, _compute_duration_needed(judgement))
         yield _Step("log_longer", key, name, True, duration=needed)
 
 
@@ -132,7 +136,7 @@ def specimens_needed(expected: Expected, away: float) -> int | None:
     far the limits may be. None where 20 specimens would not do.
     """
     assert expected.spread is not None
-    for number in range(expected.specimens + 1, _MOST_SPECIMENS + 1):
+    for number in range(expected.specimens + 1, _MAX_SPECIMENS + 1):
         half = float(stdtrit(number - 1, 0.975)) * math.sqrt(
             expected.spread.variance * (1.0 + 1.0 / number)
         )
@@ -141,45 +145,45 @@ def specimens_needed(expected: Expected, away: float) -> int | None:
     return None
 
 
-def _to_strengthen(judgement: Judgement, reason: str, basis: Basis) -> Iterator[_Step]:
+def _find_strengthening_steps(judgement: Judgement, reason: str, basis: Basis) -> Iterator[_Step]:
     decides, sensor, name = judgement.decides, judgement.sensor, judgement.name
-    key, duration = _longest(sensor, decides, basis)
+    key, duration = _find_longest(sensor, decides, basis)
     if reason == "one_specimen":
-        more = _ENOUGH_SPECIMENS - decides.expected.specimens
+        more = _MIN_SPECIMENS - decides.expected.specimens
         yield _Step("add_specimens", (sensor, None), name, False, specimens=more)
     elif reason == "short_log" and duration is not None:
-        yield _Step("log_longer", key, name, False, duration=_duration_needed(judgement))
+        yield _Step("log_longer", key, name, False, duration=_compute_duration_needed(judgement))
     elif reason == "few_axes":
         yield _Step("add_channels", key, name, False, what="all three axes")
-    elif reason not in REASONS:
+    elif reason not in WEAKNESS_REASONS:
         for total in decides.totals:
             own = sensor, total.recording
             doubts = [row for row in basis.doubts.get(own, ()) if row.code == reason]
             if any(row.factor is not None for row in doubts):
-                what = _quantities(basis.factors(own))
+                what = _join_quantities(basis.factors(own))
                 yield _Step("check_unit", own, name, False, what=what)
             elif doubts:
                 what = reason.replace("_", " ")
                 yield _Step("record_again", own, name, False, what=what)
 
 
-def _quantities(names: Iterable[str]) -> str:
+def _join_quantities(names: Iterable[str]) -> str:
     return " and ".join(f"the {SENSORS[name]}" for name in names)
 
 
-def _longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:
+def _find_longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:
     """Return the recording of a standing that is longest, and its duration."""
     keys = [(sensor, row.recording) for row in standing.totals]
     key = max(keys, key=lambda candidate: basis.duration(candidate) or 0.0)
     return key, basis.duration(key)
 
 
-def _duration_needed(judgement: Judgement) -> float:
+def _compute_duration_needed(judgement: Judgement) -> float:
     """Return the length of a log that tells the error of the limit that decides, s."""
-    return longest_asked(judgement.decides.total, judgement.requirement) / LONGEST_PART
+    return longest_asked(judgement.decides.total, judgement.requirement) / MAX_TIME_SHARE
 
 
-def _row(steps: Sequence[_Step], basis: Basis) -> NextStepRow:
+def _make_row(steps: Sequence[_Step], basis: Basis) -> NextStepRow:
     first = steps[0]
     turned = {step.requirement for step in steps if step.turns}
     strengthened = {step.requirement for step in steps} - turned
@@ -189,9 +193,9 @@ def _row(steps: Sequence[_Step], basis: Basis) -> NextStepRow:
         dict.fromkeys(part for step in steps if step.what for part in step.what.split(", "))
     )
     sensor, recording = first.key
-    effect = _effect(first.action, len(turned), len(strengthened))
+    effect = _describe_effect(first.action, len(turned), len(strengthened))
     logged = basis.duration((sensor, recording)) if recording else None
-    what = _what_to_do(first.action, recording, whats, duration, logged, specimens)
+    what = _describe_action(first.action, recording, whats, duration, logged, specimens)
     return NextStepRow(
         sensor=sensor,
         recording=recording,
@@ -205,7 +209,7 @@ def _row(steps: Sequence[_Step], basis: Basis) -> NextStepRow:
     )
 
 
-def _what_to_do(
+def _describe_action(
     action: Action,
     recording: str | None,
     what: str,
@@ -225,30 +229,30 @@ def _what_to_do(
         case "log_longer":
             assert duration is not None  # of every such step
             more = duration - (logged or 0.0)
-            return f"log {recording} for {_time(more)} more, {_time(duration)} in all"
+            return f"log {recording} for {_format_time(more)} more, {_format_time(duration)} in all"
     return f"log {specimens} more {'specimen' if specimens == 1 else 'specimens'}"
 
 
-_WOULD = {"check_unit": "turn", "record_again": "allow", "add_channels": "allow"}
+_EFFECT_VERBS = {"check_unit": "turn", "record_again": "allow", "add_channels": "allow"}
 """What a step does with verdicts; else it settles them, if the figures stay what they are."""
 
 
-def _effect(action: Action, turned: int, strengthened: int) -> str:
+def _describe_effect(action: Action, turned: int, strengthened: int) -> str:
     if action == "find_figures":
-        return f"it would free {_verdicts(strengthened)} of a condition"
+        return f"it would free {_count_verdicts(strengthened)} of a condition"
     parts = []
     if turned:
-        parts.append(f"would {_WOULD.get(action, 'settle')} {_verdicts(turned)}")
+        parts.append(f"would {_EFFECT_VERBS.get(action, 'settle')} {_count_verdicts(turned)}")
     if strengthened:
-        parts.append(f"would give {_verdicts(strengthened)} stronger evidence")
+        parts.append(f"would give {_count_verdicts(strengthened)} stronger evidence")
     return "it " + " and ".join(parts)
 
 
-def _verdicts(number: int) -> str:
+def _count_verdicts(number: int) -> str:
     return f"{number} {'verdict' if number == 1 else 'verdicts'}"
 
 
-def _time(seconds: float) -> str:
+def _format_time(seconds: float) -> str:
     """Return a length of time in the unit that suits it, to two digits, rounded up."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds >= size:

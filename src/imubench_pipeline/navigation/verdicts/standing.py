@@ -17,10 +17,10 @@ from imubench_pipeline.navigation.suitability.conditions import (
 )
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, expected
 
-_SURE = 0.975
+_SURE_PROBABILITY = 0.975
 """Chance from which a verdict is sure."""
 
-VAGUE = 4.0
+MAX_LIMIT_RATIO = 4.0
 """Upper over lower limit of an error beyond which a log says too little."""
 
 
@@ -47,13 +47,13 @@ class Standing:
     @property
     def margin(self) -> float:
         """How many times the error fits into the limit."""
-        return _over(self.total.limit, self.expected.sigma)
+        return _divide(self.total.limit, self.expected.sigma)
 
     @property
     def margins(self) -> tuple[float, float]:
         """95 % limits of the margin."""
         limit = self.total.limit
-        return _over(limit, self.expected.upper), _over(limit, self.expected.lower)
+        return _divide(limit, self.expected.upper), _divide(limit, self.expected.lower)
 
     @property
     def chance(self) -> float:
@@ -65,25 +65,25 @@ class Standing:
     def wide(self) -> bool:
         """Whether the limits of the error are far apart."""
         low, high = self.margins
-        return low <= 0.0 or high / low > VAGUE
+        return low <= 0.0 or high / low > MAX_LIMIT_RATIO
 
     @property
     def _vague(self) -> bool:
         """Whether the log that answers says too little: two specimens do not know their spread."""
         lower, upper = self.total.lower, self.total.upper
-        return lower is None or upper is None or lower <= 0.0 or upper / lower > VAGUE
+        return lower is None or upper is None or lower <= 0.0 or upper / lower > MAX_LIMIT_RATIO
 
     @property
     def verdict(self) -> str:
         """The chance in words."""
         if not self.known:
             return "not enough data"
-        if self._vague and 1.0 - _SURE < self.chance < _SURE:
+        if self._vague and 1.0 - _SURE_PROBABILITY < self.chance < _SURE_PROBABILITY:
             return "not enough data"
-        for least, words in ((_SURE, "passes"), (0.5, "probably passes")):
+        for least, words in ((_SURE_PROBABILITY, "passes"), (0.5, "probably passes")):
             if self.chance >= least:
                 return words
-        return "probably fails" if self.chance > 1.0 - _SURE else "surely fails"
+        return "probably fails" if self.chance > 1.0 - _SURE_PROBABILITY else "surely fails"
 
 
 def standings(
@@ -97,16 +97,16 @@ def standings(
     sensors by `limit_of`.
     """
     by_limit: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
-    for row in map(_judgeable, rows):
+    for row in map(_drop_unjudgeable_figure, rows):
         by_limit.setdefault(limit_of(row), []).append(row)
     return [
-        _standing(parts, devices, (usual or {}).get(key))
+        _make_standing(parts, devices, (usual or {}).get(key))
         for key, parts in by_limit.items()
         if any(row.source == "total" for row in parts)
     ]
 
 
-def _judgeable(row: ErrorBudgetRow) -> ErrorBudgetRow:
+def _drop_unjudgeable_figure(row: ErrorBudgetRow) -> ErrorBudgetRow:
     """Return a row; a total without the numbers for its verdict has no figure."""
     judged_by = {
         "sigma": row.sigma,
@@ -127,7 +127,7 @@ def limit_of(row: ErrorBudgetRow) -> tuple[Any, ...]:
     return row.error, row.time, row.limit, trajectory_of(row)
 
 
-def _standing(
+def _make_standing(
     parts: Sequence[ErrorBudgetRow], devices: Mapping[str, str], usual: Spread | None
 ) -> Standing:
     totals = [row for row in parts if row.source == "total"]
@@ -136,7 +136,7 @@ def _standing(
     prediction = expected(with_figure, devices, usual)
     if prediction.sigma is None:
         return Standing(totals[0], with_figure, prediction)
-    answer, sigma = min(figures, key=lambda figure: _apart(figure[1], prediction.sigma))
+    answer, sigma = min(figures, key=lambda figure: _compute_distance(figure[1], prediction.sigma))
     own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
     conditions = tuple(row for row in own if is_condition(row))
     sources = with_sigma(own)
@@ -158,12 +158,12 @@ def deciding(by_limit: Sequence[Standing]) -> Standing:
     return worst if not unknown or worst.verdict == "surely fails" else unknown[0]
 
 
-def _apart(sigma: float, other: float | None) -> float:
+def _compute_distance(sigma: float, other: float | None) -> float:
     """Return how far two errors are apart, as a factor from 0 up."""
     if not other or not sigma:
         return abs(sigma - (other or 0.0))
     return abs(math.log(sigma / other))
 
 
-def _over(limit: float | None, error: float | None) -> float:
+def _divide(limit: float | None, error: float | None) -> float:
     return limit / error if limit is not None and error else math.inf
