@@ -1,1 +1,1 @@
-"""Printed figures in comparable terms, and beside what was measured."""
+"""Convert datasheet figures to comparable quantities, and compare them with measurements."""

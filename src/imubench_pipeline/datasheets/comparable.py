@@ -1,11 +1,11 @@
-"""Figures as printed -> SI, in the convention of the estimate that they are compared with.
+"""Convert printed figures to SI, in the convention of the estimate that they are compared with.
 
-Three conventions ruin such a comparison. A printed noise density is mostly one-sided, and N is
-that density over √2; where the datasheet does not say, both readings are given. A printed bias
-instability is the minimum of the curve of Allan deviation, that is 0.664 B where the curve has a
-plateau. A coefficient of temperature, a total over a range of temperature and an rms while it
-changes are three quantities. A log at rest whose temperature varies shows the first: it is the
-sensitivity that `imubench_pipeline.estimators.thermal` fits. The other two no such log shows.
+Three conventions need care. A printed noise density is mostly one-sided, and N is that density over
+√2; if the datasheet does not say, both readings are returned. A printed bias instability is the
+minimum of the Allan deviation, 0.664 B if the curve has a plateau. A temperature coefficient, a
+total over a temperature range and an rms during a temperature change are three quantities. A static
+log with varying temperature shows the first, the sensitivity that
+`imubench_pipeline.estimators.thermal` fits. It cannot show the other two.
 """
 
 from __future__ import annotations
@@ -44,25 +44,24 @@ _ONE_LOG_OBSTACLES = {
 
 
 SENSITIVITY = "sensitivity"
-"""The statistic of a printed coefficient of temperature."""
+"""Name of the statistic of a printed temperature coefficient."""
 
 
 @dataclass(frozen=True)
 class Comparable:
     """A printed figure in SI, in the convention of the estimate that it is compared with."""
 
-    # quantity, statistic: what is printed, and what of an estimate it is compared with
+    # quantity, statistic: the printed quantity, and the statistic of an estimate to compare it with
     quantity: str
     statistic: str
     figure: PrintedFigure | None  # None: not published, or not looked up
-    sidedness: str | None = None  # of a noise density, as this reading takes it
-    # SI; None where nothing is published, or it cannot be compared. Of a range, its worse end
+    sidedness: str | None = None  # of a noise density, in this reading
+    # SI; None if nothing is published, or it cannot be compared. The worse end of a range
     value: float | None = None
-    reason: str | None = None  # how it was read, or why there is nothing to read
+    reason: str | None = None  # how it was converted, or why there is no value
     printed: float | None = None  # as printed for the axis
     least: float | None = None  # the better end of a printed range
-    # lower, upper: the least and the largest figure that the vendor prints of it, such as typ and
-    # max
+    # lower, upper: least and largest figure that the vendor prints for it, such as typ and max
     lower: float | None = None
     upper: float | None = None
     obstacle: str | None = None  # why it cannot be compared with a static log
@@ -72,7 +71,7 @@ class Comparable:
 
 @dataclass(frozen=True)
 class PrintedAxis:
-    """What a datasheet says of one axis of a quantity."""
+    """The datasheet figures of one axis of a quantity."""
 
     sheet: QuantityDatasheet
     options: Sequence[str]  # grades, ranges and modes that the logged sensors have
@@ -82,13 +81,13 @@ class PrintedAxis:
 
     @classmethod
     def of(cls, datasheet: Datasheet, channel: str) -> PrintedAxis:
-        """Return what a datasheet says of a channel, such as ``gyro_x``."""
+        """Return the datasheet figures of a channel, such as ``gyro_x``."""
         quantity, axis = channel.split("_")
         sheet = getattr(datasheet, quantity) or QuantityDatasheet()
         return cls(sheet, datasheet.options, quantity, axis)
 
     def si(self, name: str) -> Callable[[float, PrintedFigure], float]:
-        """Return the conversion of a figure that is compared as it is."""
+        """Return the SI conversion of a figure that needs no other conversion."""
         (dimension,) = FIGURE_DIMENSIONS[self.quantity][name]
         return lambda value, figure: to_si(value, figure.unit or "", dimension)
 
@@ -99,9 +98,10 @@ class PrintedAxis:
         convert: Callable[[float, PrintedFigure], float],
         figures: Sequence[PrintedFigure] | None = None,
     ) -> list[Comparable]:
-        """Return what is printed of a name for the axis, in the form of ``like``.
+        """Return the printed figures of a name for the axis, as copies of ``like``.
 
-        Figures of options that the logged sensors do not have are there only if nothing else is.
+        Figures of options that the logged sensors do not have are returned only if there are no
+        others.
         """
         listed = [
             figure
@@ -148,14 +148,14 @@ class PrintedAxis:
         return None
 
     def unpublished(self, like: Comparable, *names: str) -> Comparable:
-        """Return the row of what has no figure."""
+        """Return the row of a quantity without a printed figure."""
         looked_up = any(self.sheet.looked_up(name) for name in names)
         reason = "the vendor does not publish it" if looked_up else "the sensor file does not say"
         return replace(like, reason=reason, looked_up=looked_up)
 
 
 def _add_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
-    """Return a row with the least and the largest figure of the rows of its option."""
+    """Return a row with the least and the largest figure among the rows of its option."""
     option = row.figure.option if row.figure else None
     values = [
         value
@@ -168,9 +168,9 @@ def _add_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
 
 
 def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of N, bias instability, K and T_B of a channel, SI.
+    """Yield the datasheet figures of N, bias instability, K and T_B of a channel, SI.
 
-    Without a figure where none is published, or nobody looked it up.
+    Rows have no figure if none is published, or if nobody looked it up.
     """
     axis = PrintedAxis.of(datasheet, channel)
     noise = [*_read_densities(axis), *_read_random_walks(axis), *_read_rms(axis)]
@@ -189,10 +189,10 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
 
 
 def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of the fixed bias of a channel, and of how it changes, SI.
+    """Yield the datasheet figures of the fixed bias of a channel, and of its changes, SI.
 
-    The offset always, the others where they are published: the coefficient of temperature to be
-    compared with the sensitivity, the rest with the obstacle.
+    The offset is always yielded, the others only if they are published. The temperature coefficient
+    is comparable with the sensitivity; the rest have an obstacle.
     """
     axis = PrintedAxis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)
@@ -206,9 +206,9 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
 
 
 def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of how a bias differs from one turn-on to the next, SI.
+    """Yield the printed turn-on to turn-on repeatability of the bias of a channel, SI.
 
-    To be compared with a standard deviation; nothing where none is published.
+    It is comparable with a standard deviation. Nothing is yielded if none is published.
     """
     axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
     yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))

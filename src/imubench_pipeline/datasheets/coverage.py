@@ -1,4 +1,4 @@
-"""What vendors publish of their sensors, and what they leave to the user to measure."""
+"""List the figures that vendors publish, and those that users must measure."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "offset": (("offset",), ("bias_repeatability",)),
 }
-"""Figures that a filter needs, with the keys that give them, plainly and in another convention."""
+"""Figures that a filter needs: keys that give them directly, and in another convention."""
 
 
 @dataclass(frozen=True)
@@ -35,18 +35,18 @@ class Coverage:
     model: str
     quantity: str  # ``gyro`` or ``accel``
     figure: str  # ``N``, ``B``, ``K``, ``T_B``, ``temperature_coefficient`` or ``offset``
-    # ``yes``; ``other convention``: something akin, such as an rms for N or a total over
+    # ``yes``; ``other convention``: a related figure, such as an rms for N or a total over
     # temperature for the coefficient; ``no``: looked up (null), and not published; ``not looked
-    # up``: the sensor file does not say, so that it counts neither way
+    # up``: the sensor file does not say, so it counts neither as published nor as unpublished
     published: Published
-    as_printed: str | None  # every figure of it, with its unit and kind
+    as_printed: str | None  # all its printed figures, with unit and kind
     document: str | None  # with its revision
     source: str | None  # ``primary`` or ``secondary``, of the figures or else of the datasheet
 
 
 @dataclass(frozen=True)
 class VendorCoverage:
-    """Of how many sensors a vendor publishes a figure."""
+    """Number of sensors for which a vendor publishes a figure."""
 
     vendor: str
     quantity: str
@@ -59,9 +59,10 @@ class VendorCoverage:
 
 
 def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
-    """Return what the vendors of a catalogue, by sensor file, publish.
+    """Return which figures the vendors of a catalogue publish.
 
-    One row a sensor, quantity that it has, and figure, in the order of the sensors.
+    There is one row for each sensor, quantity that it measures, and figure, in the order of the
+    sensors.
     """
     return [
         _make_row(name, sensor, quantity, figure)

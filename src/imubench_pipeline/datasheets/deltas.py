@@ -1,8 +1,8 @@
-"""The deltas between what is measured and what vendors print.
+"""Compare measured values with printed figures.
 
-A verdict needs the whole 95 % interval of what is measured: ``worse than typ`` says that all of
-it lies beyond the printed figure and the tolerance. Where it reaches over a border the verdict is
-``not sure``, and the reason says what the interval leaves open.
+A verdict applies to the whole 95 % interval of the measurement: ``worse than typ`` means that all
+of it lies beyond the printed figure and the tolerance. If the interval crosses a boundary, the
+verdict is ``not sure``, and the reason names the possible verdicts.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ VERDICTS: dict[str, str] = {
     "not measured": "the log does not tell the value",
     "not comparable (condition)": "the figure holds for what this log does not have",
 }
-"""What a verdict says."""
+"""Meaning of each verdict."""
 
 _TYPICAL_KINDS = ("typ", "1sigma", "derived")
 
 
 @dataclass(frozen=True)
 class Delta:
-    """One printed figure against one estimate, as a row of the table ``datasheet``."""
+    """Comparison of one printed figure with one estimate: a row of the table ``datasheet``."""
 
     quantity: str
     statistic: str
@@ -71,11 +71,11 @@ def deltas(
     tau: NDArray[np.float64],
     tolerance: float,
 ) -> Iterator[Delta]:
-    """Compare an estimate, SI, with what a datasheet prints.
+    """Compare an estimate, SI, with the figures of a datasheet.
 
-    One a printed figure and reading of it; K and T_B are mostly not published. tau, shape (m,), s,
-    is where the log shows the curve well enough for its minimum; the tolerance is the relative
-    difference that still counts as printed.
+    There is one row for each printed figure and reading of it; K and T_B are mostly not published.
+    tau, shape (m,), s, are the averaging times at which the curve is accurate enough to find its
+    minimum. The tolerance is the relative difference that still counts as printed.
     """
     for entry in comparables(datasheet, channel):
         yield compare(entry, measured(entry, estimate, tau), tolerance)
@@ -88,10 +88,10 @@ def bias_deltas(
     tolerance: float,
     sensitivity: Parameter | None = None,
 ) -> Iterator[Delta]:
-    """Compare the fixed bias of a recording, and how temperature moves it, with what is printed.
+    """Compare the fixed bias of a recording and its temperature sensitivity with the datasheet.
 
-    The offset; the coefficient of temperature, where one is printed; and what is printed of
-    repeatability and temperature that one log cannot be compared with.
+    The rows are the offset; the temperature coefficient, if one is printed; and the printed figures
+    of repeatability and temperature that cannot be compared with one log.
 
     Parameters
     ----------
@@ -119,12 +119,12 @@ def bias_deltas(
 
 
 def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
-    """Compare a printed figure with what was measured of it, SI.
+    """Compare a printed figure with its measured value, SI.
 
-    Without limits, the value alone decides; the tolerance is the relative difference from a typical
+    Without limits, the value alone decides. The tolerance is the relative difference from a typical
     figure that still counts as printed. ``delta`` is measured / comparable - 1; ``delta_lower`` and
-    ``delta_upper`` are the least and the largest that the interval of the measurement and that of
-    the printed figures allow.
+    ``delta_upper`` are its least and largest value within the interval of the measurement and the
+    interval of the printed figures.
     """
     figure = entry.figure
     value, lower, upper = parameter.value, parameter.lower, parameter.upper
@@ -173,7 +173,7 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
 def _judge_without_value(
     entry: Comparable, parameter: Parameter, tolerance: float
 ) -> tuple[str, str]:
-    """Return verdict and reason where the log gives limits alone, or nothing."""
+    """Return verdict and reason if the log gives only limits, or nothing."""
     reason = f"{parameter.status.replace('_', ' ')}: {parameter.reason}"
     if parameter.upper is not None:
         least = _classify_value(entry, parameter.lower or 0.0, tolerance)
@@ -183,7 +183,7 @@ def _judge_without_value(
 
 
 def _classify_value(entry: Comparable, value: float, tolerance: float) -> str:
-    """Return where one value lies beside a printed figure."""
+    """Return the verdict on one value by its position relative to a printed figure."""
     assert entry.figure is not None and entry.value is not None
     if entry.figure.kind in ("max", "range"):
         if value > entry.value:
@@ -195,7 +195,7 @@ def _classify_value(entry: Comparable, value: float, tolerance: float) -> str:
 
 
 def _compute_relative_difference(value: float | None, printed: float | None) -> float | None:
-    """Return the relative difference, where both are there and the printed figure is a size."""
+    """Return the relative difference; None if a number is missing or the printed one not positive."""
     if value is None or printed is None or printed <= 0:
         return None
     return value / printed - 1.0
@@ -203,13 +203,13 @@ def _compute_relative_difference(value: float | None, printed: float | None) -> 
 
 @dataclass(frozen=True)
 class CurveRms:
-    """How far a measured curve is from the lines of a datasheet."""
+    """Distance between a measured curve and the lines of a datasheet."""
 
-    # noise, floor: the printed figures that the lines are of
+    # noise, floor: the printed figures of the two lines
     noise: Comparable | None
     floor: Comparable | None
     rms: float  # root mean square over tau of measured minus printed Allan deviation, rad/s or m/s²
-    rms_log10: float  # the same of the difference of log10, decades
+    rms_log10: float  # rms of the difference of log10, decades
 
 
 def curve_rms(
@@ -217,21 +217,21 @@ def curve_rms(
 ) -> list[CurveRms]:
     """Compare a measured curve with the lines N/√τ and bias instability of a datasheet.
 
-    The two add as variances: σ²(τ) = N²/τ + floor². A datasheet that prints one of them gives that
-    line alone, one that does not say the side of its density gives two curves, and one without a
-    line none. Typical figures are taken where there are any, else the others.
+    The two add as variances: σ²(τ) = N²/τ + floor². If a datasheet prints only one of them, that
+    line is used alone. A density of unknown sidedness gives two curves; a datasheet with neither
+    figure gives none. Typical figures are preferred to the others.
 
     Parameters
     ----------
     printed : sequence of Comparable
-        What `comparable.comparables` gives of a channel.
+        Figures of a channel, from `comparable.comparables`.
     tau, adev : ndarray, shape (m,)
         s, and measured Allan deviation, rad/s or m/s².
 
     Raises
     ------
     ValueError
-        If the two arrays do not go together, or a deviation is not above 0.
+        If the shapes of the arrays differ, or a deviation is not above 0.
     """
     if tau.shape != adev.shape or not tau.size or np.any(adev <= 0):
         raise ValueError(
@@ -254,7 +254,7 @@ def curve_rms(
 
 
 def _select_typical(printed: Sequence[Comparable], statistic: str) -> list[Comparable]:
-    """Return the typical figures of a statistic; the others where there are none."""
+    """Return the typical figures of a statistic, or the others if there are none."""
     with_value = [row for row in printed if row.statistic == statistic and row.value is not None]
     typical = [row for row in with_value if row.figure and row.figure.kind in _TYPICAL_KINDS]
     return typical or with_value

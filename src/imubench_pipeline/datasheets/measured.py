@@ -1,4 +1,4 @@
-"""What a recording says of the statistics that vendors print figures of."""
+"""Derive the statistics that vendors print from the estimates of a recording."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR
 
 _MAX_GRAVITY_DEVIATION = 0.027
-"""m/s²; gravity on the ground differs by less from its standard value."""
+"""m/s²; maximum deviation of gravity on the ground from its standard value."""
 
 NO_TEMPERATURE_READINGS = Parameter(None, "not_shown", "the log has no readings of the temperature")
-"""What a log without them says of the sensitivity."""
+"""Sensitivity of a log without temperature readings."""
 
 _MIN_VERTICAL_COSINE = math.cos(math.radians(15.0))
 _MAX_NORM_ERROR_AT_REST = 0.15
 
 
 def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Return what an estimate says of the statistic that a printed figure is compared with, SI.
+    """Return the estimate of the statistic that a printed figure is compared with, SI.
 
-    The minimum and the plateau are those of `imubench_pipeline.estimators.curve_bias`, of the curve
-    where the log shows it well enough, at tau, s, shape (m,). The limits of another point of the
-    curve are at least as wide as 95 %: all amplitudes are taken at the same end of their intervals,
+    Minimum and plateau are from `imubench_pipeline.estimators.curve_bias`, over the averaging times
+    tau, s, shape (m,), at which the curve is accurate enough. The limits of any other point of the
+    curve are at least as wide as 95 %: all amplitudes are at the same end of their intervals, and
     each correlation time at either end.
     """
     statistic = entry.statistic
     if statistic in ("plateau", "adev_minimum"):
-        # An estimate that was made by hand has its terms alone.
+        # An estimate that was made by hand has only its terms.
         of_curve = estimate.curve or of_model(estimate.model, tau)
         if statistic == "plateau":
             return _scale(of_curve["B_curve"], FLOOR)
@@ -65,7 +65,7 @@ def _evaluate_curve(estimate: Estimate, tau: NDArray[np.float64], at: float) -> 
 
 
 def _add_curve_limits(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Give a point of a model's curve the limits that those of its parameters allow."""
+    """Return a point of the curve of a model with limits from the limits of its parameters."""
     points = [
         float(np.sqrt(end.model.allan_variance(tau)[0])) for end in _list_interval_ends(estimate)
     ]
@@ -75,7 +75,7 @@ def _add_curve_limits(value: float, estimate: Estimate, tau: NDArray[np.float64]
 
 
 def _list_interval_ends(estimate: Estimate) -> Iterator[Estimate]:
-    """Yield the estimate at the ends of its intervals; nothing if one has no interval."""
+    """Yield the estimate at the ends of its intervals; nothing if an interval is missing."""
     groups = [estimate.parameters, *estimate.further]
     in_model = [p for group in groups for p in group.values() if p.in_model]
     if any(p.lower is None or p.upper is None for p in in_model):
@@ -93,13 +93,13 @@ def _list_interval_ends(estimate: Estimate) -> Iterator[Estimate]:
 
 
 def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
-    """Return the size of the fixed bias of a channel, as far as a recording at rest shows it.
+    """Return the magnitude of the fixed bias of a channel from a static recording.
 
-    That of a gyro is its mean; the rotation of the Earth is in it, up to 15.04 °/h either way. That
-    of an accelerometer is hidden in gravity: on a vertical axis it is the norm of the three axes
-    less that of gravity, with the error of the scale factor in it; on any other axis it cannot be
-    told from a tilt. The limits are those of what is not known of the Earth. It is in rad/s or
-    m/s², as the means of all channels.
+    For a gyro it is the magnitude of the mean, which includes up to 15.04 °/h of the Earth's
+    rotation. For a vertical accelerometer axis it is the norm of the three axes less standard
+    gravity, and includes the scale factor error. On any other axis, a bias cannot be distinguished
+    from a tilt. The limits are the uncertainty of the Earth's rate or gravity. The bias and the
+    means of all channels are in rad/s or m/s².
     """
     if channel.startswith("gyro"):
         reason = "mean of the recording; the Earth's rotation is in it, 15 °/h either way at most"
@@ -129,12 +129,12 @@ def _bound_size(value: float, unknown: float, reason: str) -> Parameter:
 def sensitivity(
     rows: Iterable[TemperatureRow], lowest: float | None, highest: float | None
 ) -> Parameter:
-    """Return the size of the sensitivity of a channel to temperature, as its thermal fit tells it.
+    """Return the magnitude of the temperature sensitivity of a channel, from its thermal fit.
 
-    A vendor prints ± so much per kelvin: the sign is left out. It is in rad/s/K or m/s²/K; the
-    reason says at what temperature and over which range, °C,
-    it holds. Where temperature is not taken out of the log, the upper limit alone; where it cannot
-    be told from time, nothing.
+    Vendors print ± a figure per kelvin, so the sign is dropped. The unit is rad/s/K or m/s²/K. The
+    reason states the reference temperature and the range, °C. If the temperature effect was not
+    removed from the log, only the upper limit is useful. If the effect cannot be separated from
+    time, there is neither value nor limit.
     """
     by_parameter = {row.parameter: row for row in rows}
     row = by_parameter.get("sensitivity")

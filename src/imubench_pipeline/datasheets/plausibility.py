@@ -1,10 +1,10 @@
-"""Whether figures can be those of a resting inertial sensor in the unit that is stated.
+"""Check whether the data of a static recording are plausible in the stated units.
 
-It is told from the levels that a recording leaves, beside what the file of its sensor prints: so an
-edit of a datasheet need not read the log again.
+The checks use the levels that are stored with a recording, and the sensor file. The log is not read
+again after an edit of a datasheet.
 
-The figures of a resting sensor are held against what its file prints, or what is usual. The rate of
-a log is held against what a sensor can do, and the unit of time is named that would explain it.
+Noise and means are compared with the printed figures, or with usual ones. The sampling rate is
+compared with the range of the sensor, and a finding names the unit of time that would explain it.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import conversion, from_si, to_si
 
 _MAX_FACTOR_BELOW_PRINTED = 2.5
-"""Times below a printed noise density that is usual: a low-pass hides nothing from
-`levels.density_of`."""
+"""Maximum usual factor below a printed noise density. `levels.density_of` is not lowered by a
+low-pass filter."""
 
 _USUAL_GYRO_DENSITY = (math.radians(5e-4), math.radians(0.06))
-"""rad/s/√Hz: beyond the figures that the shipped sensor files print, 0.0015 to 0.035 °/s/√Hz."""
+"""rad/s/√Hz: wider than the range of the shipped sensor files, 0.0015 to 0.035 °/s/√Hz."""
 
 _MAX_OFFSET = math.radians(30.0)
 _MIN_OFFSET_LIMIT = math.radians(2.0)
 _MAX_OFFSET_OF_CLASS = {"industrial": math.radians(12.0), "tactical": _MIN_OFFSET_LIMIT}
-"""rad/s. The shipped sensor files print at most 3 °/s (typ) of industrial sensors, 0.2 °/s of
-tactical ones, and 20 °/s of others."""
+"""rad/s. The shipped sensor files print at most 3 °/s (typ) for industrial sensors, 0.2 °/s for
+tactical ones, and 20 °/s for others."""
 
 _OFFSET_FACTOR_OF_KIND = {"max": 1.5}
 _OFFSET_FACTOR_OF_TYPICAL = 4.0
-"""Times the printed offset that one has: where typ and max are both printed, max is three times
-typ, and mounting adds to it."""
+"""Maximum offset over the printed one: if typ and max are both printed, max is three times typ, and
+mounting adds to it."""
 
 MIN_RATE, MIN_RATE_STATED, _MAX_RATE = 1.05, 0.105, 1e4
 """Limits of the sampling rate of any log, Hz. Stamps in ms that are read as s give at most 1 Hz for
@@ -50,64 +50,64 @@ a log of 1 kHz, and 0.1 Hz for one of 100 Hz. A slower log is plausible if its r
 
 _MAX_LOG_RATE_PER_BANDWIDTH = 100.0
 _MAX_SAMPLING_RATE_PER_BANDWIDTH = 10.0
-"""Times the bandwidth that a log is read at, at most; and that a sensor samples at, at most: those
-that the shipped sensor files print are sampled at 2 to 8 times theirs."""
+"""Maximum rate of a log, and of a sensor, over the printed bandwidth. The sensors of the shipped
+sensor files are sampled at 2 to 8 times their bandwidth."""
 
 _USUAL_RATE = 100.0
 _TIME_UNIT_PENALTIES: Mapping[float, float] = {60.0: 1.0, 1e3: 0.0, 1e6: 0.0, 1e9: 0.0}
-"""Ratios of two units of time, and decades from the usual rate (Hz) that each is taken to be less
-likely: no sensor file can state minutes."""
+"""Usual rate, Hz; and ratios of two units of time, each with a penalty in decades from the usual
+rate. Minutes have a penalty, since a sensor file cannot state them."""
 
 Level = Mapping[str, Any]
-"""Of a channel, as `imubench_pipeline.recordings.quality.levels.kept_level` returns it."""
+"""Level of a channel, from `imubench_pipeline.recordings.quality.levels.kept_level`."""
 
 _GRAVITY_TOLERANCE = 0.15
-"""Part of gravity that the mean of an accelerometer may be off."""
+"""Maximum error of the mean acceleration, as a fraction of gravity."""
 
 _SUSPICIOUS_NOISE_FACTOR = 2.5
-"""Times beyond what is usual from which a noise is suspicious: above 10 times or below 0.16 times
-what a datasheet prints, and of a gyro without one above 0.15 °/s/√Hz or below 2e-4."""
+"""Noise is suspicious beyond this factor outside the usual range: above 10 times or below 0.16
+times the printed figure, or for a gyro without one, above 0.15 °/s/√Hz or below 2e-4."""
 
 _MAX_EXPLAINED_FACTOR = 1.5
-"""Times beyond what is usual that a noise may be in the unit that is asked for instead."""
+"""Maximum factor outside the usual range for noise in the suggested unit."""
 
 _MIN_SUSPICIOUS_AXIS_RATIO = 4.0
-"""Times the noise of both other axes of a sensor, either way, from which one is in doubt."""
+"""Minimum ratio of the noise of one axis to both others, either way, for a finding."""
 
 _MAX_RATIO_OF_OTHER_AXES = 2.5
-"""Times by which those two may differ from each other for that."""
+"""Maximum ratio of the noise of those two to each other."""
 
 _MAX_FACTOR_WITHOUT_STAMPS = 2.5
-"""Times a printed noise, either way, from which it is in doubt where no stamps tell the rate: N
-goes with its root, and a stated rate that is ten times wrong is 3.2 times."""
+"""Maximum ratio to the printed noise, either way, if the rate is not known from time stamps. N is
+proportional to the root of the rate: a stated rate that is 10 times wrong changes N 3.2 times."""
 
 _MAX_EXPLAINED_AXIS_RATIO = 1.5
-"""Times by which its noise may be off theirs in the unit that is asked for instead."""
+"""Maximum ratio of its noise to theirs in the suggested unit."""
 
 _LOGGER_UNITS: Mapping[str, Sequence[str]] = {
     "gyro": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h"),
     "accel": ("m/s^2", "g", "mg", "ug"),
 }
-"""In which loggers write, the usual ones first."""
+"""Units that loggers write, the most common first."""
 
 _DENSITY_UNITS = {"gyro": ("°/s/√Hz", "gyro_density"), "accel": ("µg/√Hz", "accel_density")}
 
 _MIN_TURN_OF_GRAVITY = math.radians(10.0)
-"""Turn of gravity over a log that no drift of an accelerometer makes: 0.17 g."""
+"""Minimum turn of gravity over a log, rad. No accelerometer drifts so far: 0.17 g."""
 
 _MIN_TURN_WITH_GYROS = math.radians(1.0)
 _MAX_RATE_DISAGREEMENT = 0.25
-"""The same where gyros turn with it, and part of its rate that they may be off."""
+"""Minimum turn of gravity if the gyros agree with it; maximum relative difference of the rates."""
 
 _UNIT_ADVICE = "state the right 'unit' in the sensor file"
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What is usual of a quantity of a sensor at rest."""
+    """Usual levels of a quantity of a static sensor."""
 
     noise: tuple[float, float] | None  # least and most white noise density, SI/√Hz, two-sided
-    noise_from: str  # what says so
+    noise_from: str  # source of the range, in words
     offset: float = _MAX_OFFSET  # largest mean of a gyro that an offset explains, rad/s
     offset_from: str = "of any gyro"
     bandwidth: float | None = None  # the widest that is printed, Hz
@@ -115,7 +115,7 @@ class Expected:
 
 
 def expected(sensor: Sensor | None, quantity: str) -> Expected:
-    """Return what is usual of a quantity of a sensor, by its file where that prints it."""
+    """Return the usual levels of a quantity of a sensor, from its file if it prints them."""
     usual = _USUAL_GYRO_DENSITY if quantity == "gyro" else None
     if sensor is None:
         return Expected(usual, "of a gyro")
@@ -132,7 +132,7 @@ def expected(sensor: Sensor | None, quantity: str) -> Expected:
 
 
 def _find_max_offset(sensor: Sensor) -> tuple[float, str]:
-    """Return the largest offset of the gyro of a sensor, rad/s, and what says so."""
+    """Return the largest offset of the gyro of a sensor, rad/s, and its source."""
     printed = [
         row.value * _OFFSET_FACTOR_OF_KIND.get(row.figure.kind, _OFFSET_FACTOR_OF_TYPICAL)
         for axis in "xyz"
@@ -216,9 +216,9 @@ def implausible_rates(
 
 
 def time_factor(rate: float, fastest: float = _MAX_RATE) -> float:
-    """Return by what times are to be multiplied, so that a rate, Hz, is likely.
+    """Return the factor for the time stamps that makes a rate, Hz, most likely.
 
-    ``fastest`` is what the sensor can do, Hz.
+    ``fastest`` is the highest rate of the sensor, Hz.
     """
     sign = 1.0 if rate > fastest else -1.0
     return min(
@@ -246,10 +246,10 @@ def implausible(
     *,
     static: bool = True,
 ) -> list[Finding]:
-    """Return what speaks against a sensor at rest whose figures are in the stated unit.
+    """Return the findings that contradict a static sensor with data in the stated units.
 
-    Of the levels of each channel, how gravity turns against the sensor, and what its file says;
-    ``static``: it was to be at rest.
+    They are based on the levels of each channel, on the rotation of gravity relative to the sensor,
+    and on the sensor file. ``static``: the sensor should be at rest.
     """
     of = {quantity: expected(sensor, quantity) for quantity in QUANTITIES}
     rates = {name: level["rate"] for name, level in channels.items()}
@@ -258,7 +258,7 @@ def implausible(
         {name: of[quantity_of(name)].bandwidth for name in channels},
         sensor.log.rate_hz if sensor else None,
     )
-    if not findings:  # else the density is that of another time
+    if not findings:  # else the density has a wrong unit of time
         findings += _check_noise(channels, of)
         findings += _compare_noise(channels, of, {f.channel for f in findings})
     if gravity is None or gravity.swept < _MIN_TURN_OF_GRAVITY:  # its mean is not gravity then
@@ -277,7 +277,7 @@ def implausible(
 
 
 def implausible_of(quality: Quality, sensor: Sensor | None) -> list[FindingRow]:
-    """Return the rows of findings on what can be of no sensor at rest in its unit."""
+    """Return the finding rows about data that are implausible for a static sensor."""
     about = quality.row
     turn = GravityTurn(**quality.gravity) if quality.gravity else None
     findings = implausible(quality.channels, turn, sensor, static=about.kind == "static")
@@ -285,7 +285,7 @@ def implausible_of(quality: Quality, sensor: Sensor | None) -> list[FindingRow]:
 
 
 def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:
-    """Yield the units that may be meant instead of one, and the factor that mends the figures."""
+    """Yield the units that may be meant instead of one, and the factor that corrects the data."""
     dimension = QUANTITIES[quantity]
     stated = conversion(unit, dimension)[0]
     for other in _LOGGER_UNITS[quantity]:
@@ -295,7 +295,7 @@ def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:
 
 
 def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
-    """Yield what the mean of three accelerometers tells, which is gravity."""
+    """Yield a finding if the norm of the mean acceleration is not gravity."""
     axes = [f"accel_{axis}" for axis in "xyz"]
     if not set(axes) <= channels.keys():
         return
@@ -318,13 +318,13 @@ def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
 
 
 def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:
-    """Yield the channels whose noise is usual in another unit alone."""
+    """Yield a finding for each channel whose noise is usual only in another unit."""
     weighed = {f"accel_{axis}" for axis in "xyz"} <= channels.keys()
     for name, level in channels.items():
         quantity = quantity_of(name)
         usual = of[quantity].noise
         if usual is None or (quantity == "accel" and weighed):
-            continue  # gravity tells better
+            continue  # gravity is the better test
         low, high = level["density"]
         if low > _SUSPICIOUS_NOISE_FACTOR * usual[1]:
             shown = low
@@ -353,10 +353,10 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
 def _compare_noise(
     channels: Mapping[str, Level], of: Mapping[str, Expected], doubted: Collection[str | None]
 ) -> Iterator[Finding]:
-    """Yield the channels whose noise is far from what is printed, or from both other axes.
+    """Yield a finding for each channel whose noise differs from the datasheet or the other axes.
 
-    What a wrong scale or range, another sensor or one axis in another unit leaves, where no unit
-    explains the figure by itself.
+    Causes are a wrong scale or range, another sensor, or one axis in another unit. ``doubted``
+    channels are skipped: another unit already explains them.
     """
     untimed = False
     for name, level in channels.items():
@@ -381,7 +381,7 @@ def _compare_noise(
             far = (
                 low > MAX_FACTOR_FROM_PRINTED * printed or MAX_FACTOR_FROM_PRINTED * high < printed
             )
-            if far or not untimed:  # a wrong rate is that of all channels: it is told once
+            if far or not untimed:  # a wrong rate affects all channels: report it once
                 untimed = untimed or not timed
                 of_channel = name if timed or far else None
                 yield Finding(
@@ -406,7 +406,7 @@ def _compare_noise(
 
 
 def _compute_axis_ratio(level: Level, others: Sequence[Level]) -> float | None:
-    """Return how many times the noise of two axes alike a third has; None: not far off."""
+    """Return the ratio of the noise of an axis to two similar ones; None if not suspicious."""
     if len(others) < 2 or any(axis["density"][1] is None for axis in (level, *others)):
         return None
     least = min(axis["density"][0] for axis in others)
@@ -422,7 +422,7 @@ def _compute_axis_ratio(level: Level, others: Sequence[Level]) -> float | None:
 
 
 def _check_mean_rates(means: Mapping[str, float], usual: Expected) -> Iterator[Finding]:
-    """Yield the gyros whose mean no offset explains."""
+    """Yield a finding for each gyro whose mean exceeds the largest offset."""
     for name, mean in means.items():
         if abs(mean) > usual.offset:
             detail = (
@@ -436,13 +436,13 @@ def _check_mean_rates(means: Mapping[str, float], usual: Expected) -> Iterator[F
 def _check_gravity_turn(
     means: Mapping[str, float], gravity: GravityTurn | None
 ) -> Iterator[Finding]:
-    """Yield a turn that gravity shows, alone or together with the gyros."""
+    """Yield a finding if gravity turns, by itself or in agreement with the gyros."""
     if gravity is None or gravity.swept < _MIN_TURN_WITH_GYROS:
         return
     seen = np.array(gravity.rate)
     rate = float(np.linalg.norm(seen))
     gyro = np.array([means.get(f"gyro_{axis}", np.nan) for axis in "xyz"])
-    # The accelerometers do not show what turns about the vertical.
+    # The accelerometers do not show a rotation about the vertical.
     along = float(gyro @ seen) / rate
     together = abs(along / rate - 1.0) < _MAX_RATE_DISAGREEMENT
     if gravity.swept < _MIN_TURN_OF_GRAVITY and not together:

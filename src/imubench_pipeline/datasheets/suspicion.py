@@ -1,4 +1,4 @@
-"""Whether a printed or an estimated figure is so far from others that its unit is in doubt."""
+"""Check printed and estimated figures for wrong units, against the figures of other sensors."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ _UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
         *_PREFIX_MISTAKES,
     ),
 }
-"""Units that are mixed up: the factor that mends a figure, and what it would be in."""
+"""Common unit mistakes: the factor that corrects a figure, and the mistake in words."""
 
 MAX_FACTOR_FROM_PRINTED = 4.0
-"""Times a printed figure that is usual of its sensor, either way: behind a low-pass, of a bad
-specimen, in another sidedness."""
+"""Maximum usual ratio of a figure to the printed one, either way: low-pass filters, a bad specimen
+or another sidedness explain it."""
 
 _MAX_FACTOR_BEYOND_CATALOGUE = 2.0
-"""Times the least and the most of a catalogue that is usual."""
+"""Maximum usual factor below the least, or above the largest, figure of a catalogue."""
 
 _DISPLAY_UNITS: dict[tuple[str, str], tuple[str, str]] = {
     ("gyro", "N"): ("°/s/√Hz", "gyro_density"),
@@ -57,13 +57,13 @@ _DISPLAY_UNITS: dict[tuple[str, str], tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Usual:
-    """What is usual of a figure."""
+    """Usual range of a figure."""
 
     # median, least, most: SI
     median: float
     least: float
     most: float
-    sensors: int  # how many there are
+    sensors: int  # number of sensors
 
 
 UsualFigures = Mapping[tuple[str, str], Usual]
@@ -81,7 +81,7 @@ def usual_of_text(text: str) -> UsualFigures:
 
 
 def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]:
-    """Return what is usual of N and B in a catalogue, where at least five sensors have them."""
+    """Return the usual N and B of a catalogue, if at least five sensors have them."""
     by_figure: dict[tuple[str, str], list[float]] = {}
     for sensor in sensors.values():
         for quantity in QUANTITIES:
@@ -95,9 +95,9 @@ def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]
 
 
 def printed_figures(sensor: Sensor, quantity: str) -> dict[str, float]:
-    """Return N and B of a sensor, SI, as its datasheet prints them, of the first axis with them.
+    """Return the printed N and B of a sensor, SI, from the first axis that has them.
 
-    B is the minimum of the curve, as vendors print it.
+    B is the minimum of the Allan deviation, as vendors print it.
     """
     figures: dict[str, float] = {}
     for axis in "xyz":
@@ -125,14 +125,14 @@ def suspicious(
     printed: Mapping[str, float] | None = None,
     written: Mapping[str, str] | None = None,
 ) -> list[str]:
-    """Say which figures are twenty times off what is usual, and in which unit they would not be.
+    """Return a sentence for each figure that is 20 times too large or small, with a likely unit.
 
-    A sentence a figure, of N and B, printed or estimated, SI. Too large is what is above twenty
-    times the median of the catalogue (`usual_figures`); too small, since there are sensors of every
-    price, what is below a twentieth of its least. A figure as the sensor's own datasheet prints it,
-    SI, is neither. Another unit is named where its factor explains the figure: what is left is
-    usual of the sensor, or of the catalogue where its datasheet prints nothing. ``written``: how a
-    figure is written, with its name, where it is not N or B itself to three digits.
+    The figures are N and B, printed or estimated, SI. A figure is too large above 20 times the
+    median of the catalogue (`usual_figures`). It is too small below a twentieth of the least of the
+    catalogue, since there are sensors of every price. A figure near the one in the sensor's own
+    datasheet (``printed``, SI) is neither. Another unit is named if its factor gives a usual figure
+    for the sensor, or for the catalogue if the datasheet prints none. ``written``: text of a figure
+    with its name, if it is not N or B to three digits.
     """
     sentences = []
     for figure, value in figures.items():
@@ -167,7 +167,7 @@ def suspicious(
 
 
 def _ask_about_unit(quantity: str, figure: str, value: float, least: float, most: float) -> str:
-    """Return the question whether it is in another unit, which is named if that explains it."""
+    """Return the question about the unit of a figure, with the unit that explains it, if any."""
     for factor, unit in _UNIT_MISTAKES[quantity]:
         if least <= value * factor <= most:
             mended = _format_figure(quantity, figure, value * factor)
@@ -181,7 +181,7 @@ def _format_figure(quantity: str, figure: str, value: float, digits: int = 3) ->
 
 
 _SYMBOLS = {"N": "N", "B": "σ_min"}
-"""What estimates are compared by, with what vendors print."""
+"""Symbols of the estimates that are compared with printed figures."""
 
 
 def unusual_rows(
@@ -189,10 +189,11 @@ def unusual_rows(
 ) -> Iterator[FindingRow]:
     """Yield the rows of the table ``findings`` about estimates far from what vendors print.
 
-    Of rows of the table ``parameters``, of ``sensors`` by name; ``usual`` is what a catalogue has.
+    ``parameters`` are rows of that table, ``sensors`` are by name, and ``usual`` is from a
+    catalogue.
     """
     for row in parameters:
-        # What vendors print of B is the minimum of the curve.
+        # Vendors print the minimum of the Allan deviation as B.
         figure = {"N": "N", "sigma_min": "B"}.get(row.parameter)
         value = row.value
         if figure is None or value is None:
