@@ -1,1 +1,1 @@
-"""What noise means for use: error budgets, fusion, pools, drift, requirements and verdicts."""
+"""Navigation errors from sensor noise: budgets, fusion, pooling, drift, verdicts."""

@@ -1,7 +1,7 @@
-"""How the error of a recording grows, after static windows of several lengths: rows of a table.
+"""Growth of the errors of a recording after static windows of several lengths: rows of a table.
 
-The same errors as those of `expected_errors`, at more times and windows, with the same models.
-They are summed over all models drawn at once: a budget of each would take a thousand times as
+The errors are defined as in `expected_errors`, at more times and windows, with the same models. The
+variances of all drawn models are computed at once: separate budgets would take a thousand times as
 long.
 """
 
@@ -37,7 +37,7 @@ from imubench_pipeline.units import SI_UNITS
 _STANDARD_TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 _STANDARD_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 _TAIL_PROBABILITY = 0.025
-"""Beyond each 95 % limit."""
+"""Probability beyond each 95 % limit."""
 
 
 def growth_rows(
@@ -52,8 +52,8 @@ def growth_rows(
 ) -> Iterator[ErrorGrowthRow]:
     """Yield the rows of the table ``error_growth`` of a recording.
 
-    They are of its worst axes, and where it has several, of each alone: of the gyro and the
-    accelerometer of one letter.
+    They are for its worst axes, and if it has several, for each axis alone: the gyro and the
+    accelerometer of the same letter.
 
     Parameters
     ----------
@@ -62,9 +62,9 @@ def growth_rows(
     estimates : mapping of str to Estimate
         The recommended one of each channel.
     times : iterable of float
-        s; besides those that every table has.
+        s; in addition to the times that every table has.
     window : float
-        Static window, s, likewise.
+        Static window, s, in addition to the windows that every table has.
     draws, seed : int
     figures : mapping of str to mapping
         All three as `expected_errors.error_rows` takes them.
@@ -124,7 +124,7 @@ def growth_rows(
 
 
 def _map_answering_axes(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, AxisErrors]]:
-    """Return the channels that may answer for the worst axes, and for each axis alone."""
+    """Return the candidate channels for the worst axes, and for each axis alone."""
     letters = sorted({channel[-1] for channel in axes})
     alone = {
         letter: {channel: errors for channel, errors in axes.items() if channel[-1] == letter}
@@ -135,8 +135,8 @@ def _map_answering_axes(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, A
 
 
 def _compute_limits(budget: Budget, drawn: Array) -> tuple[float, float]:
-    """Return the limits of the total of a budget, by the variances that noise has drawn."""
+    """Return the limits of the total of a budget, from the drawn variances of the noise."""
     sure = math.fsum(part.sigma**2 for part in budget.contributions if part.cause != "noise")
     lower, upper = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
-    # The draws of what is absent lie above it: the value itself is inside.
+    # Draws of an absent term are above 0: extend the limits to the value.
     return min(float(lower), budget.total), max(float(upper), budget.total)

@@ -1,4 +1,4 @@
-"""What the estimates of a recording mean: rows of the table ``error_budget``."""
+"""Expected navigation errors of a recording: rows of the table ``error_budget``."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ NO_FIGURES_OF_CHANNELS: Mapping[str, Figures] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class AxisErrors:
-    """What is known of the errors of one axis: its noise, and figures of what comes in use."""
+    """Error sources of one axis: its noise, and figures of the errors in use."""
 
     model: NoiseModel = field(default_factory=NoiseModel)
     figures: Figures = field(default_factory=dict)
@@ -60,30 +60,30 @@ _NO_AXIS_ERRORS = AxisErrors()
 
 @dataclass(frozen=True)
 class Question:
-    """One error that is asked for."""
+    """One error to be computed."""
 
-    requirement: str | None  # name of the requirement; None for the times that are always given
+    requirement: str | None  # name of the requirement; None for the standard times
     error: Error
     time: float  # s
     start: Start
-    axis: Axis  # which axis of the sensor answers
+    axis: Axis  # which axis of the sensor is used
     latitude: float | None = None  # rad; for ``north``
     limit: float | None = None  # largest standard deviation that fulfils the requirement, SI
-    use: Use = NO_USE  # what happens besides
+    use: Use = NO_USE  # motion, temperature and vibration
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The quantities that it takes to answer."""
+        """Quantities that are needed to compute it."""
         return ("gyro",) if self.error in ("heading", "north") else ("gyro", "accel")
 
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
-        """Return the budget with these axes."""
+        """Return the budget for these axes."""
         if self.error == "north":
             return self._compass(gyro).heading(self.time)
         return budget(self.error, self.time, **self._conditions(gyro, accel))
 
     def reached(self, gyro: AxisErrors, accel: AxisErrors) -> float | None:
-        """Return after which time the limit is reached, s; for north, the rest that it takes."""
+        """Return the time at which the limit is reached, s; for north, the static time needed."""
         if self.limit is None:
             return None
         if self.error == "north":
@@ -91,7 +91,7 @@ class Question:
         return time_until(self.limit, self.error, **self._conditions(gyro, accel))
 
     def _conditions(self, gyro: AxisErrors, accel: AxisErrors) -> dict[str, Any]:
-        """Return what a budget takes beside the error and its time."""
+        """Return the arguments of a budget other than the error and its time."""
         return {
             "gyro": gyro.model,
             "accel": accel.model,
@@ -104,7 +104,7 @@ class Question:
     def _compass(self, gyro: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
         stated = self.start.gyro.bias if isinstance(self.start.gyro, Uncalibrated) else None
-        # Whoever looks for north at any time takes a bias off by turning the gyro.
+        # North-finding at arbitrary times removes the bias by turning the gyro.
         figures = gyro.figures if self.requirement is not None else NO_FIGURES
         return Gyrocompass(gyro=gyro.model, latitude=self.latitude, bias=stated, figures=figures)
 
@@ -112,9 +112,10 @@ class Question:
 def standard(
     times: Sequence[float], window: float, latitude: float, axes: Sequence[Axis]
 ) -> Iterator[Question]:
-    """Yield the questions that every recording answers.
+    """Yield the standard questions, which are computed for every recording.
 
-    Of each time, s, after a static window, s, for these axes; north at a latitude in rad.
+    There is one for each time, s, after a static window, s, for these axes; north is at a latitude
+    in rad.
     """
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
@@ -142,7 +143,7 @@ def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
 
 
 def start_of(requirement: Requirement) -> Start:
-    """Return how dead reckoning begins in an application."""
+    """Return the initial conditions of dead reckoning in an application."""
     if requirement.static_window is not None:
         return Start.calibrated(quantity_to_si(requirement.static_window, "time"))
     assert requirement.turn_on is not None  # checked with the requirement
@@ -155,7 +156,7 @@ def start_of(requirement: Requirement) -> Start:
 
 
 def use_of(environment: Environment, time: float) -> Use:
-    """Return what happens in an application, all of it within the time of a limit, s."""
+    """Return the motion and environment of an application within the time of a limit, s."""
     stated = {
         "turns": (environment.turns, "angle"),
         "speed_change": (environment.speed_change, "velocity"),
@@ -188,11 +189,11 @@ def error_rows(
         The recommended one of each channel.
     questions : iterable of Question
     draws : int
-        Noise models drawn from what each log leaves open; they give the interval of a total.
+        Number of noise models drawn from the estimate of each log, for the interval of a total.
     seed : int
-        Of the run; each channel has a stream of its own.
+        Seed of the run; each channel has its own random stream.
     figures : mapping of str to mapping
-        Of each channel, what is known of the errors that come in use (`printed_errors.in_use`).
+        Figures of the errors in use, by channel (`printed_errors.in_use`).
     """
     axes = axes_of(estimates, figures)
 
@@ -230,7 +231,7 @@ def error_rows(
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
         asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
         lower, upper = interval(budgets)
-        # The draws of what is absent lie above it: the value itself is inside.
+        # Draws of an absent term are above 0: extend the limits to the value.
         lower, upper = min(lower, nominal.total), max(upper, nominal.total)
         apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
         reasons = (
@@ -259,9 +260,9 @@ def error_rows(
 def axes_of(
     estimates: Mapping[str, Estimate], figures: Mapping[str, Figures]
 ) -> dict[str, AxisErrors]:
-    """Return what is known of the axes of which something is known.
+    """Return the error sources of the axes that have a noise model.
 
-    Of a log too short for any estimate nothing is known: that is not a sensor without noise.
+    An axis without one is left out: its log is too short for any estimate, and its noise is not 0.
     """
     return {
         channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
@@ -271,7 +272,7 @@ def axes_of(
 
 
 def answering(question: Question, axes: Mapping[str, AxisErrors]) -> dict[str, str | None] | None:
-    """Return the channels of gyro and accelerometer that answer; None: one of them is missing."""
+    """Return the gyro and accelerometer channels to use; None if one of them is missing."""
     if not all(_list_channels(quantity, axes) for quantity in question.needs):
         return None
     return {
@@ -285,7 +286,7 @@ def _list_channels(quantity: str, axes: Mapping[str, AxisErrors]) -> list[str]:
 
 
 def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
-    """Return draws of what is known of an axis, as sure as its measured figures are."""
+    """Return draws of the figures of an axis, from the spread of the measured ones."""
     spread = {
         cause: figure
         for cause, figure in figures.items()
@@ -305,7 +306,7 @@ def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> lis
 
 
 def _explain_missing_noise(quantity: str, estimates: Mapping[str, Estimate]) -> str:
-    """Return why there is no noise of a quantity to answer with."""
+    """Return why a quantity has no noise model."""
     silent = [channel for channel in estimates if quantity_of(channel) == quantity]
     if not silent:
         return f"no {SENSORS[quantity]} in the recording"
@@ -316,7 +317,7 @@ def _explain_missing_noise(quantity: str, estimates: Mapping[str, Estimate]) -> 
 
 
 def _list_unknown_axes(question: Question, estimates: Mapping[str, Estimate]) -> Iterator[str]:
-    """Yield the axes that could not answer."""
+    """Yield a note on each axis without a noise model."""
     for channel, estimate in estimates.items():
         if quantity_of(channel) in question.needs and not estimate.model.terms:
             yield (
@@ -331,7 +332,7 @@ def _find_reason(estimate: Estimate) -> str:
 
 
 def _select_axis(question: Question, quantity: str, axes: Mapping[str, AxisErrors]) -> str:
-    """Return the channel of a quantity whose own part of the error is the worst, or the median."""
+    """Return the channel of a quantity whose own share of the error is the worst or the median."""
 
     def part(channel: str) -> float:
         own = axes[channel]
@@ -357,7 +358,7 @@ def _list_independent_channels(
 def _list_doubts(
     chosen: Mapping[str, str | None], estimates: Mapping[str, Estimate]
 ) -> Iterator[str]:
-    """Yield the parameters that the logs do not tell."""
+    """Yield a note on each parameter that the logs do not determine."""
     for channel in chosen.values():
         for _, name, parameter in estimates[channel].components() if channel else ():
             if parameter.status in ("not_identified", "at_bound"):

@@ -1,7 +1,7 @@
-"""Errors at the end of outages of GNSS as rows of the table ``error_budget``, to be judged.
+"""Errors at the end of GNSS outages, as rows of the table ``error_budget`` for the verdicts.
 
-Of a sensor the filter counts that is tuned by the recommended estimate, on simulated signals.
-Errors are those of one axis: in the plane a root mean square is over sqrt(2).
+For each sensor, the filter that is tuned by its recommended estimate is used, on simulated signals.
+Errors are per axis: a root mean square in the plane is divided by sqrt(2).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from imubench_pipeline.settings.requirements import DIMENSIONS, Limit, Requireme
 from imubench_pipeline.units import SI_UNITS
 
 _AXIS_FACTORS = {"position": math.sqrt(2.0), "velocity": math.sqrt(2.0), "heading": 1.0}
+"""Root mean square error in the tables over the error of one axis."""
 
 _LIMITS_NOTE = "simulated drives; the limits are those of the runs, not of the estimate"
 
@@ -33,7 +34,7 @@ class OutageErrorRow(ErrorBudgetRow):
 
 
 def trajectory_of(total: ErrorBudgetRow) -> str | None:
-    """Return the trajectory whose outages an error is of; None: an error of dead reckoning."""
+    """Return the trajectory of an error in outages; None for an error of dead reckoning."""
     return total.trajectory if isinstance(total, OutageErrorRow) else None
 
 
@@ -42,9 +43,10 @@ def outage_rows(
     recordings: Iterable[RecordingRow],
     requirements: Mapping[str, Requirement],
 ) -> Iterator[OutageErrorRow]:
-    """Yield the rows of the limits that are about outages, of every sensor with static recordings.
+    """Yield the rows of the outage limits, for every sensor with static recordings.
 
-    Of the tables ``navigation`` and ``recordings``. A sensor without such a run has no figure.
+    ``navigation`` and ``recordings`` are rows of these tables. A sensor without a filter run has no
+    figure.
     """
     runs: dict[tuple[Any, ...], NavigationRow] = {}
     for run in navigation:

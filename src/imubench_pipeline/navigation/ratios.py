@@ -1,9 +1,9 @@
-"""How many times the noise of one log is that of another, and how sure that is.
+"""Ratio of the noise of two logs, with its confidence interval.
 
-Two logs are independent, so a ratio of two parameters has limits that follow from the limits of
-each: on the logarithm, those of a difference (MOVER). The Allan deviation of two models at a tau is
-that of all their parameters together, which are not independent: it is compared over the joint
-draws of both.
+Two logs are independent, so the limits of a ratio of two parameters follow from the limits of each:
+on the logarithm, they are the limits of a difference (MOVER). The Allan deviation of a model at a
+tau depends on all its parameters, which are not independent: ratios of Allan deviations are
+computed over the joint draws of both.
 
 References
 ----------
@@ -32,26 +32,26 @@ from imubench_pipeline.typing import Array
 Verdict = Literal["lower", "higher", "not told apart", "not known"]
 
 _TAIL_PROBABILITY = 0.025
-"""Beyond each 95 % limit."""
+"""Probability beyond each 95 % limit."""
 
 _TAUS_PER_DECADE = 2
-"""Tau of the table ``drawn_deviations``."""
+"""Number of tau per decade in the table ``drawn_deviations``."""
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """One over the other."""
+    """Ratio of two logs, the first over the second."""
 
     value: float | None
     """None: one of them has no value."""
-    # 95 % limits; None: there is none, upwards or at all
+    # 95 % limits; None: unbounded above, or not known
     lower: float | None
     upper: float | None
     reason: str | None = None
 
     @property
     def verdict(self) -> Verdict:
-        """What the first is, beside the second: by the interval alone."""
+        """How the first compares with the second, from the interval alone."""
         if self.upper is not None and self.upper < 1.0:
             return "lower"
         if self.lower is not None and self.lower > 1.0:
@@ -63,8 +63,9 @@ class Ratio:
 def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
     """Return the ratio of one noise parameter of two logs, both from 0.
 
-    Where one has no value, but limits, the interval is from the lower limit of the first over the
-    upper one of the second to the upper one over the lower one: it is wide.
+    The limits are from Zou and Donner (2008), eq. 2 and 3. If one has limits but no value, the
+    interval goes from the lower limit of the first over the upper limit of the second to the upper
+    limit of the first over the lower limit of the second, which is conservative.
     """
     reason = "; ".join(dict.fromkeys(_list_doubts(first, second))) or None
     a, b = first.value, second.value
@@ -105,7 +106,7 @@ def _divide(numerator: float | None, denominator: float | None) -> float | None:
 
 
 def _compute_log_ratio(low: float | None, high: float | None) -> float | None:
-    """Return the logarithm of one limit over the other; infinite down to 0, None: not known."""
+    """Return ln(high / low); infinite if low is 0, None if a limit is not known."""
     if low is None or high is None:
         return None
     return math.log(high / low) if low > 0.0 else math.inf
@@ -132,11 +133,11 @@ def ratio_of_deviations(
     tau : float
         s.
     longest : float
-        Longest tau that a log tells, as a part of it.
+        Longest tau, as a fraction of the log.
     draws : int
-        Noise models that are drawn of those that each log allows; each pair of them counts.
+        Number of noise models drawn from the estimate of each log; all pairs are used.
     seed : int
-        Each channel has a stream of its own.
+        Each channel has its own random stream.
     """
     told = longest * min(first.duration, second.duration)
     if tau > told:
@@ -153,7 +154,7 @@ def ratio_of_deviations(
         ratios, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY], method="inverted_cdf"
     )
     unknown = "; ".join(dict.fromkeys([*first.unknown(tau), *second.unknown(tau)])) or None
-    # The draws of what is absent lie above it: the value itself is inside.
+    # Draws of an absent term are above 0: extend the limits to the value.
     limits = min(float(lower), value), max(float(upper), value)
     return Ratio(None if unknown else value, *limits, unknown)
 
@@ -174,17 +175,17 @@ def deviation_rows(
 ) -> Iterator[DrawnDeviationRow]:
     """Yield the rows of the table ``drawn_deviations`` of a channel.
 
-    What `ratio_of_deviations` needs to know of it, at tau of two a decade from the sampling
-    interval on, so that any two channels can be compared without their logs.
+    They hold the input of `ratio_of_deviations` for the channel, at two tau a decade from the
+    sampling interval on. Any two channels can then be compared without their logs.
 
     Parameters
     ----------
     channel : FusionChannel
     rate : float
-        Of its log, Hz.
+        Sampling rate of its log, Hz.
     longest : float
     draws, seed : int
-        All three as `ratio_of_deviations` takes them.
+        As in `ratio_of_deviations`, with ``longest``.
     """
     if not channel.model.terms:
         return

@@ -1,4 +1,4 @@
-"""The fixed bias of a device from one turn-on to the next, against the printed repeatability."""
+"""Compare the turn-on to turn-on spread of the fixed bias with the printed repeatability."""
 
 from __future__ import annotations
 
@@ -20,12 +20,11 @@ def repeatability_rows(
     sensors: Mapping[str, Sensor],
     tolerance: float,
 ) -> Iterator[RepeatabilityRow]:
-    """Yield the rows of the table ``repeatability``: biases of a device against what is printed.
+    """Yield the rows of the table ``repeatability``: bias spread and printed repeatability.
 
-    A printed repeatability is the spread of the bias from one turn-on to the next. A recording
-    before which the power stayed on is of the turn-on of the one before, and does not count; nor do
-    recordings that do not decide. The tolerance is the relative difference that still counts as
-    printed.
+    A printed repeatability is the spread of the bias from one turn-on to the next. A recording is
+    left out if the power stayed on before it, since it belongs to the turn-on of the previous one,
+    or if it does not decide. The tolerance is the relative difference that still counts as printed.
     """
     about = {(row.sensor, row.recording): row for row in recordings if row.decides}
     by_channel: dict[tuple[str, str, str], list[tuple[RecordingRow, float]]] = {}
@@ -37,7 +36,7 @@ def repeatability_rows(
     for (sensor, device, channel), several in by_channel.items():
         if sensor not in sensors or len(several) < 2:
             continue
-        # The first recording of a device has none before it.
+        # The first recording of a device has no previous one: its flag does not matter.
         unknown = sum(row.power_cycled is None for row, _ in several) > 1
         spread = _estimate_spread(channel, [value for _, value in several], unknown)
         for entry in repeatability_comparables(sensors[sensor].datasheet, channel):

@@ -1,4 +1,4 @@
-"""Which sensor fulfils which requirement: rows of the table ``ranking``."""
+"""Rank the sensors for each requirement: rows of the table ``ranking``."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.navigation.verdicts.unless import unless_words
 
 _MAX_NAMED_RECORDINGS = 3
-"""Recordings whose doubts are named; of more the number."""
+"""Maximum number of recordings whose doubts are listed; the others are counted."""
 
 
 def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
-    """Yield the rows of the table ``ranking``, of judgements and the recordings that they stand on.
+    """Yield the rows of the table ``ranking``, from the judgements and their recordings.
 
-    A sensor stands where its limit with the least margin stands. Its rank is one more than the
-    number of sensors that are surely better, whose interval lies wholly above its own: sensors with
-    overlapping intervals are tied. One with a figure that is not known is surely better than
-    another only where that of the other is not known, too.
+    The limit with the least margin decides for a sensor. Its rank is one more than the number of
+    sensors that are significantly better: the interval of their margin lies wholly above its own.
+    Sensors with overlapping intervals are tied. A sensor with unknown figures is significantly
+    better than another only if the other lacks the same figures.
     """
     for name in dict.fromkeys(judgement.name for judgement in judged):
         own = [judgement for judgement in judged if judgement.name == name]
@@ -98,7 +98,7 @@ def _make_row(
 
 
 def _describe_doubts(sensor: str, standing: Standing, basis: Basis) -> str:
-    """Return what is doubted of the recordings that a standing rests on."""
+    """Return the doubts about the recordings of a standing, in words."""
     recordings = [row.recording for row in standing.totals]
     if len(recordings) < 2:
         return basis.doubted((sensor, standing.total.recording))
@@ -108,7 +108,7 @@ def _describe_doubts(sensor: str, standing: Standing, basis: Basis) -> str:
 
 
 def _find_backtest(requirement: str, standing: Standing, basis: Basis) -> BacktestRow | None:
-    """Return what the log of the channel that an error mostly comes of shows of its part."""
+    """Return the back-test of the channel that contributes most to an error."""
     total = standing.total
     words = (standing.source or "").split()
     channels = {"gyro": total.gyro, "accel": total.accel}
@@ -122,7 +122,7 @@ def _get_margin(standing: Standing | None) -> float | None:
 
 
 def _compute_rank(sensor: str, compared: Mapping[str, Judgement]) -> tuple[int, list[str]]:
-    """Return the rank of a sensor, and the sensors that it is tied with."""
+    """Return the rank of a sensor, and the sensors that are tied with it."""
 
     def better(first: str, second: str) -> bool:
         this, that = compared[first], compared[second]
