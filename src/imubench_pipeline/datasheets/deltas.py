@@ -195,7 +195,7 @@ def _classify_value(entry: Comparable, value: float, tolerance: float) -> str:
 
 
 def _compute_relative_difference(value: float | None, printed: float | None) -> float | None:
-    """Return the relative difference; None if a number is missing or the printed one not positive."""
+    """Return the relative difference; None without two numbers, the printed one positive."""
     if value is None or printed is None or printed <= 0:
         return None
     return value / printed - 1.0
