@@ -1,4 +1,4 @@
-"""What is known of the recordings that a verdict stands on, beside their errors."""
+"""Collect the properties of recordings, other than their errors, that verdicts depend on."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Basis:
 
     recordings: Mapping[Key, RecordingRow] = field(default_factory=dict)
     doubts: Mapping[Key, Sequence[DoubtRow]] = field(default_factory=dict)
-    # the channels that were analysed, and whether anything is known of their noise
+    # analysed channels, and whether any noise parameter has a value
     channels: Mapping[Key, Mapping[str, bool]] = field(default_factory=dict)
-    # why a recording does not decide, of those that do not
+    # reasons why recordings do not decide
     apart: Mapping[Key, str] = field(default_factory=dict)
-    # what the logs themselves show, by requirement, sensor, recording, channel, error and time
+    # back-tests by requirement, sensor, recording, channel, error and time
     backtests: Mapping[tuple[Any, ...], BacktestRow] = field(default_factory=dict)
 
     @classmethod
@@ -37,7 +37,7 @@ class Basis:
         parameters: Iterable[ParameterRow] = (),
         backtests: Iterable[BacktestRow] = (),
     ) -> Basis:
-        """Return it from the rows of a run; of parameters the recommended ones count."""
+        """Return the basis from the rows of a run; only recommended parameters are used."""
         about = {_make_key(row): row for row in recordings}
         doubted: dict[Key, list[DoubtRow]] = {}
         for doubt in doubts:
@@ -55,36 +55,36 @@ class Basis:
     def backtest(
         self, of: ErrorBudgetRow, requirement: str, channel: str | None
     ) -> BacktestRow | None:
-        """Return what the log of a channel shows of an error of a requirement; else nothing."""
+        """Return the back-test of a channel for an error of a requirement, or None."""
         return self.backtests.get(_make_backtest_key(of, requirement, channel))
 
     def device(self, key: Key) -> str:
-        """Return the specimen: by default each recording is one of its own."""
+        """Return the specimen of a recording; by default each recording is its own specimen."""
         row = self.recordings.get(key)
         return row.device if row else key[1]
 
     def duration(self, key: Key) -> float | None:
-        """Return the length of a recording, s; None where it is not known."""
+        """Return the length of a recording, s; None if it is not known."""
         row = self.recordings.get(key)
         return row.duration if row else None
 
     def longest(self, rows: Iterable[OfRecordingRow]) -> float | None:
-        """Return the length of the longest recording of rows, s; None where none is known."""
+        """Return the length of the longest recording of rows, s; None if none is known."""
         durations = (self.duration(_make_key(row)) for row in rows)
         return max((duration for duration in durations if duration is not None), default=None)
 
     def simulated(self, key: Key) -> bool:
-        """Tell whether a recording is simulated."""
+        """Return whether a recording is simulated."""
         row = self.recordings.get(key)
         return bool(row and row.simulated)
 
     def doubted(self, key: Key) -> str:
-        """Return the doubts of a recording in words; empty where there are none."""
+        """Return the doubts about a recording in words; empty if there are none."""
         row = self.recordings.get(key)
         return (row.doubts or "") if row else ""
 
     def axes(self, key: Key, quantity: str) -> int | None:
-        """Return of how many axes of a quantity the noise is known; None: nobody says."""
+        """Return the number of axes of a quantity with known noise; None without an analysis."""
         channels = self.channels.get(key)
         if channels is None:
             return None
@@ -95,19 +95,19 @@ class Basis:
         )
 
     def lacks(self, key: Key, quantity: str) -> bool:
-        """Tell whether a recording has no axis of a quantity."""
+        """Return whether an analysed recording has no axis of a quantity."""
         channels = self.channels.get(key)
         return channels is not None and quantity not in map(quantity_of, channels)
 
     def factors(self, key: Key) -> dict[str, float]:
-        """Return by what a unit that may be mixed up multiplies a quantity that is mended.
+        """Return the factor that corrects each quantity with a doubtful unit.
 
-        A log has one unit for all axes of a quantity, so that a doubt of one axis is one of all.
+        A log has one unit for all axes of a quantity, so a doubt about one axis applies to all.
         """
         factors: dict[str, float] = {}
         for row in self.doubts.get(key, ()):
             if row.factor is not None:
-                # Gravity is told by all axes together: its doubt names no channel.
+                # Gravity is checked over all axes together: its doubt names no channel.
                 quantity = quantity_of(row.channel) if row.channel else "accel"
                 factors.setdefault(quantity, row.factor)
         return factors

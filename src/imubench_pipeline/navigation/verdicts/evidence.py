@@ -1,10 +1,10 @@
-"""How strong the evidence of a verdict is: all that makes it weak is derived here.
+"""Derive the strength of the evidence for a verdict, and the reasons why it is weak.
 
-A verdict says how sure a figure is if its log is what it seems. Evidence says how far the logs
-carry: how long they are, of how many specimens and axes, and what is doubted of the parameter that
-makes most of the error (`imubench_pipeline.recordings.fitness` says what is doubted of a log).
+A verdict gives the confidence in a figure, assuming that its log is representative. The evidence
+depends on the logs: their length, the number of specimens and axes, and doubts about the parameter
+that contributes most to the error (`imubench_pipeline.recordings.fitness` lists the doubts).
 
-What a contribution to an error comes of, quantity and noise parameter, is told by its name.
+The name of a contribution to an error gives its quantity and noise parameter.
 """
 
 from __future__ import annotations
@@ -30,27 +30,27 @@ def _list_parameters(kind: type[Term]) -> frozenset[str]:
 
 
 _PARAMETERS_OF_SOURCE = {kind.word: _list_parameters(kind) for kind in TERMS}
-"""Parameters behind the first word of a term's name (`Term.source`); the lowest part of the curve
-is what its bias instability makes of it."""
+"""Noise parameters by the first word of a term's name (`Term.source`). Bias instability determines
+the lowest part of the curve, so its terms include the parameters of the curve."""
 
 
 Reason = Literal["one_specimen", "short_log", "wide_interval", "few_axes"]
-"""What makes evidence weak; beside these, the codes of doubts."""
+"""Reasons for weak evidence, in addition to the codes of doubts."""
 
 WEAKNESS_REASONS: tuple[str, ...] = get_args(Reason)
 
 MAX_TIME_SHARE = 1 / 9
-"""Part of a log that tells an error of that length: there the Allan deviation of white noise has
-8 differences of clusters end to end, and is known to about a quarter."""
+"""Maximum time of an error as a fraction of the log. There, the Allan deviation of white noise has
+8 differences of adjacent clusters, and a relative error of about a quarter."""
 
 _AXIS_COUNT = 3
 
 
 def quantity_behind(source: str) -> str | None:
-    """Return gyro or accel where a source is noise of one that the log tells; else None.
+    """Return gyro or accel if a source is sensor noise estimated from the log; else None.
 
-    A source is such as ``gyro N`` or ``initial tilt by accel GM 89.5 s`` of the table
-    ``error_budget``. A turn-on bias is stated, and not of the log.
+    Sources are those of the table ``error_budget``, such as ``gyro N`` or ``initial tilt by accel
+    GM 89.5 s``. A turn-on bias is stated, and not estimated from the log.
     """
     words = source.removeprefix("initial tilt by ").split()
     noise = len(words) > 1 and words[0] in ("gyro", "accel") and words[1] in _PARAMETERS_OF_SOURCE
@@ -58,14 +58,14 @@ def quantity_behind(source: str) -> str | None:
 
 
 def parameters_behind(source: str) -> frozenset[str]:
-    """Return the noise parameters that a source comes of; none where it is no noise of the log."""
+    """Return the noise parameters of a source; empty if it is not noise of the log."""
     if quantity_behind(source) is None:
         return frozenset()
     return _PARAMETERS_OF_SOURCE[source.removeprefix("initial tilt by ").split()[1]]
 
 
 def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
-    """Return what makes the evidence of a limit weak; nothing where it is strong.
+    """Return the reasons for weak evidence on a limit; empty if it is strong.
 
     They are `WEAKNESS_REASONS` and codes of the table ``doubts``. Axes and doubts count if at least
     half of the recordings have them; the longest recording gives the length. The standing must have
@@ -111,8 +111,8 @@ def _list_log_weaknesses(
 
 
 def longest_asked(total: ErrorBudgetRow, requirement: Requirement) -> float:
-    """Return the longest time that a limit is about, s: its own, or the window at rest before."""
+    """Return the longest time in a limit, s: its own, or its static window."""
     window = requirement.static_window
-    # The heading found at rest has no window before it.
+    # North-finding has no static window before it.
     before = quantity_to_si(window, "time") if window and total.error != "north" else 0.0
     return max(total.time, before)

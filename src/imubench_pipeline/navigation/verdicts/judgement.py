@@ -1,4 +1,4 @@
-"""How each sensor stands to each requirement, with all that the verdict hangs on."""
+"""Judge each sensor by each requirement, with the conditions of the verdict."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ _WORST_FIRST = (
 
 @dataclass(frozen=True)
 class Judgement:
-    """A sensor and a requirement."""
+    """Judgement of a sensor by a requirement."""
 
     name: str  # of the requirement
     requirement: Requirement
     sensor: str
     standings: Sequence[Standing]  # one a limit
-    decides: Standing  # the one of them with which the sensor stands
-    # what makes the evidence of each limit weak; empty also where nothing is known
+    decides: Standing  # the limit that decides the verdict
+    # reasons for weak evidence, by limit; also empty if nothing is known
     weak: Sequence[Sequence[str]]
-    outside: str | None  # why the requirement does not admit the sensor
-    rests: Rests  # on what the verdict rests beside the errors that are known
-    unless: Unless | None  # what the verdict would be, if what is doubted were mended
+    outside: str | None  # why the requirement excludes the sensor
+    rests: Rests  # conditions other than the known errors
+    unless: Unless | None  # verdict with doubtful units corrected
 
     @property
     def verdict(self) -> str:
-        """What is said of the sensor."""
+        """Verdict on the sensor."""
         return self.outside or self.rests.verdict(self._of_errors)[0]
 
     @property
     def conditions(self) -> str | None:
-        """On what the verdict rests, or why the sensor is excluded, in words."""
+        """Conditions of the verdict, or why the sensor is excluded, in words."""
         return None if self.outside else self.rests.verdict(self._of_errors)[1]
 
     @property
     def _of_errors(self) -> str:
-        """The verdict on what is known: of the limit that decides, or of all once calibrated."""
+        """Verdict on the known errors: by the deciding limit, or by all after calibration."""
         once = [_judge_once_calibrated(standing) for standing in self.standings]
         if self.decides.known and once != [standing.verdict for standing in self.standings]:
             return min(once, key=_WORST_FIRST.index)
@@ -60,12 +60,12 @@ class Judgement:
 
     @property
     def compared(self) -> bool:
-        """Whether it has a place among the others."""
+        """Whether the sensor is ranked among the others."""
         return self.decides.known and not self.outside and not self.rests.lacking
 
     @property
     def reasons(self) -> Sequence[str]:
-        """What makes the evidence of the limit weak that decides."""
+        """Reasons for weak evidence on the deciding limit."""
         pairs = zip(self.standings, self.weak, strict=True)
         return next(weak for standing, weak in pairs if standing is self.decides)
 
@@ -76,10 +76,10 @@ def judgements(
     sensors: Mapping[str, Mapping[str, Any]],
     basis: Basis,
 ) -> Iterator[Judgement]:
-    """Yield how each sensor stands to each requirement.
+    """Yield the judgement of each sensor by each requirement.
 
-    Of the errors of all recordings, ``price_class`` and, where known, ``abilities`` of each
-    sensor, and the recordings, of which those that do not decide are left out.
+    ``errors`` are those of all recordings; ``sensors`` have ``price_class`` and, if known,
+    ``abilities``; ``basis`` has the recordings. Recordings that do not decide are left out.
     """
     by_requirement: dict[str | None, dict[str, list[ErrorBudgetRow]]] = {}
     for row in errors:
@@ -112,14 +112,14 @@ def judgements(
 def _map_specimens(
     sensor: str, rows: Iterable[ErrorBudgetRow], basis: Basis
 ) -> tuple[dict[str, str], bool]:
-    """Return the specimen of each recording of rows, and whether all of these are simulated."""
+    """Return the specimen of each recording in rows, and whether all are simulated."""
     keys = [(sensor, row.recording) for row in rows]
     devices = {recording: basis.device((sensor, recording)) for _, recording in keys}
     return devices, all(basis.simulated(key) for key in keys)
 
 
 def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[ErrorBudgetRow]:
-    """Return rows without the figures of recordings that do not decide."""
+    """Return rows, with figures removed for recordings that do not decide."""
     apart = [basis.apart.get((row.sensor, row.recording)) for row in rows]
     return [
         row if reason is None else _remove_figure(row, reason)
@@ -136,7 +136,7 @@ def _remove_figure(row: ErrorBudgetRow, reason: str) -> ErrorBudgetRow:
 def _pool_spreads(
     of_sensors: Mapping[str, Sequence[ErrorBudgetRow]], basis: Basis, *, simulated: bool
 ) -> dict[tuple[Any, ...], Spread]:
-    """Return the spread between specimens of all sensors that have several, by limit."""
+    """Return the pooled spread of all sensors with several specimens, by limit."""
     by_limit: dict[tuple[Any, ...], list[Spread]] = {}
     for sensor, rows in of_sensors.items():
         devices, made = _map_specimens(sensor, rows, basis)

@@ -1,4 +1,4 @@
-"""What to do next: the steps that would turn or strengthen most verdicts."""
+"""Recommend the next steps: those that would change or strengthen the most verdicts."""
 
 from __future__ import annotations
 
@@ -24,18 +24,19 @@ from imubench_pipeline.settings.printed import SENSORS
 Action = Literal[
     "check_unit", "find_figures", "add_channels", "record_again", "log_longer", "add_specimens"
 ]
-"""What can be done, the cheapest first."""
+"""Possible steps, the cheapest first."""
 
 _ACTION_ORDER = get_args(Action)
 
 _MAX_DURATION_FACTOR = 100.0
-"""Times the length of a log beyond which none is advised: limits ten times as narrow."""
+"""Maximum recommended duration over the present one: it makes limits ten times as narrow."""
 
 _MAX_SPECIMENS = 20
-"""Of one sensor, beyond which no more are advised."""
+"""Maximum number of specimens of a sensor that is recommended."""
 
 _MIN_SPECIMENS = 3
-"""Specimens that know their spread at all: t of two degrees of freedom is 4.3, of one 12.7."""
+"""Minimum number of specimens to estimate their spread: t is 4.3 with two degrees of freedom, 12.7
+with one."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class _Step:
 
 
 def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
-    """Return the rows of the table ``next_steps``, what turns most verdicts first."""
+    """Return the rows of the table ``next_steps``, those that change most verdicts first."""
     groups: dict[tuple[Any, ...], list[_Step]] = {}
     for judgement in judged:
         if judgement.outside is None and not judgement.rests.lacking:
@@ -72,7 +73,7 @@ def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRo
 
 
 def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
-    """Yield what would help one verdict: to turn it, and to make its evidence stronger."""
+    """Yield the steps that could change one verdict or make its evidence stronger."""
     unless, name = judgement.unless, judgement.name
     if unless is not None:
         action: Action = "check_unit" if unless.factors else "record_again"
@@ -94,7 +95,7 @@ def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
 
 
 def _find_missing_data(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
-    """Yield what a recording lacks of which nothing is known, or how long it is to be."""
+    """Yield the missing channels, or the needed length, of a recording without a figure."""
     total = judgement.decides.total
     key = judgement.sensor, total.recording
     if key in basis.apart:
@@ -119,7 +120,7 @@ def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     low, high = decides.margins
     if duration is None or not low or math.isinf(high):
         return
-    # The side of the interval that reaches over 1.
+    # The half of the interval that includes 1.
     half = (
         math.log(decides.margin / low) if decides.margin > 1.0 else math.log(high / decides.margin)
     )
@@ -131,9 +132,10 @@ def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
 def specimens_needed(expected: Expected, away: float) -> int | None:
     """Return how many more specimens would bring the limits of an error within a distance.
 
-    t sqrt(tau^2 (1 + 1/n)) with n - 1 degrees of freedom, where the spread, which is known, stays
-    what it is: the errors of the logs are left out. ``away`` is the logarithm of the margin, how
-    far the limits may be. None where 20 specimens would not do.
+    The half width of the prediction interval is t sqrt(tau^2 (1 + 1/n)) with n - 1 degrees of
+    freedom. The spread is assumed to remain the same, and the errors of the logs are neglected.
+    ``away`` is the logarithm of the margin, the maximum distance of the limits. None if 20
+    specimens are not enough.
     """
     assert expected.spread is not None
     for number in range(expected.specimens + 1, _MAX_SPECIMENS + 1):
@@ -172,14 +174,14 @@ def _join_quantities(names: Iterable[str]) -> str:
 
 
 def _find_longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:
-    """Return the recording of a standing that is longest, and its duration."""
+    """Return the longest recording of a standing, and its duration."""
     keys = [(sensor, row.recording) for row in standing.totals]
     key = max(keys, key=lambda candidate: basis.duration(candidate) or 0.0)
     return key, basis.duration(key)
 
 
 def _compute_duration_needed(judgement: Judgement) -> float:
-    """Return the length of a log that tells the error of the limit that decides, s."""
+    """Return the length of a log that can determine the error of the deciding limit, s."""
     return longest_asked(judgement.decides.total, judgement.requirement) / MAX_TIME_SHARE
 
 
@@ -234,7 +236,7 @@ def _describe_action(
 
 
 _EFFECT_VERBS = {"check_unit": "turn", "record_again": "allow", "add_channels": "allow"}
-"""What a step does with verdicts; else it settles them, if the figures stay what they are."""
+"""Effect of a step on verdicts. Other steps settle them, if the figures remain the same."""
 
 
 def _describe_effect(action: Action, turned: int, strengthened: int) -> str:
@@ -253,7 +255,7 @@ def _count_verdicts(number: int) -> str:
 
 
 def _format_time(seconds: float) -> str:
-    """Return a length of time in the unit that suits it, to two digits, rounded up."""
+    """Return a duration in a suitable unit, to two digits, rounded up."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds >= size:
             number = seconds / size

@@ -1,19 +1,19 @@
-"""The error of the next specimen of a sensor, by those that were recorded.
+"""Predict the error of the next specimen of a sensor from the recorded specimens.
 
 The errors of specimens are log-normal: y_d = ln sigma_d = mu + u_d + e_d, with variances tau^2
-between specimens and v_d from the 95 % limits of each (`navigation.pooled.pool`, which gives
-mu, its standard error s and tau, the errors of the logs taken out). The next specimen lies at
-mu +- t sqrt(tau^2 + s^2), with t of D - 1 degrees of freedom: of logs without error the known
-t sqrt(1 + 1/D) times the standard deviation of the y_d.
+between specimens and v_d from the 95 % limits of each. `navigation.pooled.pool` gives mu, its
+standard error s, and tau without the errors of the logs. The prediction interval of the next
+specimen is mu +- t sqrt(tau^2 + s^2), with t of D - 1 degrees of freedom. For logs without error it
+is the known t sqrt(1 + 1/D) times the standard deviation of the y_d.
 
-tau^2 is at least half the variance of the y_d. Taken out in full, the errors of the logs may leave
-nothing where they are as large as the spread. In 100,000 sets a case of D = 2; 3; 5; 10, with a
-spread of 0 to 10 errors, the 95 % limits so cover no less than 95.8; 94.4; 93.3; 93.4 % (without
-that bound 95.1; 92.8; 89.5; 86.4 %), and 95 % where the spread is large.
+tau^2 is at least half the variance of the y_d. Otherwise, log errors as large as the spread may
+reduce tau to 0. In 100,000 simulated sets a case of D = 2; 3; 5; 10, with a spread of 0 to 10
+errors, the 95 % limits cover at least 95.8; 94.4; 93.3; 93.4 % (without that bound 95.1; 92.8;
+89.5; 86.4 %), and 95 % if the spread is large.
 
-One specimen does not know the spread. It is then that of other sensors with several specimens, all
-of them together, where they have three degrees of freedom or more; else it stays unknown, and the
-error is that of this specimen.
+One specimen does not determine the spread. It is then pooled from other sensors with several
+specimens, if they have three degrees of freedom or more. Else the spread is unknown, and the error
+applies to this specimen only.
 
 References
 ----------
@@ -36,18 +36,18 @@ from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE, Pool, bounded_e
 Limits = tuple[float, float, float]  # value, lower, upper
 
 _MIN_VARIANCE_SHARE = 0.5
-"""Part of the variance of the logarithms that the errors of the logs never explain away."""
+"""Minimum tau^2, as a fraction of the variance of the logarithms."""
 
 _MIN_FREEDOM = 3
-"""Degrees of freedom that a spread of other sensors needs; t = 3.2, of two it is 4.3."""
+"""Minimum degrees of freedom of a spread from other sensors: t = 3.2, and 4.3 with two."""
 
-_MIN_LOWER_RATIO = 1e-4  # of a value: a lower limit of 0 is no logarithm
-_MIN_RELATIVE_WIDTH = 1e-9  # likewise, for a value that is its own limit
+_MIN_LOWER_RATIO = 1e-4  # of a value: a lower limit of 0 has no logarithm
+_MIN_RELATIVE_WIDTH = 1e-9  # of a value, for a value that equals its limit
 
 
 @dataclass(frozen=True)
 class Spread:
-    """How much specimens differ."""
+    """Variance between specimens."""
 
     variance: float  # of the logarithm, tau^2
     freedom: int  # degrees of freedom
@@ -55,14 +55,14 @@ class Spread:
 
 @dataclass(frozen=True)
 class Expected:
-    """The error of the next specimen, or of the only one."""
+    """Predicted error of the next specimen, or error of the only one."""
 
-    # sigma, lower, upper: median and 95 % limits, SI; None where nothing is known
+    # sigma, lower, upper: median and 95 % limits, SI; None if nothing is known
     sigma: float | None
     lower: float | None
     upper: float | None
-    within: float | None  # chance that it is within the limit
-    # specimens, recordings: that it stands on
+    within: float | None  # probability that it is within the limit
+    # specimens, recordings: their numbers
     specimens: int
     recordings: int
     # between specimens, or between the recordings of one; None: unknown
@@ -74,11 +74,11 @@ class Expected:
 def expected(
     totals: Sequence[ErrorBudgetRow], devices: Mapping[str, str], usual: Spread | None = None
 ) -> Expected:
-    """Return the error that the next specimen of a sensor will have.
+    """Return the predicted error of the next specimen of a sensor.
 
-    Of rows ``total`` of the table ``error_budget`` of one limit, one a recording, of which those
-    without a figure do not count; the specimen of each recording; and the spread of other sensors,
-    for one specimen.
+    The arguments are the rows ``total`` of the table ``error_budget`` for one limit, one a
+    recording; the specimen of each recording; and the spread of other sensors, which is used with
+    one specimen only. Rows without a figure are ignored.
     """
     figures = [(row, figure) for row in totals if (figure := _read_limits(row)) is not None]
     if not figures:
@@ -94,7 +94,7 @@ def expected(
     if len(groups) == 1 and usual is not None:
         value, lower, upper = _pool_device(*groups.values())
         error = math.log(upper / lower) / (2.0 * NORMAL_QUANTILE)
-        # Of the specimen that is known, and of the next one.
+        # Spread of the known specimen, and of the next one.
         scale = math.sqrt(2.0 * usual.variance + error**2)
         prediction = _predict(math.log(value), scale, usual.freedom, limit)
         return Expected(*prediction, *counts, usual, "other sensors")
@@ -112,9 +112,9 @@ def expected(
 
 
 def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
-    """Return the spread of several sensors together; None where they tell too little.
+    """Return the pooled spread of several sensors; None with too few degrees of freedom.
 
-    Each is between specimens, of one sensor.
+    Each spread is between the specimens of one sensor.
     """
     listed = list(spreads)
     freedom = sum(spread.freedom for spread in listed)
@@ -132,7 +132,7 @@ def _read_limits(row: ErrorBudgetRow) -> Limits | None:
 
 
 def _clip_limits(value: float, lower: float, upper: float) -> Limits:
-    """Return value and limits as `pool` takes them: positive, and on either side of the value."""
+    """Return value and limits for `pool`: positive limits on either side of the value."""
     return (
         value,
         min(max(lower, _MIN_LOWER_RATIO * value), value * (1.0 - _MIN_RELATIVE_WIDTH)),
@@ -155,7 +155,7 @@ def _estimate_spread(values: Sequence[Limits], together: Pool) -> Spread:
 def _predict(
     mean: float, scale: float, freedom: int, limit: float | None
 ) -> tuple[float, float, float, float | None]:
-    """Return median, 95 % limits and the chance to be within a limit."""
+    """Return median, 95 % limits and the probability to be within a limit."""
     half = float(stdtrit(freedom, 0.975)) * scale
     within = None
     if limit is not None:

@@ -1,4 +1,4 @@
-"""How a sensor stands to one limit of a requirement, and which limit decides."""
+"""Compare the error of a sensor with each limit of a requirement, and find the deciding limit."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from imubench_pipeline.navigation.suitability.conditions import (
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, expected
 
 _SURE_PROBABILITY = 0.975
-"""Chance from which a verdict is sure."""
+"""Minimum probability of a sure verdict."""
 
 MAX_LIMIT_RATIO = 4.0
-"""Upper over lower limit of an error beyond which a log says too little."""
+"""Maximum ratio of upper to lower limit of an error; beyond it, the log is not conclusive."""
 
 
 @dataclass(frozen=True)
 class Standing:
-    """What a sensor makes of one limit of a requirement."""
+    """Error of a sensor and one limit of a requirement."""
 
-    # row ``total`` of the recording that answers: of several, the one whose error is nearest to
-    # what is expected
+    # row ``total`` of the representative recording: the one whose error is nearest to the expected
+    # error
     total: ErrorBudgetRow
-    totals: Sequence[ErrorBudgetRow]  # those of all recordings with a figure
+    totals: Sequence[ErrorBudgetRow]  # one for each recording with a figure
     expected: Expected  # the error, of the next specimen where there are several
     source: str | None = None  # the largest contribution
     share: float | None = None  # its part of the variance
-    parts: str | None = None  # all sources that count
-    # rows of sources whose figure is not known, or breaks the limit until it is calibrated
+    parts: str | None = None  # all relevant sources
+    # rows of sources with an unknown figure, or with one above the limit before calibration
     conditions: tuple[ErrorBudgetRow, ...] = ()
 
     @property
@@ -46,7 +46,7 @@ class Standing:
 
     @property
     def margin(self) -> float:
-        """How many times the error fits into the limit."""
+        """Limit over error."""
         return _divide(self.total.limit, self.expected.sigma)
 
     @property
@@ -57,28 +57,28 @@ class Standing:
 
     @property
     def chance(self) -> float:
-        """Chance that the error is within its limit, as far as logs and specimens tell."""
+        """Probability that the error is within its limit, given the logs and specimens."""
         assert self.expected.within is not None  # of a known error with a limit
         return self.expected.within
 
     @property
     def wide(self) -> bool:
-        """Whether the limits of the error are far apart."""
+        """Whether the interval of the error is wide."""
         low, high = self.margins
         return low <= 0.0 or high / low > MAX_LIMIT_RATIO
 
     @property
-    def _vague(self) -> bool:
-        """Whether the log that answers says too little: two specimens do not know their spread."""
+    def _is_vague(self) -> bool:
+        """Whether the interval of the representative log is too wide for a verdict."""
         lower, upper = self.total.lower, self.total.upper
         return lower is None or upper is None or lower <= 0.0 or upper / lower > MAX_LIMIT_RATIO
 
     @property
     def verdict(self) -> str:
-        """The chance in words."""
+        """The probability in words."""
         if not self.known:
             return "not enough data"
-        if self._vague and 1.0 - _SURE_PROBABILITY < self.chance < _SURE_PROBABILITY:
+        if self._is_vague and 1.0 - _SURE_PROBABILITY < self.chance < _SURE_PROBABILITY:
             return "not enough data"
         for least, words in ((_SURE_PROBABILITY, "passes"), (0.5, "probably passes")):
             if self.chance >= least:
@@ -91,10 +91,10 @@ def standings(
     devices: Mapping[str, str],
     usual: Mapping[tuple[Any, ...], Spread] | None = None,
 ) -> list[Standing]:
-    """Return how one sensor stands to each limit of one requirement.
+    """Return the standing of one sensor for each limit of one requirement.
 
-    Of rows of the table ``error_budget``, the specimen of each recording, and the spread of other
-    sensors by `limit_of`.
+    The arguments are rows of the table ``error_budget``, the specimen of each recording, and the
+    spread of other sensors by `limit_of`.
     """
     by_limit: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
     for row in map(_drop_unjudgeable_figure, rows):
@@ -123,7 +123,7 @@ def _drop_unjudgeable_figure(row: ErrorBudgetRow) -> ErrorBudgetRow:
 
 
 def limit_of(row: ErrorBudgetRow) -> tuple[Any, ...]:
-    """Return what names the limit of a row."""
+    """Return the key of the limit of a row."""
     return row.error, row.time, row.limit, trajectory_of(row)
 
 
@@ -151,7 +151,7 @@ def _make_standing(
 
 
 def deciding(by_limit: Sequence[Standing]) -> Standing:
-    """Return the limit that decides for a sensor: one that surely fails, whatever is not known."""
+    """Return the deciding limit: the worst known one; an unknown one unless that surely fails."""
     known = [standing for standing in by_limit if standing.known]
     worst = min(known, key=lambda standing: standing.margin, default=by_limit[0])
     unknown = [standing for standing in by_limit if not standing.known]
@@ -159,7 +159,7 @@ def deciding(by_limit: Sequence[Standing]) -> Standing:
 
 
 def _compute_distance(sigma: float, other: float | None) -> float:
-    """Return how far two errors are apart, as a factor from 0 up."""
+    """Return the logarithmic distance of two errors; their difference if one is 0."""
     if not other or not sigma:
         return abs(sigma - (other or 0.0))
     return abs(math.log(sigma / other))

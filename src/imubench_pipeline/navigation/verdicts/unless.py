@@ -1,9 +1,9 @@
-"""Verdicts that a doubt of a unit could turn: as logged, and with the factor of the doubt.
+"""Verdicts that a doubtful unit could change: as logged, and with the corrected unit.
 
-Every noise source of a quantity in another unit is multiplied by one factor f, since all errors
-are linear in it: sigma'^2 = sum of the other sources^2 + f^2 sum of its own^2. What a requirement
-states, or a datasheet prints, stays. The limits keep their distance from sigma as factors: exact
-where one quantity makes the error, as it does where a unit turns a verdict.
+All errors are linear in the noise of a quantity, so another unit multiplies each of its noise
+sources by one factor f: sigma'^2 = sum of the other sources^2 + f^2 sum of its own^2. Figures from
+a requirement or a datasheet do not change. The ratios of the limits to sigma are kept. This is
+exact if one quantity dominates the error, as it does if a unit changes a verdict.
 """
 
 from __future__ import annotations
@@ -37,26 +37,26 @@ _UNIT_OF_FACTOR = {
         (1e3, "g, and not mg"),
     ),
 }
-"""What is meant where a factor mends figures."""
+"""Likely unit mistake for each factor that corrects the data."""
 
 
 @dataclass(frozen=True)
 class Unless:
-    """What the verdict on a sensor would be."""
+    """Alternative verdict on a sensor."""
 
-    # the limit that would decide with the figures as they were logged; None: as it does
+    # the deciding limit with the figures as logged; None if it is the present one
     logged: Standing | None
-    mended: Standing | None  # with the factors of the doubts; None where there are none
+    mended: Standing | None  # with corrected units; None if there is no correction
     factors: Factors  # by quantity
-    doubts: Mapping[tuple[str, str], str]  # what is doubted of each recording that is concerned
+    doubts: Mapping[tuple[str, str], str]  # by sensor and recording, in words
 
 
 def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless | None:
-    """Return what the verdict on a sensor would be if what is doubted were mended.
+    """Return the verdict on a sensor with doubtful units corrected.
 
-    The rows are those of one requirement, with the figures of all recordings. None where there is
-    nothing to say. Where all recordings of a sensor were left out, it says what they would give as
-    they were logged; else what another unit would turn.
+    The rows are those of one requirement, with the figures of all recordings. None without a
+    figure, or if the verdict would not change. If all recordings of a sensor were left out, the
+    verdict from their figures as logged is returned too.
     """
     keys = list(dict.fromkeys((sensor, row.recording) for row in rows))
     apart = [key for key in keys if key in basis.apart]
@@ -81,7 +81,7 @@ def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless 
 def _correct_rows(
     rows: Iterable[ErrorBudgetRow], factors: Mapping[tuple[str, str], Factors]
 ) -> Iterator[ErrorBudgetRow]:
-    """Yield rows with the figures that recordings would have in the other unit."""
+    """Yield rows with the figures of the recordings in the other unit."""
     by_total: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
     for row in rows:
         by_total.setdefault((row.sensor, row.recording, *limit_of(row)), []).append(row)
@@ -90,9 +90,9 @@ def _correct_rows(
 
 
 def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudgetRow]:
-    """Return the rows of one error of one recording with the quantities of factors multiplied.
+    """Return the rows of one error of one recording, with quantities multiplied by factors.
 
-    They are ``total``, and its sources.
+    The rows are ``total`` and its sources.
     """
     own = [row for row in parts if row.source != "total"]
     sources = [
@@ -117,12 +117,12 @@ def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudge
 def _compute_chance_within(
     limit: float | None, sigma: float, lower: float, upper: float
 ) -> float | None:
-    """Return the chance that an error is within its limit, log-normal on either side."""
+    """Return the probability that an error is within its limit, log-normal on either side."""
     if limit is None:
         return None
     away = math.log(limit / sigma)
     if away <= 0.0 and lower <= 0.0:
-        return 0.5  # the limits leave it open
+        return 0.5  # without limits, either is possible
     side = upper / sigma if away > 0.0 else sigma / lower
     half = math.log(side)
     if half <= 0.0:
@@ -131,7 +131,7 @@ def _compute_chance_within(
 
 
 def unless_words(alternative: Unless) -> str:
-    """Return in words what the verdict would be."""
+    """Return the alternative verdict in words."""
     parts = []
     if alternative.logged is not None:
         parts.append(f"as logged it {_describe_outcome(alternative.logged)}")
