@@ -1,6 +1,6 @@
-"""Before buying: which sensors of the catalogue are worth logging for a requirement.
+"""Shortlist before buying: the catalogue sensors that are worth logging for a requirement.
 
-`figures` reads datasheets by all conventions that they leave open, `classes` fills what vendors do
-not publish with what is measured of sensors of the same class, and `rows` holds both ends against
-the limits of a requirement.
+`figures` reads datasheets in all conventions that they may use. `classes` fills unpublished figures
+with the ranges measured on sensors of the same class. `rows` compares the best and the worst case
+with the limits of a requirement.
 """

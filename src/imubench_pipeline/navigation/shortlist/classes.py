@@ -1,4 +1,4 @@
-"""What the measured sensors of a price class show of figures that vendors do not publish."""
+"""Ranges of unpublished figures, from the measured sensors of a price class."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.settings.sensor import quantity_of
 
 _FIGURE_OF_PARAMETER = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
-"""Parameters of the estimates, and what stands for them here: B is that of the curve."""
+"""Figure for each parameter of the estimates: B is taken from the curve."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """The least and the largest value that a figure may have."""
+    """Range of possible values of a figure."""
 
     # low, high: SI
     low: float
     high: float
-    words: str = ""  # what it is from, where it is assumed; empty: as printed
+    words: str = ""  # source of an assumed range; empty if printed
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,16 @@ class MeasuredRanges:
 
     # (sensor, quantity, figure) -> (low, high), SI
     of_sensor: Mapping[tuple[str, str, str], tuple[float, float]]
-    classes: Mapping[str, str]  # the class of each sensor that states one
-    # (sensor, quantity) -> (low, high) of B, SI, as datasheets have it: where none is measured
+    classes: Mapping[str, str]  # class of each sensor that states one
+    # (sensor, quantity) -> (low, high) of B, SI, from datasheets: used if none is measured
     printed: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
 
     def span(self, price_class: str | None, quantity: str, figure: str) -> Span | None:
         """Return the range of a figure (N, B, K or T_B) over the measured sensors of a class.
 
-        Of the class as stated, only what stands before a comma or parenthesis counts. It is over
-        all measured sensors where none of the class is measured; of B where no sensor is measured
-        over datasheets; None: nothing is known.
+        Of the stated class, only the part before a comma or parenthesis is used. If no sensor of
+        the class is measured, the range is over all measured sensors. If no sensor at all is
+        measured, the range of B is from datasheets. None if nothing is known.
         """
         by_sensor = {
             sensor: ends
@@ -64,7 +64,7 @@ class MeasuredRanges:
 
 
 def class_of(price_class: str | None) -> str:
-    """Return the class that a price class names: ``consumer`` of consumer, about US$8."""
+    """Return the name in a price class, such as ``consumer`` in ``consumer, about US$8``."""
     return re.split(r"[,(]", price_class or "")[0].strip().lower()
 
 
@@ -73,10 +73,10 @@ def measured_ranges(
     recordings: Iterable[RecordingRow],
     price_classes: Mapping[str, str | None],
 ) -> MeasuredRanges:
-    """Return what the logs of a run say, of real sensors and recordings that decide.
+    """Return the measured ranges of a run, from real sensors and recordings that decide.
 
-    They are the 95 % limits of what has a value. A random walk that a log does not show may be 0;
-    its upper limit counts only where no log of the sensor shows one.
+    They are the 95 % limits of parameters with a value. A random walk that is not significant in a
+    log may be 0; its upper limit is used only if no log of the sensor determines one.
     """
     about = list(recordings)
     apart = left_out(about)

@@ -1,9 +1,10 @@
-"""The noise that a datasheet allows: the least and the largest of each figure, as models.
+"""Noise models of the best and the worst case that a datasheet allows.
 
-A density of unstated side is N or N times sqrt(2). A printed bias instability is B at best, and at
-worst the minimum of the curve, B over 0.664. Grades and ranges that a sensor comes in all count,
-unless its file says which one is meant. What is not published is that of measured sensors of its
-class, B where none is measured that of the datasheets of its class.
+A density of unknown sidedness is N or N times sqrt(2). A printed bias instability is B at best; at
+worst it is the minimum of the curve, so that B is the printed figure over 0.664. All grades and
+ranges of a sensor are included, unless its file selects one. An unpublished figure is taken from
+measured sensors of its class, or, for B without a measured sensor, from the datasheets of its
+class.
 """
 
 from __future__ import annotations
@@ -24,29 +25,29 @@ End = Literal["best", "worst"]
 
 @dataclass(frozen=True)
 class Figures:
-    """What a quantity of a sensor may have."""
+    """Ranges of the noise figures of a quantity of a sensor."""
 
-    # N, B, K: SI; None: not published, and known of no other sensor. It is 0 at best then, and the
-    # worst is not known
+    # N, B, K: SI; None: not published, and known for no other sensor. The best case is then 0, and
+    # the worst case is not known
     N: Span
     B: Span | None
     K: Span | None
-    # correlation times of the process that B may be, s; None: flicker noise
+    # possible correlation times of B, s; None: flicker noise
     times: tuple[float | None, ...]
-    assumed: tuple[str, ...]  # what stands for what is not printed, in words
+    assumed: tuple[str, ...]  # assumptions for figures that are not printed, in words
 
     @property
     def bounded(self) -> bool:
-        """Whether the worst is known."""
+        """Whether the worst case is known."""
         return self.B is not None and self.K is not None
 
     def models(self, end: End) -> list[NoiseModel]:
-        """Return the models of one end: all figures there, for each correlation time.
+        """Return the models of one case, one for each correlation time.
 
         Raises
         ------
         ValueError
-            If the worst is not known.
+            If the worst case is not known.
         """
         if end == "worst" and not self.bounded:
             raise ValueError("the worst is not known: a figure is measured of no sensor")
@@ -60,7 +61,7 @@ class Figures:
 
 
 def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures | str:
-    """Return what a datasheet allows of a quantity, or why nothing can be said."""
+    """Return the ranges that a datasheet allows for a quantity, or why there are none."""
     if getattr(sensor.datasheet, quantity) is None:
         return f"it has no {SENSORS[quantity]}"
     printed, options = _read_printed(sensor.datasheet, quantity)
@@ -83,7 +84,7 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
     if not any(row.statistic == "N" for row in printed):
         return f"no noise density of the {of} is published"
     N = filled("N", "N")
-    assert N is not None  # some is printed
+    assert N is not None  # at least one is printed
     B = filled("B", "adev_minimum")
     if B is not None and not B.words:
         assumed.append(f"{of} B: the printed figure at best, the minimum of the curve at worst")
@@ -103,9 +104,9 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
 
 
 def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple[float, float]]:
-    """Return the range of B, SI, that each datasheet of a catalogue allows, where it prints one.
+    """Return the range of B, SI, that each datasheet of a catalogue allows, if printed.
 
-    (sensor, quantity) -> (low, high).
+    The keys are (sensor, quantity), the values (low, high).
     """
     ranges = {}
     for name, sensor in sensors.items():
@@ -127,7 +128,7 @@ def _find_ends(rows: Sequence[Comparable]) -> Span:
 
 
 def _describe_readings(rows: Sequence[Comparable]) -> list[str]:
-    """Return what a printed figure leaves open, in words."""
+    """Return the ambiguities of a printed figure, in words."""
     readings = []
     if any("assumed" in (row.reason or "") for row in rows):
         readings.append("the side of the density is not stated: both")
@@ -137,14 +138,14 @@ def _describe_readings(rows: Sequence[Comparable]) -> list[str]:
 
 
 def _read_printed(datasheet: Datasheet, quantity: str) -> tuple[list[Comparable], list[str]]:
-    """Return what is printed of all axes of a quantity, and the options that are all taken."""
+    """Return the printed figures of all axes of a quantity, and the options included."""
     sheet, options = _select_every_option(datasheet, quantity)
     rows = [row for axis in "xyz" for row in comparables(sheet, f"{quantity}_{axis}")]
     return [row for row in rows if row.value is not None], options
 
 
 def _select_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet, list[str]]:
-    """Return a datasheet with every option taken, where it does not say which one is meant."""
+    """Return a datasheet with all options selected if it selects none, and these options."""
     sheet: QuantityDatasheet = getattr(datasheet, quantity)
     named = {
         figure.option

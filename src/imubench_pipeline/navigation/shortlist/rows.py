@@ -1,8 +1,8 @@
-"""Which sensors of a catalogue are worth logging for a requirement: the table ``shortlist``.
+"""Select the catalogue sensors worth logging for a requirement: the table ``shortlist``.
 
-What comes in use counts as its datasheet prints it (see `error_budget.in_use`). A turn-on bias can
-be calibrated away: it is left out at best, and there at worst. Where a figure is not published the
-worst is not known.
+Errors in use are taken from the datasheet (see `error_budget.in_use`). A turn-on bias can be
+calibrated: the best case excludes it, and the worst case includes it. If a figure is not published,
+the worst case is not known.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ VERDICTS: Mapping[str, str] = {
     "passes at its worst": "passes with the worst that its datasheet allows",
     "not judged": "too little is published, or it is outside the price class",
 }
-"""What a verdict says."""
+"""Meaning of each verdict."""
 
 _NO_AXIS_ERRORS = AxisErrors()
 _QUANTITIES = ("gyro", "accel")
@@ -45,11 +45,11 @@ def shortlist_rows(
     ranking: Iterable[RankingRow] = (),
     recordings: Iterable[RecordingRow] = (),
 ) -> Iterator[ShortlistRow]:
-    """Judge all sensors of a catalogue by their datasheets alone, beside what is measured.
+    """Judge all sensors of a catalogue by their datasheets, with measured verdicts for comparison.
 
-    Yields a row a requirement and sensor, the best margin first; what is not judged is last. The
-    ranges are for what is not published; the ranking and the recordings of a run have what its logs
-    say.
+    Yields a row for each requirement and sensor, the best margin first; sensors without a verdict
+    are last. The ranges replace unpublished figures. The ranking and the recordings of a run
+    provide the measured verdicts.
     """
     simulated = {(row.sensor, row.recording): row.simulated for row in recordings}
     measured = {(row.requirement, row.sensor): row for row in ranking if row.decides}
@@ -60,7 +60,7 @@ def shortlist_rows(
     for name, requirement in requirements.items():
         questions = list(of_requirement(name, requirement))
         if not questions:
-            continue  # no datasheet tells how a filter navigates
+            continue  # a datasheet gives no errors in outages
         rows = []
         for sensor, figures in by_sensor.items():
             row = _judge((name, sensor), requirement, questions, sensors[sensor], figures)
@@ -119,7 +119,7 @@ def _judge(
 
 
 def _assume_all_axes(sensor: Sensor) -> Abilities:
-    """Return what a sensor has, logged or not: all axes of the quantities that it measures."""
+    """Return the properties of a sensor with all axes of its quantities, logged or not."""
     has = abilities(sensor)
     quantities = [name for name in _QUANTITIES if name not in has.without]
     channels = tuple(f"{name}_{axis}" for name in quantities for axis in "xyz")
@@ -138,12 +138,12 @@ def _compute_margins(
     in_use: Mapping[str, InUse],
     end: End,
 ) -> tuple[list[float], list[str]]:
-    """Return the limit over the error of each question, and what they all leave out, in words."""
+    """Return the limit over the error of each question, and all omissions in words."""
     budgets = [_compute_budget(question, figures, in_use, end) for question in questions]
     margins = [
         question.limit / budget.total if budget.total > 0.0 else math.inf
         for question, budget in zip(questions, budgets, strict=True)
-        if question.limit is not None  # of a requirement every one has
+        if question.limit is not None  # every question of a requirement has one
     ]
     missing = (
         f"{missed.source}: not known ({missed.reason})"
@@ -162,7 +162,7 @@ def _compute_budget(
     for quantity in question.needs:
         models = figures[quantity].models(end)
         axes = [AxisErrors(model, {**in_use[quantity], **beside}) for model in models]
-        # The quantities are independent: each has its own extreme.
+        # The quantities are independent: take the extreme of each.
         totals = [question.answer(**{**_NO_ERRORS, quantity: axis}).total for axis in axes]
         chosen[quantity] = axes[totals.index(pick(totals))]
     return question.answer(**chosen)

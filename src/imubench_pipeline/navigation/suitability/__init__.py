@@ -1,1 +1,1 @@
-"""Whether a sensor suits an application: what it must have, and on what its verdict rests."""
+"""Check the suitability of a sensor for an application: hard requirements and conditions."""

@@ -1,4 +1,4 @@
-"""What a sensor has beside its noise, as far as its file tells, against what must be there."""
+"""Compare the properties of a sensor other than noise with the hard requirements."""
 
 from __future__ import annotations
 
@@ -23,21 +23,20 @@ from imubench_pipeline.units import from_si, quantity_to_si, to_si
 _FULL_SCALE_UNITS: dict[Measured, str] = {"gyro": "deg/s", "accel": "g"}
 
 _ROUNDING_MARGIN = 1.0 + 1e-9
-"""For what is as asked, but in another unit."""
+"""Tolerance for figures that are equal to the required ones in another unit."""
 
 
 class Abilities(Strict):
-    """What a sensor has; SI, None: not known."""
+    """Properties of a sensor, SI; None if not known."""
 
-    # full_scale, bandwidth: the largest that it has, or that can be chosen, by quantity; rad/s,
-    # m/s^2 and Hz
+    # full_scale, bandwidth: the largest fixed or selectable one, by quantity; rad/s, m/s^2, Hz
     full_scale: dict[Measured, float] = Field(default_factory=dict)
     bandwidth: dict[Measured, float] = Field(default_factory=dict)
-    # logged_rate, rate: of its logs, and the highest that it gives, Hz
+    # logged_rate, rate: rate of its logs, and its highest rate, Hz
     logged_rate: float | None = None
     rate: float | None = None
     temperature: tuple[float, float] | None = None  # range of operation, degC
-    channels: tuple[str, ...] = ()  # axes that its logs have
+    channels: tuple[str, ...] = ()  # logged axes
     without: tuple[Measured, ...] = ()  # quantities that it does not measure
     # mass, power: kg and W
     mass: float | None = None
@@ -46,7 +45,7 @@ class Abilities(Strict):
 
 @dataclass(frozen=True)
 class _Point:
-    """One thing that must be there; fulfilled is None where it is not known."""
+    """One requirement; ``fulfilled`` is None if not known."""
 
     name: str
     fulfilled: bool | None
@@ -55,7 +54,7 @@ class _Point:
 
 
 def abilities(sensor: Sensor) -> Abilities:
-    """Return what the file of a sensor tells of what it has."""
+    """Return the properties of a sensor from its file."""
     quantities: tuple[Measured, ...] = ("gyro", "accel")
     printed = {
         name: {
@@ -90,7 +89,7 @@ def _convert_to_si(text: str | None, dimension: str) -> float | None:
 
 
 def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float | None:
-    """Return the largest printed figure of the axis that has the least of it, SI."""
+    """Return the largest printed figure of the weakest axis, SI."""
     sheet = getattr(datasheet, quantity)
     figures: list[PrintedFigure] = [
         figure
@@ -112,13 +111,13 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
 
 
 def judge(must: Must, has: Abilities) -> tuple[list[str], list[str]]:
-    """Hold what a sensor has against what must be there.
+    """Compare the properties of a sensor with the hard requirements.
 
     Returns
     -------
     (list of str, list of str)
-        What it is known not to have, such as ``full scale of the gyro 250 deg/s, 300 deg/s
-        asked``, and what is not known of it, such as ``mass``.
+        Requirements that it does not meet, such as ``full scale of the gyro 250 deg/s, 300 deg/s
+        asked``, and properties that are not known, such as ``mass``.
     """
     lacking: list[str] = []
     unknown: list[str] = []
@@ -173,7 +172,7 @@ def _compare_full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
 
 
 def _compare_bandwidths(must: Must, has: Abilities) -> Iterator[_Point]:
-    """Yield the bandwidth of the quantities whose axes must be there, or else of all."""
+    """Yield the bandwidth of the quantities with required axes, or else of all."""
     if must.bandwidth is None:
         return
     asked = {text.split("_")[0] for text in must.axes} or set(SENSORS)
@@ -189,7 +188,7 @@ def _compare_rate(text: str, has: Abilities) -> _Point:
     least = quantity_to_si(text, "frequency")
     if has.logged_rate is not None and has.logged_rate >= least:
         return _Point("rate", True, text)
-    # A log at a lower rate is not all that a sensor can give.
+    # The rate of a log may be lower than the highest rate of the sensor.
     fast = None if has.rate is None else has.rate >= least
     return _Point("rate", fast, text, _format_value(has.rate, "Hz", "frequency"))
 
@@ -211,7 +210,7 @@ def _compare_axes(must: Must, has: Abilities) -> Iterator[_Point]:
             yield _Point(SENSORS[quantity], False, text)
             continue
         for axis in axes:
-            # The logs may leave out an axis that the sensor has.
+            # The sensor may have axes that are not in its logs.
             logged = f"{quantity}_{axis}" in has.channels or None
             yield _Point(f"axis {quantity}_{axis}", logged, text)
 

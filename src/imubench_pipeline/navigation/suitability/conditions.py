@@ -1,10 +1,10 @@
-"""On what a verdict rests beside the errors that are known: figures that are not, and musts.
+"""Conditions of a verdict other than the known errors: unknown figures and hard requirements.
 
-A sensor that is known not to have what a requirement says it must is excluded. One whose known
-errors pass, but of which a figure is not known that the use brings into play, passes if that
-figure is below the largest that leaves the limit kept; several that are not known share what room
-there is, so that with all of them at their largest the limit is just reached. One whose printed
-turn-on bias alone breaks a limit passes if it is calibrated to what there is room for.
+A sensor that does not meet a hard requirement is excluded. If its known errors pass, but a figure
+that matters in this use is not known, it passes if that figure is below the largest one within the
+limit. Several unknown figures share the remaining error budget: with all of them at their largest,
+the limit is just reached. If the printed turn-on bias alone exceeds a limit, the sensor passes if
+it is calibrated to within the remaining error budget.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from imubench_pipeline.units import from_si
 EXCLUDED = "excluded"
 
 CONDITIONAL_VERDICTS = {"passes": "passes if", "probably passes": "probably passes if"}
-"""The verdicts that a condition changes: what fails without it fails with it, too."""
+"""Verdicts that a condition changes. A sensor that fails without a condition fails with it."""
 
 _CONDITION_TEXTS = {
     "turn_on_bias": ("its {sensor}s are calibrated to {largest}", "deg/s", "mg"),
@@ -40,7 +40,7 @@ _CONDITION_TEXTS = {
         "mg/g^2",
     ),
 }
-"""By cause: the condition, and the unit of the figure of a gyro and of an accelerometer."""
+"""By cause: the condition, and the unit of the figure for a gyro and an accelerometer."""
 
 _FIGURE_NAMES = {
     "temperature": "temperature coefficient",
@@ -48,7 +48,7 @@ _FIGURE_NAMES = {
     "g_sensitivity": "g-sensitivity",
     "vibration_rectification": "vibration rectification",
 }
-"""Of the figures that a datasheet can tell of every specimen."""
+"""Names of the figures that a datasheet can give for every specimen."""
 
 _DIMENSION_OF_UNIT = {
     "deg/s": "angular_rate",
@@ -64,33 +64,33 @@ _DIMENSION_OF_UNIT = {
 
 @dataclass(frozen=True)
 class Rests:
-    """What a verdict on a sensor rests on."""
+    """Conditions of a verdict on a sensor."""
 
-    lacking: tuple[str, ...]  # what it must have and has not
-    unknown: tuple[str, ...]  # what it must have, and nobody knows whether it has
-    # figures that are not known, or too large, by ``gyro`` or ``accel`` and cause, with the largest
-    # with which every limit is kept, SI
+    lacking: tuple[str, ...]  # hard requirements that it does not meet
+    unknown: tuple[str, ...]  # hard requirements with unknown properties
+    # figures that are not known, or too large, by ``gyro`` or ``accel`` and cause: the largest one
+    # within every limit, SI
     figures: Mapping[tuple[str, str], float]
 
     @classmethod
     def of(cls, must: Must, has: Abilities, conditions: Iterable[ErrorBudgetRow]) -> Rests:
-        """Return what the verdict on a sensor rests on.
+        """Return the conditions of the verdict on a sensor.
 
-        Of what it must have and has, and the rows of the table ``error_budget`` that a limit rests
-        on, of all limits.
+        ``must`` are the hard requirements, ``has`` the properties of the sensor. ``conditions`` are
+        the rows of the table ``error_budget`` that the limits depend on.
         """
         lacking, unknown = judge(must, has)
         figures: dict[tuple[str, str], float] = {}
         for row in conditions:
             if row.cause is None:
-                continue  # a condition has one
+                continue  # every condition has a cause
             key = _get_quantity(row), row.cause
             largest = row.largest or 0.0
             figures[key] = min(figures.get(key, largest), largest)
         return cls(tuple(lacking), tuple(unknown), figures)
 
     def verdict(self, words: str) -> tuple[str, str | None]:
-        """Return a verdict on the known errors with what it rests on, and the latter in words."""
+        """Return the verdict with its conditions applied, and the conditions in words."""
         if self.lacking:
             return EXCLUDED, "; ".join(self.lacking)
         conditions = list(self._conditions())
@@ -99,7 +99,7 @@ class Rests:
         return CONDITIONAL_VERDICTS[words], "; ".join(conditions)
 
     def unknown_figures(self) -> list[str]:
-        """Return the names of the figures that its file does not say, but for turn-on biases."""
+        """Return the names of figures missing from its file, other than turn-on biases."""
         causes = [
             f"{SENSORS[measured]} {_FIGURE_NAMES[cause]}"
             for measured, cause in self.figures
@@ -121,15 +121,15 @@ class Rests:
 
 
 def _round_down(value: float) -> float:
-    """Return a number above 0 cut to three digits: rounded up it would no more keep the limit."""
+    """Return a positive number, rounded down to three digits to stay within the limit."""
     step = Decimal(1).scaleb(Decimal(value).adjusted() - 2)
     return float(Decimal(value).quantize(step, rounding=ROUND_DOWN))
 
 
 def in_words(verdict: str, conditions: str | None) -> str:
-    """Return a verdict of the table ``ranking`` with the conditions that it rests on.
+    """Return a verdict of the table ``ranking`` with its conditions, in words.
 
-    Such as ``passes if its gyros are calibrated to ...``.
+    An example is ``passes if its gyros are calibrated to ...``.
     """
     if not conditions:
         return verdict
@@ -153,11 +153,11 @@ def once_calibrated(
     upper: float | None,
     conditions: Iterable[ErrorBudgetRow],
 ) -> str:
-    """Return the verdict on an error when the biases that break its limit are calibrated.
+    """Return the verdict on an error after calibration of the biases that exceed its limit.
 
-    A bias is in every draw of the total by its square, and so in the limits of the total. ``words``
-    is the verdict as it is; limit, sigma and upper are those of the error; conditions are the
-    sources that the limit rests on.
+    The square of a bias is a term of every draw of the total, and so of the squared limits of the
+    total. ``words`` is the verdict without calibration; limit, sigma and upper belong to the error;
+    conditions are the sources that the verdict depends on.
     """
     squares = [size**2 for _, size in with_sigma(conditions)]
     if not squares or words in CONDITIONAL_VERDICTS or limit is None:
@@ -174,9 +174,9 @@ def with_sigma(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, flo
 
 
 def parts_of(total: float, sources: Iterable[ErrorBudgetRow], least: float = 0.01) -> str | None:
-    """Return the sources of an error with their parts of the variance, the largest first.
+    """Return the sources of an error with their shares of the variance, the largest first.
 
-    Of a total, 1 sigma, and its sources; parts below ``least`` are left out.
+    ``total`` is 1 sigma. Shares below ``least`` are left out.
     """
     if total <= 0.0:
         return None
@@ -186,5 +186,5 @@ def parts_of(total: float, sources: Iterable[ErrorBudgetRow], least: float = 0.0
 
 
 def named(row: ErrorBudgetRow) -> str:
-    """Return the name of a source, marked where it is printed."""
+    """Return the name of a source, with a note if it is from the datasheet."""
     return row.source + f" (datasheet, {row.kind})" * (row.origin == "datasheet")
