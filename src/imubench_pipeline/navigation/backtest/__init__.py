@@ -1,1 +1,1 @@
-"""What a log shows of its own error budget: dead reckoning over windows of it, and the budget."""
+"""Back-test of an error budget: dead reckoning over windows of the log."""

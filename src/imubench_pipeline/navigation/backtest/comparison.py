@@ -1,17 +1,17 @@
-"""The errors that a log shows beside those that its noise model predicts.
+"""Compare the errors over windows of a log with the prediction of its noise model.
 
-What the table ``backtest`` says of them: rows, in words, and as findings.
+The results are rows of the table ``backtest``, text, and findings.
 
-Beside the ratio of measured to predicted error stands the range in which it lies if the noise model
-is right. The errors of a log scatter about what its noise leads to, and the model is uncertain: it
-was estimated, of the same log. That matters. With S the mean square that the log shows, and P that
-of the model, both estimate the same number, and where the model is as sure as the log allows,
+The ratio of measured to predicted error comes with its 95 % range if the noise model is right. The
+errors of a log have a random scatter, and the model is uncertain, since it was estimated from the
+same log. Let S be the mean square of the errors of the log, and P that of the model: both estimate
+the same number. If P is an efficient estimate,
 
     var(S - P) = var(S) - var(P),
 
-because no weighted mean of the two is better than P alone, so that S - P does not go with P. The
-uncertainty of the model is thus a part of the scatter of S and not beside it: were it added, the
-ranges would hold 98.5 % of logs in the place of 95 %.
+because no weighted mean of the two has less variance than P, so S - P and P are uncorrelated
+(Hausman 1978). The uncertainty of the model is thus a part of the scatter of S. If it were added,
+the ranges would cover 98.5 % of logs instead of 95 %.
 
 References
 ----------
@@ -39,30 +39,30 @@ from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
 _MIN_SCATTER_SHARE = 0.3
-"""Part of the scatter of the log that is left at least: where a model is known hardly better than
-the one error shows it, the difference is no number to rely on. On 600 logs with 7 errors each the
-ranges hold 94.3 % with 0.2, 95.5 % with 0.3 and 97.1 % with 0.5."""
+"""Minimum remaining variance, as a fraction of the scatter of the log. If the model is hardly
+better known than the error itself, the difference is unreliable. On 600 logs with 7 errors each,
+the ranges cover 94.3 % with 0.2, 95.5 % with 0.3 and 97.1 % with 0.5."""
 
 
 Verdict = Literal["as predicted", "more than predicted", "less than predicted"]
 
 MIN_WINDOWS = 3
-"""Windows, one after the other, that a log must hold."""
+"""Minimum number of consecutive windows in a log."""
 
 
 @dataclass(frozen=True)
 class Predicted:
-    """The mean square of the errors of a log, by the noise models that the log allows."""
+    """Predicted mean square of the errors of a log, from drawn noise models."""
 
-    spreads: Sequence[Spread]  # by each model drawn, at least one
-    # the models are drawn jointly from a likelihood, as sure as the log allows; else the
-    # uncertainty of the model is taken to be independent of the scatter, and adds to it
+    spreads: Sequence[Spread]  # one for each drawn model, at least one
+    # whether the models are drawn jointly from a likelihood (an efficient estimate); else the
+    # uncertainty of the model is assumed to be independent of the scatter, and adds to it
     efficient: bool = True
 
     def limits(self, level: float = 0.95) -> tuple[float, float]:
-        """Return between what limits the mean square of a part ``level`` of all logs lies.
+        """Return the limits that contain the mean square of a fraction ``level`` of all logs.
 
-        If the model is right; in rad^2, (m/s)^2 or m^2.
+        They assume that the model is right, and are in rad^2, (m/s)^2 or m^2.
         """
         means = np.array([spread.mean for spread in self.spreads])
         logarithms = np.log(means)
@@ -77,10 +77,10 @@ class Predicted:
         return float(lower), float(upper)
 
     def chance_above(self, mean_square: float) -> float:
-        """Return the chance of so large a mean square, or a larger one, if the model is right.
+        """Return the p-value of a mean square: the probability of this or a larger one.
 
-        Here the uncertainty of the model counts in full beside the scatter: to doubt a log, more is
-        asked than that a ratio is outside its range. The mean square is in rad^2, (m/s)^2 or m^2.
+        The uncertainty of the model is added in full to the scatter: a ratio outside its range is
+        not enough to contradict a budget. The mean square is in rad^2, (m/s)^2 or m^2.
         """
         means = np.array([spread.mean for spread in self.spreads])
         variances = np.array([spread.variance for spread in self.spreads])
@@ -89,21 +89,21 @@ class Predicted:
 
 @dataclass(frozen=True)
 class DeadReckoning:
-    """An error of one channel."""
+    """One dead-reckoning error of one channel."""
 
-    order: int  # m: integrations but one
-    # rest, time: W at rest, over which the bias is the mean, and t in motion, s
+    order: int  # m: number of integrations minus one
+    # rest, time: W at rest, whose mean is the bias, and t in motion, s
     rest: float
     time: float
-    factor: float = 1.0  # by which the integral is multiplied
+    factor: float = 1.0  # multiplier of the integral
 
     @property
     def duration_needed(self) -> float:
-        """Length of a log that can be compared, s."""
+        """Minimum length of a log for the comparison, s."""
         return MIN_WINDOWS * (self.rest + self.time)
 
     def sigma(self, model: NoiseModel) -> float:
-        """Return the standard deviation of the error, by the error budget of a noise model."""
+        """Return the standard deviation of the error, from the error budget of a noise model."""
         start = Calibrated(self.rest)
         parts = of_sensor("", model, self.order, self.time, start, self.factor)
         return math.hypot(*(part.sigma for part in parts))
@@ -111,19 +111,19 @@ class DeadReckoning:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The rms error over the windows of a log, and what its noise model predicts."""
+    """Measured rms error over the windows of a log, and its prediction."""
 
-    windows: int  # of the log; those with gaps are left out
+    windows: int  # number in the log; windows with gaps are left out
     # predicted, lower, upper: standard deviation, with 95 % limits: rad, m/s or m
     predicted: float
     lower: float
     upper: float
-    measured: float | None = None  # rms over the windows; None where ``reason`` says why
-    independent: float | None = None  # windows that would scatter as little, if independent
+    measured: float | None = None  # rms over the windows; None if ``reason`` is set
+    independent: float | None = None  # equivalent number of independent windows
     # least, most: limits of measured in 95 % of logs, if the model is right
     least: float | None = None
     most: float | None = None
-    # of such an rms or a larger one, if the model is right (`Predicted.chance_above`)
+    # p-value of the rms (`Predicted.chance_above`)
     chance: float | None = None
     reason: str | None = None
 
@@ -134,7 +134,7 @@ class Comparison:
 
     @property
     def verdict(self) -> Verdict | None:
-        """Where measured lies."""
+        """Position of the measured rms relative to the predicted range."""
         if self.measured is None or self.least is None or self.most is None:
             return None
         if self.measured > self.most:
@@ -151,25 +151,25 @@ def compare(
     *,
     efficient: bool = True,
 ) -> Comparison:
-    """Return how the errors of a log compare with those that its noise model predicts.
+    """Return the comparison of the errors of a log with those that its noise model predicts.
 
     Parameters
     ----------
     asked : DeadReckoning
     cut : Window
-        That of the times at rest and in motion.
+        Window for the times at rest and in motion.
     means : sequence of ndarray
-        Of the blocks of each segment of the log, NaN where samples are missing.
+        Block means of each segment of the log, NaN where samples are missing.
     model : NoiseModel
-        Of the log; it has a term.
+        Model of the log, with at least one term.
     drawn : sequence of NoiseModel
-        Those that the log allows.
+        Models drawn from the estimate of the log.
     efficient : bool
-        They are drawn jointly from a likelihood (`Predicted`).
+        Whether they are drawn jointly from a likelihood (`Predicted`).
     """
     predicted = asked.sigma(model)
     lower, upper = np.quantile([asked.sigma(candidate) for candidate in drawn], [0.025, 0.975])
-    # The draws of what is absent lie above it: the value itself is inside.
+    # Draws of an absent term are above 0: extend the limits to the value.
     budget = (predicted, min(float(lower), predicted), max(float(upper), predicted))
     covariance = WindowCovariance(cut, asked.order, asked.factor)
     window_errors = errors(means, covariance.weights, covariance.lags)
@@ -219,9 +219,9 @@ def words(row: BacktestRow) -> str:
 
 
 def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
-    """Yield the rows of the table ``findings`` of logs that contradict their own budgets.
+    """Yield the rows of the table ``findings`` for logs that contradict their own budgets.
 
-    One a channel, of the error whose ratio is least likely.
+    There is one for each channel, about the error with the smallest p-value.
     """
     by_channel: dict[tuple[str, str, str], list[tuple[float, float, BacktestRow]]] = {}
     for row in rows:

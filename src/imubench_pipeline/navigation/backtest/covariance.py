@@ -1,9 +1,9 @@
-"""How the errors of windows of a log are correlated, by the noise model of the log.
+"""Correlation of the errors of windows of a log, from the noise model of the log.
 
-A window weights the noise by a kernel h whose integral is 0. So its error is stationary for every
-term, a random walk and flicker noise included, and its covariance at a lag u is the double integral
-of h(s) h(s') C(s - s' + u) with C the generalised covariance of the term: what that has beside, a
-constant, cancels. All is of means over blocks of a length d, k blocks apart.
+A window weights the noise by a kernel h whose integral is 0. Its error is therefore stationary for
+every term, including a random walk and flicker noise. Its covariance at a lag u is the double
+integral of h(s) h(s') C(s - s' + u), with C the generalised covariance of the term; a constant in C
+cancels. The calculation uses means over blocks of length d, k blocks apart.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from imubench_pipeline.noise import Deterministic, NoiseModel, Term
 from imubench_pipeline.typing import Array
 
 MAX_CORRELATED_SPANS = 4
-"""Lags, in lengths of a window, up to which windows are taken for correlated: beyond, the squares
-of the correlations of flicker noise and of a process as slow add less than 1 % to their sum."""
+"""Maximum lag of correlated windows, in lengths of a window. Beyond it, the squared correlations of
+flicker noise and of a similarly slow process add less than 1 % to their sum."""
 
 _MIN_RELATIVE_VARIANCE = 1e-12
-"""Least relative variance of a mean square: what is deterministic alone does not scatter."""
+"""Minimum relative variance of a mean square: purely deterministic errors have no scatter."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """What the mean square of the errors of a log is by a noise model."""
+    """Distribution of the mean square of the errors of a log, from a noise model."""
 
     # mean, variance: of the mean square: rad^2, (m/s)^2 or m^2, and its square
     mean: float
@@ -46,22 +46,22 @@ class WindowCovariance:
     """The covariance of the errors of windows, for any noise model."""
 
     window: Window
-    order: int  # m: integrations but one
-    # by which the errors are multiplied: g, where a gyro's attitude turns gravity
+    order: int  # m: number of integrations minus one
+    # multiplier of the errors: g if a gyro's attitude error projects gravity
     factor: float = 1.0
 
     @cached_property
     def weights(self) -> Array:
-        """Of the blocks of a window (`Window.weights`), times the factor."""
+        """Weights of the blocks of a window (`Window.weights`), times the factor."""
         return self.factor * self.window.weights(self.order)
 
     @property
     def lags(self) -> int:
-        """Lags that it is computed for, from 0."""
+        """Number of lags, from 0."""
         return MAX_CORRELATED_SPANS * self.window.blocks
 
     def of(self, model: NoiseModel) -> Array:
-        """Return the covariance of the errors by lag in blocks, without what is deterministic.
+        """Return the covariance of the errors by lag in blocks, without deterministic terms.
 
         Shape (lags,), in rad^2, (m/s)^2 or m^2.
         """
@@ -73,11 +73,12 @@ class WindowCovariance:
         return total
 
     def spread(self, model: NoiseModel, errors: Errors) -> Spread:
-        """Return mean and variance of the mean square of the errors that a log has.
+        """Return mean and variance of the mean square of the errors of a log.
 
-        Of Gaussian errors of covariance c the variance is 2 / n^2 times the sum of c^2 over all
-        pairs of windows, which the errors say. A ramp adds its square; a line, at a random phase,
-        half that of its amplitude, and both their products with the noise.
+        For Gaussian errors with covariance c, the variance is 2 / n^2 times the sum of c^2 over all
+        pairs of windows, which ``errors`` counts. A ramp adds its square to the mean square. A
+        line, at a random phase, adds half the square of its amplitude. Both add their products with
+        the noise to the variance.
         """
         covariance, share = self.of(model), _count_both_signs(errors.pairs) / errors.count**2
         mean, variance = float(covariance[0]), 2.0 * float(share @ covariance**2)
@@ -87,13 +88,13 @@ class WindowCovariance:
             wave = np.cos(2.0 * math.pi * frequency * distance)
             variance += 4.0 * power * max(float(share @ (covariance * wave)), 0.0)
             if frequency > 0.0:
-                # How much of it these windows see goes with its phase, unless they see all phases.
+                # Its mean square depends on the phase, unless the windows cover all phases.
                 turn = 2.0 * math.pi * frequency * self.window.block
                 variance += 0.5 * power**2 * _compute_coherence(2.0 * turn, errors.count)
         return Spread(mean, max(variance, _MIN_RELATIVE_VARIANCE * mean**2))
 
     def _deterministic(self, model: NoiseModel) -> Iterator[tuple[float, float]]:
-        """Yield mean square and frequency, Hz, of what is no noise; the ramp has frequency 0."""
+        """Yield mean square and frequency, Hz, of deterministic terms; 0 Hz for the ramp."""
         for term in model.terms:
             if isinstance(term, Deterministic):
                 yield term.swing(self.weights, self.window.block)
@@ -120,12 +121,12 @@ class WindowCovariance:
 
 
 def _count_both_signs(pairs: Array) -> Array:
-    """Return the pairs of either sign of the lag."""
+    """Return the number of pairs by lag, counting both signs of the lag."""
     return np.concatenate((pairs[:1], 2.0 * pairs[1:]))
 
 
 def _compute_coherence(angle: float, count: int) -> float:
-    """Return the square of the mean of that many phasors, an angle apart: 1 for whole turns."""
+    """Return the squared mean of ``count`` phasors, an angle apart: 1 for whole turns."""
     half = math.remainder(0.5 * angle, math.pi)
     if abs(half) < 1e-9:
         return 1.0

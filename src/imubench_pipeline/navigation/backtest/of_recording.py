@@ -18,11 +18,11 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import SI_UNITS, quantity_to_si
 
 CONTRADICTION_LEVEL = 0.01
-"""Chance, for all rows of a recording together, below which its log contradicts its budget."""
+"""Significance level of a contradiction, for all rows of a recording together (Bonferroni)."""
 
 MIN_CONTRADICTING_RATIO = 1.1
-"""Ratio below which a log does not contradict its budget, however sure: a day at 1 Hz has 30,000
-windows of 10 s, which tell a ratio of 1.01 from 1, and no margin of a requirement hangs on that."""
+"""Minimum ratio of a contradiction. A day at 1 Hz has 30,000 windows of 10 s, so that a ratio of
+1.01 is significant, but it does not matter for a requirement."""
 
 _INTEGRATIONS: Mapping[tuple[str, Error], tuple[int, float]] = {
     ("gyro", "attitude"): (0, 1.0),
@@ -32,8 +32,8 @@ _INTEGRATIONS: Mapping[tuple[str, Error], tuple[int, float]] = {
     ("accel", "velocity"): (0, 1.0),
     ("accel", "position"): (1, 1.0),
 }
-"""Integrations but one, and what the integral is multiplied by, of the part that a quantity has in
-an error: a gyro's attitude turns gravity into velocity and position."""
+"""Number of integrations minus one, and multiplier of the integral, by quantity and error. The
+attitude error of a gyro projects gravity into velocity and position."""
 
 
 def backtest_rows(
@@ -48,24 +48,24 @@ def backtest_rows(
 ) -> Iterator[BacktestRow]:
     """Yield the rows of the table ``backtest`` of a recording.
 
-    The logs are taken as they are, with lines, drift with temperature and what is taken out of the
-    noise: that is what a user of the sensor gets.
+    The logs are used as recorded, with lines, temperature drift and other deterministic signals,
+    since a user of the sensor gets them too.
 
     Parameters
     ----------
     names : mapping of str to str
         ``sensor`` and ``recording``.
     logs : mapping of str to ChannelLog
-        At rest all the time.
+        Static logs.
     estimates : mapping of str to Estimate
         The recommended one of each channel.
     requirements : mapping of str to Requirement
     deterministic : iterable of DeterministicRow
-        What is taken out of the noise, and not in the models.
+        Signals that are removed from the noise, and not in the models.
     draws : int
-        Noise models drawn from what each log leaves open.
+        Number of noise models drawn from the estimate of each log.
     seed : int
-        Of the run; each channel has a stream of its own.
+        Seed of the run; each channel has its own random stream.
     """
     apart: dict[str, dict[str, None]] = {}
     for component in deterministic:
@@ -146,7 +146,7 @@ def _make_row(
 def _select_dead_reckoning(
     channel: str, requirement: Requirement, limit: Limit, estimate: Estimate
 ) -> DeadReckoning | str:
-    """Return what a limit asks of a channel, or why its log cannot answer."""
+    """Return the error that a limit needs from a channel, or why its log cannot show it."""
     if limit.error == "north":
         return "a log at one position does not tell the bias of a gyro from the Earth's rate"
     if requirement.static_window is None:

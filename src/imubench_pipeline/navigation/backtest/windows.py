@@ -1,10 +1,10 @@
-"""Dead reckoning over windows of a log at rest: the errors that the log itself shows.
+"""Dead-reckoning errors over windows of a static log.
 
-A window is at rest for a time W, over which its mean is taken for the bias, and then moves for a
-time t, over which what is left is integrated m + 1 times. Its error is that of
-`error_budget.growth`, with the log in the place of the noise. Windows begin one
-block after the other, so that they overlap; of a log only the means of its blocks are needed, of
-several lengths in one pass and bounded memory (`block_means`).
+A window is at rest for a time W, and its mean over W is the bias. It then moves for a time t, and
+the log less the bias is integrated m + 1 times over t. The error is that of `error_budget.growth`,
+with the log instead of the noise. Windows begin one block apart, so that they overlap. Only the
+block means of a log are needed, which are computed for several lengths in one pass and bounded
+memory (`block_means`).
 """
 
 from __future__ import annotations
@@ -21,15 +21,16 @@ from imubench_pipeline.allan.phase import finite_mean
 from imubench_pipeline.typing import Array
 
 BLOCK_COUNTS = range(8, 25)
-"""Blocks in the shorter part of a window. With 8 the windows, which begin a block apart, tell of
-white noise 99 % of what windows at every sample would, and the weights of a double integration,
-level over a block, change its rms by 0.2 %; more are taken where they divide both parts evenly."""
+"""Possible numbers of blocks in the shorter part of a window. With 8 blocks, windows one block
+apart have 99 % of the information of windows at every sample, for white noise. The constant weights
+over a block change the rms of a double integration by 0.2 %. More blocks are used if they divide
+both parts evenly."""
 
 
 Span = tuple[int, int]
 
 MIN_PRESENT_SHARE = 0.9
-"""Part of the samples of a block that must be there, as of a cluster of the Allan variance."""
+"""Minimum share of the samples of a block, as for a cluster of the Allan variance."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,11 @@ class Window:
         return self.moving * self.block
 
     def weights(self, order: int) -> Array:
-        """Return what each block mean counts in the error, s^(m+1), shape (blocks,); their sum: 0.
+        """Return the weights of the block means in the error, s^(m+1), shape (blocks,); sum 0.
 
-        In motion it is the integral of (t - s)^m / m! over the block, at rest -c / W times the
-        length of the block, with c = t^(m+1) / (m+1)!; ``order`` is m, integrations but one.
+        In motion, a weight is the integral of (t - s)^m / m! over the block. At rest, it is -c / W
+        times the length of the block, with c = t^(m+1) / (m+1)!. ``order`` is m, the number of
+        integrations minus one.
         """
         left = self.block * np.arange(self.moving, -1, -1, dtype=np.float64)
         grown = left ** (order + 1) / math.factorial(order + 1)
@@ -70,10 +72,10 @@ class Window:
 def window(rest: float, time: float, rate: float) -> Window | None:
     """Return a window in blocks that divide both its parts as evenly as possible.
 
-    Its parts W and t in s, the rate in Hz; None where the shorter part has no sample.
+    Its parts W and t are in s, the rate in Hz. None if the shorter part has no sample.
     """
     shorter, longer = sorted((rest, time))
-    # A rate that is found from stamps may be a little low.
+    # A rate that is estimated from time stamps may be slightly low.
     most = math.floor(1.001 * shorter * rate)
     if most < 1:
         return None
@@ -87,9 +89,9 @@ def window(rest: float, time: float, rate: float) -> Window | None:
 
 
 def _estimate_variance_error(number: int, shorter: float, longer: float, rate: float) -> float:
-    """Return about by how much a number of blocks puts the variance of an error off."""
+    """Return the approximate relative error of the variance with a number of blocks."""
     others, samples = number * longer / shorter, shorter * rate / number
-    # Blocks have a sample more or less: the mean of 1 / size is above 1 / mean size.
+    # Block sizes differ by one sample: the mean of 1 / size is above 1 / mean size.
     part = samples % 1.0
     return abs(round(others) / others - 1.0) + part * (1.0 - part) / samples**2
 
@@ -98,8 +100,8 @@ def _estimate_variance_error(number: int, shorter: float, longer: float, rate: f
 class Errors:
     """The errors of the windows of a log."""
 
-    mean_square: float  # of the errors; rad^2, (m/s)^2 or m^2. NaN where there is no window
-    count: int  # windows; those with a gap in them are left out
+    mean_square: float  # of the errors; rad^2, (m/s)^2 or m^2. NaN without a window
+    count: int  # number of windows without a gap
     # shape (lags,); pairs of windows that begin so many blocks apart, from 0; in one segment only
     pairs: Array
 
@@ -110,11 +112,11 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
     Parameters
     ----------
     means : sequence of ndarray
-        Block means of each segment, NaN where there is none.
+        Block means of each segment, NaN where one is missing.
     weights : ndarray, shape (blocks,)
-        Of the blocks of a window.
+        Weights of the blocks of a window.
     lags : int
-        How many lags to count pairs for.
+        Number of lags for the pair counts.
     """
     total, count = 0.0, 0
     pairs = np.zeros(lags)
@@ -122,7 +124,7 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
         if len(segment) < len(weights):
             continue
         gaps = ~np.isfinite(segment)
-        # What all blocks have in common cancels; taken off, it does not eat digits.
+        # A constant cancels in the error: subtract it to keep precision.
         level = float(np.mean(segment[~gaps])) if not gaps.all() else 0.0
         window_errors = correlated(np.where(gaps, 0.0, segment - level), weights)
         before = np.concatenate(([0], np.cumsum(gaps)))
@@ -134,18 +136,18 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
 
 
 def correlated(values: Array, weights: Array) -> Array:
-    """Return the sums of weights times values, one for every place that the weights fit in.
+    """Return the correlation of values with weights at every full overlap.
 
-    Of values, shape (n,), and weights, shape (p,), p <= n, they have the shape (n - p + 1,).
+    Values have the shape (n,), weights (p,) with p <= n, and the result (n - p + 1,).
     """
     length = 1 << (len(values) - 1).bit_length()
-    # What wraps around comes to the places that are cut off.
+    # The circular wrap-around affects only the part that is cut off.
     product = np.fft.rfft(values, length) * np.conj(np.fft.rfft(weights, length))
     return np.fft.irfft(product, length)[: len(values) - len(weights) + 1]
 
 
 def _count_pairs(whole: NDArray[np.bool_], lags: int) -> Array:
-    """Return how many pairs of whole windows begin so many blocks apart, by lag."""
+    """Return the number of pairs of windows without a gap, by lag in blocks."""
     length = 1 << (2 * len(whole) - 1).bit_length()
     power = np.abs(np.fft.rfft(whole.astype(np.float64), length)) ** 2
     number = np.zeros(lags)
@@ -162,7 +164,7 @@ def block_means(
 ) -> dict[float, list[Array]]:
     """Return the means of consecutive blocks of each segment, NaN where samples are missing.
 
-    A block has a sample more or less than others where the samples do not divide evenly.
+    Block sizes differ by one sample if the samples do not divide evenly.
 
     Parameters
     ----------
@@ -173,12 +175,12 @@ def block_means(
     rate : float
         Hz.
     lengths : iterable of float
-        Of the blocks, s; a sample or more.
+        Lengths of the blocks, s; at least one sample.
 
     Returns
     -------
     dict of float to list of ndarray
-        By length, of each segment: rad/s or m/s^2, less one constant of the log.
+        By length, for each segment: rad/s or m/s^2, less a constant of the log.
     """
     edges = {
         length: [_find_edges(start, stop, length * rate) for start, stop in segments]
@@ -201,7 +203,7 @@ def _find_edges(start: int, stop: int, samples: float) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class _Sums:
-    """Sums of the samples before each edge, and how many they are."""
+    """Cumulative sums and numbers of the samples before each edge."""
 
     edges: NDArray[np.int64]
     sums: Array
@@ -222,7 +224,7 @@ def _sum_parts(parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int
     level: float | None = None
     for part in parts:
         if level is None and not np.isnan(part).all():
-            # Gravity would eat the digits of the sum.
+            # Subtract gravity: it would cost precision in the sum.
             level = finite_mean(part)
         values = part - (level or 0.0)
         gaps = np.isnan(values)
