@@ -296,7 +296,7 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
     yield DEPENDS, "verdict"
     for verdict in strings_in("navigation/verdicts/standing.py", "verdict"):
         yield verdict, "verdict"
-    for verdict in strings_in("navigation/verdicts/judgement.py", "_outside"):
+    for verdict in strings_in("navigation/verdicts/judgement.py", "_explain_exclusion"):
         if "price class" in verdict:
             yield verdict, "verdict"
     for verdict in (conditions.EXCLUDED, *conditions.CONDITIONAL_VERDICTS.values()):
