@@ -1,4 +1,4 @@
-"""What a noise model means for navigation: errors of dead reckoning, by what they come of."""
+"""Dead-reckoning errors from a noise model, by source."""
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget, time_until

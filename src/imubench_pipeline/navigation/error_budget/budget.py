@@ -1,23 +1,23 @@
 """Error budgets: attitude, heading, velocity and position after dead reckoning, by source.
 
-The assumptions, of all budgets here:
+All budgets here assume:
 
-- one horizontal axis: the accelerometer along it and the gyro across it, whose tilt turns gravity
-  into that accelerometer. The error in the plane is sqrt(2) times that of one axis where both
-  are alike. Velocity and position errors need no motion. Of what grows with motion and in the
-  field, scale factors, temperature and vibration count as far as a use is stated (`in_use`);
-  misalignment and heading times way are left out;
+- one horizontal axis: the accelerometer along it and the gyro across it, whose tilt projects
+  gravity into that accelerometer. If both axes are alike, the error in the plane is sqrt(2) times
+  the error of one axis. Velocity and position errors need no motion. Errors from scale factors,
+  temperature and vibration are included if a use is stated (`in_use`). Misalignment, and the
+  position error from heading times distance, are neglected;
 - small angles: up to about 0.2 rad;
 - a flat Earth that does not turn, g = 9.80665 m/s^2: no Schuler feedback (a period of 84.4 min),
-  whose absence overstates errors. After 60 s that is 0.3 % at most. After 600 s it is 10 % of the
-  attitude, 5 to 6 % of the velocity and 3 % of the position that come of a gyro, 10 % of the
-  velocity and 5 to 6 % of the position that come of an accelerometer or an initial tilt (the first
-  from a bias, the second from white noise), and 36 % of an initial tilt itself. The Earth's rate
-  goes with the bias of a calibrated gyro, and counts as a part of the bias of another;
-- sensors independent of each other, and their terms, too;
-- deterministic terms count by their size: a ramp is as good as one of either sign.
+  whose absence overstates errors. After 60 s, the excess is 0.3 % at most. After 600 s it is 10 %
+  of the attitude, 5 to 6 % of the velocity and 3 % of the position from a gyro; 10 % of the
+  velocity and 5 to 6 % of the position from an accelerometer or an initial tilt (the first from a
+  bias, the second from white noise); and 36 % of an initial tilt itself. The Earth's rate is
+  removed with the bias of a calibrated gyro, and is a part of the bias of any other;
+- independent sensors with independent noise terms;
+- deterministic terms of random sign: only the size of a ramp matters.
 
-`time_until` says how long dead reckoning stays within a limit.
+`time_until` returns the time for which dead reckoning remains within a limit.
 """
 
 from __future__ import annotations
@@ -56,28 +56,28 @@ from imubench_pipeline.settings.printed import SENSORS, Measured
 
 GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
 ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
-"""Integrations but one, m of `growth`."""
+"""Number of integrations minus one, m of `growth`."""
 
 
 _MIN_TIME = 1e-6
 _MAX_TIME = 1e9
 _CROSSING_POINTS = 4096
-"""Where lines let the error swing, it is looked at so often."""
+"""Number of times at which the error is evaluated if lines make it oscillate."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Levelled:
     """The initial tilt is found by the accelerometers: it is their mean error over g.
 
-    The mean is over the static window of the accelerometers, which must be calibrated. Velocity
-    and position do not see this tilt, since it cancels the mean error that made it; what they
-    see is the later departure from that mean, which is that of a calibrated accelerometer.
+    The mean is over the static window of the accelerometers, which must be calibrated. This tilt
+    has no effect on velocity and position, since it cancels the mean error that caused it. Only the
+    later departure from that mean has an effect, as for a calibrated accelerometer.
 
     Parameters
     ----------
     bias : float, optional
-        Turn-on bias of the accelerometer, 1 sigma, m/s^2; None: it is a figure of the sensor, and
-        where that is not known, it is left out of the attitude and the budget says so.
+        Turn-on bias of the accelerometer, 1 sigma, m/s^2. None: it is taken from the figures of
+        the sensor; if it is not known, it is left out of the attitude, and the budget has a note.
     on_time : float
         Time from switch-on to the beginning of the window, s; walks, ramps and flicker noise
         count from switch-on.
@@ -97,14 +97,14 @@ class Levelled:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """How dead reckoning begins.
+    """Initial conditions of dead reckoning.
 
     Parameters
     ----------
     gyro, accel : Calibrated or Uncalibrated
     tilt : Levelled or float
-        Initial tilt: levelled by the accelerometers, or its 1 sigma, rad, where it comes from
-        elsewhere and has nothing to do with how the accelerometers were calibrated.
+        Initial tilt: levelled by the accelerometers, or its 1 sigma, rad, if it has another source
+        that is independent of the calibration of the accelerometers.
     heading : float
         Initial heading error, 1 sigma, rad.
 
@@ -154,7 +154,7 @@ class Start:
     ) -> Start:
         """Return a start with turn-on biases of a given sigma, rad/s and m/s^2, and no window.
 
-        None: a bias is a figure of the sensor.
+        None: a bias is taken from the figures of the sensor.
 
         Raises
         ------
@@ -184,12 +184,12 @@ def budget(
 
     The noise of the gyro is integrated once to the attitude and the heading, twice and three
     times with g to velocity and position; that of the accelerometer once and twice; an initial
-    tilt adds g t and g t^2 / 2 times itself (the formulas stand at `Term.growth` of each term).
-    From white noise alone after t: N sqrt(t), g N sqrt(t^3/3) and g N sqrt(t^5/20) of the gyro,
-    N sqrt(t) and N sqrt(t^3/3) of the accelerometer.
+    tilt adds g t and g t^2 / 2 times itself (for the formulas see `Term.growth` of each term).
+    White noise alone gives, after t, N sqrt(t), g N sqrt(t^3/3) and g N sqrt(t^5/20) from the gyro,
+    and N sqrt(t) and N sqrt(t^3/3) from the accelerometer.
 
-    White noise in the window is independent of that in motion and has a contribution of its own;
-    of every other term window and motion are taken together, because they are correlated.
+    White noise in the window is independent of the noise in motion and has a separate contribution.
+    For every other term, window and motion are correlated and have one contribution.
 
     Parameters
     ----------
@@ -202,9 +202,9 @@ def budget(
         The accelerometer along the axis; the heading does not need it.
     start : Start
     use : Use
-        What happens besides.
+        Motion and environment.
     gyro_figures, accel_figures : mapping of str to Figure
-        What is known of these axes beside the noise.
+        Figures of these axes other than noise.
 
     Raises
     ------
@@ -261,7 +261,7 @@ def _list_sources(
 def _list_levers(
     quantity: Quantity, time: float, start: Start, use: Use
 ) -> Iterator[tuple[Measured, Cause, str, float]]:
-    """Yield sensor, cause, source and lever of what figures of the sensors add."""
+    """Yield sensor, cause, source and lever of the figures of the sensors."""
     order = GYRO_ORDER[quantity]
     gravity = STANDARD_GRAVITY if order > 0 else 1.0
     for cause, lever in levers("gyro", order, time, start.gyro, use, seen=order == 0):
@@ -317,9 +317,10 @@ def time_until(
 ) -> float | None:
     """Return the time after which an error reaches a limit.
 
-    The total of a `budget` rises with time, because the errors at two times never have a negative
-    correlation: the covariance of every random term falls with the lag. Lines may swing; then the
-    first crossing is taken of 4096 times up to one at which the limit is surely passed.
+    The total of a `budget` increases with time, because the errors at two times never have a
+    negative correlation: the covariance of every random term decreases with the lag. With lines,
+    the error may oscillate; the first crossing is then found among 4096 times up to one at which
+    the limit is certainly exceeded.
 
     Parameters
     ----------
@@ -335,8 +336,7 @@ def time_until(
     Returns
     -------
     float or None
-        s; 0 where the error is beyond the limit from the beginning, None where it is not within
-        30 years.
+        s; 0 if the error exceeds the limit from the beginning, None if it does not within 30 years.
 
     Raises
     ------

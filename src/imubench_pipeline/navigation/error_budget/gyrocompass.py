@@ -1,9 +1,9 @@
-"""The heading that a gyro finds from the Earth's rate, at rest.
+"""Heading error of gyrocompassing: north from the Earth's rate, at rest.
 
 The horizontal part of the Earth's rate, w_ie cos(latitude), points north. A horizontal gyro
-across it, towards east, should read 0: an error dw of its mean turns the north that is found by
-dw / (w_ie cos(latitude)). Left out: the error of the levelling (a tilt about north turns a part
-of the vertical rate into the gyro, tan(latitude) times itself) and angles that are not small.
+across it, towards east, should read 0. An error dw of its mean gives a heading error of
+dw / (w_ie cos(latitude)). Neglected are the levelling error (a tilt about north projects the
+vertical rate into the gyro: a heading error of tan(latitude) times the tilt) and large angles.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _WINDOW_LENGTHS: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
 
 @dataclass(frozen=True, kw_only=True)
 class Gyrocompass:
-    """A gyro that looks for north.
+    """A gyro that is used for north-finding.
 
     Parameters
     ----------
@@ -44,17 +44,17 @@ class Gyrocompass:
     latitude : float
         rad.
     bias : float, optional
-        Turn-on bias of the gyro, 1 sigma, rad/s: at one position it cannot be told from the
-        Earth's rate. None: it is a figure of the gyro; where that is not known, it is left out and
-        the budget says so.
+        Turn-on bias of the gyro, 1 sigma, rad/s: at one position it cannot be separated from the
+        Earth's rate. None: it is taken from ``figures``; if it is not known, it is left out, and
+        the budget has a note.
     on_time : float
         Time from switch-on to the beginning, s; a walk, a ramp and flicker noise count from
         switch-on (see `growth.Uncalibrated`). At two positions it does not matter.
     positions : {1, 2}
-        2: the gyro is turned end for end after half the time, in no time, and half the difference
-        of the two means is taken. That takes off the turn-on bias.
+        2: the gyro is turned by 180 degrees after half the time, instantaneously, and half the
+        difference of the two means is used, which removes the turn-on bias.
     figures : mapping of str to Figure
-        What is known of the gyro beside its noise.
+        Figures of the gyro other than its noise.
 
     Raises
     ------
@@ -110,9 +110,10 @@ class Gyrocompass:
     def time_needed(self, accuracy: float) -> float | None:
         """Return the shortest static window, s, that gives a heading accuracy, 1 sigma, rad.
 
-        Longer is not always better: a walk and a ramp grow. Lines count by the envelope of their
-        mean, so that no lucky number of whole periods is found. It is from 1 ms to 30 years; None
-        where no window gives it, because of turn-on bias, flicker noise, walk or ramp.
+        Longer is not always better, since a walk and a ramp grow. For lines, the envelope of their
+        mean is used, so that the result does not depend on whole periods. The window is from 1 ms
+        to 30 years; None if no window is sufficient, because of turn-on bias, flicker noise, walk
+        or ramp.
 
         Raises
         ------
@@ -136,7 +137,7 @@ class Gyrocompass:
             first = int(reached[0])
             after = float(at[first])
         else:
-            # The best window may give it, between two of the times that were looked at.
+            # The best window may lie between two of the sampled times.
             first = int(np.clip(np.argmin(values), 1, len(at) - 2))
             best = minimize_scalar(
                 excess,
@@ -153,11 +154,11 @@ class Gyrocompass:
 
     @property
     def _north(self) -> float:
-        """The part of the Earth's rate that points north, rad/s."""
+        """North component of the Earth's rate, rad/s."""
         return EARTH_RATE * math.cos(self.latitude)
 
     def _biases(self) -> list[Contribution | Missing]:
-        """Return what the bias of the gyro adds, which no time takes off."""
+        """Return the contributions of the gyro bias, which do not decrease with time."""
         if self.positions == 2:
             return []
         if self.bias is not None:
@@ -171,7 +172,7 @@ class Gyrocompass:
 
     def _of_noise(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
-            # A line alone swings: its mean is nothing after each whole period.
+            # Only a line oscillates: its mean is 0 after each whole period.
             if isinstance(term, Sinusoid) and not swings:
                 sigma = self._envelope(term, time)
             else:

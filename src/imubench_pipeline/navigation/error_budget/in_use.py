@@ -1,21 +1,20 @@
-"""Errors that come in use and that no static log shows: what an axis of a sensor adds to them.
+"""Errors that occur in use and that a static log does not show, for one axis of a sensor.
 
-Each cause is a figure of the sensor, a standard deviation, times what the use makes of it:
+Each error is a figure of the sensor, a standard deviation, times a factor that depends on the use:
 
-- ``turn_on_bias``, ``repeatability``: a bias that no static window takes off. Levelling at rest
-  turns that of an accelerometer into a tilt, bias / g, and gyrocompassing that of a gyro into an
+- ``turn_on_bias``, ``repeatability``: a bias that is not removed by a static window. Levelling at
+  rest turns an accelerometer bias into a tilt, bias / g. Gyrocompassing turns a gyro bias into an
   error of north;
-- ``temperature``: coefficient times change. With a static window the temperature moves linearly
-  from there on and has changed by the whole at the end; without one the bias holds elsewhere, and
-  the whole change is there from the beginning. ``temperature_squared``: the same of a measured
-  curvature;
-- ``scale_factor``, ``nonlinearity``: of a gyro times the angle turned about its axis, in attitude
-  and heading (what such a tilt does to velocity and position is left out: vehicles mostly turn
-  about the vertical); of an accelerometer times the change of speed along its axis, in velocity and
-  position. Both come evenly over the time that is asked. A nonlinearity counts as that part of
-  what is turned: at rates far below the full scale that it is printed of;
-- ``g_sensitivity``: of a gyro, times the vibration, as if all of it were acceleration that lasts;
-  vibration about zero averages out, so this is a bound. ``vibration_rectification``: times the
+- ``temperature``: coefficient times change. With a static window, the temperature changes linearly
+  from the window to the end. Without one, the bias was determined elsewhere, and the whole change
+  acts from the beginning. ``temperature_squared``: the same for a measured curvature;
+- ``scale_factor``, ``nonlinearity``: for a gyro, times the angle turned about its axis, in attitude
+  and heading. The effect of such a tilt on velocity and position is neglected, since vehicles
+  mostly turn about the vertical. For an accelerometer, times the change of speed along its axis, in
+  velocity and position. Both act evenly over the time. A nonlinearity is applied to the motion, not
+  to the full scale that it is printed for: rates are far below it;
+- ``g_sensitivity``: for a gyro, times the vibration, as if it were a constant acceleration.
+  Vibration about zero averages out, so this is a bound. ``vibration_rectification``: times the
   square of the rms of the vibration.
 
 Causes are independent of each other and of the noise; a figure has no sign.
@@ -54,39 +53,40 @@ CAUSE_NAMES: Mapping[Cause, str] = {
     "g_sensitivity": "g-sensitivity",
     "vibration_rectification": "vibration rectification",
 }
-"""What each cause is called in a source."""
+"""Name of each cause in a source."""
 
 _SUBSTITUTE_CAUSES: Mapping[tuple[Measured, Cause], Cause] = {
     ("gyro", "turn_on_bias"): "repeatability",
     ("accel", "turn_on_bias"): "repeatability",
     ("gyro", "g_sensitivity"): "vibration_rectification",
 }
-"""The figure that also tells how large an error may be, where one is not known."""
+"""Figure that replaces another one that is not known."""
 
 BIAS_CAUSES: tuple[Cause, ...] = ("turn_on_bias", "repeatability")
-"""The causes of a bias that nothing has taken off."""
+"""Causes of a bias that is not calibrated."""
 
 _REQUIRED_CAUSES: frozenset[Cause] = frozenset(
     ("turn_on_bias", "temperature", "scale_factor", "g_sensitivity")
 )
-"""The causes that are missed where nothing is known; of an accelerometer the last one, too."""
+"""Causes that are reported as missing without a figure. For an accelerometer,
+``vibration_rectification`` is too."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """How large an error of one axis is.
+    """Size of an error of one axis.
 
     Attributes
     ----------
     sigma : float or None
-        1 sigma, SI; None: not known.
+        1 sigma, SI; None if not known.
     origin : str
     kind : str or None
-        Of a printed figure: typ, max, 1sigma ...
+        Kind of a printed figure: typ, max, 1sigma ...
     convention : str or None
-        How it became a standard deviation.
+        How it was converted to a standard deviation.
     spread : float
-        1 sigma of the figure itself, where it is an estimate.
+        1 sigma of the figure itself, if it is an estimate.
     reason : str or None
         Why it is not known.
     """
@@ -100,16 +100,16 @@ class Figure:
 
 
 STATED_FIGURE = Figure(origin="requirement", convention="as it is stated, 1 sigma")
-"""Of what a requirement states."""
+"""Figure that is stated in a requirement."""
 
 Figures = Mapping[Cause, Figure]
-"""What is known of one axis."""
+"""Figures of one axis, by cause."""
 
 NO_FIGURES: Figures = MappingProxyType({})
 
 
 def check_not_negative(**values: float) -> None:
-    """Raise a ValueError that names a number, if it is not finite or negative."""
+    """Raise a ValueError with the name of a number that is negative or not finite."""
     for name, value in values.items():
         if not (math.isfinite(value) and value >= 0):
             raise ValueError(f"{name} is {value}, expected a number from 0")
@@ -117,7 +117,7 @@ def check_not_negative(**values: float) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Use:
-    """What happens to a sensor in dead reckoning; 0: it does not.
+    """Motion and environment of a sensor in dead reckoning; 0 for none.
 
     Parameters
     ----------
@@ -130,8 +130,8 @@ class Use:
     vibration : float
         rms, m/s^2.
     over : float
-        The time in which temperature, heading and speed change, s; what is turned and sped up
-        comes evenly, and afterwards no more.
+        Time during which temperature, heading and speed change, s. They change evenly, and not
+        afterwards.
 
     Raises
     ------
@@ -156,24 +156,24 @@ NO_USE = Use()
 
 
 def of_pulse(order: int, time: float, over: float) -> float:
-    """Return what an error of 1 grows to that lasts a time: c(t) - c(t - T), see `of_constant`.
+    """Return the growth of a unit error that lasts for T: c(t) - c(t - T), see `of_constant`.
 
-    ``order`` is m, integrations but one; t and T in s, T begins at 0.
+    ``order`` is m, the number of integrations minus one; t and T are in s, and T begins at 0.
     """
     return of_constant(order, time) - of_constant(order, max(time - over, 0.0))
 
 
 def of_rise(order: int, time: float, over: float) -> float:
-    """Return what an error grows to that rises linearly to 1 in a time T, and stays there.
+    """Return the growth of an error that rises linearly to 1 in a time T, and remains there.
 
     (c'(t) - c'(t - T)) / T with c' of ``order + 1`` (see `of_constant`): t^(m+1) / (m+2)! at t = T,
-    a (m+2)nd of what a constant 1 grows to. The arguments are those of `of_pulse`.
+    1 / (m+2) of the growth of a constant 1. The arguments are those of `of_pulse`.
     """
     return of_pulse(order + 1, time, over) / over
 
 
 def of_squared_rise(order: int, time: float, over: float) -> float:
-    """Return what the square of the error of `of_rise` grows to, s^(m+1).
+    """Return the growth of the square of the error of `of_rise`, s^(m+1).
 
     2 (c''(t) - c''(t - T) - T c'(t - T)) / T^2, with c' and c'' of ``order + 1`` and ``order + 2``.
     """
@@ -184,11 +184,11 @@ def of_squared_rise(order: int, time: float, over: float) -> float:
 def levers(
     measured: Measured, order: int, time: float, start: SensorStart, use: Use, *, seen: bool
 ) -> Iterator[tuple[Cause, float]]:
-    """Yield each cause that there is in a use, and what a figure of 1 grows to.
+    """Yield each cause that occurs in a use, and its lever: the error from a figure of 1.
 
-    ``order`` is m, 0 to 2, and the time in s; ``seen``: what the sensor measures is the error that
-    is asked for, or a rate of it, so that its scale factor counts. A lever is in s^(m+1) times the
-    unit of the use.
+    ``order`` is m, 0 to 2, and the time is in s. ``seen``: the sensor measures the quantity of the
+    error or its rate, so that its scale factor matters. A lever is in s^(m+1) times the unit of the
+    use.
     """
     constant = of_constant(order, time)
     calibrated = isinstance(start, Calibrated)
@@ -212,7 +212,7 @@ def levers(
 
 
 def needed(measured: Measured, cause: Cause, figures: Figures) -> bool:
-    """Tell whether an error that is there in use is not known, because a figure is missing."""
+    """Return whether an error in use is not known because a figure is missing."""
 
     def has_figure(candidate: Cause) -> bool:
         return candidate in figures and figures[candidate].sigma is not None

@@ -1,6 +1,6 @@
-"""What an error budget is made of: what each source adds, and what is not known.
+"""Parts of an error budget: contributions of the sources, and missing figures.
 
-`Largest` says how large a figure may be that is not known, or that a calibration can take down.
+`Largest` gives the largest value of a figure that is not known, or that a calibration can reduce.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Quantity = Literal["attitude", "heading", "velocity", "position"]
 
 @dataclass(frozen=True)
 class Contribution:
-    """What one source adds to an error.
+    """Contribution of one source to an error.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Contribution:
     cause : str
         ``noise``, ``start`` (a stated angle), or of `in_use`.
     figure : Figure or None
-        What it follows from, where that is no noise.
+        Figure that it follows from, if it is not noise.
     """
 
     source: str
@@ -58,7 +58,7 @@ class Missing:
         ``gyro`` or ``accel``.
     cause : str
     lever : float
-        The error that a figure of 1 SI unit makes.
+        Error from a figure of 1 SI unit.
     reason : str
         Why it is not known.
     """
@@ -72,7 +72,7 @@ class Missing:
 
 @dataclass(frozen=True)
 class Budget:
-    """An error and what it is made of.
+    """An error and its contributions.
 
     Attributes
     ----------
@@ -83,9 +83,9 @@ class Budget:
     contributions : sequence of Contribution
         Independent of each other.
     assumptions : sequence of str
-        What was not known, and what stands for it.
+        Assumptions for figures that are not known.
     missing : sequence of Missing
-        What is left out because no figure is known.
+        Sources that are left out because no figure is known.
     """
 
     time: float
@@ -103,10 +103,10 @@ class Budget:
 def of_figure(
     measured: Measured, cause: Cause, source: str, lever: float, figures: Figures
 ) -> Contribution | Missing | None:
-    """Return what a figure of a sensor adds to an error, or that it is not known.
+    """Return the contribution of a figure of a sensor to an error, or that it is missing.
 
-    ``lever`` is the error that a figure of 1 SI unit makes. None: another figure says how large it
-    may be.
+    ``lever`` is the error from a figure of 1 SI unit. None if the figure is not required, or
+    another one replaces it.
     """
     figure = figures.get(cause, Figure(reason="the sensor file does not give it"))
     if figure.sigma is not None:
@@ -117,7 +117,7 @@ def of_figure(
 
 
 def source_row(of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow:
-    """Return the row of a source, from one that says what it is a source of."""
+    """Return the row of a source, as a copy of the row of its error."""
     figure = contribution.figure
     return replace(
         of,
@@ -132,21 +132,21 @@ def source_row(of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow
 
 @dataclass(frozen=True)
 class Largest:
-    """What room a limit leaves to figures that are not known, and to biases that it cannot bear.
+    """Remaining error budget under a limit, for unknown figures and biases above the limit.
 
-    A printed turn-on bias counts as delivered; where it alone breaks the limit, a calibration may
-    take it down to what there is room for. All these figures share the room.
+    A printed turn-on bias is used as printed. If it exceeds the limit, a calibration may reduce it
+    to its share of the remaining budget. All these figures share the budget (``room``) equally.
     """
 
-    room: float  # of each of them: the error that it may add, 1 sigma; 0 where there is none
-    biases: tuple[Contribution, ...] = ()  # the printed biases that break the limit
+    room: float  # largest error of each of them, 1 sigma; 0 if there is none
+    biases: tuple[Contribution, ...] = ()  # printed biases, if the total exceeds the limit
 
     @classmethod
     def of(cls, budget: Budget, limit: float | None, upper: float) -> Largest:
-        """Return the room in a budget.
+        """Return the remaining error budget.
 
-        Under a limit, SI (None: there is none to keep), with the upper limit of the total: a sensor
-        that surely passes still does with these figures.
+        ``limit`` is in SI; None if there is no limit. ``upper`` is the upper limit of the total: a
+        sensor that surely passes still does so with these figures.
         """
         if limit is None:
             return cls(0.0)
@@ -168,9 +168,9 @@ class Largest:
         return cls(math.sqrt(max(room, 0.0) / parts) if parts else 0.0, biases)
 
     def of_bias(self, of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow:
-        """Return the row of a source, of a printed bias with the largest figure.
+        """Return the row of a source; a printed bias above the limit has its largest value.
 
-        Nothing is said of what the limit can bear. `of` says what it is a source of.
+        ``of`` is the row of the error.
         """
         row, figure = source_row(of, contribution), contribution.figure
         if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
@@ -179,7 +179,7 @@ class Largest:
         return self._figure(row, quantity, contribution.cause, contribution.sigma / figure.sigma)
 
     def of_missing(self, of: ErrorBudgetRow, missing: Missing) -> ErrorBudgetRow:
-        """Return the row of a source whose figure is not known, from one that says of what."""
+        """Return the row of a source with a missing figure. ``of`` is the row of the error."""
         row = replace(
             of,
             source=missing.source,

@@ -1,17 +1,17 @@
-"""Figures of a datasheet, and what a log tells of temperature, as standard deviations.
+"""Standard deviations from the figures of a datasheet, and from the thermal fit of a log.
 
-A printed figure is no standard deviation unless the document says so. The convention:
+A printed figure is not a standard deviation unless the document says so. The conventions are:
 
 - ``1sigma``: as printed;
 - ``typ`` and ``derived``: a typical ± is taken as 1 sigma;
-- ``range``: any value between the ends is as likely, sigma is the larger end over sqrt(3);
-- ``max``: taken as 3 sigma. Data sheets of the catalogue that print both say 3 and 3.3 times the
-  typical offset (BNO055 and BMI160 gyros), 1.9 times (BNO055 accelerometer), 2 and 3.5 times the
-  typical coefficient of temperature (BNO055).
+- ``range``: a uniform distribution, sigma is the larger end over sqrt(3);
+- ``max``: taken as 3 sigma. In data sheets of the catalogue with both, max is 3 and 3.3 times the
+  typical offset (BNO055 and BMI160 gyros), 1.9 times (BNO055 accelerometer), and 2 and 3.5 times
+  the typical temperature coefficient (BNO055).
 
-Of several figures the first kind of this list counts, and of one kind the largest. What is printed
-for an option that the logged sensors do not have does not count. A coefficient of temperature that
-a log tells stands before the printed one: it is of this specimen.
+With several figures, the first kind of this list is used, and the largest figure of that kind.
+Figures for options that the logged sensors do not have are not used. A temperature coefficient from
+a log is used instead of the printed one, since it belongs to this specimen.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ DATASHEET_KEY_OF_CAUSE: Mapping[Cause, str] = {
     "g_sensitivity": "g_sensitivity",
     "vibration_rectification": "vibration_rectification",
 }
-"""The figure of a datasheet that each cause follows from."""
+"""Datasheet key of the figure for each cause."""
 
 _SIGMA_CONVENTIONS: Mapping[str, tuple[float, str]] = {
     "1sigma": (1.0, "1 sigma as printed"),
@@ -42,7 +42,7 @@ _SIGMA_CONVENTIONS: Mapping[str, tuple[float, str]] = {
     "range": (math.sqrt(3.0), "any value of the range as likely: its end is sqrt(3) sigma"),
     "max": (3.0, "maximum taken as 3 sigma"),
 }
-"""By kind, the first that counts first: how many sigma a figure is, and in words."""
+"""By kind, in order of preference: number of sigmas of a figure, and description."""
 
 SIGMAS = 1.96
 """Half the width of a 95 % interval."""
@@ -54,9 +54,9 @@ _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
 
 
 def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
-    """Return what a datasheet says of the errors of a channel that come in use, SI.
+    """Return the datasheet figures of the errors in use of a channel, SI.
 
-    Of every cause that a datasheet may print; without sigma where it does not.
+    There is one for every cause that a datasheet may print; without sigma if it does not print it.
     """
     axis = PrintedAxis.of(datasheet, channel)
     names = FIGURE_DIMENSIONS[axis.quantity]
@@ -82,10 +82,10 @@ def _read_figure(axis: PrintedAxis, name: str) -> Figure:
 
 
 def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
-    """Return what the log of a channel tells of the errors that come in use, SI.
+    """Return the figures of the errors in use that the log of a channel determines, SI.
 
-    From its rows of the table ``temperature``; ``temperature`` and ``temperature_squared`` where it
-    tells them.
+    ``rows`` are its rows of the table ``temperature``. The causes are ``temperature`` and
+    ``temperature_squared``, if determined.
     """
     figures: dict[Cause, Figure] = {}
     for row in rows:
@@ -106,9 +106,9 @@ def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
 def in_use(
     datasheet: Datasheet, channels: Iterable[str], temperature: Iterable[TemperatureRow]
 ) -> dict[str, dict[Cause, Figure]]:
-    """Return by channel what is known of the errors that come in use, as `error_rows` takes it.
+    """Return the figures of the errors in use by channel, for `error_rows`.
 
-    From the datasheet of the sensor, and the table ``temperature`` of the recording.
+    They are from the datasheet of the sensor, and the table ``temperature`` of the recording.
     """
     rows = list(temperature)
     return {

@@ -1,4 +1,4 @@
-"""How sure a budget is, when the parameters of the noise model are estimates."""
+"""Uncertainty of an error budget from the uncertainty of the noise model."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, flo
     Parameters
     ----------
     budgets : sequence of Budget
-        Of one quantity at one time, one a draw: from the posterior of a fit, or `draw_models`.
+        For one quantity and time, one a draw: from the posterior of a fit, or `draw_models`.
     level : float
-        Share of the totals between the limits.
+        Fraction of the totals between the limits.
 
     Returns
     -------
@@ -44,10 +44,10 @@ def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, flo
 
 
 def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
-    """Return the chance that a total is within a limit, over budgets of drawn noise models.
+    """Return the probability that a total is within a limit, over budgets of drawn noise models.
 
-    The share of the draws, each smeared by the width of a normal kernel in log total (Silverman),
-    so that it does not go in steps and falls off beyond the outermost draws.
+    It is the integral of a kernel density estimate in log total, with a normal kernel (Silverman
+    1986), so that it is continuous, and not 0 or 1 beyond the outermost draws.
 
     Parameters
     ----------
@@ -70,20 +70,20 @@ def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
 
 
 def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
-    """Return as many noise models as ``draws`` that the log of an estimate allows.
+    """Return ``draws`` noise models, drawn from the uncertainty of an estimate.
 
-    Where the estimate has draws of its posterior they are taken, all parameters of a model
-    together: evenly where fewer are asked for than there are, the same ones again where more are,
-    in random order, so that those of two channels meet by chance. Lines, which no noise parameter
-    depends on, are drawn beside them.
+    If the estimate has posterior draws, they are used, with all parameters of a model together.
+    They are thinned evenly if fewer are needed, and repeated if more are needed. Their order is
+    random, so that the draws of two channels are combined at random. Lines, which are independent
+    of the noise parameters, are drawn separately.
 
-    An estimate without draws (of the curve, or by least squares) has its parameters drawn from
-    their limits **independently**, which they are not: what is computed from several of them then
-    has an interval that is too wide, 1.0 to 3.5 times. Each is log-normal about its value, with a
-    spread of its own on either side, so that the limits are the 2.5 % and 97.5 % points of the
-    draws. A lower limit of 0 is reached linearly. What is absent, with an upper limit, is
-    half-normal from 0 with that as its 95 % point. A ramp, which has a sign, is normal on either
-    side. What has no limits stays as it is.
+    If an estimate has no draws (from the curve, or by least squares), its parameters are drawn from
+    their limits **independently**, which they are not. Intervals of functions of several of them
+    are then 1.0 to 3.5 times too wide. Each parameter is log-normal about its value, with a
+    separate spread on either side, so that the limits are the 2.5 % and 97.5 % quantiles. Towards a
+    lower limit of 0, the draws are linear. An absent parameter with an upper limit is half-normal
+    from 0, with that limit as its 95 % quantile. A ramp, which has a sign, is normal on either
+    side. A parameter without limits is not changed.
     """
     if estimate.draws is None:
         return [_draw_model(estimate, rng) for _ in range(draws)]
@@ -95,7 +95,7 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
 
 
 def drawn_jointly(estimate: Estimate) -> bool:
-    """Tell whether `draw_models` draws the parameters of an estimate together."""
+    """Return whether `draw_models` draws the parameters of an estimate together."""
     return estimate.draws is not None
 
 
@@ -124,8 +124,8 @@ def _draw_model(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
 
 
 def _draw_values(parameters: Mapping[str, Parameter], rng: np.random.Generator) -> dict[str, float]:
-    """Return a draw of each parameter; 0 for what is not there."""
-    # Every parameter takes its number, so that one more or less does not change the others.
+    """Return a draw of each parameter; 0 for absent ones."""
+    # Draw one number for each parameter, so that an extra one does not change the others.
     normal = {name: float(rng.standard_normal()) for name in parameters}
     return {
         name: _draw_value(name, parameter, normal[name]) for name, parameter in parameters.items()
