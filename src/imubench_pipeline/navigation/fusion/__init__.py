@@ -1,1 +1,1 @@
-"""Several sensors on one board as one virtual sensor: weights, what they give, and the filter."""
+"""Fuse several sensors on one board into one virtual sensor: weights, prediction and filter."""

@@ -1,4 +1,4 @@
-"""Several sensors on one board: their noise models, rates, and what they have in common."""
+"""Several sensors on one board: noise models, rates, and shared processes."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 _RATIO_TOLERANCE = 1e-9
-"""Relative distance of a ratio of rates from a whole number that is rounding alone."""
+"""Maximum relative distance of a ratio of rates from a whole number (rounding)."""
 
 _SHARED_PARAMETERS = ("N", "B", "K", "R")
-"""The parameters that sensors may have in common, each the root of a variance."""
+"""Parameters that sensors may share, each the root of a variance."""
 
 
 @dataclass(frozen=True)
 class Shared:
-    """One process that several sensors see, each with a sensitivity of its own.
+    """One process that acts on several sensors, with a separate sensitivity for each.
 
-    Such are the temperature of a board, the noise of its supply, and a motion that is not wanted
-    (sensitivity 1): the errors that come of it go together and are not averaged away.
+    Examples are the temperature of a board, the noise of its supply, and an unwanted motion
+    (sensitivity 1). The resulting errors are correlated and do not average out.
     """
 
-    model: NoiseModel  # the process in its own unit, say K (kelvin); it is taken at the fused rate
-    # SI unit of the sensors per that unit, one a sensor; the sign is kept: sensors of opposite
-    # signs can cancel it
+    model: NoiseModel  # the process in its own unit, such as kelvin, at the fused rate
+    # SI unit of the sensors per that unit, one a sensor, with sign: sensors of opposite signs can
+    # cancel the process
     sensitivity: Sequence[float]
 
 
@@ -38,16 +38,16 @@ class Shared:
 class Parts:
     """Variances of the sensors of a board at several frequencies or tau.
 
-    The covariance of the sensors is diag(own) + sum over s of shared_s g_s g_s^T. It is kept in
-    these parts: where what is common is far the largest, the sum would have lost the rest.
+    The covariance of the sensors is diag(own) + sum over s of shared_s g_s g_s^T. The parts are
+    stored separately, since the sum loses precision if the shared part is far the largest.
     """
 
-    own: Array  # shape (m, n); of what each sensor has alone, SI^2
-    shared: Array  # shape (m, s); of the shared processes, in their squared units
+    own: Array  # shape (m, n); independent part of each sensor, SI^2
+    shared: Array  # shape (m, s); shared processes, in their squared units
     sensitivities: Array  # shape (s, n); g: SI per these units
 
     def of_sum(self, weights: NDArray[Any]) -> Array:
-        """Return the variances of weighed sums, alone and in common, SI^2, shape (m, 2).
+        """Return the independent and shared variances of weighted sums, SI^2, shape (m, 2).
 
         The weights have the shape (m, n), real or complex.
         """
@@ -58,21 +58,21 @@ class Parts:
 
 @dataclass(frozen=True)
 class Board:
-    """Sensors that measure one signal, all in SI: other units or scales cannot occur.
+    """Sensors that measure the same signal, all in SI.
 
-    The fused rate is the lowest of the rates. A faster sensor is brought to it by the means of
-    blocks of its samples: white noise keeps its density N, the Allan variance at each tau is not
-    changed at all, and what the sensor has above the fused Nyquist frequency is folded below it,
-    weakened by the transfer of the mean, |sin(m w/2) / (m sin(w/2))|^2.
+    The fused rate is the lowest of the rates. A faster sensor is decimated by block means. Its
+    white noise density N and its Allan variance at each tau do not change. Its spectrum above the
+    fused Nyquist frequency is aliased below it, attenuated by the transfer function of the mean,
+    |sin(m w/2) / (m sin(w/2))|^2.
 
     Parameters
     ----------
     models : sequence of NoiseModel
-        What each sensor has alone; independent of each other.
+        Noise of each sensor, independent of the others.
     rates : sequence of float
         Hz, one a sensor.
     shared : sequence of Shared
-        What several have in common; independent of each other and of `models`.
+        Shared processes, independent of each other and of `models`.
 
     Raises
     ------
@@ -118,13 +118,13 @@ class Board:
         Parameters
         ----------
         model : NoiseModel
-            The whole error of each.
+            The whole noise of each.
         number : int
             From 1.
         rate : float
             Hz.
         correlation : mapping of str to float, optional
-            Part of the variance of N, B, K and R that is common to all, 0 to 1; by default none.
+            Fraction of the variance of N, B, K and R that is shared, 0 to 1; by default 0.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class Board:
 
     @property
     def sensors(self) -> int:
-        """How many there are."""
+        """Number of sensors."""
         return len(self.models)
 
     @property
@@ -147,21 +147,21 @@ class Board:
 
     @property
     def blocks(self) -> list[int]:
-        """Samples of each sensor in one of the fused rate."""
+        """Number of samples of each sensor in one fused sample."""
         return [round(rate / self.rate) for rate in self.rates]
 
     @property
     def sensitivities(self) -> Array:
-        """Those of all shared processes, shape (s, n)."""
+        """Sensitivities to all shared processes, shape (s, n)."""
         return np.array([process.sensitivity for process in self.shared], dtype=np.float64).reshape(
             len(self.shared), self.sensors
         )
 
     def allan_parts(self, tau: ArrayLike) -> Parts:
-        """Return the Allan variances of what the sensors have alone and in common.
+        """Return the independent and shared Allan variances of the sensors.
 
-        At tau, s, array_like of shape (m,): taken to the nearest whole number of fused samples, at
-        least one.
+        They are at tau, s, array_like of shape (m,), rounded to the nearest whole number of fused
+        samples, at least one.
         """
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
@@ -170,12 +170,12 @@ class Board:
         return self._parts(own, common, len(t))
 
     def spectral_parts(self, omega: ArrayLike) -> Parts:
-        """Return the spectra of the fused samples; ramps and lines have none.
+        """Return the spectra of the fused samples, without ramps and lines.
 
-        At omega, rad a fused sample, above 0, array_like of shape (m,).
+        They are at omega, rad per fused sample, above 0, array_like of shape (m,).
         """
         w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
-        spectra: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum
+        spectra: dict[tuple[int, int], Array] = {}  # specimens of one sensor have the same spectrum
         keys = [(id(m), size) for m, size in zip(self.models, self.blocks, strict=True)]
         for key, model, rate in zip(keys, self.models, self.rates, strict=True):
             if key not in spectra:
@@ -189,19 +189,19 @@ class Board:
 
 
 def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseModel, NoiseModel]:
-    """Divide the noise of a sensor into what a specimen has alone and what all have in common.
+    """Split the noise of a sensor into an independent part and one shared by all specimens.
 
     Parameters
     ----------
     model : NoiseModel
     correlation : mapping of str to float
-        Part of the variance of N, B, K and R that is common, 0 to 1; further Gauss-Markov
-        processes go with B. Quantization and lines are each sensor's own.
+        Fraction of the variance of N, B, K and R that is shared, 0 to 1. The fraction of B
+        applies to further Gauss-Markov processes, too. Quantization and lines are independent.
 
     Returns
     -------
     (NoiseModel, NoiseModel)
-        Alone and in common: their spectra add up to that of the model.
+        Independent and shared part; the sum of their spectra is the spectrum of the model.
 
     Raises
     ------
@@ -230,11 +230,11 @@ def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseM
 
 
 def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int) -> Array:
-    """Return the spectrum of the means of blocks of samples, with all that is folded into it.
+    """Return the spectrum of block means of samples, with all aliases.
 
     sum over k of P((w + 2 pi k)/m) sin^2(w/2) / (m^3 sin^2((w + 2 pi k)/(2m))), SI^2, with w
-    ``omega`` of shape (m,), rad a block, above 0 and up to pi, the rate of the samples in Hz, and m
-    ``size``, samples in a block.
+    ``omega`` of shape (m,), rad per block, above 0 and up to pi; the rate of the samples is in Hz,
+    and m is ``size``, the number of samples in a block.
     """
     if size == 1:
         return model.sampled_spectrum(omega, rate)
@@ -247,5 +247,5 @@ def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int)
 
 
 def stochastic(model: NoiseModel) -> NoiseModel:
-    """Return a model without its ramp and its lines, which have no spectrum."""
+    """Return a model without its ramp and lines, which have no spectral density."""
     return replace(model, R=0.0, sinusoids=())

@@ -1,4 +1,4 @@
-"""How many of one sensor, averaged, are as good as one of another: rows of the table ``fusion``."""
+"""Number of averaged sensors that equals one better sensor: rows of the table ``fusion``."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.typing import Array
 
 _MIN_RELEVANT_SHARE = 0.1
-"""Part of the Allan variance from which a parameter that is not known leaves no plain number."""
+"""Minimum share of the Allan variance for which an unknown parameter matters."""
 
 _TAIL_PROBABILITY = 0.025
-"""Beyond each 95 % limit."""
+"""Probability beyond each 95 % limit."""
 
 
 def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array:
-    """Return how many sensors of one kind have together the Allan variance that is wanted.
+    """Return the number of sensors of one kind whose mean has a given Allan variance.
 
-    n of them with equal weights have ``own / n + common``: n = own / (wanted - common). Where
-    nothing is common, n is the ratio of the Allan variances. It is not rounded, below 1 where less
-    than one would do, and infinite where no number is enough.
+    The mean of n sensors has ``own / n + common``, so n = own / (wanted - common). Without a common
+    part, n is the ratio of the Allan variances. It is not rounded, may be below 1, and is infinite
+    if no number is enough.
 
     Parameters
     ----------
     own, common, wanted : array_like
-        Allan variance of one without what all have in common, that, and such as that of one better
-        sensor; (rad/s)^2 or (m/s^2)^2, in shapes that go together.
+        Allan variance of the independent part of one sensor, of the part common to all, and the
+        given one, such as of one better sensor; (rad/s)^2 or (m/s^2)^2, in broadcastable shapes.
     """
     own, common, wanted = np.broadcast_arrays(own, common, wanted)
     room = np.asarray(wanted - common, dtype=np.float64)
@@ -46,7 +46,7 @@ def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array
 
 @dataclass(frozen=True)
 class TemperaturePart:
-    """What temperature adds to a channel: all specimens on a board follow it together."""
+    """Temperature effect on a channel, which is common to all specimens on a board."""
 
     tau: Array  # shape (t,); s
     deviation: Array  # shape (t,); its Allan deviation over the recording, (rad/s) or (m/s²)
@@ -65,22 +65,22 @@ class TemperaturePart:
 
 @dataclass(frozen=True)
 class FusionChannel:
-    """A channel that may answer for its sensor."""
+    """A channel that may represent its sensor."""
 
     sensor: str
     recording: str
     channel: str
     simulated: bool
     duration: float  # of the recording, s
-    # the recommended one; where temperature is taken out, that of what it leaves
+    # the recommended one, after removal of the temperature effect, if any
     estimate: Estimate
-    temperature: TemperaturePart | None = None  # what is taken out
-    # gives the joint draws of the estimate where the estimate has not got them with it: of a run
-    # they are read of the channels that answer alone
+    temperature: TemperaturePart | None = None  # removed temperature effect
+    # loads the joint draws, if the estimate does not contain them: in a run, they are read only for
+    # the representative channels
     joint: Callable[[], JointDraws | None] | None = None
 
     def drawn(self, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
-        """Return noise models that the log allows (`draw_models`)."""
+        """Return noise models drawn from the estimate (`draw_models`)."""
         estimate = self.estimate
         if estimate.draws is None and self.joint is not None:
             estimate = replace(estimate, draws=self.joint())
@@ -100,7 +100,7 @@ class FusionChannel:
         return 0.0 if self.temperature is None else self.temperature.variance(tau)
 
     def unknown(self, tau: float) -> Iterator[str]:
-        """Yield the parameters that the log does not tell and that may matter at a tau in s."""
+        """Yield the parameters that are not determined and may matter at a tau in s."""
         total = self.variance(tau)
         groups = [self.estimate.parameters, *self.estimate.further]
         for group in groups:
@@ -114,7 +114,7 @@ class FusionChannel:
 
 
 def _alone(name: str, group: Mapping[str, Parameter], tau: float) -> float:
-    """Return the Allan variance that a parameter may stand for at most, by what is known of it."""
+    """Return the largest Allan variance of a parameter, from its value or upper limit."""
     size = {
         key: parameter.in_model if parameter.upper is None else parameter.upper
         for key, parameter in group.items()
@@ -130,16 +130,16 @@ def _alone(name: str, group: Mapping[str, Parameter], tau: float) -> float:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a sensor has at one tau."""
+    """Allan variance of a sensor at one tau."""
 
-    candidate: FusionChannel  # the channel that answers
-    # own, common: Allan variance of one specimen without the common part, and this, SI
+    candidate: FusionChannel  # the representative channel
+    # own, common: Allan variance of the independent and common part of one specimen, SI
     own: float
     common: float
-    # drawn_own, drawn_common: shape (draws,); the same of the models that the log allows
+    # drawn_own, drawn_common: shape (draws,); the same for the drawn models
     drawn_own: Array
     drawn_common: Array
-    unknown: str | None  # the parameters that matter and are not known: there is no plain number
+    unknown: str | None  # unknown parameters that matter; the number is then not given
 
 
 def answer(
@@ -152,24 +152,24 @@ def answer(
     draws: int,
     seed: int,
 ) -> Answer | str:
-    """Return the Allan variance of a sensor at a tau, that of its median channel; or why not.
+    """Return the Allan variance of the median channel of a sensor at a tau; or why not.
 
     Parameters
     ----------
     sensor : str
     candidates : sequence of FusionChannel
-        All channels of one quantity of the sensor, at least one; where some are measured, simulated
-        ones are left out. Of two the worse one is the median.
+        All channels of one quantity of the sensor, at least one. Simulated ones are left out if
+        there are measured ones. The median of two is the worse one.
     tau : float
         s.
     correlation : mapping of str to float
-        Part of the variance of each parameter that specimens have in common.
+        Fraction of the variance of each parameter that specimens share.
     longest : float
-        Longest tau that a log tells, as a part of it.
+        Longest tau, as a fraction of the log.
     draws : int
-        Models that are drawn of those that the log allows.
+        Number of models drawn from the estimate.
     seed : int
-        Each channel has a stream of its own.
+        Each channel has its own random stream.
     """
     measured = [channel for channel in candidates if not channel.simulated] or list(candidates)
     long = [channel for channel in measured if tau <= longest * channel.duration]
@@ -230,7 +230,7 @@ def equivalence_rows(
 
 
 def _compare_pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow:
-    """Return the row of two sensors at a tau with what is found of them."""
+    """Return the row of two sensors at a tau with the number needed, or why there is none."""
     answers = [each if isinstance(each, str) else each.unknown for each in (a, b)]
     reasons = [reason for reason in answers if reason]
     plain = not reasons
@@ -258,11 +258,11 @@ def _compare_pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow
         return replace(row, reason="; ".join(reasons))
     number = float(number_needed(a.own, a.common, b.own + b.common))
     drawn = number_needed(a.drawn_own, a.drawn_common, b.drawn_own + b.drawn_common)
-    # Between infinite ones there is nothing to interpolate.
+    # Infinite numbers cannot be interpolated.
     low, high = np.quantile(
         drawn, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY], method="inverted_cdf"
     )
-    # The draws of what is absent lie above it: the value itself is inside.
+    # Draws of an absent term are above 0: extend the limits to the value.
     low, high = min(float(low), number), max(float(high), number)
     if math.isinf(number):
         reasons.append(f"no number of them reaches it at {row.tau:g} s: the common part is a floor")

@@ -1,8 +1,8 @@
-"""How many of a sensor reach what is printed of a better class: rows of the table ``grades``.
+"""Number of sensors that reach the printed figures of a better class: the table ``grades``.
 
-White noise and the lowest point of the curve of n sensors with noise of their own are 1/√n of one:
-n = (own / printed)^2, of each by itself. What they have in common, such as a temperature, no number
-takes off; what a fused log has of it shows in its own rows, as it is a sensor like any other.
+For n sensors with independent noise, white noise and the minimum of the curve are 1/√n of one
+sensor: n = (own / printed)^2, for each figure separately. Common errors, such as from temperature,
+do not average out. A fused log is treated as a separate sensor, and its rows include them.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.settings.printed import Datasheet
 
 PARAMETER_OF_STATISTIC = {"N": "N", "adev_minimum": "sigma_min"}
-"""What is compared, by the name of a printed figure's statistic."""
+"""Parameter that is compared with a printed figure, by its statistic."""
 
 
 @dataclass(frozen=True)
 class Grade:
-    """A sensor of the class that is to be reached."""
+    """A sensor of the better class."""
 
-    sensor: str  # of the catalogue
+    sensor: str  # name in the catalogue
     name: str  # vendor and model
     datasheet: Datasheet
 
     def printed(self, channel: str) -> Iterator[tuple[str | None, Comparable]]:
-        """Yield N and the floor as printed, SI, of each option; without a value where none is."""
+        """Yield the printed N and floor, SI, of each option; without a value if not printed."""
         sheet = getattr(self.datasheet, channel.split("_")[0])
         if sheet is None:
             return
@@ -48,7 +48,7 @@ class Grade:
 def grade_rows(candidates: Iterable[FusionChannel], grades: Sequence[Grade]) -> Iterator[GradeRow]:
     """Yield the rows of the table ``grades``: each sensor against each printed figure.
 
-    The axis that is the middle one by N answers for a sensor, a measured one before a simulated.
+    The axis with the median N represents a sensor; measured axes are preferred to simulated ones.
     """
     by_sensor: dict[tuple[str, str], list[FusionChannel]] = {}
     for channel in candidates:

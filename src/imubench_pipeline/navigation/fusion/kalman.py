@@ -1,6 +1,6 @@
-"""The Kalman filter that fuses the samples of a board's sensors: weights by frequency, causal.
+"""Causal Kalman filter that fuses the samples of the sensors of a board.
 
-Its steady state is found by doubling (`steady_covariance`).
+Its steady state is computed by a doubling algorithm (`steady_covariance`).
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from imubench_pipeline.typing import Array
 
 _MAX_DOUBLINGS = 80
 _CONVERGENCE_TOLERANCE = 1e-13
-"""Relative change of the covariance in a doubling that ends the search."""
+"""Maximum number of doublings, and relative change of the covariance at convergence."""
 
 
 _MAX_FLICKER_TAU = 1e5
-"""Tau in s up to which the filter follows flicker noise, where nothing else is asked."""
+"""Maximum tau, s, up to which the filter models flicker noise."""
 
 _WALK_SURROGATE_TIME_RATIO = 100.0
-"""Correlation time of what stands for a random walk, over the longest tau.
+"""Correlation time of the Gauss-Markov process that replaces a random walk, over the longest tau.
 
-A walk that all sensors have in common cannot be seen in their differences and would have no steady
-state. It does not matter what the filter thinks of it: it goes with the signal.
+A walk that all sensors share is not observable in their differences and would have no steady state.
+Its estimate does not matter: it is fused as a part of the signal.
 """
 
 
@@ -44,14 +44,14 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
         P = Phi P (I + G P)^-1 Phi^T + Q,    G = H^T R^-1 H,
 
     by the structure-preserving doubling algorithm: k doublings are 2^k steps of the filter from
-    a known state. It takes the information G of one sample, not H and R, so that measurements of
-    which a combination says nothing (G singular) need no choice of differences; and it does not
-    suffer from eigenvalues near 1, of which slow Gauss-Markov processes have many.
+    a known state. It uses the information G of one sample, not H and R, so that a singular G (a
+    combination without information) needs no choice of differences. It is accurate for
+    eigenvalues near 1, which slow Gauss-Markov processes have.
 
     Parameters
     ----------
     transition, process_noise, information : ndarray, shape (m, m)
-        Phi, Q_d and G. Processes that are not seen must be stable.
+        Phi, Q_d and G. Unobservable processes must be stable.
 
     Returns
     -------
@@ -93,21 +93,21 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
 class KalmanFusion:
     """The best causal fusion in the steady state.
 
-    The common signal may be anything: nothing is assumed of it, and it passes unchanged, without
-    delay. The slow errors of the sensors are states, estimated from the differences between the
-    sensors alone; what is left is weighed by its variance. With y = 1 s + H x + v, P the steady
-    covariance of the predicted states and S = H P H^T + R,
+    There is no model of the common signal, and it passes unchanged, without delay. The slow errors
+    of the sensors are states, estimated only from the differences between the sensors; the
+    residuals are weighted by their variance. With y = 1 s + H x + v, P the steady covariance of
+    the predicted states and S = H P H^T + R,
 
         s^ = a^T (y - H x),    a = S^-1 1 / (1^T S^-1 1),
         x' = Phi (x + L (y - H x)),    L = P H^T (S^-1 - S^-1 1 a^T),
 
-    which is the Kalman filter of any n - 1 independent differences, and does not prefer a sensor.
-    The discretisation is exact, that of block means of faster sensors too; flicker noise is
-    its bank of Gauss-Markov processes.
+    which is equivalent to the Kalman filter of any n - 1 independent differences. The
+    discretisation is exact, including block means of faster sensors; flicker noise is modelled by
+    a bank of Gauss-Markov processes.
 
-    It has the least variance of one sample that the past allows. At each frequency an optimal
-    smoother (`imubench_pipeline.navigation.fusion.weights.ByFrequency`) is as good or better.
-    Ramps and lines are not estimated: they pass with the weights at their frequency.
+    A sample has the least variance of all causal filters. At each frequency, an optimal smoother
+    (`imubench_pipeline.navigation.fusion.weights.ByFrequency`) has the same or less noise. Ramps
+    and lines are not estimated: they pass with the weights at their frequency.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class KalmanFusion:
         gain = covariance @ space.output.T @ _project_out_common(of_output)
         self._output = space.output
         self._transition = space.transition
-        # That the signal is not seen must hold to the last digit.
+        # The rows must be orthogonal to the signal to machine precision.
         gain -= np.outer(gain.sum(axis=1), self.weights)
         self._gain = space.transition @ gain
         self._seen = self.weights @ space.output
@@ -144,14 +144,14 @@ class KalmanFusion:
 
     @property
     def states(self) -> int:
-        """How many states there are."""
+        """Number of states."""
         return len(self._transition)
 
     def response(self, omega: Array) -> NDArray[np.complex128]:
         """Return the transfer from each sensor, shape (m, n); its sum over the sensors is 1.
 
         a^T (I - H (z I - F)^-1 Phi L) with F = Phi (I - L H), solved in the Schur form of F, at
-        angular frequencies in rad a fused sample, shape (m,).
+        angular frequencies in rad per fused sample, shape (m,).
         """
         # Loss of significance near frequency 0 is avoided: (z - 1) + (1 - F).
         turn = np.expm1(1j * omega)
@@ -164,8 +164,8 @@ class KalmanFusion:
     def fuse(self, blocks: Iterable[Array]) -> Iterator[Array]:
         """Yield the fused samples, block by block; they do not depend on the size of the blocks.
 
-        The filter begins with states of 0: take off the fixed bias of each sensor before. Where a
-        sensor has no sample (NaN), there is no fused one, and the states are predicted.
+        The filter begins with states of 0: subtract the fixed bias of each sensor before. If a
+        sensor has no sample (NaN), there is no fused sample, and the states are only predicted.
 
         Parameters
         ----------
@@ -204,7 +204,7 @@ class KalmanFusion:
 
 @dataclass(frozen=True)
 class _Space:
-    """The states of all sensors of a board, and of what they share."""
+    """State space of all sensors of a board, and of their shared processes."""
 
     transition: Array
     process_noise: Array
@@ -236,7 +236,7 @@ def _build_state_space(board: Board) -> _Space:
 
 
 def _stabilise(model: NoiseModel) -> NoiseModel:
-    """Return a model without what is deterministic, its walk bound to 0 by a long time."""
+    """Return a model without deterministic terms, its walk replaced by a slow stable process."""
     noise = stochastic(model)
     if not noise.K:
         return noise
@@ -269,7 +269,7 @@ def _run_filter(
     gain: Array,
     weights: Array,
 ) -> None:
-    """Run the filter over samples, and leave the state as it is after the last."""
+    """Run the filter over samples, and update the state in place."""
     sensors, states = weights.size, state.size
     left, moved = np.empty(sensors), np.empty(states)
     for k in range(len(samples)):
@@ -289,7 +289,7 @@ def _run_filter(
             for e in range(transition[0][j], transition[0][j + 1]):
                 total += transition[2][e] * state[transition[1][e]]
             if not missing:
-                # The gain does not see the signal: taken off, a large one costs no digits.
+                # The gain is orthogonal to the signal: subtract it to keep precision.
                 for i in range(sensors):
                     total += gain[j, i] * (left[i] - signal)
             moved[j] = total

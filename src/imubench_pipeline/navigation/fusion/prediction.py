@@ -1,6 +1,6 @@
-"""The spectrum and the Allan deviation of a virtual sensor, in closed form, and how sure.
+"""Predicted spectrum and Allan deviation of a virtual sensor, with limits.
 
-The Allan variance of any smooth spectrum of samples is taken by quadrature.
+The Allan variance of any smooth spectrum of samples is computed by quadrature.
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 _QUADRATURE_POINTS = 16
-"""Of Gauss and Legendre in a panel."""
+"""Number of Gauss-Legendre points in a panel."""
 
 _OCTAVE_PANELS = 40
-"""Panels below the first zero of sin^4(n w/2): the rest is 1e-12 of a random walk's."""
+"""Number of panels below the first zero of sin^4(n w/2): remainder 1e-12 for a random walk."""
 
 _RESOLVED_PERIODS = 64
-"""Periods of sin^4(n w/2) that are resolved; beyond, 3/8 stands for it, wrong by 4e-8 of white
-noise (the first term of the asymptotic series of the rest, 0.23/X^3 against pi/4)."""
+"""Number of resolved periods of sin^4(n w/2). Beyond, its mean of 3/8 is used, with an error of
+4e-8 for white noise (first term of the asymptotic series of the remainder, 0.23/X^3 against
+pi/4)."""
 
 
 _RAMP_FREQUENCY = 1e-9
-"""rad a sample; the frequency of a ramp, for a filter."""
+"""rad per sample; frequency at which the response of a filter to a ramp is evaluated."""
 
 
 def nodes(n: int) -> tuple[Array, Array]:
@@ -40,10 +41,10 @@ def nodes(n: int) -> tuple[Array, Array]:
 
     sigma^2(n T) = (1/pi) int_0^pi P(w) 2 sin^4(n w/2) / (n^2 sin^2(w/2)) dw = ``weights @ P(w)``
 
-    with w in rad a sample and n samples in a cluster, from 1, by Gauss and Legendre, in panels of
-    an octave of w up to the first zero of sin^4, where P is smooth over log w, then of one period;
-    the many periods of a long cluster at high frequencies are replaced by their mean, again in
-    octaves.
+    with w in rad per sample and n samples in a cluster, from 1. The rule is Gauss-Legendre, in
+    panels of an octave of w up to the first zero of sin^4, where P is smooth over log w, and then
+    of one period. At high frequencies, the many periods of a long cluster are replaced by their
+    mean, again in octaves.
 
     Raises
     ------
@@ -73,8 +74,8 @@ def nodes(n: int) -> tuple[Array, Array]:
 def allan_of_spectrum(spectrum: Callable[[Array], NDArray[Any]], sizes: ArrayLike) -> NDArray[Any]:
     """Return the Allan variance of samples of a given spectrum, SI^2, shape (m, ...).
 
-    The spectrum takes angular frequencies in rad a sample, shape (k,), and returns SI^2, shape (k,
-    ...); ``sizes`` are samples in a cluster, shape (m,).
+    The spectrum takes angular frequencies in rad per sample, shape (k,), and returns SI^2, shape
+    (k, ...); ``sizes`` are the numbers of samples in a cluster, shape (m,).
     """
     variances = []
     for n in np.atleast_1d(np.asarray(sizes, dtype=np.int64)):
@@ -110,7 +111,7 @@ class FusedCurve:
 
     tau: Array  # shape (m,); s
     variance: Array  # shape (m,); (rad/s)^2 or (m/s^2)^2
-    # shape (m,); the part of it that comes of what the sensors share: more sensors do not lower it
+    # shape (m,); the part from shared processes, which more sensors do not reduce
     common: Array
 
     @property
@@ -120,14 +121,14 @@ class FusedCurve:
 
     @property
     def common_share(self) -> Array:
-        """Part of the variance that cannot be averaged away, 0 to 1, shape (m,)."""
+        """Fraction of the variance that does not average out, 0 to 1, shape (m,)."""
         return np.divide(
             self.common, self.variance, out=np.zeros_like(self.common), where=self.variance > 0
         )
 
 
 def fused_psd(board: Board, weights: Weights, frequency: ArrayLike) -> tuple[Array, Array]:
-    """Return the two-sided density of a virtual sensor, and the part that is common.
+    """Return the two-sided density of a virtual sensor, and its common part.
 
     w^H S w / rate of the samples, in (rad/s)^2/Hz or (m/s^2)^2/Hz, shapes (m,), at frequencies,
     array_like of shape (m,), in Hz, above 0 and up to half the fused rate.
@@ -143,18 +144,18 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
     With constant weights it is the sum of w_i^2 AV_i and, of each shared process, of
     (w^T g)^2 AV. With weights that change with the frequency it is the integral of the
     fused spectrum (`nodes`; relative error below 1e-7). A ramp passes with the weights
-    at frequency 0, a line with those at its own; ramps of several sensors are taken as
-    independent, of either sign.
+    at frequency 0, a line with the weights at its frequency. Ramps of several sensors are
+    assumed to be independent, with random signs.
 
     Parameters
     ----------
     board : Board
-        What the sensors are.
+        The actual sensors.
     weights : Weights
-        Of `weights` or a filter of `kalman`; they may be made for another board, for sensors
-        that are not quite what they were thought to be.
+        From `weights`, or a filter of `kalman`. They may be from another board, to predict the
+        effect of wrong sensor models.
     tau : array_like, shape (m,)
-        s; taken to the nearest whole number of fused samples, at least one.
+        s; rounded to the nearest whole number of fused samples, at least one.
     """
     sizes = np.maximum(np.rint(np.atleast_1d(np.asarray(tau)) * board.rate).astype(np.int64), 1)
     tau = sizes / board.rate
@@ -167,13 +168,13 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
 
 
 def _compute_spectra(board: Board, weights: Weights, omega: Array) -> Array:
-    """Return the fused spectra of what is alone and what is common, SI^2, shape (m, 2)."""
+    """Return the fused spectra of the independent and common parts, SI^2, shape (m, 2)."""
     return board.spectral_parts(omega).of_sum(weights.response(omega))
 
 
 def _compute_deterministic_variance(board: Board, weights: Weights, tau: Array) -> Array:
-    """Return the Allan variances of ramps and lines, alone and common, shape (m, 2)."""
-    # Each at its own rate: the means of the blocks of a faster sensor weaken its lines.
+    """Return the Allan variances of independent and common ramps and lines, shape (m, 2)."""
+    # Each at its own rate: block means of a faster sensor attenuate its lines.
     alone = list(zip(board.models, board.rates, np.eye(board.sensors), strict=True))
     common = [
         (process.model, board.rate, np.asarray(process.sensitivity)) for process in board.shared
@@ -205,28 +206,27 @@ def prediction_limits(
     rng: np.random.Generator,
     level: float = 0.95,
 ) -> tuple[Array, Array]:
-    """Return limits of the predicted Allan deviation that follow from those of the parameters.
+    """Return limits of the predicted Allan deviation from the uncertainty of the parameters.
 
-    The weights stay as they are, made from the estimates; what the sensors are is drawn by
-    `draw_models`: all parameters together where the estimates have joint draws, else one by one,
-    and then the limits are too wide where the parameters trade off.
-    Sensors with one and the same estimate are specimens of one sensor and are drawn together:
-    not to know a parameter is a common error.
+    The weights are fixed, computed from the estimates. The sensors are drawn by `draw_models`: all
+    parameters together if the estimates have joint draws, else independently, which gives limits
+    that are too wide for correlated parameters. Sensors with the same estimate are specimens of one
+    sensor and are drawn together, since the error of a parameter is common to them.
 
     Parameters
     ----------
     board : Board
-        Made from the estimates; its shared parts are taken as known.
+        Board from the estimates; its shared parts are assumed to be known.
     estimates : sequence of Estimate
-        One a sensor, of what it has alone.
+        One a sensor, of its independent noise.
     weights : Weights
     tau : array_like, shape (m,)
         s.
     draws : int
-        Boards that are drawn.
+        Number of drawn boards.
     rng : numpy.random.Generator
     level : float
-        Share of the draws between the limits.
+        Fraction of the draws between the limits.
 
     Returns
     -------

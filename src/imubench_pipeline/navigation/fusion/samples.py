@@ -1,4 +1,4 @@
-"""Samples of the sensors of a board: brought to one rate, and weighed."""
+"""Decimate the samples of the sensors of a board to one rate, and fuse them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from imubench_pipeline.navigation.fusion.weights import Constant
 from imubench_pipeline.typing import Array
 
 _BLOCK_LENGTH = 1 << 16
-"""Fused samples that are brought to one rate at a time."""
+"""Number of fused samples in a block of processing."""
 
 
 def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
@@ -22,8 +22,8 @@ def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
     ----------
     board : Board
     samples : sequence of ndarray
-        Of each sensor at its own rate, rad/s or m/s^2, beginning together; a rest that fills no
-        block of every sensor is left out. NaN: missing, and so is the block.
+        Samples of each sensor at its own rate, rad/s or m/s^2, with a common start. A remainder
+        that does not fill a block of every sensor is left out. A block with NaN (missing) is NaN.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def fuse(board: Board, how: Constant | KalmanFusion, samples: Sequence[Array]) -
 
 
 def _count_fused_samples(board: Board, samples: Sequence[Array]) -> int:
-    """Return how many fused samples the logs of all sensors make."""
+    """Return the number of fused samples in the logs of all sensors."""
     if len(samples) != board.sensors:
         raise ValueError(f"found samples of {len(samples)} sensors, expected {board.sensors}")
     return min(len(log) // size for log, size in zip(samples, board.blocks, strict=True))

@@ -12,16 +12,16 @@ from imubench_pipeline.navigation.fusion.board import Board, Parts
 from imubench_pipeline.typing import Array
 
 _MIN_VARIANCE_RATIO = 1e-14
-"""Variance of a perfect sensor over that of the poorest beside it."""
+"""Variance of a sensor without noise over the variance of the noisiest one."""
 
 
 class Weights(Protocol):
-    """What weighs the sensors of a board."""
+    """Weights of the sensors of a board."""
 
     def response(self, omega: Array) -> NDArray[Any]:
         """Return the weight of each sensor, shape (m, n), complex where a filter delays.
 
-        At angular frequencies in rad a fused sample, shape (m,).
+        The angular frequencies are in rad per fused sample, shape (m,).
         """
 
 
@@ -35,7 +35,7 @@ class Constant:
         If there is not one weight a sensor, or their sum is not 1 or not a number.
     """
 
-    values: Array  # shape (n,); their sum is 1: what all sensors measure alike passes unchanged
+    values: Array  # shape (n,); their sum is 1, so that the common signal passes unchanged
 
     def __post_init__(self) -> None:
         if self.values.ndim != 1 or not abs(self.values.sum() - 1.0) <= 1e-9:
@@ -48,17 +48,17 @@ class Constant:
 
 @dataclass(frozen=True)
 class ByFrequency:
-    """The best weights at each frequency: those of least fused spectrum.
+    """Optimal weights at each frequency: they minimise the fused spectrum.
 
-    w(f) = S^-1 1 / (1^T S^-1 1) with S the matrix of spectra: the inverse spectra where nothing is
-    shared. They are those of an optimal smoother, which looks ahead as far as back; no filter of
-    the past alone can have less noise at any frequency, and the Kalman filter
-    (`imubench_pipeline.navigation.fusion.kalman`) has some more where the weights change.
+    w(f) = S^-1 1 / (1^T S^-1 1) with S the spectral matrix: inverse spectra without shared
+    processes. They are the weights of an optimal, non-causal smoother. No causal filter has less
+    noise at any frequency; the Kalman filter (`imubench_pipeline.navigation.fusion.kalman`) has
+    slightly more where the weights change.
 
     Attributes
     ----------
     board : Board
-        Whose models give the weights.
+        Board with the models for the weights.
     """
 
     board: Board
@@ -69,7 +69,7 @@ class ByFrequency:
 
 
 def equal(sensors: int) -> Constant:
-    """Return equal weights of a number of sensors, from 1; else a ValueError is raised."""
+    """Return equal weights for a number of sensors; raise a ValueError below 1."""
     if sensors < 1:
         raise ValueError(f"found {sensors} sensors, expected at least one")
     return Constant(np.full(sensors, 1.0 / sensors))
@@ -78,20 +78,21 @@ def equal(sensors: int) -> Constant:
 def best_constant(board: Board, tau: float | None = None) -> Constant:
     """Return the constant weights of least Allan variance at a tau.
 
-    Without common parts they are the inverse Allan variances. With them, a weight may be negative:
-    a poor sensor that follows the temperature more than the others takes its effect off.
+    Without common parts they are the normalised inverse Allan variances. With common parts, a
+    weight may be negative: a poor sensor with a large temperature sensitivity compensates the
+    others.
 
     Parameters
     ----------
     board : Board
     tau : float, optional
-        s, taken to the nearest whole number of fused samples, at least one; without it the
-        weights are the best for white noise, N^-2.
+        s, rounded to the nearest whole number of fused samples, at least one; without it, the
+        weights are optimal for white noise, N^-2.
 
     Raises
     ------
     ValueError
-        If a sensor has no noise to weigh it by.
+        If a sensor has no noise to compute its weight.
     """
     if tau is None:
         own = np.array([[model.N**2 for model in board.models]])
@@ -107,11 +108,11 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
 def least(parts: Parts) -> Array:
     """Return the weights of least variance with a sum of 1, shape (m, n), at m frequencies or tau.
 
-    The sensors are y = 1 x + G c + e, with x not known at all, and c of unit variance the shared
-    processes. Their best estimates follow from normal equations that stay well conditioned however
-    large c is, if what c has in common with x (the mean of G) is set apart.
+    The model is y = 1 x + G c + e, with x unknown, and c the shared processes with unit variance.
+    The estimates follow from normal equations, which remain well conditioned for any size of c if
+    the part of G along x (the mean of G) is treated separately.
     """
-    # What has nothing of its own is nearly perfect; where none has, all are alike.
+    # A sensor without independent noise is nearly perfect; if none has any, all are equal.
     largest = parts.own.max(axis=1, keepdims=True)
     own = np.where(
         parts.own > 0.0, parts.own, np.where(largest > 0.0, _MIN_VARIANCE_RATIO * largest, 1.0)
@@ -121,7 +122,7 @@ def least(parts: Parts) -> Array:
     across = parts.sensitivities - mean[:, None]
     seen = np.ones((len(own), 1 + len(mean), own.shape[1]))
     seen[:, 1:] = root[:, :, None] * across
-    # Variances of SI units are tiny: the best of each point is the unit.
+    # Variances in SI units are tiny: scale by the smallest at each point.
     unit = own.min(axis=1)[:, None, None]
     seen[:, 1:] /= np.sqrt(unit)
     weighed = seen * (unit / own[:, None, :])
