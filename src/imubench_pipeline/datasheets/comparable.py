@@ -109,10 +109,10 @@ class PrintedAxis:
             if figure.kind != "choices" and figure.on_axis(self.axis) is not None
         ]
         logged = [f for f in listed if f.option is None or f.option in self.options]
-        rows = [self._row(name, figure, like, convert) for figure in logged or listed]
+        rows = [self._make_row(name, figure, like, convert) for figure in logged or listed]
         return [_add_interval(row, rows) for row in rows]
 
-    def _row(
+    def _make_row(
         self,
         name: str,
         figure: PrintedFigure,
@@ -125,7 +125,7 @@ class PrintedAxis:
             like,
             figure=figure,
             printed=max(ends, key=lambda end: (abs(end), end)),
-            obstacle=like.obstacle or self._obstacle(name, figure),
+            obstacle=like.obstacle or self._find_obstacle(name, figure),
             tau=figure.tau_s,
         )
         if row.obstacle is not None:
@@ -134,7 +134,7 @@ class PrintedAxis:
         least = min(values) if len(values) > 1 else None
         return replace(row, value=max(map(abs, values)), least=least)
 
-    def _obstacle(self, name: str, figure: PrintedFigure) -> str | None:
+    def _find_obstacle(self, name: str, figure: PrintedFigure) -> str | None:
         if figure.option is not None and figure.option not in self.options:
             logged = ", ".join(self.options)
             which = f"that is logged has: {logged}" if logged else "file does not say what it has"

@@ -187,7 +187,7 @@ _SYMBOLS = {"N": "N", "B": "σ_min"}
 def unusual_rows(
     parameters: Iterable[ParameterRow], sensors: Mapping[str, Sensor], usual: UsualFigures
 ) -> Iterator[FindingRow]:
-    """Yield the rows of the table ``findings`` about estimates far from what vendors print.
+    """Yield the rows of the table ``findings`` about estimates far from the printed figures.
 
     ``parameters`` are rows of that table, ``sensors`` are by name, and ``usual`` is from a
     catalogue.

@@ -280,17 +280,17 @@ class _Levels:
         self.results = np.tile(np.reshape(_EMPTY_RESULT, (-1, 1, 1)), (recordings, columns))
         self._member = np.zeros((recordings, columns), dtype=bool)
         self._state = np.zeros((7, columns))
-        self._aside: dict[int, tuple[int, NDArray[np.bool_], NDArray[np.float64]]] = {}
+        self._replaced: dict[int, tuple[int, NDArray[np.bool_], NDArray[np.float64]]] = {}
         with np.errstate(all="ignore"):
             for place in range(recordings):
-                self._take(place)
+                self._add_recording(place)
 
-    def _take(self, place: int) -> None:
+    def _add_recording(self, place: int) -> None:
         y, below, above = self._points[:, place]
         present = np.isfinite(y)
-        for column in [column for column in self._aside if present[column]]:
-            self._resume(place, column)
-        self._settle()
+        for column in [column for column in self._replaced if present[column]]:
+            self._restore_level(place, column)
+        self._update_levels()
         # Number of recordings; how many of them gave tau; mu; 1 / var mu; tau^2; its degrees of
         # freedom times the mean of 1 / (v + tau^2); the degrees of freedom.
         count, _, mean, weight, spread, information, freedom = self._state
@@ -310,7 +310,7 @@ class _Levels:
         self.results[0, place, present & (count > 0.0)] = mean[present & (count > 0.0)]
         for column in np.flatnonzero(changed).tolist():
             member, state = self._member[:, column], self._state[:, column]
-            self._aside[column] = place, member.copy(), state.copy()
+            self._replaced[column] = place, member.copy(), state.copy()
             member[:], state[:] = False, 0.0
         self._member[place] = present
         added = np.where(present, 1.0 / np.where(own[0] > 0.0, own[0], 1.0), 0.0)
@@ -318,9 +318,9 @@ class _Levels:
         weight += added
         mean += np.where(present, added / weight * (y - mean), 0.0)
 
-    def _resume(self, place: int, column: int) -> None:
+    def _restore_level(self, place: int, column: int) -> None:
         """Restore the previous level if a value is nearer to it than to the flagged one."""
-        flagged, member, state = self._aside.pop(column)
+        flagged, member, state = self._replaced.pop(column)
         y, below, above = self._points[:, place, column]
         new, new_below, new_above = self._points[:, flagged, column]
         old, weight, spread = state[2:5]
@@ -330,7 +330,7 @@ class _Levels:
             self._member[:, column], self._state[:, column] = member, state
             self.results[6, place, column] = flagged
 
-    def _settle(self) -> None:
+    def _update_levels(self) -> None:
         """Update mu and tau of the levels that have grown (Satterthwaite; DerSimonian-Kacker)."""
         count, settled = self._state[:2]
         due = np.flatnonzero(

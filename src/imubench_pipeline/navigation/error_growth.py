@@ -81,7 +81,7 @@ def growth_rows(
         return summed(models(channel), lambda term: np.asarray(term.growth(order, time, start)))
 
     def noise(error: str, time: float, start: Calibrated, gyro: str, accel: str | None) -> Array:
-        """Return the variances of what noise adds to an error, shape (draws,)."""
+        """Return the variances of an error from noise, shape (draws,)."""
         order = GYRO_ORDER[error]  # type: ignore[index]  # north is not asked for
         gravity = STANDARD_GRAVITY if order else 1.0
         total = gravity**2 * grown(gyro, order, time, start)

@@ -79,18 +79,18 @@ class Question:
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
         """Return the budget for these axes."""
         if self.error == "north":
-            return self._compass(gyro).heading(self.time)
-        return budget(self.error, self.time, **self._conditions(gyro, accel))
+            return self._make_gyrocompass(gyro).heading(self.time)
+        return budget(self.error, self.time, **self._make_arguments(gyro, accel))
 
     def reached(self, gyro: AxisErrors, accel: AxisErrors) -> float | None:
         """Return the time at which the limit is reached, s; for north, the static time needed."""
         if self.limit is None:
             return None
         if self.error == "north":
-            return self._compass(gyro).time_needed(self.limit)
-        return time_until(self.limit, self.error, **self._conditions(gyro, accel))
+            return self._make_gyrocompass(gyro).time_needed(self.limit)
+        return time_until(self.limit, self.error, **self._make_arguments(gyro, accel))
 
-    def _conditions(self, gyro: AxisErrors, accel: AxisErrors) -> dict[str, Any]:
+    def _make_arguments(self, gyro: AxisErrors, accel: AxisErrors) -> dict[str, Any]:
         """Return the arguments of a budget other than the error and its time."""
         return {
             "gyro": gyro.model,
@@ -101,7 +101,7 @@ class Question:
             "accel_figures": accel.figures,
         }
 
-    def _compass(self, gyro: AxisErrors) -> Gyrocompass:
+    def _make_gyrocompass(self, gyro: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
         stated = self.start.gyro.bias if isinstance(self.start.gyro, Uncalibrated) else None
         # North-finding at arbitrary times removes the bias by turning the gyro.

@@ -69,7 +69,11 @@ class WindowCovariance:
         for term in model.terms:
             if not isinstance(term, Deterministic):
                 power, unit = term.as_unit()
-                total += power * (self._of_term(term) if unit is term else self._of_unit(unit))
+                total += power * (
+                    self._compute_covariance(term)
+                    if unit is term
+                    else self._get_unit_covariance(unit)
+                )
         return total
 
     def spread(self, model: NoiseModel, errors: Errors) -> Spread:
@@ -83,7 +87,7 @@ class WindowCovariance:
         covariance, share = self.of(model), _count_both_signs(errors.pairs) / errors.count**2
         mean, variance = float(covariance[0]), 2.0 * float(share @ covariance**2)
         distance = self.window.block * np.arange(self.lags)
-        for power, frequency in self._deterministic(model):
+        for power, frequency in self._list_deterministic(model):
             mean += power
             wave = np.cos(2.0 * math.pi * frequency * distance)
             variance += 4.0 * power * max(float(share @ (covariance * wave)), 0.0)
@@ -93,29 +97,29 @@ class WindowCovariance:
                 variance += 0.5 * power**2 * _compute_coherence(2.0 * turn, errors.count)
         return Spread(mean, max(variance, _MIN_RELATIVE_VARIANCE * mean**2))
 
-    def _deterministic(self, model: NoiseModel) -> Iterator[tuple[float, float]]:
+    def _list_deterministic(self, model: NoiseModel) -> Iterator[tuple[float, float]]:
         """Yield mean square and frequency, Hz, of deterministic terms; 0 Hz for the ramp."""
         for term in model.terms:
             if isinstance(term, Deterministic):
                 yield term.swing(self.weights, self.window.block)
 
     @cached_property
-    def _units(self) -> dict[Term, Array]:
+    def _unit_covariances(self) -> dict[Term, Array]:
         return {}
 
-    def _of_unit(self, unit: Term) -> Array:
+    def _get_unit_covariance(self, unit: Term) -> Array:
         """Return the covariance of a term that all models share."""
-        if unit not in self._units:
-            self._units[unit] = self._of_term(unit)
-        return self._units[unit]
+        if unit not in self._unit_covariances:
+            self._unit_covariances[unit] = self._compute_covariance(unit)
+        return self._unit_covariances[unit]
 
-    def _of_term(self, term: Term) -> Array:
+    def _compute_covariance(self, term: Term) -> Array:
         reach = self.window.blocks - 1
         lags = np.abs(np.arange(-reach, self.lags + reach, dtype=np.float64))
-        return correlated(term.block_covariance(lags, self.window.block), self._overlap)
+        return correlated(term.block_covariance(lags, self.window.block), self._autocorrelation)
 
     @cached_property
-    def _overlap(self) -> Array:
+    def _autocorrelation(self) -> Array:
         """The autocorrelation of the weights, from -(blocks - 1) to blocks - 1."""
         return np.correlate(self.weights, self.weights, "full")
 

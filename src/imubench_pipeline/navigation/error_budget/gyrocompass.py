@@ -94,13 +94,13 @@ class Gyrocompass:
         """
         if not (math.isfinite(time) and time > 0):
             raise ValueError(f"time is {time}, expected a time above 0")
-        biases = self._biases()
+        biases = self._list_bias_errors()
         missing = [part for part in biases if isinstance(part, Missing)]
         return Budget(
             time,
             "heading",
             [
-                *self._of_noise(time, swings=True),
+                *self._list_noise_errors(time, swings=True),
                 *(part for part in biases if isinstance(part, Contribution)),
             ],
             [_BIAS_LEFT_OUT_NOTE] if missing else [],
@@ -123,11 +123,11 @@ class Gyrocompass:
         if not (math.isfinite(accuracy) and accuracy > 0):
             raise ValueError(f"accuracy is {accuracy}, expected an angle above 0")
 
-        biases = [part.sigma for part in self._biases() if isinstance(part, Contribution)]
+        biases = [part.sigma for part in self._list_bias_errors() if isinstance(part, Contribution)]
 
         def excess(logarithm: float) -> float:
             time = math.exp(logarithm)
-            sigmas = (part.sigma for part in self._of_noise(time, swings=False))
+            sigmas = (part.sigma for part in self._list_noise_errors(time, swings=False))
             return math.hypot(*sigmas, *biases) / accuracy - 1.0
 
         at = np.log(_WINDOW_LENGTHS)
@@ -153,38 +153,40 @@ class Gyrocompass:
         return math.exp(brentq(excess, float(at[first - 1]), after, xtol=1e-12))
 
     @property
-    def _north(self) -> float:
+    def _north_rate(self) -> float:
         """North component of the Earth's rate, rad/s."""
         return EARTH_RATE * math.cos(self.latitude)
 
-    def _biases(self) -> list[Contribution | Missing]:
+    def _list_bias_errors(self) -> list[Contribution | Missing]:
         """Return the contributions of the gyro bias, which do not decrease with time."""
         if self.positions == 2:
             return []
         if self.bias is not None:
-            sigma = self.bias / self._north
+            sigma = self.bias / self._north_rate
             return [Contribution("gyro turn-on bias", sigma, "turn_on_bias", STATED_FIGURE)]
         parts = (
-            of_figure("gyro", cause, f"gyro {CAUSE_NAMES[cause]}", 1.0 / self._north, self.figures)
+            of_figure(
+                "gyro", cause, f"gyro {CAUSE_NAMES[cause]}", 1.0 / self._north_rate, self.figures
+            )
             for cause in BIAS_CAUSES
         )
         return [part for part in parts if part is not None]
 
-    def _of_noise(self, time: float, *, swings: bool) -> Iterator[Contribution]:
+    def _list_noise_errors(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
             # Only a line oscillates: its mean is 0 after each whole period.
             if isinstance(term, Sinusoid) and not swings:
-                sigma = self._envelope(term, time)
+                sigma = self._compute_envelope(term, time)
             else:
-                sigma = math.sqrt(self._variance(term, time))
-            yield Contribution(f"gyro {term.source}", sigma / self._north)
+                sigma = math.sqrt(self._compute_variance(term, time))
+            yield Contribution(f"gyro {term.source}", sigma / self._north_rate)
 
-    def _variance(self, term: Term, time: float) -> float:
+    def _compute_variance(self, term: Term, time: float) -> float:
         if self.positions == 1:
             return term.mean_variance(time, self.on_time)
         return float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0
 
-    def _envelope(self, line: Sinusoid, time: float) -> float:
+    def _compute_envelope(self, line: Sinusoid, time: float) -> float:
         # |sin(x) / x| at one position, sin^2(x/2) / (x/2) at two.
         x = math.pi * line.frequency * time / self.positions
         most = min(1.0, 1.0 / x) if self.positions == 1 else min(x, 1.0 / x)

@@ -176,7 +176,9 @@ class Largest:
         if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
             return row
         quantity = "accel" if "accel" in contribution.source.split() else "gyro"
-        return self._figure(row, quantity, contribution.cause, contribution.sigma / figure.sigma)
+        return self._add_largest(
+            row, quantity, contribution.cause, contribution.sigma / figure.sigma
+        )
 
     def of_missing(self, of: ErrorBudgetRow, missing: Missing) -> ErrorBudgetRow:
         """Return the row of a source with a missing figure. ``of`` is the row of the error."""
@@ -187,9 +189,9 @@ class Largest:
             origin="not known",
             reason=missing.reason,
         )
-        return self._figure(row, missing.quantity, missing.cause, missing.lever)
+        return self._add_largest(row, missing.quantity, missing.cause, missing.lever)
 
-    def _figure(
+    def _add_largest(
         self, row: ErrorBudgetRow, quantity: str, cause: str, lever: float
     ) -> ErrorBudgetRow:
         dimension = FIGURE_DIMENSIONS[quantity][DATASHEET_KEY_OF_CAUSE[cause]][0]  # type: ignore[index]  # a cause

@@ -167,7 +167,7 @@ class Board:
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
         own = [m.allan_variance(t, r) for m, r in zip(self.models, self.rates, strict=True)]
         common = [process.model.allan_variance(t, self.rate) for process in self.shared]
-        return self._parts(own, common, len(t))
+        return self._make_parts(own, common, len(t))
 
     def spectral_parts(self, omega: ArrayLike) -> Parts:
         """Return the spectra of the fused samples, without ramps and lines.
@@ -181,9 +181,9 @@ class Board:
             if key not in spectra:
                 spectra[key] = block_mean_spectrum(model, w, rate, key[1])
         common = [process.model.sampled_spectrum(w, self.rate) for process in self.shared]
-        return self._parts([spectra[key] for key in keys], common, len(w))
+        return self._make_parts([spectra[key] for key in keys], common, len(w))
 
-    def _parts(self, own: Sequence[Array], common: Sequence[Array], points: int) -> Parts:
+    def _make_parts(self, own: Sequence[Array], common: Sequence[Array], points: int) -> Parts:
         shared = np.array(common).reshape(len(self.shared), points)
         return Parts(np.column_stack(own), shared.T, self.sensitivities)
 

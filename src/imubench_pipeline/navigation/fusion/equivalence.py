@@ -96,7 +96,7 @@ class FusionChannel:
         return float(self.model.allan_variance(tau)) + self.of_temperature(tau)
 
     def of_temperature(self, tau: float) -> float:
-        """Return what temperature adds to it, (rad/s)² or (m/s²)², at a tau in s."""
+        """Return the Allan variance from temperature, (rad/s)² or (m/s²)², at a tau in s."""
         return 0.0 if self.temperature is None else self.temperature.variance(tau)
 
     def unknown(self, tau: float) -> Iterator[str]:
@@ -107,13 +107,13 @@ class FusionChannel:
             for name, parameter in group.items():
                 if parameter.value is not None or parameter.status in ("absent", "not_shown"):
                     continue
-                part = _alone(name, group, tau)
+                part = _bound_variance(name, group, tau)
                 if part > _MIN_RELEVANT_SHARE * total:
                     status = parameter.status.replace("_", " ")
                     yield f"{name} of {self.sensor}/{self.recording} {self.channel} is {status}"
 
 
-def _alone(name: str, group: Mapping[str, Parameter], tau: float) -> float:
+def _bound_variance(name: str, group: Mapping[str, Parameter], tau: float) -> float:
     """Return the largest Allan variance of a parameter, from its value or upper limit."""
     size = {
         key: parameter.in_model if parameter.upper is None else parameter.upper

@@ -93,7 +93,7 @@ class Rests:
         """Return the verdict with its conditions applied, and the conditions in words."""
         if self.lacking:
             return EXCLUDED, "; ".join(self.lacking)
-        conditions = list(self._conditions())
+        conditions = list(self._list_conditions())
         if words not in CONDITIONAL_VERDICTS or not conditions:
             return words, None
         return CONDITIONAL_VERDICTS[words], "; ".join(conditions)
@@ -107,7 +107,7 @@ class Rests:
         ]
         return [*causes, *self.unknown]
 
-    def _conditions(self) -> Iterator[str]:
+    def _list_conditions(self) -> Iterator[str]:
         for (measured, cause), largest in self.figures.items():
             text, *units = _CONDITION_TEXTS[cause]
             unit = units[measured == "accel"]

@@ -1,1 +1,1 @@
-"""What verdicts on sensors stand on: specimens, evidence, doubts of units, and what to do next."""
+"""Verdicts on sensors: specimens, evidence, doubtful units, and recommended next steps."""

@@ -43,15 +43,15 @@ class Judgement:
     @property
     def verdict(self) -> str:
         """Verdict on the sensor."""
-        return self.outside or self.rests.verdict(self._of_errors)[0]
+        return self.outside or self.rests.verdict(self._verdict_on_errors)[0]
 
     @property
     def conditions(self) -> str | None:
         """Conditions of the verdict, or why the sensor is excluded, in words."""
-        return None if self.outside else self.rests.verdict(self._of_errors)[1]
+        return None if self.outside else self.rests.verdict(self._verdict_on_errors)[1]
 
     @property
-    def _of_errors(self) -> str:
+    def _verdict_on_errors(self) -> str:
         """Verdict on the known errors: by the deciding limit, or by all after calibration."""
         once = [_judge_once_calibrated(standing) for standing in self.standings]
         if self.decides.known and once != [standing.verdict for standing in self.standings]:
