@@ -7,7 +7,11 @@ from scipy.signal import lfilter
 from imubench_pipeline.experiments.earth_rate.alternation import alternation, between
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import interval_density
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell
-from imubench_pipeline.experiments.earth_rate.transients import CLEAR, blocks_of, transients
+from imubench_pipeline.experiments.earth_rate.transients import (
+    CLEAR_LOG_LIKELIHOOD,
+    blocks_of,
+    transients,
+)
 from imubench_pipeline.experiments.earth_rate.turning import find_turning
 from imubench_pipeline.experiments.earth_rate.turns import Turning
 from imubench_pipeline.noise import NoiseModel
@@ -305,7 +309,7 @@ def test_noise_has_no_handling_at_the_ends() -> None:
     for seed in range(60):
         log = turned([], 300.0, noise=noise, seed=seed)
         events = transients(blocks_of(log, RATE, 30.0, noise), log, RATE)
-        assert not [event for event in events if event.likelihood > CLEAR], seed
+        assert not [event for event in events if event.likelihood > CLEAR_LOG_LIKELIHOOD], seed
 
 
 def test_noise_that_is_not_the_models_is_a_doubt() -> None:
@@ -331,8 +335,8 @@ def test_noise_alone_has_hardly_a_transient() -> None:
     assert len(transients(blocks_of(log, RATE, 30.0), log, RATE)) < 25
     slow = lfilter([1.0], [1.0, -0.9], np.random.default_rng(1).standard_normal(len(log)))
     found = transients(blocks_of(slow, RATE, 30.0), slow, RATE)
-    assert sum(event.likelihood > CLEAR for event in found) < 15
-    assert max(event.likelihood for event in found) < 2.0 * CLEAR
+    assert sum(event.likelihood > CLEAR_LOG_LIKELIHOOD for event in found) < 15
+    assert max(event.likelihood for event in found) < 2.0 * CLEAR_LOG_LIKELIHOOD
 
 
 def test_the_density_of_intervals_is_one_in_all() -> None:

@@ -10,13 +10,17 @@ import numpy as np
 
 from imubench_pipeline.experiments.earth_rate.alternation import alternation, best_shift, between
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import (
-    EDGE,
+    EDGE_DWELL_FRACTION,
     choose,
-    closest,
+    compute_min_calm,
     may_be_silent,
     shorter_dwell,
 )
-from imubench_pipeline.experiments.earth_rate.transients import CLEAR, Event, LevelBlocks
+from imubench_pipeline.experiments.earth_rate.transients import (
+    CLEAR_LOG_LIKELIHOOD,
+    Event,
+    LevelBlocks,
+)
 from imubench_pipeline.experiments.earth_rate.turns import Turn
 from imubench_pipeline.typing import Array
 
@@ -81,7 +85,9 @@ def by_sight(
     else:
         seen, rest, doubts = _scheduled(blocks, events, schedule, trust)
     quick = [e for e in rest if e.kind == "transient"]
-    ends = sum(_at_end(event, schedule) and event.likelihood > CLEAR for event in quick)
+    ends = sum(
+        _at_end(event, schedule) and event.likelihood > CLEAR_LOG_LIKELIHOOD for event in quick
+    )
     if ends:
         doubts.append("handling at the ends of the log is left out")
     silent = sum(turn.found_by == "schedule" for turn in seen)
@@ -97,7 +103,7 @@ def _of_events(
     events: list[Event], chosen: Sequence[int], schedule: TurnSchedule
 ) -> tuple[list[Turn], list[Event]]:
     """Return the turns of the events chosen, with what came of the same turn, and the others."""
-    near = closest(schedule.dwell)
+    near = compute_min_calm(schedule.dwell)
     turns: list[Turn] = []
     used = set(chosen)
     for k in chosen:
@@ -112,13 +118,17 @@ def _of_events(
                 gap = max(other.start - stop, start - other.stop)
                 if gap > near:
                     break
-                if not other.haste and other.likelihood > CLEAR and other.kind == "transient":
+                if (
+                    not other.haste
+                    and other.likelihood > CLEAR_LOG_LIKELIHOOD
+                    and other.kind == "transient"
+                ):
                     start, stop = min(start, other.start), max(stop, other.stop)
                     peak = max(peak, other.peak)
                     used.add(i)
                     doubts = ["overrun and come back, or handled beside the turn"]
                 i += step
-        if event.likelihood < CLEAR:
+        if event.likelihood < CLEAR_LOG_LIKELIHOOD:
             doubts.append("hardly above the noise")
         if event.haste:
             doubts.append("as short as a knock")
@@ -141,7 +151,9 @@ def _filled(
     usual = float(np.median(single)) if len(single) else schedule.dwell
     filled: list[Turn] = []
     if silent:
-        more = np.arange(time[0] - usual, (EDGE + 0.3) * schedule.dwell, -usual)[::-1]
+        more = np.arange(time[0] - usual, (EDGE_DWELL_FRACTION + 0.3) * schedule.dwell, -usual)[
+            ::-1
+        ]
         filled += [_silent(float(at), schedule) for at in more]
     for k, turn in enumerate(turns):
         many = max(1, round(float(gaps[k - 1]) / usual)) if k else 1
@@ -156,7 +168,7 @@ def _filled(
             turn = replace(turn, doubts=(*turn.doubts, words))
         filled.append(turn)
     if silent:
-        last = schedule.duration - (EDGE + 0.3) * schedule.dwell
+        last = schedule.duration - (EDGE_DWELL_FRACTION + 0.3) * schedule.dwell
         filled += [_silent(float(at), schedule) for at in np.arange(time[-1] + usual, last, usual)]
     return filled
 
@@ -183,7 +195,7 @@ def _scheduled(
     blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
 ) -> tuple[list[Turn], list[Event], list[str]]:
     """Return the turns of the schedule; where a clear transient is near one, that is it."""
-    half, longest = _half(schedule), schedule.duration - EDGE * schedule.dwell
+    half, longest = _half(schedule), schedule.duration - EDGE_DWELL_FRACTION * schedule.dwell
     count = max(0, math.ceil((longest - schedule.start) / schedule.dwell))
     slots: Array = schedule.start + schedule.dwell * np.arange(1.0, count) + 0.5 * schedule.turning
     slots = slots[(slots > half) & (slots < longest)]
@@ -195,7 +207,7 @@ def _scheduled(
         calm, slots, 0.5 * schedule.turning, longest_shift, schedule.duration
     )
     doubts: list[str] = []
-    by_step = abs(z) > _SHIFTED and z**2 - unshifted**2 > 2.0 * CLEAR
+    by_step = abs(z) > _SHIFTED and z**2 - unshifted**2 > 2.0 * CLEAR_LOG_LIKELIHOOD
     if by_step:
         slots = slots + shift
         slots = slots[(slots > half) & (slots < schedule.duration - half)]
@@ -219,7 +231,7 @@ def _scheduled(
             k
             for k, e in enumerate(events)
             if abs(e.time - slot) < 2.0 * schedule.tolerance
-            and (e.likelihood > CLEAR and not e.haste and k not in used)
+            and (e.likelihood > CLEAR_LOG_LIKELIHOOD and not e.haste and k not in used)
         ]
         if near:
             best = max(near, key=lambda k: events[k].likelihood)
@@ -234,7 +246,7 @@ def _scheduled(
 
 
 def _at_end(event: Event, schedule: TurnSchedule) -> bool:
-    edge = EDGE * schedule.dwell
+    edge = EDGE_DWELL_FRACTION * schedule.dwell
     return not event.haste and not edge <= event.time <= schedule.duration - edge
 
 
@@ -243,7 +255,7 @@ def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
     return [
         (event.start - _CALMING, event.stop + _CALMING)
         for event in events
-        if event.haste or event.likelihood > CLEAR
+        if event.haste or event.likelihood > CLEAR_LOG_LIKELIHOOD
     ]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.experiments.earth_rate.alternation import alternation, contradiction
-from imubench_pipeline.experiments.earth_rate.choice_of_turns import EDGE
+from imubench_pipeline.experiments.earth_rate.choice_of_turns import EDGE_DWELL_FRACTION
 from imubench_pipeline.experiments.earth_rate.sight import (
     TurnSchedule,
     by_sight,
@@ -24,7 +24,7 @@ from imubench_pipeline.experiments.earth_rate.sight import (
     leave_out_knocks,
 )
 from imubench_pipeline.experiments.earth_rate.transients import (
-    CLEAR,
+    CLEAR_LOG_LIKELIHOOD,
     Event,
     LevelBlocks,
     blocks_of,
@@ -266,7 +266,7 @@ def _by_column(
         first, last, peak = float(stop), float(start), None
         for k, event in enumerate(events):
             near = event.stop > stop - 3.0 and event.start < start + 3.0
-            if near and not event.haste and event.likelihood > CLEAR:
+            if near and not event.haste and event.likelihood > CLEAR_LOG_LIKELIHOOD:
                 first, last = min(first, event.start), max(last, event.stop)
                 peak = max(peak or 0.0, event.peak)
                 used.add(k)
@@ -299,7 +299,7 @@ def _stretches(
     turns: Sequence[Turn], knocks: Sequence[tuple[float, float]], schedule: TurnSchedule
 ) -> tuple[list[tuple[float, float]], list[str]]:
     """Return start and stop of the dwells between turns; handling at the ends is cut off."""
-    edge = EDGE * schedule.dwell
+    edge = EDGE_DWELL_FRACTION * schedule.dwell
     first = max((stop for _, stop in knocks if stop < min(edge, turns[0].start)), default=0.0)
     late = max(schedule.duration - edge, turns[-1].stop)
     last = min((start for start, _ in knocks if start > late), default=schedule.duration)
