@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.aided.axis_states import axis_states, stack, steps_of
+from imubench_pipeline.experiments.aided.axis_states import axis_states, split_into_steps, stack
 from imubench_pipeline.noise import NoiseModel
 
 RATE, WIDTH, STEPS = 50.0, 5, 10
@@ -36,11 +36,19 @@ def sums(model: NoiseModel, steps: int) -> np.ndarray:
     powers = [np.linalg.matrix_power(one.step[own, own], k) for k in range(steps)]
     start, covariance = one.start[own, own], np.empty((steps, steps))
     for i in range(steps):
-        covariance[i, i] = one.seen[i, own] @ start @ one.seen[i, own] + one.summed[i, 2]
+        covariance[i, i] = (
+            one.sum_observation[i, own] @ start @ one.sum_observation[i, own]
+            + one.sum_variance[i, 2]
+        )
         # The state after step i and the sum of it: what later sums have in common with it.
-        shared = one.mixed[i, own] + powers[1] @ powers[i] @ start @ one.seen[i, own]
+        shared = (
+            one.sum_state_covariance[i, own]
+            + powers[1] @ powers[i] @ start @ one.sum_observation[i, own]
+        )
         for j in range(i + 1, steps):
-            covariance[i, j] = covariance[j, i] = one.now[own] @ powers[j - i - 1] @ shared
+            covariance[i, j] = covariance[j, i] = (
+                one.first_observation[own] @ powers[j - i - 1] @ shared
+            )
     return covariance
 
 
@@ -75,7 +83,7 @@ def test_the_bias_at_switch_on_is_the_start_of_a_walk_or_a_state() -> None:
 
 
 def test_steps_divide_the_time_between_fixes() -> None:
-    assert steps_of(100, 10) == (10, 10)
-    assert steps_of(32, 4) == (4, 8)
-    assert steps_of(7, 1) == (1, 7)
-    assert steps_of(51, 6) == (3, 17)
+    assert split_into_steps(100, 10) == (10, 10)
+    assert split_into_steps(32, 4) == (4, 8)
+    assert split_into_steps(7, 1) == (1, 7)
+    assert split_into_steps(51, 6) == (3, 17)

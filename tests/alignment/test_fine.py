@@ -13,7 +13,7 @@ from imubench_pipeline.experiments.alignment.coarse import (
     coarse_alignment,
     mean_vectors,
 )
-from imubench_pipeline.experiments.alignment.fine import UNKNOWN, FineAlignment, align
+from imubench_pipeline.experiments.alignment.fine import INITIAL_ANGLE_SIGMA, FineAlignment, align
 from imubench_pipeline.experiments.alignment.triad import Positions, Triad
 from imubench_pipeline.experiments.calibration.least_squares import NotObservableError
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
@@ -54,7 +54,7 @@ def by_matrices(triad, positions, means):
     whitened = np.concatenate(x) / unit[:, None]
     inverse = np.linalg.inv(covariance / np.outer(unit, unit))
     left = (means - true_means(positions, SITE, ATTITUDE)).T.ravel() / unit
-    found = np.linalg.inv(whitened.T @ inverse @ whitened + np.eye(3) / UNKNOWN**2)
+    found = np.linalg.inv(whitened.T @ inverse @ whitened + np.eye(3) / INITIAL_ANGLE_SIGMA**2)
     return found @ whitened.T @ inverse @ left, found
 
 

@@ -12,7 +12,7 @@ from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.experiments.alignment.accuracy import accuracies
-from imubench_pipeline.experiments.alignment.fine import OPEN
+from imubench_pipeline.experiments.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.experiments.alignment.triad import Site, Triad
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.config import EarthRateSettings
@@ -95,7 +95,7 @@ def test_errors_of_simulated_triads_are_as_large_as_said(density: float) -> None
         assert (one.errors is not None) == (one.method == "fine" and one.time == 600.0)
         if one.errors is not None:
             there = np.isfinite(one.errors)
-            assert there.tolist() == [True, True, one.sigma[2] < OPEN]
+            assert there.tolist() == [True, True, one.sigma[2] < UNIFORM_HEADING_SIGMA]
             assert np.all(np.abs(one.errors[there] - 1.0) < 0.15), one
 
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.experiments.earth_rate.covariance import of_means
+from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.noise import Flicker, NoiseModel, RandomWalk, WhiteNoise
 from tests.earth_rate.brute import MODELS, of_blocks
@@ -15,7 +15,7 @@ from tests.earth_rate.test_experiment import experiments
 @settings(max_examples=15, deadline=None)
 def test_closed_forms_are_the_sums_over_samples(name, experiment, longest):
     blocks = experiment.blocks(longest)
-    found, wanted = of_means(MODELS[name], blocks), of_blocks(MODELS[name], blocks)
+    found, wanted = block_mean_covariance(MODELS[name], blocks), of_blocks(MODELS[name], blocks)
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-11 * np.abs(wanted).max())
 
 
@@ -25,7 +25,7 @@ def test_a_slow_process_keeps_its_digits():
     model = NoiseModel(B=1.0, T_B=1e7 / 32)
     step = np.array([1.0, -1.0])
     walk = RandomWalk(model.terms[0].density ** 0.5)
-    assert step @ of_means(model, blocks) @ step == pytest.approx(
+    assert step @ block_mean_covariance(model, blocks) @ step == pytest.approx(
         step @ walk.mean_covariance(blocks) @ step, rel=1e-4
     )
 

@@ -13,7 +13,7 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
     paper_run,
     simulate_runs,
 )
-from imubench_pipeline.experiments.earth_rate.states import WIDE, block_states
+from imubench_pipeline.experiments.earth_rate.states import UNINFORMATIVE_SIGMA, block_states
 from imubench_pipeline.noise import NoiseModel, WhiteNoise
 from tests.earth_rate.brute import MODELS, of_blocks, of_samples
 from tests.earth_rate.test_experiment import experiments
@@ -96,7 +96,7 @@ def test_no_knowledge_at_the_start_costs_no_digits(scale):
     blocks = paper_run(12.0).blocks(448)
     one = RateFilter(blocks, model)
     bound = cramer_rao(blocks, model)
-    assert one.rate_sigma[0] == pytest.approx(WIDE, rel=0.5)
+    assert one.rate_sigma[0] == pytest.approx(UNINFORMATIVE_SIGMA, rel=0.5)
     np.testing.assert_allclose(one.rate_sigma[4:], bound[4:], rtol=1e-6)
     smoothed = one.smooth(one.run(np.zeros((1, len(blocks)))))
     assert np.all(smoothed.drift_sigma < 1e-3 * scale)

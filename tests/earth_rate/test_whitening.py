@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.linalg import cholesky, solve_triangular
 
 from imubench_pipeline.experiments.earth_rate.bound import whiten
-from imubench_pipeline.experiments.earth_rate.covariance import of_means
+from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
 from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, paper_run
 from imubench_pipeline.noise import NoiseModel
 from tests.conftest import few
@@ -37,7 +37,7 @@ def test_many_blocks_lose_no_digits(model):
     blocks = paper_run(30.0).blocks(32)
     assert len(blocks) > 1600
     columns = np.column_stack([blocks.seen, np.ones(len(blocks))])
-    root = cholesky(of_means(model, blocks), lower=True)
+    root = cholesky(block_mean_covariance(model, blocks), lower=True)
     wanted = solve_triangular(root, columns, lower=True)
     found = whiten(model, blocks, columns)
     np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())

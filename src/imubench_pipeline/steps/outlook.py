@@ -18,7 +18,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.experiments.alignment.accuracy import accuracies
-from imubench_pipeline.experiments.alignment.fine import OPEN
+from imubench_pipeline.experiments.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.experiments.alignment.triad import Site, Triad
 from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.model.experiments import AlignmentRow, EarthRatePredictionRow
@@ -155,7 +155,7 @@ def _aligned(
             time=accuracy.time,
             roll=roll,
             pitch=pitch,
-            heading=heading if heading < OPEN else None,
+            heading=heading if heading < UNIFORM_HEADING_SIGMA else None,
             reason=accuracy.reason,
             error_roll=of_roll,
             error_pitch=of_pitch,

@@ -1,9 +1,9 @@
 """The states of a filter for the error of each axis, from discrete matrices of a noise model.
 
-An axis has x_(k+1) = Phi x_k + w_k, z_k = H x_k + v_k at its sampling rate, as
-`noise.NoiseModel.state_space` gives them, or a file that was exported. A filter that takes the
-samples of a step together needs the sum of z T over a step, an angle or a velocity, and the states
-after it. Both follow exactly from the matrices, by repeating
+An axis has x_(k+1) = Phi x_k + w_k, z_k = H x_k + v_k at its sampling rate, with the matrices of
+`noise.NoiseModel.state_space` or of an exported file. A filter that combines the samples of a step
+needs the sum of z T over the step (an angle or a velocity increment) and the states after it. Both
+follow exactly from the matrices, by repeating
 
     [sum, x] -> [sum + T (H x + v), Phi x + w].
 """
@@ -22,14 +22,14 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class AxisStates:
-    """What a filter knows of the error of one axis, at the sampling rate.
+    """Error model of one axis in a filter, at the sampling rate.
 
     Attributes
     ----------
     space : StateSpace
-        Its noise, and its bias at switch-on.
+        Noise and turn-on bias.
     scale : float
-        Standard deviation of the relative error of its scale factor; 0: it has no state.
+        Standard deviation of the relative scale-factor error; 0 if it is not a state.
     """
 
     space: StateSpace
@@ -53,9 +53,9 @@ def axis_states(
     sampling : float
         Hz.
     turn_on : float
-        Standard deviation of the bias at switch-on, rad/s or m/s^2.
+        Standard deviation of the turn-on bias, rad/s or m/s^2.
     shortest, longest : float
-        Tau between which flicker noise is followed by a bank of processes, s; below it is white.
+        Range of tau over which a bank of processes represents flicker noise, s; below, it is white.
     scale : float
         See `AxisStates`.
     """
@@ -66,9 +66,9 @@ def axis_states(
 
 
 def with_turn_on(space: StateSpace, turn_on: float) -> StateSpace:
-    """Return a space with a bias at switch-on of a standard deviation, in SI.
+    """Return a state space with a turn-on bias of this standard deviation, in SI.
 
-    A random walk begins with it; where there is none, it is a constant state of its own.
+    It is added to the initial variance of a random walk, or else becomes a constant state.
     """
     space = space.of_either_sign() if np.any(space.initial_mean) else space
     for i in range(len(space.output)):
@@ -82,44 +82,45 @@ def with_turn_on(space: StateSpace, turn_on: float) -> StateSpace:
 
 
 @dataclass(frozen=True)
-class Stacked:
+class StackedStates:
     """The states of all six axes over steps of several samples, for the compiled filter.
 
-    m states in all, gyros x, y, z before accelerometers; n steps from a fix of GNSS to the next.
+    There are m states, gyros x, y, z before accelerometers, and n steps between two GNSS fixes.
 
     Attributes
     ----------
     first : ndarray, shape (7,)
-        First state of each axis, and m.
+        Index of the first state of each axis, and m.
     step, epoch : ndarray, shape (m, m)
-        Transitions over a step and over n.
+        Transition matrices over one step and over n.
     noise : ndarray, shape (m, m)
-        Covariance of what the states gain over n steps.
-    seen : ndarray, shape (n, m)
-        What the sum over step k of the axis of each state gains of a state at the beginning.
-    mixed : ndarray, shape (n, m)
-        Covariance of that sum with what the state has gained since, after the step.
-    summed : ndarray, shape (n, 6)
-        Variance that the sums gain from what is new since the beginning.
-    now : ndarray, shape (m,)
-        Of ``seen``, for the first step.
+        Process noise covariance over n steps.
+    sum_observation : ndarray, shape (n, m)
+        Sensitivity of the sum over step k, on the axis of each state, to that state at the last
+        fix.
+    sum_state_covariance : ndarray, shape (n, m)
+        Covariance of this sum with the state after step k, from the noise since the last fix.
+    sum_variance : ndarray, shape (n, 6)
+        Variance of the sum over step k, from the noise since the last fix.
+    first_observation : ndarray, shape (m,)
+        ``sum_observation`` of the first step.
     start : ndarray, shape (m, m)
     mean : ndarray, shape (m,)
         Covariance and mean at switch-on.
     scale : ndarray, shape (6,)
-        See `AxisStates`; such states come after the m.
+        As in `AxisStates`; the states of scale factors come after the m.
     output : ndarray, shape (m,)
-        What z gains of a state.
+        Output matrix H: sensitivity of z to each state.
     """
 
     first: Array
     step: Array
     epoch: Array
     noise: Array
-    seen: Array
-    mixed: Array
-    summed: Array
-    now: Array
+    sum_observation: Array
+    sum_state_covariance: Array
+    sum_variance: Array
+    first_observation: Array
     start: Array
     mean: Array
     scale: Array
@@ -127,22 +128,22 @@ class Stacked:
 
     @property
     def states(self) -> int:
-        """How many the filter has, with position, velocity and attitude."""
+        """Number of states of the filter, including position, velocity and attitude."""
         return 9 + int(self.first[-1]) + int(np.count_nonzero(self.scale))
 
 
-def stack(axes: Sequence[AxisStates], sampling: float, width: int, steps: int) -> Stacked:
+def stack(axes: Sequence[AxisStates], sampling: float, width: int, steps: int) -> StackedStates:
     """Return the states of six axes over ``steps`` steps of ``width`` samples, at a rate in Hz.
 
-    What the sum over a step has in common with the states after it is a part of that.
+    The covariance between the sum over a step and the states after it is included.
     """
     T = 1.0 / sampling
     spaces = [axis.space for axis in axes]
     whole = StateSpace.together([*spaces, StateSpace.without_states(0.0)])
     first = np.cumsum([0, *(len(space.output) for space in spaces)])
     m = int(first[-1])
-    step, noise_of_step, now = np.zeros((m, m)), np.zeros((m, m)), np.zeros(m)
-    fresh_mixed, fresh_summed = np.zeros(m), np.zeros(6)
+    step, noise_of_step, first_observation = np.zeros((m, m)), np.zeros((m, m)), np.zeros(m)
+    step_state_covariance, step_variance = np.zeros(m), np.zeros(6)
     for a, space in enumerate(spaces):
         own = slice(first[a], first[a + 1])
         size = len(space.output)
@@ -150,28 +151,32 @@ def stack(axes: Sequence[AxisStates], sampling: float, width: int, steps: int) -
         once[0, 1:], once[1:, 1:] = T * space.output, space.transition
         gained[0, 0], gained[1:, 1:] = T**2 * space.measurement_noise, space.process_noise
         over, noise = repeat_step(once, gained, width)
-        step[own, own], now[own] = over[1:, 1:], over[0, 1:]
+        step[own, own], first_observation[own] = over[1:, 1:], over[0, 1:]
         noise_of_step[own, own] = noise[1:, 1:]
-        fresh_mixed[own], fresh_summed[a] = noise[0, 1:], noise[0, 0]
-    seen, mixed, summed = np.empty((steps, m)), np.empty((steps, m)), np.empty((steps, 6))
+        step_state_covariance[own], step_variance[a] = noise[0, 1:], noise[0, 0]
+    sum_observation, sum_state_covariance, sum_variance = (
+        np.empty((steps, m)),
+        np.empty((steps, m)),
+        np.empty((steps, 6)),
+    )
     transition, noise = np.eye(m), np.zeros((m, m))
     for k in range(steps):
-        seen[k] = now @ transition
-        of_now = now @ noise  # each axis is independent of the others
+        sum_observation[k] = first_observation @ transition
+        noise_observation = first_observation @ noise  # each axis is independent of the others
         for a in range(6):
             own = slice(first[a], first[a + 1])
-            summed[k, a] = of_now[own] @ now[own] + fresh_summed[a]
-        mixed[k] = of_now @ step.T + fresh_mixed
+            sum_variance[k, a] = noise_observation[own] @ first_observation[own] + step_variance[a]
+        sum_state_covariance[k] = noise_observation @ step.T + step_state_covariance
         transition, noise = step @ transition, step @ noise @ step.T + noise_of_step
-    return Stacked(
+    return StackedStates(
         first=first.astype(np.int64),
         step=step,
         epoch=transition,
         noise=noise,
-        seen=seen,
-        mixed=mixed,
-        summed=summed,
-        now=now,
+        sum_observation=sum_observation,
+        sum_state_covariance=sum_state_covariance,
+        sum_variance=sum_variance,
+        first_observation=first_observation,
         start=whole.initial_variance,
         mean=whole.initial_mean,
         scale=np.array([axis.scale for axis in axes]),
@@ -179,10 +184,10 @@ def stack(axes: Sequence[AxisStates], sampling: float, width: int, steps: int) -
     )
 
 
-def steps_of(samples: int, widest: int) -> tuple[int, int]:
-    """Return the samples of a step and the steps between two fixes that are some samples apart.
+def split_into_steps(samples: int, widest: int) -> tuple[int, int]:
+    """Return samples per step, and steps between two fixes, from the samples between the fixes.
 
-    A step has ``widest`` samples at most, from 1.
+    A step has 1 to ``widest`` samples.
     """
     width = next(width for width in range(min(widest, samples), 0, -1) if samples % width == 0)
     return width, samples // width

@@ -85,10 +85,10 @@ def run(
     D: Array,
     D_epoch: Array,
     noise: Array,
-    seen: Array,
-    mixed: Array,
-    summed: Array,
-    now: Array,
+    sum_observation: Array,
+    sum_state_covariance: Array,
+    sum_variance: Array,
+    first_observation: Array,
     start_of_states: Array,
     mean: Array,
     scale: Array,
@@ -119,7 +119,7 @@ def run(
     start : ndarray, shape (9, 9)
         Covariance of its error.
     first ... output
-        Of `axis_states.Stacked`.
+        Of `axis_states.StackedStates`.
     width : int
         Samples of a step.
 
@@ -132,7 +132,7 @@ def run(
     covariance : ndarray, shape (9 + m + s, 9 + m + s)
         Of all states after the last epoch.
     """
-    E, steps = len(fixes), len(seen)
+    E, steps = len(fixes), len(sum_observation)
     m = first[6]
     of_scale = np.full(6, -1)
     total = NAV + m
@@ -183,7 +183,7 @@ def run(
             for a in range(6):
                 s = 0.0
                 for j in range(first[a], first[a + 1]):
-                    s += now[j] * x[j]
+                    s += first_observation[j] * x[j]
                 estimated[a] = s / dt
                 moved[a] = 0.0
             mean_force[:] = 0.0
@@ -255,10 +255,10 @@ def run(
             MSQ[:] = 0.0
             for i in range(NAV):
                 for j in range(m):
-                    MSQ[i, axis_of[j]] += Qnx[i, j] * now[j]
+                    MSQ[i, axis_of[j]] += Qnx[i, j] * first_observation[j]
             for i in range(NAV):
                 for j in range(6):
-                    s = 0.5 * M[i, j] * summed[part, j]
+                    s = 0.5 * M[i, j] * sum_variance[part, j]
                     for r in range(NAV):
                         if A_step[i, r] != 0.0:
                             s += A_step[i, r] * MSQ[r, j]
@@ -282,7 +282,7 @@ def run(
                         for j in range(m):
                             Q_new[i, j] += c * Qnx[r, j]
                 for j in range(m):
-                    B_new[i, j] += M[i, axis_of[j]] * seen[part, j]
+                    B_new[i, j] += M[i, axis_of[j]] * sum_observation[part, j]
                 for a in range(6):
                     if of_scale[a] >= 0:
                         B_new[i, of_scale[a] - NAV] += M[i, a] * moved[a]
@@ -290,7 +290,7 @@ def run(
             for i in range(NAV):
                 for a in range(6):
                     for j in range(first[a], first[a + 1]):
-                        s = M[i, a] * mixed[part, j]
+                        s = M[i, a] * sum_state_covariance[part, j]
                         for r in range(first[a], first[a + 1]):
                             s += D[j, r] * Q_new[i, r]
                         Qnx[i, j] = s

@@ -10,7 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.experiments.aided.axis_states import AxisStates, Stacked, stack, steps_of
+from imubench_pipeline.experiments.aided.axis_states import (
+    AxisStates,
+    StackedStates,
+    split_into_steps,
+    stack,
+)
 from imubench_pipeline.experiments.aided.error_state import run
 from imubench_pipeline.experiments.aided.signals import Signals
 from imubench_pipeline.experiments.aided.strapdown import rotation
@@ -80,7 +85,7 @@ class Drive:
         self.trajectory = trajectory
         rate = trajectory.sampling
         self.every = max(round(rate * EPOCH), 1)
-        self.width, self.steps = steps_of(self.every, math.ceil(rate * LONGEST_STEP))
+        self.width, self.steps = split_into_steps(self.every, math.ceil(rate * LONGEST_STEP))
         self.at: NDArray[np.int64] = np.arange(self.every, len(trajectory.rate) + 1, self.every)
         self.times = self.at / rate
         self.available = np.ones(len(self.at), dtype=np.bool_)
@@ -114,11 +119,11 @@ class Drive:
         ]
         return np.add.outer(np.array(lasts, dtype=np.int64), 1 + np.arange(self._epochs(length)))
 
-    def stacked(self, axes: Sequence[AxisStates]) -> Stacked:
+    def stacked(self, axes: Sequence[AxisStates]) -> StackedStates:
         """Return the states of six axes over the steps of this drive."""
         return stack(axes, self.trajectory.sampling, self.width, self.steps)
 
-    def filter(self, stacked: Stacked, signals: Signals) -> tuple[Array, Array, Array, Array]:
+    def filter(self, stacked: StackedStates, signals: Signals) -> tuple[Array, Array, Array, Array]:
         """Run the filter once; see `error_state.run` for what it returns."""
         way = self.trajectory
         off = self._sigmas * signals.start
@@ -144,10 +149,10 @@ class Drive:
             stacked.step,
             stacked.epoch,
             stacked.noise,
-            stacked.seen,
-            stacked.mixed,
-            stacked.summed,
-            stacked.now,
+            stacked.sum_observation,
+            stacked.sum_state_covariance,
+            stacked.sum_variance,
+            stacked.first_observation,
             stacked.start,
             stacked.mean,
             stacked.scale,

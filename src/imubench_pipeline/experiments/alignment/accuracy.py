@@ -1,11 +1,11 @@
-"""How well a triad aligns itself as the time at rest grows, in one position and in two.
+"""Accuracy of the self-alignment of a triad over the time at rest, in one position and in two.
 
-The triad is level, its nose to the north: the accuracy of the heading is that of the east gyro. Two
-positions are opposite about the vertical, with as much data each. Coarse alignment is that of means
-(`coarse`), fine that of the filter (`fine`). As a check triads are simulated from the exact
-distribution of their block means, aligned coarsely and then by the filter; the root mean square of
-their errors over the standard deviation that the filter states is 1 where that is right. Where the
-heading is not small enough for that, small angles about the true attitude are compared.
+The triad is level, its nose to the north: the east gyro determines the accuracy of the heading. Two
+positions are opposite about the vertical, with equal amounts of data. Coarse alignment uses the
+means (`coarse`), fine alignment the filter (`fine`). As a check, triads are simulated from the
+exact distribution of their block means, and aligned coarsely, then by the filter. The root mean
+square of their errors over the standard deviation of the filter is 1 if the latter is right. If the
+error of the heading is too large for that, small angles about the true attitude are compared.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from imubench_pipeline.experiments.alignment.coarse import (
     coarse_alignment,
     mean_vectors,
 )
-from imubench_pipeline.experiments.alignment.fine import OPEN, FineAlignment
+from imubench_pipeline.experiments.alignment.fine import UNIFORM_HEADING_SIGMA, FineAlignment
 from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs
 from imubench_pipeline.typing import Array
@@ -39,7 +39,7 @@ class TriadRuns:
 
 
 def true_means(positions: Positions, site: Site, attitude: Array) -> Array:
-    """Return what a triad without error shows, rad/s and m/s^2, shape (b, 6).
+    """Return the readings of an error-free triad, rad/s and m/s^2, shape (b, 6).
 
     Gyros and accelerometers x, y, z, at an attitude in the first position, shape (3, 3).
     """
@@ -58,7 +58,7 @@ def simulate_triad(
 ) -> TriadRuns:
     """Draw the block means of many runs; the fixed biases are drawn for each.
 
-    The attitude is that in the first position, shape (3, 3).
+    The attitude, shape (3, 3), belongs to the first position.
     """
     drawn = [
         simulate_runs(
@@ -71,40 +71,40 @@ def simulate_triad(
     return TriadRuns(errors + true_means(positions, site, attitude), drift)
 
 
-TURNING = 2.0
+TURN_TIME = 2.0
 """Time between two positions, s."""
 
-_BLOCKS = {1: 16, 2: 64}
-"""Blocks of a run, by the number of its positions: twice as many lower a sigma by 5 % at most, and
-that after an hour in two positions."""
+_BLOCKS_BY_POSITIONS = {1: 16, 2: 64}
+"""Blocks of a run, by the number of its positions. Twice as many lower a sigma by 5 % at most,
+after an hour in two positions."""
 
-_LINEAR = 0.2
-"""Standard deviation of a heading up to which the filter corrects that of means, rad."""
+_MAX_LINEAR_HEADING_SIGMA = 0.2
+"""Largest standard deviation of a heading, rad, for a start from coarse alignment."""
 
-_LEVEL = np.eye(3)
+_LEVEL_ATTITUDE = np.eye(3)
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How well attitude is known after a time."""
+    """Uncertainty of the attitude after a time."""
 
     positions: int  # 1 or 2
     method: str  # ``coarse`` or ``fine``
     time: float  # s
     sigma: Array  # shape (3,); of roll, pitch and heading, rad
-    # shape (3,); rms of simulated errors over these; NaN where there is no heading
+    # shape (3,); rms of simulated errors over ``sigma``; NaN where there is no heading
     errors: Array | None = None
-    simulated: int = 0  # triads of that check
+    simulated: int = 0  # number of simulated triads
 
     @property
     def reason(self) -> str | None:
-        """Why an angle is missing; None where all are there."""
+        """Reason for a missing angle; None if there is none."""
         if not np.all(np.isfinite(self.sigma)):
             return (
                 "the noise is so small that rounding errors hide the angles: no sensor is that "
                 "quiet, look at the findings about it"
             )
-        if self.sigma[2] < OPEN:
+        if self.sigma[2] < UNIFORM_HEADING_SIGMA:
             return None
         if self.positions == 1:
             return (
@@ -126,46 +126,46 @@ def accuracies(
     runs: int = 0,
     rng: np.random.Generator | None = None,
 ) -> Iterator[Accuracy]:
-    """Yield how well a triad aligns itself in these times, in one position and in two.
+    """Yield the accuracy of a triad after these times, in one position and in two.
 
-    The rate is that of sampling, Hz; the times rise, each longer than the turn between two
-    positions, s. So many ``runs`` are simulated by ``rng`` at the last time, for fine alignment; 0:
+    The sampling rate is in Hz; the times, s, increase, each longer than the turn between two
+    positions. For fine alignment, ``rng`` simulates this number of ``runs`` at the last time; 0:
     none.
     """
     for number in (1, 2):
         for time in times:
-            positions = _positions(number, time, rate)
-            coarse = coarse_accuracy(triad, positions, site, _LEVEL)
+            positions = _build_positions(number, time, rate)
+            coarse = coarse_accuracy(triad, positions, site, _LEVEL_ATTITUDE)
             yield Accuracy(number, "coarse", time, coarse.sigma)
-            fine = FineAlignment(triad, positions, site, _LEVEL)
+            fine = FineAlignment(triad, positions, site, _LEVEL_ATTITUDE)
             errors = None
             if runs and rng is not None and time == times[-1]:
-                errors = _errors(triad, site, fine, runs, rng)
+                errors = _simulate_errors(triad, site, fine, runs, rng)
             yield Accuracy(
                 number, "fine", time, fine.sigma[-1], errors, 0 if errors is None else runs
             )
 
 
-def _positions(number: int, time: float, rate: float) -> Positions:
-    block = time / _BLOCKS[number]
+def _build_positions(number: int, time: float, rate: float) -> Positions:
+    block = time / _BLOCKS_BY_POSITIONS[number]
     if number == 1:
         return Positions.at_rest(time, block, rate)
-    dwell = (time - TURNING) / 2.0
+    dwell = (time - TURN_TIME) / 2.0
     return Positions.turned_about_z(
-        [0.0, math.pi], dwell=dwell, turning=TURNING, block=block, rate=rate
+        [0.0, math.pi], dwell=dwell, turning=TURN_TIME, block=block, rate=rate
     )
 
 
-def _errors(
+def _simulate_errors(
     triad: Triad, site: Site, fine: FineAlignment, runs: int, rng: np.random.Generator
 ) -> Array:
-    """Return the rms of the errors of simulated triads over the sigma that the filter states."""
-    drawn = simulate_triad(triad, fine.positions, site, _LEVEL, runs=runs, rng=rng)
+    """Return the rms error of simulated triads over the sigma of the filter, shape (3,)."""
+    drawn = simulate_triad(triad, fine.positions, site, _LEVEL_ATTITUDE, runs=runs, rng=rng)
     sigma = fine.sigma[-1]
-    if sigma[2] < _LINEAR:
+    if sigma[2] < _MAX_LINEAR_HEADING_SIGMA:
         start = coarse_alignment(*mean_vectors(drawn.means, fine.positions), site)
         aligned = fine.run(drawn.means, start)
         return np.asarray(np.sqrt(np.mean(euler_angles(aligned.attitude) ** 2, axis=0)) / sigma)
-    # Level and to the north: attitude is off by the angles about north, east and down.
+    # Level, to the north: the angles about north, east, down are errors of roll, pitch, heading.
     ratios = np.sqrt(np.mean(fine.run(drawn.means).psi[:, -1] ** 2, axis=0)) / sigma
-    return np.where([True, True, sigma[2] < OPEN], ratios, math.nan)
+    return np.where([True, True, sigma[2] < UNIFORM_HEADING_SIGMA], ratios, math.nan)

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from imubench_pipeline.typing import Array
 
-STEEPEST = 1e-6
-"""Least cosine of the pitch at which roll and heading are two angles."""
+MIN_COS_PITCH = 1e-6
+"""Least cosine of the pitch; below it roll and heading are not separable (gimbal lock)."""
 
 
 def matrix(roll: float, pitch: float, heading: float) -> Array:
@@ -36,8 +36,8 @@ def matrix(roll: float, pitch: float, heading: float) -> Array:
 def euler_angles(attitude: Array) -> Array:
     """Return roll, pitch and heading, rad, of attitudes of shape (..., 3, 3).
 
-    Roll and heading are from -pi to pi, pitch from -pi/2 to pi/2. Where the pitch is +-pi/2 roll
-    and heading are not told apart.
+    Roll and heading are from -pi to pi, pitch from -pi/2 to pi/2. At a pitch of +-pi/2
+    roll and heading are not separable (gimbal lock).
     """
     c = attitude
     level = np.hypot(c[..., 0, 0], c[..., 1, 0])
@@ -60,21 +60,21 @@ def cross_matrix(vector: ArrayLike) -> Array:
 
 
 def rotation(vector: ArrayLike) -> Array:
-    """Return the matrix that turns by a vector (O. Rodrigues), exp([v x]), shape (..., 3, 3).
+    """Return the matrix of a rotation vector (O. Rodrigues), exp([v x]), shape (..., 3, 3).
 
     The vector is in rad, shape (..., 3).
     """
     v = np.asarray(vector, dtype=np.float64)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     across = cross_matrix(v)
-    # sin(x)/x and (1 - cos(x))/x^2 = sinc^2(x/2)/2, which keep their digits towards 0.
+    # sin(x)/x and (1 - cos(x))/x^2 = sinc^2(x/2)/2, which stay accurate near 0.
     sine_part = np.sinc(angle / np.pi)
     cosine_part = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
     return np.asarray(np.eye(3) + sine_part * across + cosine_part * across @ across)
 
 
 def correct(attitude: Array, psi: Array) -> Array:
-    """Return C: an attitude C~, shape (..., 3, 3), from which its error psi is taken off.
+    """Return C: an attitude C~, shape (..., 3, 3), corrected by its error psi.
 
     psi is in rad, shape (..., 3); exp([psi x]) is the inverse of I - [psi x] to the first order,
     and a rotation.
@@ -82,20 +82,20 @@ def correct(attitude: Array, psi: Array) -> Array:
     return np.asarray(rotation(psi) @ attitude)
 
 
-def of_euler_angles(attitude: Array) -> Array:
-    """Return what times a small error psi is the errors of roll, pitch and heading, rad.
+def euler_jacobian(attitude: Array) -> Array:
+    """Return the Jacobian of roll, pitch and heading with respect to a small error psi.
 
-    Shape (3, 3), as the attitude.
+    Multiplied by psi, it gives the errors of the three angles, rad. Shape (3, 3), as the attitude.
 
     Raises
     ------
     ValueError
-        If the pitch is +-pi/2: roll and heading are then one angle.
+        If the pitch is +-pi/2: roll and heading are not separable.
     """
     _, pitch, heading = euler_angles(attitude)
     cp, sp, ch, sh = np.cos(pitch), np.sin(pitch), np.cos(heading), np.sin(heading)
-    if cp < STEEPEST:
+    if cp < MIN_COS_PITCH:
         raise ValueError("the x axis is vertical: roll and heading cannot be told from each other")
-    # Columns: the turns of the navigation frame that roll, pitch and heading alone are.
+    # Columns: small rotations in the navigation frame due to roll, pitch and heading.
     turns = np.array([[cp * ch, -sh, 0.0], [cp * sh, ch, 0.0], [-sp, 0.0, 1.0]])
     return -np.linalg.inv(turns)

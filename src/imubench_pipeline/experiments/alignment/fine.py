@@ -1,19 +1,19 @@
 """Fine alignment: a Kalman filter of attitude and sensor errors at rest.
 
 The body stands on the Earth, so its attitude is constant, or is turned by known angles between
-positions. What an attitude C~ = (I - [psi x]) C leaves of the block means is linear in psi,
+positions. The residual of the block means for an attitude C~ = (I - [psi x]) C is linear in psi,
 
     y - T^T C~^T v = T^T C~^T [v x] psi + mean error + white noise,
 
 v the Earth's rate or the specific force, T the turn since the first position. The errors of the six
-axes are states as their noise models have them (`earth_rate.states`), with the fixed biases: the
-filter estimates psi and all of them, and its discretisation is exact. In one position it cannot
-tell the biases of the level accelerometers from tilt, nor that of the east gyro from the heading;
-its covariance says so:
+axes are states of their noise models (`earth_rate.states`), with the fixed biases. The filter
+estimates psi and all of them; its discretisation is exact. In one position it cannot separate the
+biases of the level accelerometers from tilt, nor the bias of the east gyro from the heading. Its
+covariance shows this:
 
     sigma(roll, pitch) -> accelerometer bias / g,   sigma(heading) -> gyro bias / (w_ie cos(L)).
 
-Left out are the errors of the turns, scale factors and misalignments, and what moves the body.
+The model has no errors of the turns, scale factors or misalignments, and no motion of the body.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import numpy as np
 from imubench_pipeline.experiments.alignment.attitude import (
     correct,
     cross_matrix,
-    of_euler_angles,
+    euler_jacobian,
 )
 from imubench_pipeline.experiments.alignment.coarse import coarse_alignment, mean_vectors
 from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
@@ -38,16 +38,16 @@ from imubench_pipeline.experiments.earth_rate.block_filter import BlockFilter
 from imubench_pipeline.experiments.earth_rate.states import block_states
 from imubench_pipeline.typing import Array
 
-UNKNOWN = 10.0
-"""Standard deviation of each small angle at the start, rad: so much that it adds nothing."""
+INITIAL_ANGLE_SIGMA = 10.0
+"""Standard deviation of each small angle at the start, rad: an uninformative prior."""
 
-OPEN = math.pi / math.sqrt(3.0)
-"""Standard deviation of a heading of which nothing is known, rad."""
+UNIFORM_HEADING_SIGMA = math.pi / math.sqrt(3.0)
+"""Standard deviation of a uniformly distributed heading, rad; the limit for an unknown heading."""
 
-_SETTLED = 1e-7
-"""Last correction of an attitude that has settled, rad."""
+_MAX_LAST_CORRECTION = 1e-7
+"""Largest last correction, rad, of an attitude that has converged."""
 
-_MOST = 20
+_MAX_ITERATIONS = 20
 
 
 @dataclass(frozen=True)
@@ -56,11 +56,10 @@ class Aligned:
 
     # shape (runs, 3, 3); from body to navigation frame, in the first position, from all the data
     attitude: Array
-    # shape (runs, b, 3); what the filter held for the error of the attitude that it was given,
-    # after each block, rad
+    # shape (runs, b, 3); estimated error of the given attitude after each block, rad
     psi: Array
-    # shape (runs, b, 6); mean of each axis' error over each block, its bias included, as known
-    # then, rad/s and m/s^2
+    # shape (runs, b, 6); mean of each axis' error over each block, its bias included, as
+    # estimated then, rad/s and m/s^2
     drift: Array
     # shape (runs, b); normalised innovation squared: chi-squared of six degrees of freedom
     nis: Array
@@ -75,7 +74,7 @@ class FineAlignment:
     positions : Positions
     site : Site
     attitude : ndarray, shape (3, 3)
-        From body to navigation frame in the first position; that of a coarse alignment.
+        From body to navigation frame in the first position, as from a coarse alignment.
 
     Raises
     ------
@@ -92,8 +91,8 @@ class FineAlignment:
             [to_body @ cross_matrix(site.earth_rate), to_body @ cross_matrix(site.specific_force)],
             axis=1,
         )
-        self._filter = BlockFilter(axes, seen, np.eye(3) * UNKNOWN)
-        self._euler = of_euler_angles(attitude)
+        self._filter = BlockFilter(axes, seen, np.eye(3) * INITIAL_ANGLE_SIGMA)
+        self._euler = euler_jacobian(attitude)
 
     @property
     def time(self) -> Array:
@@ -113,13 +112,13 @@ class FineAlignment:
 
     @property
     def drift_sigma(self) -> Array:
-        """Standard deviations of each axis' error over each block, as known then, shape (b, 6)."""
+        """Standard deviations of the ``drift`` of `Aligned`, shape (b, 6)."""
         return np.asarray(np.linalg.norm(self._filter.roots[:, -6:], axis=2))
 
     @property
     def not_observable(self) -> tuple[NotObservable, ...]:
-        """The heading, where the data tell no more of it than none at all."""
-        if self.sigma[-1, 2] < OPEN:
+        """The heading, if its standard deviation is not below that of a uniform distribution."""
+        if self.sigma[-1, 2] < UNIFORM_HEADING_SIGMA:
             return ()
         reason = (
             "what is not known of the east gyro's bias is more than the horizontal part of the "
@@ -135,12 +134,12 @@ class FineAlignment:
         means : ndarray, shape (runs, b, 6)
             Block means of gyros and accelerometers x, y, z, rad/s and m/s^2.
         attitude : ndarray, shape (runs, 3, 3), optional
-            Attitude of each run that is corrected, near to that of the filter; by default that.
+            Attitude of each run to correct, near the attitude of the filter, which is the default.
 
         Raises
         ------
         ValueError
-            If there are not six finite means a block.
+            If there are not six finite means per block.
         """
         if means.ndim != 3 or means.shape[1:] != (len(self.positions.blocks), 6):
             raise ValueError(
@@ -153,11 +152,14 @@ class FineAlignment:
             self.attitude if attitude is None else attitude, (len(means), 3, 3)
         )
         to_navigation = np.einsum("rij,bjk->rbik", attitudes, self.positions.of_blocks)
-        left = np.empty_like(means)
-        for part, true in ((slice(0, 3), self.site.earth_rate), (slice(3, 6), self._force)):
-            missed = np.einsum("rbij,rbj->rbi", to_navigation, means[:, :, part]) - true
-            left[:, :, part] = np.einsum("bij,rbj->rbi", self._to_body, missed)
-        states, innovations = self._filter.run(left)
+        residual = np.empty_like(means)
+        for part, true in (
+            (slice(0, 3), self.site.earth_rate),
+            (slice(3, 6), self._specific_force),
+        ):
+            error = np.einsum("rbij,rbj->rbi", to_navigation, means[:, :, part]) - true
+            residual[:, :, part] = np.einsum("bij,rbj->rbi", self._to_body, error)
+        states, innovations = self._filter.run(residual)
         psi = states[:, :, :3]
         white = np.linalg.solve(self._filter.innovation_roots, innovations[..., None])[..., 0]
         return Aligned(
@@ -165,37 +167,36 @@ class FineAlignment:
         )
 
     @property
-    def _force(self) -> Array:
+    def _specific_force(self) -> Array:
         return self.site.specific_force
 
 
 def align(
     means: Array, triad: Triad, positions: Positions, site: Site
 ) -> tuple[Aligned, FineAlignment]:
-    """Align one run: coarsely, then by filters about the attitude last found until it settles.
+    """Align one run: coarsely, then by filters about the last attitude until it converges.
 
-    With the filter about a better attitude each time this is Gauss and Newton's method: what is not
-    linear in a large error of the coarse heading goes. The means of blocks are of gyros and
-    accelerometers x, y, z, rad/s and m/s^2, shape (b, 6). Beside the attitude of one run the last
-    filter is returned, which has the standard deviations.
+    This is the Gauss-Newton method: each iteration linearises about a better attitude, which
+    removes the nonlinear effect of a large error of the coarse heading. The block means are of
+    gyros and accelerometers x, y, z, rad/s and m/s^2, shape (b, 6). Returned are the alignment of
+    the run and the last filter, which has the standard deviations.
 
     Raises
     ------
     NotObservableError
-        If the data tell no more of the heading than none at all; roll and pitch are those of the
-        coarse alignment.
+        If the heading is not observable; use roll and pitch of the coarse alignment.
     ValueError
-        If the attitude does not settle.
+        If the attitude does not converge.
     """
     attitude = coarse_alignment(*mean_vectors(means, positions), site)
-    for _ in range(_MOST):
+    for _ in range(_MAX_ITERATIONS):
         fine = FineAlignment(triad, positions, site, attitude)
         if fine.not_observable:
             raise NotObservableError(f"heading: {fine.not_observable[0].reason}")
         aligned = fine.run(means[None])
         attitude = aligned.attitude[0]
         step = float(np.abs(aligned.psi[0, -1]).max())
-        if step < _SETTLED:
+        if step < _MAX_LAST_CORRECTION:
             return aligned, fine
     raise ValueError(
         f"the attitude does not settle; its last correction was {step:.2g} rad, the heading's "

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import chi2, norm
 
-from imubench_pipeline.experiments.earth_rate.covariance import of_means
+from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -143,7 +143,7 @@ class LeastSquares:
                 f"{len(blocks)} means cannot tell {regressors.shape[1]} parameters{listed}"
             )
         self._blocks = blocks
-        covariance = of_means(model, blocks)
+        covariance = block_mean_covariance(model, blocks)
         if further is not None:
             covariance = covariance + further
         self._root = cholesky(covariance, lower=True)

@@ -43,7 +43,7 @@ from imubench_pipeline.experiments.calibration.least_squares import (
     limits,
 )
 from imubench_pipeline.experiments.calibration.schedule import Schedule
-from imubench_pipeline.experiments.earth_rate.covariance import of_means
+from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Measured, block_means
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.pointing import Pointing
@@ -365,7 +365,7 @@ def residuals(
     mean_of[place, np.arange(len(blocks))] = blocks.count
     mean_of /= mean_of.sum(axis=1, keepdims=True)
     regressors = np.column_stack([np.ones(len(blocks)), rates])
-    covariance = of_means(model, blocks)
+    covariance = block_mean_covariance(model, blocks)
     covariance = covariance + setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
     covariance -= regressors @ calibration.line.covariance @ regressors.T
     variance = np.einsum("ki,ij,kj->k", mean_of, covariance, mean_of)

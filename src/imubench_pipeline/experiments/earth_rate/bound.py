@@ -1,19 +1,18 @@
-"""The least standard deviation of the Earth's rate that data allow, and blocks that lose none.
+"""The Cramér-Rao bound of the Earth's rate, and a block length that loses no information.
 
-The bound is that of generalised least squares over the covariance of the block means (Cramér and
-Rao; for Gaussian noise it is reached): with h what the blocks see of the rate, 1 what they see of
-the fixed bias and C their covariance,
+The bound is the variance of generalised least squares over the covariance C of the block means;
+Gaussian noise reaches it. With h the sensitivity of the block means to the rate, and 1 to the fixed
+bias,
 
     information of the rate = h^T C^-1 h - (h^T C^-1 1)^2 / (1^T C^-1 1 + 1 / bias variance).
 
 It uses nothing of the filter. White noise alone gives N / sqrt(T) / cos(latitude) for T seconds in
-dwells, where the bias is known; all else only adds to it.
+dwells, if the bias is known; all other noise only adds to it.
 
-Block means are made independent in a time that grows with their number and not with its cube
-(`whiten`). What `covariance.of_means` and a Cholesky root do for any blocks, the innovations of a
-Kalman filter do for those whose noise has states: divided by their standard deviations they are
-L^-1 y, L the root of the same covariance (R. E. Kalman 1960). The covariance is closed form against
-states; they are checked against each other.
+`whiten` decorrelates block means in a time that grows with their number, not with its cube. For any
+blocks, `covariance.block_mean_covariance` and a Cholesky root do the same. For noise with states,
+the innovations of a Kalman filter over their standard deviations are L^-1 y, with L the root of the
+same covariance (R. E. Kalman 1960). The tests compare the closed-form covariance with the states.
 """
 
 from __future__ import annotations
@@ -25,26 +24,26 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from imubench_pipeline.experiments.earth_rate.covariance import of_means
+from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
 from imubench_pipeline.experiments.earth_rate.states import block_states
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_TOLERANCE = 1e-3
-"""Relative loss of the standard deviation by longer blocks that is nothing."""
+_MAX_SIGMA_INCREASE = 1e-3
+"""Largest relative increase of the standard deviation by longer blocks."""
 
-_TRIED = 4
-"""Dwells on which a block length is tried."""
+_TESTED_DWELLS = 4
+"""Dwells on which a block length is tested."""
 
-MOST_BLOCKS = 2048
-"""Blocks whose covariance is still formed."""
+MAX_BLOCKS = 2048
+"""Largest number of blocks in the test of a block length, and in a prediction."""
 
 
 def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
-    """Return L^-1 columns, shape (b, c), L L^T the covariance of the block means of a noise model.
+    """Return L^-1 columns, shape (b, c), with L L^T the covariance of the block means of a model.
 
-    The model has some noise in every sample.
+    The model must have some noise in every sample.
 
     Raises
     ------
@@ -52,7 +51,7 @@ def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
         If a mean has no noise, given those before it.
     """
     states = block_states(model, blocks, turn_on_bias=0.0)
-    innovations = _innovations(
+    innovations = _compute_innovations(
         np.stack([step.transition for step in states.steps]),
         np.stack([step.factor @ step.factor.T for step in states.steps]),
         states.which,
@@ -66,7 +65,7 @@ def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _innovations(
+def _compute_innovations(
     transitions: Array,
     noises: Array,
     which: NDArray[np.int64],
@@ -74,7 +73,10 @@ def _innovations(
     white: Array,
     columns: Array,
 ) -> Array:
-    """Return innovations over their deviations; the last row of a transition gives the mean."""
+    """Return innovations over their standard deviations.
+
+    The last row of a transition matrix gives the mean of the block.
+    """
     # Plain loops: products of arrays take eight times as long to compile.
     m, width = covariance.shape[0], columns.shape[1]
     covariance = covariance.copy()
@@ -102,10 +104,10 @@ def _innovations(
             innovations[k, 0] = np.nan
             return innovations
         for j in range(width):
-            missed = columns[k, j] - states[m, j]
-            innovations[k, j] = missed / math.sqrt(variance)
+            innovation = columns[k, j] - states[m, j]
+            innovations[k, j] = innovation / math.sqrt(variance)
             for i in range(m):
-                filtered[i, j] = states[i, j] + predicted[i, m] / variance * missed
+                filtered[i, j] = states[i, j] + predicted[i, m] / variance * innovation
         for i in range(m):
             for j in range(m):
                 covariance[i, j] = predicted[i, j] - predicted[i, m] * predicted[j, m] / variance
@@ -115,8 +117,9 @@ def _innovations(
 def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
     """Return the least standard deviation of the rate that the data up to each block allow.
 
-    In rad/s, shape (b,); infinite where the rate cannot be told from the bias, whose own, rad/s, is
-    by default not known. The model has some noise in every sample: N, or a process that has one.
+    In rad/s, shape (b,); infinite where the rate and the bias are not separable. The standard
+    deviation of the bias, rad/s, is by default unknown. The model must have some noise in every
+    sample: N, or a process with such noise.
 
     Raises
     ------
@@ -129,24 +132,24 @@ def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf
 def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
     """Return the Fisher information of the rate in the data up to each block, (rad/s)^-2, (b,).
 
-    The parameters, and what is raised, are those of `cramer_rao`.
+    The parameters and errors are as in `cramer_rao`.
     """
-    # Leading blocks have the leading part of the root.
-    root = cholesky(of_means(model, blocks), lower=True, overwrite_a=True)
-    return _of_rate(solve_triangular(root, _seen(blocks), lower=True), turn_on_bias)
+    # The root of the leading blocks is the leading part of the root.
+    root = cholesky(block_mean_covariance(model, blocks), lower=True, overwrite_a=True)
+    return _eliminate_bias(solve_triangular(root, _build_design(blocks), lower=True), turn_on_bias)
 
 
 def information_by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float) -> Array:
-    """Return what `information` does, of many blocks faster."""
-    return _of_rate(whiten(model, blocks, _seen(blocks)), turn_on_bias)
+    """Return the same as `information`, faster for many blocks."""
+    return _eliminate_bias(whiten(model, blocks, _build_design(blocks)), turn_on_bias)
 
 
-def _seen(blocks: Blocks) -> Array:
-    """Return what the means see of the rate, and of a fixed bias."""
+def _build_design(blocks: Blocks) -> Array:
+    """Return the sensitivity of the means to the rate, and to a fixed bias, shape (b, 2)."""
     return np.column_stack([blocks.seen, np.ones(len(blocks))])
 
 
-def _of_rate(white: Array, turn_on_bias: float) -> Array:
+def _eliminate_bias(white: Array, turn_on_bias: float) -> Array:
     if not turn_on_bias >= 0:
         raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0, or infinity")
     rate = np.cumsum(white[:, 0] ** 2)
@@ -159,21 +162,21 @@ def _of_rate(white: Array, turn_on_bias: float) -> Array:
 
 
 def bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
-    """Return what `cramer_rao` does at the end of a run, of many blocks faster, rad/s."""
+    """Return `cramer_rao` at the end of a run, rad/s, faster for many blocks."""
     return float(sigma_of(information_by_states(blocks, model, turn_on_bias))[-1])
 
 
 def block_length(experiment: Experiment, model: NoiseModel) -> int:
-    """Return the longest block, in samples, whose means tell as much of the rate as the samples.
+    """Return the longest block, in samples, whose means keep the information of the samples.
 
     Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
-    than 0.1 %; tried on the first four dwells, with 2,048 blocks at most, none longer than the
-    longest dwell.
+    than 0.1 %. The bound is computed for the first four dwells, with 2,048 blocks at most, none
+    longer than the longest dwell.
     """
-    tried = Experiment(experiment.dwells[:_TRIED], experiment.rate, experiment.latitude)
+    tried = Experiment(experiment.dwells[:_TESTED_DWELLS], experiment.rate, experiment.latitude)
     length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
     if len({dwell.sense for dwell in tried.dwells}) < 2:
-        return length  # nothing can be told of the rate, from samples either
+        return length  # the rate is not observable, from samples either
     sigmas: dict[int, float] = {}
 
     def sigma(longest: int) -> float:
@@ -183,8 +186,8 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
             )
         return sigmas[longest]
 
-    while length > 4 and len(tried.blocks(length // 4)) <= MOST_BLOCKS:
-        if sigma(length // 4) > (1.0 - _TOLERANCE) * sigma(length):
+    while length > 4 and len(tried.blocks(length // 4)) <= MAX_BLOCKS:
+        if sigma(length // 4) > (1.0 - _MAX_SIGMA_INCREASE) * sigma(length):
             break
         length //= 2
     return length
@@ -193,7 +196,7 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
 def sigma_of(fisher: Array) -> Array:
     """Return the standard deviations, rad/s, of information, 1/(rad/s)², both of shape (n,).
 
-    They are infinite where there is none.
+    They are infinite where there is no information.
     """
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / np.sqrt(fisher))

@@ -26,7 +26,7 @@ from imubench_pipeline.experiments.earth_rate.experiment import (
 from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
 from imubench_pipeline.experiments.earth_rate.known_rate import STARTS, settled, track
 from imubench_pipeline.experiments.earth_rate.pairs import Differences, by_pairs, by_triples
-from imubench_pipeline.experiments.earth_rate.states import WIDE
+from imubench_pipeline.experiments.earth_rate.states import UNINFORMATIVE_SIGMA
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.sigma_range import sigma_range
 from imubench_pipeline.typing import Array
@@ -116,7 +116,7 @@ def estimate_courses(
     blocks, means = measured.blocks, measured.means
     first = blocks.start[0] / blocks.rate
     rate_filter = RateFilter(
-        blocks, model, turn_on_bias=WIDE if turn_on_bias is None else turn_on_bias
+        blocks, model, turn_on_bias=UNINFORMATIVE_SIGMA if turn_on_bias is None else turn_on_bias
     )
     filtered = rate_filter.run(means)
     smoothed = rate_filter.smooth(filtered)

@@ -28,7 +28,7 @@ from scipy.linalg import solve_triangular
 
 from imubench_pipeline.experiments.earth_rate.block_filter import BlockFilter, deviation, triangle
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks
-from imubench_pipeline.experiments.earth_rate.states import WIDE, block_states
+from imubench_pipeline.experiments.earth_rate.states import UNINFORMATIVE_SIGMA, block_states
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -124,8 +124,8 @@ class RateFilter:
         blocks: Blocks,
         model: NoiseModel,
         *,
-        turn_on_bias: float = WIDE,
-        rate_sigma: float = WIDE,
+        turn_on_bias: float = UNINFORMATIVE_SIGMA,
+        rate_sigma: float = UNINFORMATIVE_SIGMA,
     ) -> None:
         if not (math.isfinite(rate_sigma) and rate_sigma >= 0):
             raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")

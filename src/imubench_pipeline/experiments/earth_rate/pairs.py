@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.covariance import of_means
+from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -105,7 +105,7 @@ def _estimated(
             row[place] = weight
     weights /= np.cos(blocks.latitude)
     each = blocks.means_of_dwells(means) @ weights.T
-    covariance = weights @ of_means(model, dwells) @ weights.T
+    covariance = weights @ block_mean_covariance(model, dwells) @ weights.T
     number = np.arange(1, len(differences) + 1)
     # Sums of the leading parts of the covariance.
     total = np.diag(np.cumsum(np.cumsum(covariance, axis=0), axis=1))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.experiments.earth_rate.bound import (
-    MOST_BLOCKS,
+    MAX_BLOCKS,
     block_length,
     information_by_states,
     sigma_of,
@@ -211,7 +211,7 @@ class Outlook:
         )
         longest = block_length(design, self.model)
         each = -(-design.samples_in_dwells // len(design.dwells) // longest)
-        summed = max(MOST_BLOCKS // each, _LEAST_SUMMED)
+        summed = max(MAX_BLOCKS // each, _LEAST_SUMMED)
         blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
         information = information_by_states(blocks, self.model, self.turn_on_bias)[last]
