@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from imubench_pipeline.experiments.papers.claims import Claim, Found, nothing, verdict_of
+from imubench_pipeline.experiments.papers.claims import Claim, Result, no_result, verdict_of
 from imubench_pipeline.experiments.papers.evidence import Evidence
 from imubench_pipeline.experiments.papers.registry import PAPERS, published_rows
 from imubench_pipeline.tables import build
@@ -13,26 +13,26 @@ from tests.conftest import PROJECT
 
 CLAIM = Claim(
     place="Table 1", quantity="N", printed="2 rad", value=2.0, unit="rad",
-    found=lambda _: Found(value=2.0), basis="computed", check="tests/papers/test_claims.py",
+    evaluate=lambda _: Result(value=2.0), basis="computed", check="tests/papers/test_claims.py",
 )  # fmt: skip
 RUN = Evidence()
 
 
 @pytest.mark.parametrize(
-    ("found", "verdict"),
+    ("result", "verdict"),
     [
-        (Found(value=2.09), "agrees"),
-        (Found(value=2.11), "differs"),
-        (Found(value=2.5, lower=1.9, upper=3.1), "agrees"),
-        (Found(value=2.5, lower=2.2, upper=3.1), "differs"),
-        (Found(words="the sign is minus", verdict="misprint"), "misprint"),
-        (nothing("no log"), "not to be had"),
+        (Result(value=2.09), "agrees"),
+        (Result(value=2.11), "differs"),
+        (Result(value=2.5, lower=1.9, upper=3.1), "agrees"),
+        (Result(value=2.5, lower=2.2, upper=3.1), "differs"),
+        (Result(words="the sign is minus", verdict="misprint"), "misprint"),
+        (no_result("no log"), "not to be had"),
     ],
 )
-def test_the_verdict_follows_from_the_numbers(found: Found, verdict: str) -> None:
-    assert verdict_of(CLAIM, found) == verdict
+def test_the_verdict_follows_from_the_numbers(result: Result, verdict: str) -> None:
+    assert verdict_of(CLAIM, result) == verdict
     negative = replace(CLAIM, value=-2.0)
-    assert verdict_of(negative, Found(value=-2.09)) == "agrees"
+    assert verdict_of(negative, Result(value=-2.09)) == "agrees"
 
 
 def test_a_run_without_logs_of_a_paper_says_nothing_of_it() -> None:

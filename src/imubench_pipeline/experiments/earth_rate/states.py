@@ -38,7 +38,7 @@ class BlockStates:
     """The states over the blocks of an experiment."""
 
     # one per state: ``z_G`` and a number for each Gauss-Markov process, including the members of a
-    # flicker bank; ``z_Q``, ``z_R``, ``z_S`` in pairs for quantization, a ramp (level and slope) and
+    # flicker bank; ``z_Q``, ``z_R``, ``z_S`` in pairs for quantization, a ramp (level, slope) and
     # lines; ``z_K``, the last, is the random walk with the fixed bias
     names: tuple[str, ...]
     # shape (m, m); a root of the covariance of the states at the first sample of the first block

@@ -1,4 +1,4 @@
-"""A line of a paper: what is printed there, how ours is found, and what the two say together."""
+"""Claims of a paper: the printed value, how this project evaluates it, and the verdict."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from imubench_pipeline.model.published import PublishedRow
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
-    """What is found of a claim: a number, or words where it is none."""
+class Result:
+    """Result of the evaluation of a claim: a number, or a text."""
 
     value: float | None = None  # SI
     lower: float | None = None  # of an interval, SI
     upper: float | None = None
-    words: str = ""  # beside the number, or in its place
-    verdict: Verdict | None = None  # where it does not follow from the numbers
-    reason: str | None = None  # in place of the claim's
+    words: str = ""  # with the number, or instead of it
+    verdict: Verdict | None = None  # None: it follows from the numbers
+    reason: str | None = None  # replaces the reason of the claim
 
 
-def number(value: float, words: str = "") -> Callable[[Evidence], Found]:
-    """Return what finds a number that hangs on no run."""
-    return lambda _: Found(value=value, words=words)
+def numeric_result(value: float, words: str = "") -> Callable[[Evidence], Result]:
+    """Return an evaluation that gives a number without data of a run."""
+    return lambda _: Result(value=value, words=words)
 
 
-def said(words: str, verdict: Verdict = "agrees") -> Callable[[Evidence], Found]:
-    """Return what finds words that hang on no run."""
-    return lambda _: Found(words=words, verdict=verdict)
+def verbal_result(words: str, verdict: Verdict = "agrees") -> Callable[[Evidence], Result]:
+    """Return an evaluation that gives a text without data of a run."""
+    return lambda _: Result(words=words, verdict=verdict)
 
 
-def nothing(reason: str) -> Found:
-    """Return what is found where there is nothing to be had."""
-    return Found(verdict="not to be had", reason=reason)
+def no_result(reason: str) -> Result:
+    """Return the result of a claim that cannot be evaluated."""
+    return Result(verdict="not to be had", reason=reason)
 
 
 DERIVED = "derived:"
-"""Begins what stands in the place of the printed, where that follows from it alone."""
+"""Prefix of a value that is not printed, but follows from printed values alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,17 +46,17 @@ class Claim:
     """One line of a paper."""
 
     place: str  # "Table 3", "Figure 5", "Equation 26" or "Section 6", as numbered there
-    quantity: str  # of what, in words
-    printed: str  # as printed, with its unit; or `DERIVED` and what follows from it
-    value: float | None = None  # the same in SI; None: it is no number
+    quantity: str  # in words
+    printed: str  # as printed, with its unit; or `DERIVED` and the derived value
+    value: float | None = None  # ``printed`` in SI; None: it is no number
     unit: str = "-"  # SI
-    found: Callable[[Evidence], Found]
+    evaluate: Callable[[Evidence], Result]
     basis: Basis
-    reason: str = ""  # why the two differ; shown where they do
-    page: str = ""  # of the report: its counterpart, with an anchor where there is one
-    check: str  # test or benchmark that stands behind the line: "tests/...::name" or a file
+    reason: str = ""  # why the two differ; shown only then
+    page: str = ""  # page of the report with the counterpart, and its anchor if any
+    check: str  # test or benchmark of the claim: "tests/...::name" or a file
     tolerance: float = 0.05  # relative difference that still agrees
-    printed_unit: str = ""  # unit in which ours is shown, where it is not the SI unit
+    printed_unit: str = ""  # unit in which the result is shown; empty: the SI unit
     scale: float = 1.0  # SI per printed unit
 
 
@@ -68,37 +68,37 @@ class Paper:
     claims: Callable[[Evidence], Iterable[Claim]]
 
 
-def verdict_of(claim: Claim, found: Found) -> Verdict:
-    """Return what printed and found say together."""
-    if found.verdict is not None:
-        return found.verdict
-    if found.value is None or claim.value is None:
+def verdict_of(claim: Claim, result: Result) -> Verdict:
+    """Return the verdict on a claim from its printed value and the result."""
+    if result.verdict is not None:
+        return result.verdict
+    if result.value is None or claim.value is None:
         return "not to be had"
     inside = (
-        found.lower is not None
-        and found.upper is not None
-        and found.lower <= claim.value <= found.upper
+        result.lower is not None
+        and result.upper is not None
+        and result.lower <= claim.value <= result.upper
     )
-    near = abs(found.value - claim.value) <= claim.tolerance * abs(claim.value)
+    near = abs(result.value - claim.value) <= claim.tolerance * abs(claim.value)
     return "agrees" if inside or near else "differs"
 
 
 def rows_of(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
     """Yield the rows of the table ``published`` of a paper."""
     for claim in paper.claims(evidence):
-        found = claim.found(evidence)
-        verdict = verdict_of(claim, found)
-        ratio = found.value / claim.value if found.value is not None and claim.value else None
+        result = claim.evaluate(evidence)
+        verdict = verdict_of(claim, result)
+        ratio = result.value / claim.value if result.value is not None and claim.value else None
         yield PublishedRow(
             paper=paper.about.name,
             place=claim.place,
             quantity=claim.quantity,
             printed_as=claim.printed,
             printed=claim.value,
-            found=found.value,
-            lower=found.lower,
-            upper=found.upper,
-            found_words=found.words or None,
+            found=result.value,
+            lower=result.lower,
+            upper=result.upper,
+            found_words=result.words or None,
             ratio=ratio,
             tolerance=claim.tolerance if ratio is not None else None,
             unit=claim.unit,
@@ -106,7 +106,7 @@ def rows_of(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
             scale=claim.scale,
             basis=claim.basis,
             verdict=verdict,
-            reason=(found.reason or claim.reason or None) if verdict != "agrees" else None,
+            reason=(result.reason or claim.reason or None) if verdict != "agrees" else None,
             page=claim.page or None,
             check=claim.check,
         )

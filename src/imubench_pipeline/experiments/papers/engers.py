@@ -1,4 +1,4 @@
-"""What Engers prints of SCC2130, MPU-9250 and BNO055, and of his simulator: 001."""
+"""Claims of Engers about SCC2130, MPU-9250 and BNO055, and about his simulator."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 from imubench_pipeline.experiments.papers.about import ENGERS, Verdict
 from imubench_pipeline.experiments.papers.claims import (
     Claim,
-    Found,
     Paper,
-    nothing,
-    number,
-    said,
+    Result,
+    no_result,
+    numeric_result,
+    verbal_result,
 )
 from imubench_pipeline.experiments.papers.engers_aim import aim
 from imubench_pipeline.experiments.papers.engers_axes import (
@@ -51,17 +51,19 @@ def first_order_of_noise_bandwidth(bandwidth: float) -> float:
     return 2.0 / math.pi * bandwidth
 
 
-def _published(axis: Axis, place: str, parameter: str, times: float) -> Callable[[Evidence], Found]:
+def _published(
+    axis: Axis, place: str, parameter: str, times: float
+) -> Callable[[Evidence], Result]:
     """Return what the run finds of a figure that is printed of an axis.
 
     In the terms of what is printed, which is so many times the parameter.
     """
 
-    def found(run: Evidence) -> Found:
+    def evaluate(run: Evidence) -> Result:
         of_axis = run.of_log(PublishedFigureRow, axis.log, place=place, parameter=parameter)
         row = next((row for row in of_axis if row.of == "log"), None)
         if row is None or row.value is None:
-            return nothing(NO_LOG)
+            return no_result(NO_LOG)
         value, lower, upper = (
             None if end is None else times * end for end in (row.value, row.lower, row.upper)
         )
@@ -72,18 +74,18 @@ def _published(axis: Axis, place: str, parameter: str, times: float) -> Callable
                 times * curve / DEGREE, precision=3, fractional=False, trim="-"
             )
             words = f"{shown} read from its curve, before the fit"
-        return Found(value=value, lower=lower, upper=upper, words=words)
+        return Result(value=value, lower=lower, upper=upper, words=words)
 
-    return found
+    return evaluate
 
 
 def _datasheets() -> Iterator[Claim]:
     def line(sensor: str, quantity: str, printed: str, value: float, found: float | None,
              reason: str, unit: str) -> Claim:  # fmt: skip
-        known = Found(value=found * DEGREE) if found is not None else nothing(reason)
+        known = Result(value=found * DEGREE) if found is not None else no_result(reason)
         return in_unit(unit, Claim(
             place="Table 1", quantity=f"{NAMES[sensor]}: {quantity}", printed=printed,
-            value=value * DEGREE, found=lambda _: known, basis="computed", reason=reason,
+            value=value * DEGREE, evaluate=lambda _: known, basis="computed", reason=reason,
             page=page_of(sensor), check="tests/test_printed.py",
         ))  # fmt: skip
 
@@ -115,7 +117,7 @@ def _of_axes() -> Iterator[Claim]:
         place = OF_BIAS[axis.sensor]
         yield in_unit("rate", Claim(
             place=place, quantity=f"fixed drift, {axis.name}", printed=f"{axis.bias_as} °/s",
-            value=axis.bias * DEGREE, found=_published(axis, place, "bias", 1.0),
+            value=axis.bias * DEGREE, evaluate=_published(axis, place, "bias", 1.0),
             basis="come back", page=axis.page, check=_OF_BOARD, tolerance=0.0,
             reason="temperature moves the mean; ours is that at the mean temperature"
         ))  # fmt: skip
@@ -124,40 +126,41 @@ def _of_axes() -> Iterator[Claim]:
         yield in_unit("rate", Claim(
             place=place, quantity=f"PSD, {axis.name}: N/60, the −½ line at 1 h",
             printed=f"{axis.psd_as} (°/s)/√Hz", value=axis.psd * DEGREE,
-            found=_published(axis, place, "N", 1.0 / math.sqrt(READ_AT)), basis="come back",
+            evaluate=_published(axis, place, "N", 1.0 / math.sqrt(READ_AT)), basis="come back",
             page=axis.page, check=_OF_BOARD, reason="the log is one draw of the noise",
         ))  # fmt: skip
         yield _factor(axis, place)
         yield in_unit("rate", Claim(
             place=place, quantity=f"fixed drift, {axis.name}", printed=f"{axis.bias_as} °/s",
             value=axis.bias * DEGREE,
-            found=number(axis.bias * DEGREE, f"as in {OF_BIAS[axis.sensor]}"),
+            evaluate=numeric_result(axis.bias * DEGREE, f"as in {OF_BIAS[axis.sensor]}"),
             basis="checked", page=axis.page, tolerance=0.0,
             check=f"{_TEST}::test_what_is_typed_here_is_what_the_board_is_simulated_from",
         ))  # fmt: skip
         yield in_unit("rate", Claim(
             place=place, quantity=f"dynamic drift, {axis.name}: the floor, 0.664 B",
             printed=f"{axis.floor_as} (°/s)/K", value=axis.floor * DEGREE,
-            found=_published(axis, place, "B", FLOOR), basis="come back", page=axis.page,
+            evaluate=_published(axis, place, "B", FLOOR), basis="come back", page=axis.page,
             check=_OF_BOARD,
             reason="a floor in °/s, printed as a coefficient of temperature; read from the curve "
             "it holds what N and temperature add", ))  # fmt: skip
     yield Claim(
         place="Table 8", quantity="SCC2130: fixed drift by the datasheet", printed="0 °/s",
-        found=said("left out: the Allan deviation does not see it"), basis="checked",
+        evaluate=verbal_result("left out: the Allan deviation does not see it"), basis="checked",
         page=page_of("scc2130"), check=f"{_TEST}::test_a_fixed_drift_does_not_move_the_curve",
     )  # fmt: skip
     yield Claim(
         place="Table 8", quantity="SCC2130: ARW by the datasheet", printed="0.0002861 °/√Hz",
-        found=said("0.0002236 by his own rule, 0.005/√500; 0.0002861 °/s is the bias instability, "
-                    "1.03 °/h", "misprint"),
+        evaluate=verbal_result(
+            "0.0002236 by his own rule, 0.005/√500; 0.0002861 °/s is the bias instability, "
+            "1.03 °/h", "misprint"),
         basis="checked", page=page_of("scc2130"),
         check=f"{_TEST}::test_table_8_has_its_columns_mixed",
         reason="the columns are mixed",
     )  # fmt: skip
     yield Claim(
         place="Table 8", quantity="SCC2130: dynamic drift by the datasheet", printed="0.00041 °/K",
-        found=said("the floor that Table 5 measured, not the datasheet's 0.0002861 °/s",
+        evaluate=verbal_result("the floor that Table 5 measured, not the datasheet's 0.0002861 °/s",
                     "misprint"),
         basis="checked", page=page_of("scc2130"),
         check=f"{_TEST}::test_table_8_has_its_columns_mixed",
@@ -166,7 +169,9 @@ def _of_axes() -> Iterator[Claim]:
     yield Claim(
         place="Section 4.1.1", quantity="deviation of a sample from a density",
         printed="0.005 (°/s)/√Hz divided by √500",
-        found=said("σ = N √f: 0.005/√2 × √500 = 0.079 °/s before the low-pass", "misprint"),
+        evaluate=verbal_result(
+            "σ = N √f: 0.005/√2 × √500 = 0.079 °/s before the low-pass", "misprint"
+        ),
         basis="checked", page="theory.html#units", check="tests/test_conversions.py",
         reason="a density is multiplied by the root of the rate, and its one side is √2 too much",
     )  # fmt: skip
@@ -174,8 +179,9 @@ def _of_axes() -> Iterator[Claim]:
     yield Claim(
         place="Section 4.1.1", quantity="SCC2130: noise beside its datasheet",
         printed="lower, above all the ARW",
-        found=said(f"N by Table 5 is {two_sided:.2f} times the datasheet’s density if that is "
-                   f"two-sided, {math.sqrt(2.0) * two_sided:.2f} times if one-sided", "possible"),
+        evaluate=verbal_result(
+            f"N by Table 5 is {two_sided:.2f} times the datasheet’s density if that is "
+            f"two-sided, {math.sqrt(2.0) * two_sided:.2f} times if one-sided", "possible"),
         basis="computed", page=page_of("scc2130"),
         check=f"{_TEST}::test_the_factor_of_60_has_its_check",
         reason="lower or higher by the side of a density whose document is not at hand; most "
@@ -184,7 +190,7 @@ def _of_axes() -> Iterator[Claim]:
     yield Claim(
         place="Section 4.1.2", quantity="MPU-9250: cut-off in the simulation",
         printed="120 Hz in place of 188 Hz, as more alike", value=120.0, unit="Hz",
-        found=number(first_order_of_noise_bandwidth(188.0),
+        evaluate=numeric_result(first_order_of_noise_bandwidth(188.0),
                       "first order, noise bandwidth 188 Hz"),
         basis="computed", page=page_of("mpu9250"), tolerance=0.01,
         check=f"{_TEST}::test_a_first_order_of_120_hz_passes_the_noise_of_188_hz",
@@ -198,7 +204,7 @@ def _factor(axis: Axis, place: str) -> Claim:
     return Claim(
         place=place, quantity=f"PSD, {axis.name}: is N 60 times the figure?",
         printed="the −½ line, read at 1 h (section 3.8.1)",
-        found=said(
+        evaluate=verbal_result(
             f"the −½ line meets the floor at {axis.meeting(True):.3g} s with the 60, at "
             f"{axis.meeting(False):.2g} s without", "possible"),
         basis="computed", page=axis.page, check=f"{_TEST}::test_the_factor_of_60_has_its_check",
@@ -291,7 +297,7 @@ def _equations() -> Iterator[Claim]:
     for one in _EQUATIONS:
         yield Claim(
             place=f"Equation {one.number}", quantity=one.quantity, printed=one.printed,
-            found=said(one.words, one.verdict), basis="checked", reason=one.reason,
+            evaluate=verbal_result(one.words, one.verdict), basis="checked", reason=one.reason,
             page=one.page, check=one.check,
         )  # fmt: skip
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from imubench_pipeline.experiments.papers.claims import (
     Claim,
-    Found,
-    nothing,
-    number,
-    said,
+    Result,
+    no_result,
+    numeric_result,
+    verbal_result,
 )
 from imubench_pipeline.experiments.papers.engers_axes import (
     DATASHEETS,
@@ -87,12 +87,12 @@ def _figure(figure: int) -> Claim:
     if figure in _PICTURES:
         return Claim(
             place=place, quantity=_PICTURES[figure], printed="–", basis="checked",
-            found=lambda _: nothing("a picture, or a window of his program"), check=_TEST,
+            evaluate=lambda _: no_result("a picture, or a window of his program"), check=_TEST,
         )  # fmt: skip
     if figure in _DRAWN:
         return Claim(
             place=place, quantity=_DRAWN[figure], printed="–", basis="checked",
-            found=said("drawn from the terms themselves"), page="theory.html#terms",
+            evaluate=verbal_result("drawn from the terms themselves"), page="theory.html#terms",
             check="tests/noise/test_terms.py",
         )  # fmt: skip
     if figure in _COURSES:
@@ -101,7 +101,7 @@ def _figure(figure: int) -> Claim:
         return Claim(
             place=place, quantity=f"{'temperature' if warm else 'samples'} over time, "
             f"{NAMES[sensor]}", printed="a figure", basis="simulated",
-            found=lambda _: nothing(
+            evaluate=lambda _: no_result(
                 "the course of his log is not in the text, and that of the simulated one is "
                 "assumed" if warm else
                 "the course of his log is not in the text; its mean is the fixed drift"
@@ -113,12 +113,13 @@ def _figure(figure: int) -> Claim:
         return Claim(
             place=place, quantity=f"Allan deviation of his log, {NAMES[sensor]} {axis}",
             printed="a curve", basis="simulated", page=page_of(sensor, axis), check=_TEST,
-            found=lambda _: nothing("the curve is not in the text; what he read of it is Table 5"),
+            evaluate=lambda _: no_result(
+                "the curve is not in the text; what he read of it is Table 5"),
         )  # fmt: skip
     sensor, axis = _FITTED[figure]
     return Claim(
         place=place, quantity=f"Allan deviation of log and fitted model, {NAMES[sensor]} {axis}",
-        printed="very much alike", found=_inside(sensor, axis), basis="come back",
+        printed="very much alike", evaluate=_inside(sensor, axis), basis="come back",
         page=page_of(sensor, axis), check=f"{_TEST}::test_one_curve_in_twenty_is_less_in_its_band",
         reason="less of the curve is in the band than of nineteen in twenty by chance",
     )  # fmt: skip
@@ -135,7 +136,7 @@ def _axes_alike(figure: int, sensor: str) -> Claim:
     return Claim(
         place=f"Figure {figure}", quantity=f"Allan deviation of his log, {NAMES[sensor]}",
         printed=printed[sensor], basis="computed", page=page_of(sensor), check=_TEST_OF_AXES,
-        found=said(f"N of y {y:.2f} and of z {z:.2f} times that of x, by his table"
+        evaluate=verbal_result(f"N of y {y:.2f} and of z {z:.2f} times that of x, by his table"
                    f"{more[sensor]}"),
     )  # fmt: skip
 
@@ -154,8 +155,9 @@ def _larger() -> Claim:
     return Claim(
         place="Figure 34", quantity="samples measured, and simulated before the fit, SCC2130",
         printed="the simulation is larger",
-        found=said(f"a block that takes the figure of Table 5 as a power makes {ratio:.2f} times "
-                   "the deviation that N = 60 times the figure makes", "possible"),
+        evaluate=verbal_result(
+            f"a block that takes the figure of Table 5 as a power makes {ratio:.2f} times "
+            "the deviation that N = 60 times the figure makes", "possible"),
         basis="computed", page=_page_of_samples(axis.sensor), check=_TEST_OF_BLOCK,
         reason="he entered it as the noise power of a block (section 3.3), whose samples have the "
         "variance of power times rate; the gains beside it are not printed",
@@ -170,7 +172,7 @@ def _zoomed(figure: int, of: str) -> Claim:
         place=f"Figure {figure}",
         quantity=f"the same, enlarged: {of} the fit, SCC2130",
         printed="alike" if of == "before" else "very much alike",
-        found=_neighbours("scc2130", of), basis="come back", page=_page_of_samples("scc2130"),
+        evaluate=_neighbours("scc2130", of), basis="come back", page=_page_of_samples("scc2130"),
         check=_SAMPLES, reason="neighbouring samples go together otherwise",
     )  # fmt: skip
 
@@ -182,9 +184,10 @@ def _floor_missed() -> Claim:
     return Claim(
         place="Figure 36", quantity="Allan deviation of his log, and simulated before the fit",
         printed="the simulation misses the floor",
-        found=said(f"it must: as a coefficient, {axis.floor_as} (°/s)/K makes a steady course of "
-                   f"1 K, more than his log had, {axis.floor / drift:.0f} times less than the "
-                   f"floor, where that begins ({met:.0f} s)"),
+        evaluate=verbal_result(
+            f"it must: as a coefficient, {axis.floor_as} (°/s)/K makes a steady course of "
+            f"1 K, more than his log had, {axis.floor / drift:.0f} times less than the "
+            f"floor, where that begins ({met:.0f} s)"),
         basis="computed", page=axis.page, check=_TEST_OF_BLOCK,
     )  # fmt: skip
 
@@ -192,7 +195,7 @@ def _floor_missed() -> Claim:
 def _after_the_fit() -> Claim:
     return Claim(
         place="Figure 38", quantity="samples measured, and simulated after the fit, SCC2130",
-        printed="the simulation is slightly smaller", found=_deviations("scc2130", "differs"),
+        printed="the simulation is slightly smaller", evaluate=_deviations("scc2130", "differs"),
         basis="come back", page=_page_of_samples("scc2130"), check=_SAMPLES,
         reason="he turned gains until the Allan curves looked alike, and says that his model lacks "
         "lesser noise; the estimate here is of a log that has none beside the model",
@@ -203,7 +206,8 @@ def _of_the_vendor() -> Claim:
     return in_unit("rate", Claim(
         place="Figure 41", quantity="floor of the vendor’s own curve, SCC2130",
         printed="1.03 °/h, so 0.0002861 °/s", value=0.0002861 * DEGREE,
-        found=number(1.03 / 3600.0 * DEGREE, "the curve itself is not at hand"), basis="checked",
+        evaluate=numeric_result(1.03 / 3600.0 * DEGREE, "the curve itself is not at hand"),
+        basis="checked",
         page=page_of("scc2130"), tolerance=1e-3,
         check=f"{_TEST}::test_table_8_has_its_columns_mixed",
     ))  # fmt: skip
@@ -215,8 +219,9 @@ def _by_the_datasheet_scc2130() -> Claim:
     return Claim(
         place="Figure 42", quantity="Allan deviation by the datasheet, SCC2130",
         printed="log less noisy; the datasheet’s comes to the same floor later",
-        found=said(f"at {two:.0f} s if the density is two-sided, at {two / 2.0:.0f} s if "
-                   f"one-sided; the log at {axis.meeting(True):.0f} s", "possible"),
+        evaluate=verbal_result(
+            f"at {two:.0f} s if the density is two-sided, at {two / 2.0:.0f} s if "
+            f"one-sided; the log at {axis.meeting(True):.0f} s", "possible"),
         basis="computed", page=axis.page, check=_TEST_OF_AXES,
         reason="later or earlier by the side of the density, as in section 4.1.1",
     )  # fmt: skip
@@ -225,7 +230,7 @@ def _by_the_datasheet_scc2130() -> Claim:
 def _mpu9250_fitted() -> Claim:
     return Claim(
         place="Figure 44", quantity="samples measured, and simulated after the fit, MPU-9250",
-        printed="very much alike, above all z", found=_deviations("mpu9250", "agrees"),
+        printed="very much alike, above all z", evaluate=_deviations("mpu9250", "agrees"),
         basis="come back", page=_page_of_samples("mpu9250"), check=_SAMPLES,
         reason="the simulation has another deviation of samples",
     )  # fmt: skip
@@ -234,7 +239,7 @@ def _mpu9250_fitted() -> Claim:
 def _bno055_fitted() -> Claim:
     return Claim(
         place="Figure 50", quantity="samples simulated after the fit, BNO055",
-        printed="x and y much alike, as in the log; z steadier", found=_between_axes("bno055"),
+        printed="x and y much alike, as in the log; z steadier", evaluate=_between_axes("bno055"),
         basis="come back", page=_page_of_samples("bno055"), check=_SAMPLES,
         reason="the axes of the simulation differ in another way than those of the log",
     )  # fmt: skip
@@ -246,7 +251,9 @@ def _by_the_datasheet_mpu9250() -> Claim:
     return Claim(
         place="Figure 48", quantity="Allan deviation by the datasheet, MPU-9250",
         printed="close enough to the log’s; a ripple on the −½ line",
-        found=said(f"N by Table 6 is {times} times the datasheet’s density (x, y, z)", "differs"),
+        evaluate=verbal_result(
+            f"N by Table 6 is {times} times the datasheet’s density (x, y, z)", "differs"
+        ),
         basis="computed", page=page_of("mpu9250"), check=_TEST_OF_AXES,
         reason="the gains that he had turned for the log went with the datasheet’s figures, or N "
         "is not 60 times what Table 6 prints; the ripple he puts down to readings of temperature",
@@ -258,8 +265,9 @@ def _by_the_datasheet_bno055() -> Claim:
     return Claim(
         place="Figure 54", quantity="Allan deviation by the datasheet, BNO055 (captioned MPU9250)",
         printed="the floor is not reached in 30 h",
-        found=said(f"nor can it be: {drift:g} (°/s)/K is no floor, which the −½ line of {noise:g} "
-                   f"(°/s)/√Hz would meet at {(noise / drift) ** 2:.2g} s"),
+        evaluate=verbal_result(
+            f"nor can it be: {drift:g} (°/s)/K is no floor, which the −½ line of {noise:g} "
+            f"(°/s)/√Hz would meet at {(noise / drift) ** 2:.2g} s"),
         basis="computed", page=page_of("bno055"), check=_TEST_OF_AXES,
     )  # fmt: skip
 
@@ -268,17 +276,17 @@ def _page_of_samples(sensor: str) -> str:
     return f"recordings/{sensor}/{RECORDING}.html#gyro_x"
 
 
-def _inside(sensor: str, axis: str) -> Callable[[Evidence], Found]:
+def _inside(sensor: str, axis: str) -> Callable[[Evidence], Result]:
     """Return how much of the curve is in the band of the logs that the estimate makes."""
 
-    def found(run: Evidence) -> Found:
+    def evaluate(run: Evidence) -> Result:
         log = Log(sensor, RECORDING, f"gyro_{axis}")
         for method in ("compensated", "likelihood"):
             bands = run.of_log(ReconstructionRow, log, method=method)
             if bands:
                 break
         else:
-            return nothing(NO_LOG)
+            return no_result(NO_LOG)
         curve: type[AllanRow] | type[CompensatedAllanRow] = (
             CompensatedAllanRow if method == "compensated" else AllanRow
         )
@@ -286,14 +294,14 @@ def _inside(sensor: str, axis: str) -> Callable[[Evidence], Found]:
         seen = [row for row in bands if row.tau >= _PASSED and row.tau in measured]
         inside = sum(row.lower <= measured[row.tau] <= row.upper for row in seen)
         share = 100.0 * inside / len(seen)
-        return Found(
+        return Result(
             words=f"of the simulated log {share:.0f} % above {_PASSED:g} s is in the 95 % band of "
             f"logs of its estimate ({method}); one in twenty has less than {_MOSTLY:.0f} % by "
             "chance",
             verdict="agrees" if share >= _MOSTLY else "differs",
         )
 
-    return found
+    return evaluate
 
 
 def _spread(run: Evidence, sensor: str) -> dict[tuple[str, str], float]:
@@ -302,33 +310,33 @@ def _spread(run: Evidence, sensor: str) -> dict[tuple[str, str], float]:
     return {(row.channel, row.of): row.mean for row in rows if row.mean is not None}
 
 
-def _deviations(sensor: str, if_alike: str) -> Callable[[Evidence], Found]:
+def _deviations(sensor: str, if_alike: str) -> Callable[[Evidence], Result]:
     """Return the deviation of the samples of the fitted model over that of the log."""
 
-    def found(run: Evidence) -> Found:
+    def evaluate(run: Evidence) -> Result:
         by = _spread(run, sensor)
         ratios = [
             value / by[channel, "log"] for (channel, of), value in by.items() if of == "after"
         ]
         if not ratios:
-            return nothing(NO_LOG)
+            return no_result(NO_LOG)
         shown = ", ".join(f"{ratio:.3f}" for ratio in ratios)
         alike = all(abs(ratio - 1.0) < _ALIKE for ratio in ratios)
-        return Found(
+        return Result(
             words=f"deviation of the samples {shown} times that of the simulated log",
             verdict="agrees" if alike and if_alike == "agrees" else "differs",
         )
 
-    return found
+    return evaluate
 
 
-def _between_axes(sensor: str) -> Callable[[Evidence], Found]:
+def _between_axes(sensor: str) -> Callable[[Evidence], Result]:
     """Return the deviation of the samples of y and z over that of x, of the log and the model."""
 
-    def found(run: Evidence) -> Found:
+    def evaluate(run: Evidence) -> Result:
         by = _spread(run, sensor)
         if not by:
-            return nothing(NO_LOG)
+            return no_result(NO_LOG)
         ratios = {
             of: [by[f"gyro_{axis}", of] / by["gyro_x", of] for axis in "yz"]
             for of in ("log", "after")
@@ -342,15 +350,15 @@ def _between_axes(sensor: str) -> Callable[[Evidence], Found]:
             abs(model / log - 1.0) < _ALIKE
             for log, model in zip(ratios["log"], ratios["after"], strict=True)
         )
-        return Found(words=words, verdict="agrees" if alike else "differs")
+        return Result(words=words, verdict="agrees" if alike else "differs")
 
-    return found
+    return evaluate
 
 
-def _neighbours(sensor: str, of: str) -> Callable[[Evidence], Found]:
+def _neighbours(sensor: str, of: str) -> Callable[[Evidence], Result]:
     """Return how neighbouring samples go together, of log and model, in a short stretch."""
 
-    def found(run: Evidence) -> Found:
+    def evaluate(run: Evidence) -> Result:
         rows = run.rows(
             ModelSampleRow, sensor=sensor, recording=RECORDING, channel="gyro_x",
             what="stretch",
@@ -360,16 +368,16 @@ def _neighbours(sensor: str, of: str) -> Callable[[Evidence], Found]:
             for one in ("log", of)
         }
         if not all(stretches.values()):
-            return nothing(NO_LOG)
+            return no_result(NO_LOG)
         log, model = (_correlation(values) for values in stretches.values())
         error = math.sqrt(2.0 * (1.0 - log * log) / len(stretches["log"]))
-        return Found(
+        return Result(
             words=f"correlation of neighbouring samples {model:.2f}, of the simulated log "
             f"{log:.2f}, in {len(stretches['log'])} samples",
             verdict="agrees" if abs(model - log) < 3.0 * error else "differs",
         )
 
-    return found
+    return evaluate
 
 
 def _correlation(values: Sequence[float]) -> float:

@@ -1,4 +1,4 @@
-"""What a run found, as the claims of the papers ask for it."""
+"""Results of a run, for the claims of the papers."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ class Log(NamedTuple):
 
 
 class Evidence:
-    """The joined tables of a run; none where no run is asked.
+    """The joined tables of a run; no tables without a run.
 
     Parameters
     ----------
     tables : mapping of str to pyarrow.Table
-        By name; a table that is not there is taken to have no rows.
+        By name; a missing table counts as empty.
     """
 
     def __init__(self, tables: Mapping[str, pa.Table] | None = None) -> None:
         self._tables = dict(tables or {})
 
     def rows(self, of: type[R], **where: object) -> list[R]:
-        """Return the rows of a table, by their class, in which columns have these values."""
+        """Return the rows of a table, by their class, where the columns have these values."""
         table = self._tables.get(of.table)
         if table is None:
             return []
@@ -44,7 +44,7 @@ class Evidence:
         return of.rows_of(table)
 
     def has(self, sensor: str, recording: str) -> bool:
-        """Tell whether the run has a recording that could be used."""
+        """Return whether the run has this recording, and it was usable."""
         return bool(self.rows(RecordingRow, sensor=sensor, recording=recording, status="ok"))
 
     def of_log(self, of: type[R], log: Log, **where: object) -> list[R]:
@@ -52,9 +52,9 @@ class Evidence:
         return self.rows(of, **log._asdict(), **where)
 
     def parameter(self, log: Log, name: str, method: str | None = None) -> ParameterRow | None:
-        """Return the estimate of one parameter's first component.
+        """Return the estimate of the first component of a parameter.
 
-        By a method; without one, by the recommended method.
+        Without a method, the recommended one is used.
         """
         by: dict[str, object] = {"recommended": True} if method is None else {"method": method}
         rows = self.of_log(ParameterRow, log, parameter=name, component=1, **by)

@@ -1,4 +1,4 @@
-"""What Maia et al. print (MTi-7, C102-F9R): tables 1 to 4, figures 1 to 9, equations 1 to 27."""
+"""Claims of Maia et al. (MTi-7, C102-F9R): tables 1 to 4, figures 1 to 9, equations 1 to 27."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from imubench_pipeline.experiments.papers.about import MAIA
 from imubench_pipeline.experiments.papers.claims import (
     DERIVED,
     Claim,
-    Found,
     Paper,
-    nothing,
-    number,
+    Result,
+    no_result,
+    numeric_result,
 )
 from imubench_pipeline.experiments.papers.evidence import Evidence, Log
 from imubench_pipeline.experiments.papers.maia_equations import equations
@@ -114,18 +114,18 @@ def _words_of(row: ParameterRow | None, what: str) -> str:
     return f"{what}: {told}"
 
 
-def _estimated(channel: Channel, symbol: str, run: Evidence) -> Found:
+def _estimated(channel: Channel, symbol: str, run: Evidence) -> Result:
     """Return what the optimisation finds in the simulated log, and the likelihood beside it."""
     row = run.parameter(_log(channel), symbol, "paper")
     if row is None:
-        return nothing(_NO_LOG)
+        return no_result(_NO_LOG)
     words = _words_of(run.parameter(_log(channel), symbol), "likelihood")
     if row.value is None:
-        return Found(words=words, verdict="differs", reason=row.reason)
-    return Found(value=row.value, lower=row.lower, upper=row.upper, words=words)
+        return Result(words=words, verdict="differs", reason=row.reason)
+    return Result(value=row.value, lower=row.lower, upper=row.upper, words=words)
 
 
-def _read(channel: Channel, symbol: str, run: Evidence) -> Found:
+def _read(channel: Channel, symbol: str, run: Evidence) -> Result:
     """Return what reading the curve of Table 2 gives: of the model, and of single logs of it."""
     model = channel.table_2
     tau, level = lowest_point(model)
@@ -137,7 +137,7 @@ def _read(channel: Channel, symbol: str, run: Evidence) -> Found:
     }[symbol]
     lower, _, upper = readings(channel)[symbol]
     simulated = _words_of(run.parameter(_log(channel), symbol, "curve"), "in the simulated log")
-    return Found(
+    return Result(
         value=read,
         lower=lower,
         upper=upper,
@@ -160,7 +160,7 @@ def _tables_1_and_2() -> Iterator[Claim]:
             yield Claim(
                 place="Table 1", quantity=f"{symbol} of the {channel.name}, read from the curve",
                 printed=_written(value, units[symbol]), value=value,
-                found=partial(_read, channel, symbol), basis="computed",
+                evaluate=partial(_read, channel, symbol), basis="computed",
                 reason=_WHY_READ, check=f"{_TEST}::test_reading_the_curve_of_table_2",
                 unit=units[symbol], page=_page(channel),
             )  # fmt: skip
@@ -169,7 +169,7 @@ def _tables_1_and_2() -> Iterator[Claim]:
             yield Claim(
                 place="Table 2", quantity=f"{symbol} of the {channel.name}, optimised",
                 printed=_written(value, units[symbol]), value=value,
-                found=partial(_estimated, channel, symbol), basis="come back",
+                evaluate=partial(_estimated, channel, symbol), basis="come back",
                 reason="the log is one draw of the noise",
                 unit=units[symbol], page=_page(channel),
                 check="tests/papers/test_panel.py",
@@ -185,7 +185,8 @@ def _own_curve() -> Iterator[Claim]:
         at_peak = Claim(
             place="Table 1",
             quantity=f"{channel.name}: lowest point of the curve that its four numbers make",
-            printed=_derived(f"{peak:.0f} s = 1,89 T_B"), value=peak, unit="s", found=number(tau),
+            printed=_derived(f"{peak:.0f} s = 1,89 T_B"), value=peak, unit="s",
+            evaluate=numeric_result(tau),
             reason="T_B was read at the lowest point of a curve; the four numbers in equation 26 "
             "make a curve whose lowest point is elsewhere",
             basis="computed", page=_page(channel),
@@ -196,7 +197,7 @@ def _own_curve() -> Iterator[Claim]:
         yield replace(
             at_peak, quantity=f"{channel.name}: deviation at that point",
             printed=_derived(f"{_written(floor, unit)} = 0,664 B"), value=floor, unit=unit,
-            found=number(level), reason=_no_floor(model, tau),
+            evaluate=numeric_result(level), reason=_no_floor(model, tau),
         )  # fmt: skip
         what: Quantity = "heading" if quantity_of(channel.channel) == "gyro" else "velocity"
         unit = "rad" if what == "heading" else "m/s"
@@ -205,7 +206,7 @@ def _own_curve() -> Iterator[Claim]:
             at_peak,
             quantity=f"{channel.name}: error of {what} after 600 s (1σ, 60 s at rest before)",
             printed=_derived(f"{by_table_2:.2g} {unit} by Table 2"), value=by_table_2, unit=unit,
-            found=number(_error(channel, model, what)),
+            evaluate=numeric_result(_error(channel, model, what)),
             reason="what the readings of B, T_B and K amount to in use",
         )  # fmt: skip
 
@@ -245,13 +246,14 @@ def _table_3() -> Iterator[Claim]:
                     place="Table 3",
                     quantity=f"RMS of one reconstruction, {channel.name}, {name}, at {words}",
                     printed=_written(value, unit), value=value, unit=unit,
-                    found=partial(_drawn, channel, place, grid), basis="computed",
+                    evaluate=partial(_drawn, channel, place, grid), basis="computed",
                     page=_page(channel), check=check,
                 )  # fmt: skip
         yield Claim(
             place="Table 3",
             quantity=f"chance that one draw of Table 1 beats one of Table 2, {channel.name}",
-            printed="the optimised one is lower", found=partial(_beaten, channel), basis="computed",
+            printed="the optimised one is lower", evaluate=partial(_beaten, channel),
+            basis="computed",
             reason="one reconstruction each ranks no method, however the two differ",
             page="theory.html#reconstruction", check=check,
         )  # fmt: skip
@@ -262,7 +264,7 @@ def _table_3() -> Iterator[Claim]:
                 place="Table 3",
                 quantity=f"weighted RMS of the model’s own curve, {channel.name}, {name}",
                 printed=_written(value, unit), unit=unit,
-                found=partial(_scored, channel, method), basis="come back",
+                evaluate=partial(_scored, channel, method), basis="come back",
                 reason="another measure, so that it has no ratio: printed is one draw with every τ "
                 f"alike; here a τ weighs 1/(e² + {SUREST:g}²), e the relative error of the log’s "
                 "curve. The log is of Table 2, so that the optimised curve must be nearer",
@@ -270,10 +272,10 @@ def _table_3() -> Iterator[Claim]:
             )  # fmt: skip
 
 
-def _drawn(channel: Channel, place: int, grid: Grid, _: Evidence) -> Found:
+def _drawn(channel: Channel, place: int, grid: Grid, _: Evidence) -> Result:
     spread = lottery(channel, grid)
     lower, median, upper = (spread.state_space, spread.optimised)[place]
-    return Found(
+    return Result(
         value=median,
         lower=lower,
         upper=upper,
@@ -304,9 +306,9 @@ def _held() -> str:
     return " and ".join(f"{held[grid]} are inside at {GRIDS[grid]}" for grid in GRIDS)
 
 
-def _beaten(channel: Channel, _: Evidence) -> Found:
+def _beaten(channel: Channel, _: Evidence) -> Result:
     steps, every = (lottery(channel, grid) for grid in GRIDS)
-    return Found(
+    return Result(
         value=round(steps.beats, 2),  # so few draws do not tell it finer
         verdict="agrees" if steps.beats < 0.05 else "differs",
         words=f"at {GRIDS['steps']}; {every.beats:.2f} at {GRIDS['every']}. "
@@ -314,13 +316,13 @@ def _beaten(channel: Channel, _: Evidence) -> Found:
     )
 
 
-def _scored(channel: Channel, method: str, run: Evidence) -> Found:
+def _scored(channel: Channel, method: str, run: Evidence) -> Result:
     rows = run.of_log(ScoreRow, _log(channel), method=method)
     if not rows or rows[0].rms is None:
-        return nothing(_NO_LOG)
+        return no_result(_NO_LOG)
     row = rows[0]
     low, high = row.drawn_log10_lower, row.drawn_log10_upper
-    return Found(
+    return Result(
         value=row.rms,
         verdict="differs",
         words=f"{row.rms_log10:.3f} decades; of one reconstruction {row.drawn_log10:.3f} "
@@ -349,7 +351,7 @@ def _table_4() -> Iterator[Claim]:
             yield Claim(
                 place="Table 4", quantity=f"{symbol} of the {channel.name}, manufacturer",
                 printed=_written(value, si, -4 if channel is MTI_ACCEL else -5), value=value,
-                unit=si, found=number(vendor, words), basis="computed",
+                unit=si, evaluate=numeric_result(vendor, words), basis="computed",
                 page=page, check=check,
             )  # fmt: skip
             for name, model in (("state space", channel.table_1), ("optimised", channel.table_2)):
@@ -358,7 +360,8 @@ def _table_4() -> Iterator[Claim]:
                     place="Table 4",
                     quantity=f"{symbol} of the {channel.name}, {name} over manufacturer",
                     printed=_derived(f"{own:.2f}, {symbol} against {symbol}"),
-                    value=own, found=partial(_as_compared, symbol, model, vendor), basis="computed",
+                    value=own, evaluate=partial(_as_compared, symbol, model, vendor),
+                    basis="computed",
                     reason=_WHY_4[symbol], page=page, check=check,
                 )  # fmt: skip
 
@@ -371,23 +374,23 @@ _WHY_4 = {
 }
 
 
-def _as_compared(symbol: str, model: NoiseModel, vendor: float, _: Evidence) -> Found:
+def _as_compared(symbol: str, model: NoiseModel, vendor: float, _: Evidence) -> Result:
     if symbol == "N":
-        return Found(value=model.N / (vendor / math.sqrt(2.0)), words="one-sided density over √2")
-    return Found(value=lowest_point(model)[1] / vendor, words="lowest points of the curves")
+        return Result(value=model.N / (vendor / math.sqrt(2.0)), words="one-sided density over √2")
+    return Result(value=lowest_point(model)[1] / vendor, words="lowest points of the curves")
 
 
 def _figures() -> Iterator[Claim]:
     yield Claim(
         place="Figure 1", quantity="slopes of white noise, flicker noise and random walk",
-        printed="−1/2, 0, +1/2", found=_slopes, basis="checked", page="theory.html#reading",
+        printed="−1/2, 0, +1/2", evaluate=_slopes, basis="checked", page="theory.html#reading",
         check=f"{_TEST}::test_lines_and_floor",
     )  # fmt: skip
     for figure, channel in ((2, C102_ACCEL), (3, MTI_ACCEL), (4, C102_GYRO), (5, MTI_GYRO)):
         yield Claim(
             place=f"Figure {figure}",
             quantity=f"ASD of the {channel.name}: measured, state space, optimised",
-            printed="the optimised curve is nearer", found=partial(_nearer, channel),
+            printed="the optimised curve is nearer", evaluate=partial(_nearer, channel),
             basis="come back", page=f"papers.html#maia-{channel.sensor}-{channel.channel}",
             check="tests/test_score.py",
         )  # fmt: skip
@@ -399,7 +402,7 @@ def _figures() -> Iterator[Claim]:
             place=f"Figure {figure}",
             quantity=f"largest ratio of the ASDs, {worse.name} over {better.name}, by Table 2, "
             "from 1 s to half of 10 h",
-            printed=printed, value=value, found=partial(_apart, better, worse), basis="computed",
+            printed=printed, value=value, evaluate=partial(_apart, better, worse), basis="computed",
             reason=_WHY_APART[figure], page="index.html", check=f"{_TEST}::test_figures_6_and_7",
             tolerance=0.1,
         )  # fmt: skip
@@ -410,7 +413,7 @@ def _figures() -> Iterator[Claim]:
             place=f"Figure {figure}",
             quantity=f"line N/√τ of the datasheet over the optimised ASD at 1 s, {channel.name}",
             printed="“coherent”", value=1.0,
-            found=number(ratio, f"{ratio / math.sqrt(2.0):.3g} as a one-sided density"),
+            evaluate=numeric_result(ratio, f"{ratio / math.sqrt(2.0):.3g} as a one-sided density"),
             reason=_WHY_4["N"], basis="computed", check=f"{_TEST}::test_table_4",
             page=f"papers.html#maia-{channel.sensor}-{channel.channel}",
         )  # fmt: skip
@@ -419,7 +422,7 @@ def _figures() -> Iterator[Claim]:
         yield replace(
             line, quantity=f"line 0,664 B of the datasheet: lowest ASD of the {channel.name}",
             printed=_derived(_written(floor, unit)), value=floor, unit=unit,
-            found=number(lowest_point(model)[1]), reason=_WHY_4["B"],
+            evaluate=numeric_result(lowest_point(model)[1]), reason=_WHY_4["B"],
         )  # fmt: skip
 
 
@@ -431,39 +434,39 @@ _WHY_APART = {
 }
 
 
-def _slopes(_: Evidence) -> Found:
+def _slopes(_: Evidence) -> Result:
     tau = np.array([10.0, 1000.0])
     slopes = [
         float(np.diff(np.log10(model.allan_variance(tau))).item()) / 4.0
         for model in (NoiseModel(N=1.0), NoiseModel(B=1.0), NoiseModel(K=1.0))
     ]
     right = np.allclose(slopes, [-0.5, 0.0, 0.5], atol=1e-9)
-    return Found(
+    return Result(
         words=", ".join(f"{slope:+.2g}" for slope in slopes),
         verdict="agrees" if right else "differs",
     )
 
 
-def _nearer(channel: Channel, run: Evidence) -> Found:
+def _nearer(channel: Channel, run: Evidence) -> Result:
     scores = {row.method: row.rms_log10 for row in run.of_log(ScoreRow, _log(channel))}
     authors, optimised = scores.get("authors"), scores.get("paper")
     if authors is None or optimised is None:
-        return nothing(_NO_LOG)
-    return Found(
+        return no_result(_NO_LOG)
+    return Result(
         words=f"from the simulated log {authors:.3f} decades by Table 1, "
         f"{optimised:.3f} optimised; it cannot be otherwise, as the log is of Table 2",
         verdict="agrees" if optimised < authors else "differs",
     )
 
 
-def _apart(better: Channel, worse: Channel, _: Evidence) -> Found:
+def _apart(better: Channel, worse: Channel, _: Evidence) -> Result:
     tau = np.geomspace(1.0, DURATION / 2.0, 1000)
     ratio = np.sqrt(worse.table_2.allan_variance(tau) / better.table_2.allan_variance(tau))
     place = int(np.argmax(ratio))
     end = ", the end, and still growing" if place == tau.size - 1 else ""
     words = f"at {tau[place]:,.0f} s{end}; the least is {ratio.min():.3g}"
     walks = worse.table_2.K / better.table_2.K
-    return Found(value=float(ratio[place]), words=f"{words}, that of the K {walks:.3g}")
+    return Result(value=float(ratio[place]), words=f"{words}, that of the K {walks:.3g}")
 
 
 _PARTS: tuple[Callable[[], Iterator[Claim]], ...] = (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from imubench_pipeline.experiments.papers.claims import Claim, Found
+from imubench_pipeline.experiments.papers.claims import Claim, Result
 from imubench_pipeline.experiments.papers.evidence import Evidence
 from imubench_pipeline.experiments.papers.maia_printed import DURATION, MTI_GYRO
 from imubench_pipeline.noise import (
@@ -74,28 +74,28 @@ def spread_over_weight(tau: float = _TAU) -> tuple[float, float]:
     return spread / meant, spread / (meant / math.sqrt(variance))
 
 
-def _said(words: str) -> Callable[[Evidence], Found]:
-    return lambda _: Found(words=words, verdict="agrees")
+def _verbal_result(words: str) -> Callable[[Evidence], Result]:
+    return lambda _: Result(words=words, verdict="agrees")
 
 
-def _number(value: Callable[[], float], words: str = "") -> Callable[[Evidence], Found]:
-    return lambda _: Found(value=value(), words=words)
+def _numeric_result(value: Callable[[], float], words: str = "") -> Callable[[Evidence], Result]:
+    return lambda _: Result(value=value(), words=words)
 
 
-def _sign(_: Evidence) -> Found:
+def _sign(_: Evidence) -> Result:
     truth = by_integral(_MODEL, _TAU)
     ours = float(_MODEL.allan_variance(_TAU)) / truth - 1.0
     printed = as_printed(_MODEL, _TAU) / truth
-    return Found(
+    return Result(
         words=f"e^(−τ/T_B): {abs(ours):.0e} from the integral of the density at 100 s; as printed "
         f"it is {printed:.2g} times that",
         verdict="misprint",
     )
 
 
-def _weight(_: Evidence) -> Found:
+def _weight(_: Evidence) -> Result:
     at = ", ".join(f"{spread_over_weight(tau)[0]:.2f} at {tau:,.0f} s" for tau in WEIGHED_AT)
-    return Found(
+    return Result(
         words=f"w = 1/(2 √(n/2L) σ̂²)²; the spread of σ̂², over 2 √(n/2L) σ̂²: {at}",
         verdict="misprint",
     )
@@ -116,14 +116,18 @@ def equations() -> Iterator[Claim]:
     """Yield the 27 equations in their order."""
 
     def equation(
-        number: int, quantity: str, printed: str, found: Callable[[Evidence], Found], **more: object
+        number: int,
+        quantity: str,
+        printed: str,
+        evaluate: Callable[[Evidence], Result],
+        **more: object,
     ) -> Claim:
         about = {"basis": "checked", "page": "theory.html#terms", "check": _TEST} | more
         return Claim(
             place=f"Equation {number}",
             quantity=quantity,
             printed=printed,
-            found=found,
+            evaluate=evaluate,
             **about,  # type: ignore[arg-type]  # fields of a claim, of several types
         )
 
@@ -133,68 +137,76 @@ def equations() -> Iterator[Claim]:
     spaces = {"check": f"{_TEST}::test_the_discrete_model"}
     yield equation(
         1, "measurement of a sensor", "ũ = u + d(u) + z", **simulated,
-        found=_said("the simulated sensor has bias, temperature, scale, misalignment and noise"),
+        evaluate=_verbal_result(
+            "the simulated sensor has bias, temperature, scale, misalignment and noise"),
     )  # fmt: skip
     parts = [NoiseModel(N=_MODEL.N), NoiseModel(B=_MODEL.B, T_B=_MODEL.T_B), NoiseModel(K=_MODEL.K)]
     yield equation(
         2, "AV of z over those of z_N, z_B and z_K together", "z = z_N + z_B + z_K", value=1.0,
-        found=_number(lambda: float(_MODEL.allan_variance(_TAU)
+        evaluate=_numeric_result(lambda: float(_MODEL.allan_variance(_TAU)
                                     / sum(part.allan_variance(_TAU) for part in parts))),
         tolerance=1e-9,
     )  # fmt: skip
-    yield equation(3, "white noise", "z_N = ω_N", _said("new in every sample"))
+    yield equation(3, "white noise", "z_N = ω_N", _verbal_result("new in every sample"))
     yield equation(
         4, "decay of z_G over a correlation time", "ż_G = −μ_B z_G + ω_B", value=math.exp(-1.0),
-        found=_number(lambda: float(process.state_space(process.T_B).transition[0, 0])),
+        evaluate=_numeric_result(lambda: float(process.state_space(process.T_B).transition[0, 0])),
         tolerance=1e-9, **spaces,
     )  # fmt: skip
     yield equation(
         5, "variance of z_K after 1 s over K²", "ż_K = ω_K", value=1.0, unit="s",
-        found=_number(lambda: float(RandomWalk(1.0).state_space(1.0).process_noise[0, 0])),
+        evaluate=_numeric_result(
+            lambda: float(RandomWalk(1.0).state_space(1.0).process_noise[0, 0])
+        ),
         tolerance=1e-9, **spaces,
     )  # fmt: skip
-    yield equation(6, "decay rate", "μ_B = 1/T_B", _said("e^(−T/T_B) in equation 20"), **spaces)
+    yield equation(
+        6, "decay rate", "μ_B = 1/T_B", _verbal_result("e^(−T/T_B) in equation 20"), **spaces
+    )
     f = 1e-3
     density = {"check": f"{_TEST}::test_densities"}
     yield equation(
         7, "density of white noise over N²", "S_N = N²", value=1.0, **density,
-        found=_number(lambda: float(WhiteNoise(2.0).psd(np.array(f)) / 4.0)), tolerance=1e-9,
+        evaluate=_numeric_result(lambda: float(WhiteNoise(2.0).psd(np.array(f)) / 4.0)),
+        tolerance=1e-9,
     )  # fmt: skip
     yield equation(
         8, "S_B of the MTi-7 gyro", "S_B = 2 B² ln 2 / (π 0.4365² T_B)", **density,
         value=2.0 * _MODEL.B**2 * math.log(2.0) / (math.pi * 0.4365**2 * process.T_B),
         unit="(rad/s)^2/s", tolerance=1e-3, page="theory.html#bias-instability",
-        found=_number(lambda: driving_density(_MODEL.B, process.T_B)),
+        evaluate=_numeric_result(lambda: driving_density(_MODEL.B, process.T_B)),
     )  # fmt: skip
     yield equation(
         9, "density of a random walk times (2πf)², over K²", "S_K = K²", value=1.0, **density,
-        found=_number(lambda: float(RandomWalk(1.0).psd(np.array(f)) * (2.0 * math.pi * f) ** 2)),
+        evaluate=_numeric_result(
+            lambda: float(RandomWalk(1.0).psd(np.array(f)) * (2.0 * math.pi * f) ** 2)
+        ),
         tolerance=1e-9,
     )  # fmt: skip
     yield equation(
         10, "differences in the sum, of ten samples with n = 2", "L − 2n", value=6.0, tolerance=0.0,
-        found=_number(lambda: float(_differences(10, 2)), "L − 2n + 1"),
+        evaluate=_numeric_result(lambda: float(_differences(10, 2)), "L − 2n + 1"),
         reason="clusters begin at L − 2n + 1 samples; the paper leaves out the last, which it may",
         page="theory.html#allan", check="tests/test_allan.py",
     )  # fmt: skip
     yield equation(
         11, "Allan deviation of white noise at 1 s over N", "σ = N/√τ", value=1.0, **curve,
-        found=_number(lambda: math.sqrt(float(NoiseModel(N=1.0).allan_variance(1.0)))),
+        evaluate=_numeric_result(lambda: math.sqrt(float(NoiseModel(N=1.0).allan_variance(1.0)))),
         tolerance=1e-9,
     )  # fmt: skip
     yield equation(
         12, "Allan deviation of a random walk at 3 s over K", "σ = K √(τ/3)", value=1.0, **curve,
-        found=_number(lambda: math.sqrt(float(NoiseModel(K=1.0).allan_variance(3.0)))),
+        evaluate=_numeric_result(lambda: math.sqrt(float(NoiseModel(K=1.0).allan_variance(3.0)))),
         tolerance=1e-9,
     )  # fmt: skip
     floor = {"page": "theory.html#bias-instability", "check": f"{_TEST}::test_lines_and_floor"}
     yield equation(
         13, "floor of flicker noise over B", "0,664 B (“log” is the natural one)", value=0.664,
-        found=_number(lambda: FLOOR), tolerance=1e-3, **floor,
+        evaluate=_numeric_result(lambda: FLOOR), tolerance=1e-3, **floor,
     )  # fmt: skip
     yield equation(
         13, "place of the peak of a Gauss-Markov process over T_B", "1,89", value=1.89,
-        found=_number(lambda: PEAK_TAU, "of the process alone: N and K move it"),
+        evaluate=_numeric_result(lambda: PEAK_TAU, "of the process alone: N and K move it"),
         tolerance=2e-3, **floor,
     )  # fmt: skip
     words = "the states of the terms, held against their density"
@@ -206,26 +218,29 @@ def equations() -> Iterator[Claim]:
         (18, "states in discrete time", "x(k+1) = Φ x(k) + ω"),
         (19, "error in discrete time", "z = H x + η"),
     ):
-        yield equation(number, quantity, printed, _said(words), **spaces)
+        yield equation(number, quantity, printed, _verbal_result(words), **spaces)
     space = _MODEL.state_space(_RATE)
     yield equation(
         20, "decay of z_G over a sample", "e^(−μ_B T)", value=math.exp(-T / process.T_B),
-        found=_number(lambda: float(space.transition[0, 0])), tolerance=1e-12, **spaces,
+        evaluate=_numeric_result(lambda: float(space.transition[0, 0])), tolerance=1e-12, **spaces,
     )  # fmt: skip
-    yield equation(21, "output", "H = [1 1]", _said(f"{space.output.astype(int).tolist()}"),
+    yield equation(
+        21, "output", "H = [1 1]", _verbal_result(f"{space.output.astype(int).tolist()}"),
                    **spaces)  # fmt: skip
     yield equation(
         22, "variance of a step of z_G over S_B T", "Q ≈ diag(S_B T, S_K T)", value=1.0,
-        found=_number(_step_noise, "exact: S_B T_B/2 (1 − e^(−2T/T_B))"), **spaces,
+        evaluate=_numeric_result(_step_noise, "exact: S_B T_B/2 (1 − e^(−2T/T_B))"), **spaces,
     )  # fmt: skip
     yield equation(
         23, "variance of white noise in a sample", "S_N/T", value=_MODEL.N**2 / T,
-        unit="(rad/s)^2", found=_number(lambda: float(space.measurement_noise)), **spaces,
+        unit="(rad/s)^2", evaluate=_numeric_result(lambda: float(space.measurement_noise)),
+        **spaces,
     )  # fmt: skip
     fit = {"page": "theory.html#methods", "check": "tests/estimators/test_least_squares.py"}
     yield equation(
         24, "cost of the optimisation", "Σ w (σ̂² − σ²)²",
-        _said("the same, with S_N, S_B and S_K from 0 on, and τ up to a ninth of the log"), **fit,
+        _verbal_result("the same, with S_N, S_B and S_K from 0 on, and τ up to a ninth of the log"),
+        **fit,
     )  # fmt: skip
     yield equation(
         25, "weight of a cluster time", "1/(2 √(n/2L) σ̂)²", _weight,

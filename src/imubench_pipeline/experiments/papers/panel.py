@@ -1,7 +1,7 @@
-"""Whether the methods differ: their errors on simulated logs of one channel, against the bound.
+"""Compare the errors of the methods on simulated logs of one channel with the Cramér-Rao bound.
 
 The channel is the gyro of the MTi-7 by Table 2 of Maia et al., its logs of 10 h at a tenth of its
-rate: N, B, T_B and K are the same, and so is what a log tells of B, T_B and K.
+rate: N, B, T_B and K are the same, and so is the information about B, T_B and K.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ from imubench_pipeline.model.published import AccuracyRow
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 
 LOGS = 100
-"""Enough to tell ratios of 1.1 and 1.5; more, and whole rates: `benchmarks/accuracy.py`."""
+"""Number of logs, enough to separate ratios of 1.1 and 1.5. `benchmarks/accuracy.py` has more, at
+the full rate."""
 
 _RATE = MTI_GYRO.rate / 10.0
-_FITS: tuple[Literal["paper", "weighted"], ...] = ("paper", "weighted")
+_FIT_METHODS: tuple[Literal["paper", "weighted"], ...] = ("paper", "weighted")
 
 Values = Mapping[str, float | None]
 
@@ -40,19 +41,19 @@ def panel_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
     """
     model = MTI_GYRO.table_2
     bounds = bounds_of(model, _RATE, DURATION, _RATE / 2.0)
-    found: dict[str, list[Values]] = {}
+    by_method: dict[str, list[Values]] = {}
     whittle: Whittle | None = None
     for number in range(logs):
-        estimates, whittle = _estimates(number, whittle)
+        estimates, whittle = _estimate_log(number, whittle)
         for method, values in estimates.items():
-            found.setdefault(method, []).append(values)
-    for method, of_logs in found.items():
+            by_method.setdefault(method, []).append(values)
+    for method, of_logs in by_method.items():
         for name in PARAMETERS:
             truth = float(getattr(model, name))
             given = [value for values in of_logs if (value := values[name]) is not None]
             errors = np.array(given) / truth - 1.0
             rmse = math.sqrt(float(np.mean(errors**2))) if given else None
-            # The root mean square of n normal errors is known to 1 / sqrt(2 n).
+            # Relative standard deviation of the rms of n normal errors: 1 / sqrt(2 n).
             spread = 1.96 / math.sqrt(2.0 * len(given)) if given else 0.0
             ratio = None if rmse is None else rmse / bounds[name]
             yield AccuracyRow(
@@ -69,16 +70,16 @@ def panel_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
             )
 
 
-def _estimates(number: int, before: Whittle | None) -> tuple[dict[str, Values], Whittle]:
-    """Return what each method finds in a log, None where it gives no value, and its likelihood.
+def _estimate_log(number: int, before: Whittle | None) -> tuple[dict[str, Values], Whittle]:
+    """Return the estimates of each method for a log, None where it has none, and the likelihood.
 
-    That of the log `before` has the same bins, and with them the shapes of its terms.
+    The likelihood `before` of another log has the same bins, and so the same spectral shapes.
     """
     samples = round(DURATION * _RATE)
     rng = channel_rng(1, MTI_GYRO.sensor, MTI_GYRO.channel, f"panel {number}")
     log = simulate(MTI_GYRO.table_2, _RATE, samples, rng)
     curve = allan_variance(log, _RATE, overlap="octave")
-    estimates = [reading.read(curve), *(least_squares.solve(curve, method=m) for m in _FITS)]
+    estimates = [reading.read(curve), *(least_squares.solve(curve, method=m) for m in _FIT_METHODS)]
     spectrum, _ = spectra([log], samples, _RATE)
     whittle = before.of(spectrum) if before else whittle_of(spectrum, _RATE / 2.0)
     best = whittle.maximum(PAPERS_MODEL)
@@ -86,9 +87,9 @@ def _estimates(number: int, before: Whittle | None) -> tuple[dict[str, Values], 
     by_likelihood = {
         name: value if value > 0.0 else None for name, value in zip(PARAMETERS, powers, strict=True)
     }
-    of_curve = {estimate.method: _values(estimate) for estimate in estimates}
+    of_curve = {estimate.method: _get_values(estimate) for estimate in estimates}
     return of_curve | {"likelihood_gm": by_likelihood}, whittle
 
 
-def _values(estimate: Estimate) -> Values:
+def _get_values(estimate: Estimate) -> Values:
     return {name: estimate.parameters[name].value for name in PARAMETERS}

@@ -13,14 +13,14 @@ PAPERS: Sequence[Paper] = (maia.PAPER, silva.PAPER, engers.PAPER)
 
 
 def published_rows(evidence: Evidence) -> Iterator[PublishedRow]:
-    """Yield the rows of the table ``published``: of the papers of which the run has logs."""
+    """Yield the rows of the table ``published`` for the papers with logs in the run."""
     for paper in PAPERS:
         if any(evidence.has(*log) for log in paper.about.logs):
             yield from rows_of(paper, evidence)
 
 
 def rows_without_a_run() -> Iterator[PublishedRow]:
-    """Yield the rows that printed figures and closed forms alone give, without any log."""
+    """Yield the rows that need printed figures and closed forms only, and no log."""
     for paper in PAPERS:
         for row in rows_of(paper, Evidence()):
             if row.basis in ("computed", "checked"):

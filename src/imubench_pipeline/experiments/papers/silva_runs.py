@@ -20,9 +20,15 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
     PAPER_RATE,
 )
 from imubench_pipeline.experiments.papers.about import Verdict
-from imubench_pipeline.experiments.papers.claims import Claim, Found, nothing, number, said
+from imubench_pipeline.experiments.papers.claims import (
+    Claim,
+    Result,
+    no_result,
+    numeric_result,
+    verbal_result,
+)
 from imubench_pipeline.experiments.papers.evidence import Evidence
-from imubench_pipeline.experiments.papers.silva_settling import settling
+from imubench_pipeline.experiments.papers.silva_settling import evaluate_settling
 from imubench_pipeline.model.experiments import EarthRateRow
 
 DEGREE = math.pi / 180.0
@@ -74,7 +80,8 @@ def turned() -> Iterator[Claim]:
     yield Claim(
         place="Section 1", quantity="Earth's rate", printed="15 °/h or ≈ 0.004167 °/s",
         value=0.004167 * DEGREE, unit="rad/s", printed_unit="°/s", scale=DEGREE, tolerance=1e-3,
-        found=number(EARTH_RATE), basis="checked", check="tests/earth_rate/test_published.py",
+        evaluate=numeric_result(EARTH_RATE), basis="checked",
+        check="tests/earth_rate/test_published.py",
         page="earth_rate.html",
         reason="a turn takes a sidereal day, 23 h 56 min",
     )  # fmt: skip
@@ -83,14 +90,14 @@ def turned() -> Iterator[Claim]:
         yield Claim(
             place=f"Figure {figure}", quantity=f"turns of run {run}",
             printed=f"{PAPER_MINUTES[run]:g} min, turned every 30 s: so {turns} turns",
-            value=float(turns), found=_turns(run), basis="come back", page=page_of(run),
+            value=float(turns), evaluate=_turns(run), basis="come back", page=page_of(run),
             tolerance=0.0, check="benchmarks/dwell_detection.py", reason="turns that do not show",
         )  # fmt: skip
     for run, value in PRINTED.items():
         yield Claim(
             place="Section 6", quantity=f"Earth's rate, run {run}", printed=f"{value:g} °/s",
             value=value * DEGREE, unit="rad/s", printed_unit="°/s", scale=DEGREE,
-            found=_allowed(run), basis="computed", page="earth_rate.html#published",
+            evaluate=_allowed(run), basis="computed", page="earth_rate.html#published",
             check="tests/earth_rate/test_published.py::test_the_runs_of_the_paper",
             reason="beyond what the noise of the printed figures allows: another error of that "
             "run; what each cause asks for stands below",
@@ -104,7 +111,7 @@ def turned() -> Iterator[Claim]:
         z = off(printed_run(run)) / printed_run(run).sigma
         yield Claim(
             place="Section 6", quantity=f"cause of the error of run {run}", printed=printed,
-            found=said(f"{z:.1f} σ of that noise", "refuted"), basis="computed",
+            evaluate=verbal_result(f"{z:.1f} σ of that noise", "refuted"), basis="computed",
             reason="the mean over pairs of a run this long has less noise than that",
             page="earth_rate.html#published",
             check="tests/earth_rate/test_published.py::test_the_runs_of_the_paper",
@@ -112,28 +119,28 @@ def turned() -> Iterator[Claim]:
     yield from _hypotheses()
 
 
-def _turns(run: str) -> Callable[[Evidence], Found]:
-    def found(evidence: Evidence) -> Found:
+def _turns(run: str) -> Callable[[Evidence], Result]:
+    def evaluate(evidence: Evidence) -> Result:
         rows = evidence.rows(
             EarthRateRow, sensor=SENSOR, recording=f"sim_run_{run}", part="whole", method="pairs"
         )
         turns = rows[0].turns if rows else None
-        return nothing(NO_LOG) if turns is None else Found(value=float(turns))
+        return no_result(NO_LOG) if turns is None else Result(value=float(turns))
 
-    return found
+    return evaluate
 
 
-def _allowed(run: str) -> Callable[[Evidence], Found]:
-    def found(_: Evidence) -> Found:
+def _allowed(run: str) -> Callable[[Evidence], Result]:
+    def evaluate(_: Evidence) -> Result:
         half = _LIMIT * printed_run(run).sigma
-        return Found(
+        return Result(
             value=EARTH_RATE,
             lower=EARTH_RATE - half,
             upper=EARTH_RATE + half,
             words=f"off by {off(printed_run(run)) / printed_run(run).sigma:+.1f} σ of the pairs",
         )
 
-    return found
+    return evaluate
 
 
 def _hypotheses() -> Iterator[Claim]:
@@ -151,7 +158,7 @@ def _hypotheses() -> Iterator[Claim]:
     def cause(quantity: str, printed: str, words: str, verdict: Verdict, reason: str) -> Claim:
         return Claim(
             place="Section 6", quantity=f"hypothesis: {quantity}", printed=printed,
-            found=said(words, verdict), reason=reason, basis="computed",
+            evaluate=verbal_result(words, verdict), reason=reason, basis="computed",
             page="earth_rate.html#published", check=_CAUSES,
         )  # fmt: skip
 
@@ -250,16 +257,18 @@ def filtered() -> Iterator[Claim]:
     """Yield the lines of sections 7 and 8."""
     yield Claim(
         place="Section 7", quantity="start of the covariance", printed="P₀ = 0.1 I",
-        found=said("no unit: as (°/s)² 3.05 × 10⁻⁵ (rad/s)², as (rad/s)² 3,283 times that",
-                    "misprint"),
+        evaluate=verbal_result(
+            "no unit: as (°/s)² 3.05 × 10⁻⁵ (rad/s)², as (rad/s)² 3,283 times that",
+            "misprint"),
         reason="all else in the paper is in degrees; both are shown", basis="checked",
         page=page_of("2"), check=f"{_GIVEN}::test_its_start_has_no_unit_in_print",
     )  # fmt: skip
     yield Claim(
         place="Figure 9", quantity="run 2: cumulative mean of the samples without correction",
         printed="an order of magnitude off the true rate",
-        found=said("the mean of both positions: the bias, in which the Earth's rate cancels",
-                    "differs"),
+        evaluate=verbal_result(
+            "the mean of both positions: the bias, in which the Earth's rate cancels",
+            "differs"),
         reason="the samples point north and south in turn; their mean is no estimate of the rate",
         basis="checked", page=page_of("2"),
         check=f"{_TEST}::test_the_mean_of_all_samples_is_the_bias",
@@ -269,7 +278,7 @@ def filtered() -> Iterator[Claim]:
             place=f"Figure {figure}",
             quantity=f"run {run}: time after which the cumulative mean stays at the true rate",
             printed="about 10³ samples, 30 to 60 s", value=1000.0 / PAPER_RATE, unit="s",
-            found=settling(run, SENSOR, NO_LOG), basis="simulated",
+            evaluate=evaluate_settling(run, SENSOR, NO_LOG), basis="simulated",
             page=f"{page_of(run)}#estimates", check=_SETTLING,
             reason="within a tenth of it; the mean has the white noise of all samples so far, "
             "whether the filter is given the rate or not. A single run says little: runs differ by "
@@ -282,7 +291,7 @@ def filtered() -> Iterator[Claim]:
     yield Claim(
         place="Section 7", quantity="error of the cumulative mean after 10³ samples, 1 σ",
         printed="aligned with the true rate",
-        found=said(
+        evaluate=verbal_result(
             f"{_of_rate(scatter['degrees'])} °/h of the Earth's rate with P₀ in (°/s)², "
             f"{_of_rate(scatter['radians'])} in (rad/s)², of {_hours(EARTH_RATE)} °/h", "refuted"),
         reason=f"a mean over 31 s of this noise is not better, even of a filter that is given the "
@@ -294,8 +303,9 @@ def filtered() -> Iterator[Claim]:
     yield Claim(
         place="Section 8", quantity="what a Kalman filter improves",
         printed="can much improve the results, in accuracy and in time",
-        found=said(f"σ is {min(gains):.1f} to {max(gains):.1f} % less than that of the mean over "
-                    "pairs", "refuted"),
+        evaluate=verbal_result(
+            f"σ is {min(gains):.1f} to {max(gains):.1f} % less than that of the mean over "
+            "pairs", "refuted"),
         reason="turned every 30 s, the noise is white noise, of which the mean over pairs loses "
         "nothing; what the filter shows is the rate that it is given",
         basis="computed", page="earth_rate.html#published",

@@ -1,6 +1,6 @@
-"""How late the mean of the filter that is given the rate stays near it: 003, figures 10 to 13.
+"""Settling time of the mean of the filter with known rate (Silva et al., figures 10 to 13).
 
-One run is one draw, and draws differ tenfold: many are simulated of the four printed numbers.
+Single runs differ tenfold, so that many are simulated with the four printed numbers.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
     paper_run,
     simulate_log,
 )
-from imubench_pipeline.experiments.papers.claims import Found, nothing
+from imubench_pipeline.experiments.papers.claims import Result, no_result
 from imubench_pipeline.experiments.papers.evidence import Evidence
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.simulate.model import SensorModel
 
 RUNS = 100
-"""Simulated of each of the four."""
+"""Number of simulations of each of the four runs."""
 
-_BIAS = math.radians(0.05)  # rad/s; assumed
+_ASSUMED_BIAS = math.radians(0.05)  # rad/s; assumed
 
 
 @cache
 def settling_times(run: str) -> Mapping[str, tuple[float, ...]]:
-    """Return when the mean of each simulated run settles, s, by the unit of P_0; inf: not in it."""
+    """Return the settling time of each simulated run, s, by the unit of P_0; inf: not settled."""
     design = paper_run(PAPER_MINUTES[run])
-    model = SensorModel(noise=PAPER_MODEL, bias=_BIAS)
+    model = SensorModel(noise=PAPER_MODEL, bias=_ASSUMED_BIAS)
     times: dict[str, list[float]] = {name: [] for name in STARTS}
     for number in range(RUNS):
         rng = channel_rng(1, "sirrs01_03", "gyro_x", f"run {run}, {number}")
@@ -46,29 +46,29 @@ def settling_times(run: str) -> Mapping[str, tuple[float, ...]]:
     return {name: tuple(values) for name, values in times.items()}
 
 
-def settling(run: str, sensor: str, without: str) -> Callable[[Evidence], Found]:
-    """Return what finds when runs settle: the median of them.
+def evaluate_settling(run: str, sensor: str, without: str) -> Callable[[Evidence], Result]:
+    """Return the evaluation of the settling time: the median of the simulated runs.
 
-    Nothing, for the reason `without`, where there is no such simulated run.
+    It has no result, with the reason `without`, if there is no such simulated run.
     """
 
-    def found(evidence: Evidence) -> Found:
+    def evaluate(evidence: Evidence) -> Result:
         if not evidence.has(sensor, f"sim_run_{run}"):
-            return nothing(without)
+            return no_result(without)
         times = {name: np.array(values) for name, values in settling_times(run).items()}
         own = times["degrees"]
-        # Of a run that has not settled no more is known than that it takes longer than it lasts.
+        # The settling time of an unsettled run is only known to exceed its duration.
         early, median = np.percentile(own, [5.0, 50.0], method="higher")
         late = f"not in its {PAPER_MINUTES[run]:.0f} min"
         words = f"{100.0 * np.mean(np.isinf(own)):.0f} % {late}, 5 % by {early:.0f} s"
         other = np.percentile(times["radians"], 50.0, method="higher")
         if math.isinf(median):
             words = f"{late}; {words}"
-        return Found(
+        return Result(
             value=float(median) if math.isfinite(median) else None,
             words=f"median of {RUNS} simulated runs: {words}; with P₀ in (rad/s)² the median is "
             f"{late if math.isinf(other) else f'{other:.0f} s'}",
             verdict="differs",
         )
 
-    return found
+    return evaluate

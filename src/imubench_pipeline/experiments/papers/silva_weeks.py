@@ -1,7 +1,7 @@
-"""What reading the curve of a week gives, and of 48 h: 003, section 5.1, on simulated logs.
+"""Parameters read from curves of one week and of 48 h (Silva et al., section 5.1), simulated.
 
-The logs have the four printed numbers at 1 Hz instead of 32: what they tell of K and T_B, whose
-slopes lie beyond tau of 30 s, is the same.
+The logs have the four printed numbers at 1 Hz instead of 32. Their information about K and T_B is
+the same, since these slopes lie above a tau of 30 s.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators.estimate import PARAMETERS
 from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL
-from imubench_pipeline.experiments.papers.claims import Found, nothing
+from imubench_pipeline.experiments.papers.claims import Result, no_result
 from imubench_pipeline.experiments.papers.evidence import Evidence, Log
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 
 LOGS = 20
-"""Weeks, and logs of 48 h, that are read."""
+"""Number of simulated logs of each length."""
 
 _RATE = 1.0  # Hz
 _WEEK, _TWO_DAYS = 168, 48  # h
@@ -28,7 +28,7 @@ _WEEK, _TWO_DAYS = 168, 48  # h
 
 @cache
 def read_values(hours: int) -> Mapping[str, tuple[float, ...]]:
-    """Return what reading the curves of `LOGS` logs of a length gives, where it shows, in SI."""
+    """Return the parameters read from the curves of `LOGS` logs, SI, without missing ones."""
     shown: dict[str, list[float]] = {name: [] for name in PARAMETERS}
     for number in range(LOGS):
         rng = channel_rng(1, "sirrs01_03", "gyro_x", f"{hours} h, {number}")
@@ -41,18 +41,18 @@ def read_values(hours: int) -> Mapping[str, tuple[float, ...]]:
     return {name: tuple(values) for name, values in shown.items()}
 
 
-def of_weeks(name: str, log: Log, without: str) -> Callable[[Evidence], Found]:
-    """Return what finds a parameter by reading weeks: the median and 90 % of the logs.
+def evaluate_weeks(name: str, log: Log, without: str) -> Callable[[Evidence], Result]:
+    """Return the evaluation of a parameter read from logs of a week: median and 90 % interval.
 
-    Nothing, for the reason `without`, where a run has no such log at rest.
+    It has no result, with the reason `without`, if a run has no such log at rest.
     """
 
-    def found(run: Evidence) -> Found:
+    def evaluate(run: Evidence) -> Result:
         if not run.has(log.sensor, log.recording):
-            return nothing(without)
+            return no_result(without)
         values = read_values(_WEEK)[name]
         lower, median, upper = np.percentile(values, [5.0, 50.0, 95.0])
-        return Found(
+        return Result(
             value=float(median),
             lower=float(lower),
             upper=float(upper),
@@ -60,4 +60,4 @@ def of_weeks(name: str, log: Log, without: str) -> Callable[[Evidence], Found]:
             f"{len(read_values(_TWO_DAYS)[name])} of {LOGS} logs of {_TWO_DAYS} h",
         )
 
-    return found
+    return evaluate
