@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from imubench_pipeline.experiments.earth_rate.alternation import alternation, between
+from imubench_pipeline.experiments.earth_rate.alternation import alternation, split_at_turns
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import interval_density
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell
 from imubench_pipeline.experiments.earth_rate.transients import (
@@ -353,13 +353,13 @@ def test_hundreds_of_dwells_without_a_turn_are_none() -> None:
 def test_the_alternation_is_that_of_the_level() -> None:
     log = turned(EVERY_30, 600.0, peak=0.0, noise=NoiseModel(N=1e-8))
     log += 1e-6 * np.arange(len(log)) / RATE
-    found = alternation(blocks_of(log, RATE, 30.0), between(EVERY_30 + TURN / 2, 2.0, 600.0))
+    found = alternation(blocks_of(log, RATE, 30.0), split_at_turns(EVERY_30 + TURN / 2, 2.0, 600.0))
     assert found.value == pytest.approx(EARTH, rel=1e-3)
 
 
 def test_dwells_without_samples_leave_the_alternation_no_surer() -> None:
     rng = np.random.default_rng(15)
-    stretches = between(EVERY_30[:9], 0.0, 300.0)
+    stretches = split_at_turns(EVERY_30[:9], 0.0, 300.0)
     z = []
     for _ in range(200):
         log = rng.standard_normal(2400)

@@ -2,10 +2,10 @@
 
     y = X b + e,   cov(e) = C,   b^ = (X^T C^-1 X)^-1 X^T C^-1 y,   cov(b^) = (X^T C^-1 X)^-1
 
-(A. C. Aitken 1935). C is that of `earth_rate.covariance`: white noise, Gauss-Markov processes,
-flicker noise, random walk and the rest, as they correlate the means. The standard errors are those
-of the noise model, and not of the scatter, which sees little of what is slow. The scatter is a
-check: (y - X b^)^T C^-1 (y - X b^) is chi-squared of b - p degrees of freedom where the noise model
+(A. C. Aitken 1935). `earth_rate.covariance` gives C: the covariance of the means by white noise,
+Gauss-Markov processes, flicker noise, random walk and the other terms. The standard errors follow
+from the noise model, not from the scatter, which contains little of the slow noise. The scatter is
+a check: (y - X b^)^T C^-1 (y - X b^) is chi-squared of b - p degrees of freedom if the noise model
 and X are right.
 """
 
@@ -24,17 +24,17 @@ from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experime
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_TOLERANCE = 1e-3
-"""Relative loss of a standard error by longer blocks that is nothing."""
+_MAX_SIGMA_INCREASE = 1e-3
+"""Largest relative increase of a standard error by longer blocks."""
 
-_MOST_BLOCKS = 1024
-"""Blocks whose covariance is still formed."""
+_MAX_BLOCKS = 1024
+"""Largest number of blocks in the test of a block length."""
 
-_RANK = 1e-8
-"""Least singular value of whitened regressors of unit length that is not rounding."""
+_MIN_SINGULAR_VALUE = 1e-8
+"""Least singular value of independent whitened regressors of unit length; others are rounding."""
 
-LEVEL = 0.95
-"""Of confidence limits."""
+CONFIDENCE_LEVEL = 0.95
+"""Confidence level of intervals."""
 
 Quantity = Literal[
     "earth_rate", "bias", "heading", "scale_factor", "asymmetry", "quadratic", "linearity"
@@ -43,17 +43,16 @@ Quantity = Literal[
 
 @dataclass(frozen=True)
 class NotObservable:
-    """A quantity that the recording does not tell."""
+    """A quantity that the recording does not determine."""
 
     quantity: Quantity
     reason: str  # in words
-    # what is known of its effect all the same: half of the range of the bias that it leaves open,
-    # rad/s; None where nothing bounds it
+    # half of the range of the bias due to the unknown quantity, rad/s; None if it is unbounded
     half_width: float | None = None
 
 
 class NotObservableError(ValueError):
-    """What is asked for cannot be told from the data, however little noise there is."""
+    """The data do not determine a requested quantity, however little noise they have."""
 
 
 Limits = tuple[Array, Array]
@@ -61,7 +60,7 @@ Limits = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class Fit:
-    """What generalised least squares finds in runs of one design."""
+    """Result of generalised least squares for runs of one design."""
 
     value: Array  # shape (runs, p); estimates, SI
     covariance: Array  # shape (p, p); of their errors, by the noise model
@@ -75,7 +74,7 @@ class Fit:
 
     @property
     def p_value(self) -> Array:
-        """Chance of residuals at least as large where model and noise are right, shape (runs,)."""
+        """Probability of residuals at least as large if the model is right, shape (runs,)."""
         return np.asarray(chi2.sf(self.chi_squared, self.freedom))
 
     def interval(self) -> Limits:
@@ -86,13 +85,13 @@ class Fit:
 def limits(value: Array, sigma: Array | float) -> Limits:
     """Return the 95 % limits, lower and upper, of estimates with normal errors.
 
-    Their standard errors are in the unit of the values, of a shape that goes with theirs.
+    The standard errors have the unit of the values, and a shape that broadcasts with theirs.
     """
     half = half_width() * sigma
     return value - half, value + half
 
 
-def half_width(level: float = LEVEL) -> float:
+def half_width(level: float = CONFIDENCE_LEVEL) -> float:
     """Return half of a two-sided interval of the normal distribution, in standard deviations.
 
     A level of 0.95 gives 1.96.
@@ -125,7 +124,7 @@ class LeastSquares:
     Raises
     ------
     NotObservableError
-        If there are fewer blocks than regressors, or these cannot be told from each other.
+        If there are fewer blocks than regressors, or the regressors are collinear.
     """
 
     def __init__(
@@ -152,7 +151,7 @@ class LeastSquares:
         if np.any(length == 0.0):
             raise NotObservableError(f"a regressor is 0 throughout{listed}")
         basis, values, turn = np.linalg.svd(white / length, full_matrices=False)
-        if values[-1] < _RANK:
+        if values[-1] < _MIN_SINGULAR_VALUE:
             raise NotObservableError(f"the data cannot tell these from each other{listed}")
         self._basis = basis
         self._back = (turn.T / values) / length[:, None]
@@ -174,11 +173,11 @@ class LeastSquares:
         self._blocks.check_means(means)
         white = solve_triangular(self._root, means.T, lower=True).T
         along = white @ self._basis
-        left = white - along @ self._basis.T
+        residual = white - along @ self._basis.T
         return Fit(
             along @ self._back.T,
             self.covariance,
-            np.sum(left**2, axis=1),
+            np.sum(residual**2, axis=1),
             means.shape[1] - self._basis.shape[1],
         )
 
@@ -186,16 +185,16 @@ class LeastSquares:
 def block_length(
     experiment: Experiment, model: NoiseModel, regressors: Callable[[Blocks], Array]
 ) -> int:
-    """Return the longest block, in samples, whose means tell as much as the samples themselves.
+    """Return the longest block, in samples, whose means keep the information of the samples.
 
     Blocks are shortened by halves until a fourth of their length would lower no standard error by
-    0.1 %; with 1,024 blocks at most, none longer than the longest dwell. The regressors are those
-    of blocks, shape (b, p).
+    0.1 %. There are 1,024 blocks at most, none longer than the longest dwell. ``regressors`` gives
+    the regressors of blocks, shape (b, p).
 
     Raises
     ------
     NotObservableError
-        If samples could not tell the parameters, either.
+        If samples do not determine the parameters, either.
     """
     length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
     sigmas: dict[int, Array] = {}
@@ -210,9 +209,9 @@ def block_length(
         length //= 2
     while length > 1:
         shorter = max(length // 4, 1)
-        if len(experiment.blocks(shorter)) > _MOST_BLOCKS:
+        if len(experiment.blocks(shorter)) > _MAX_BLOCKS:
             break
-        if np.all(sigma(shorter) > (1.0 - _TOLERANCE) * sigma(length)):
+        if np.all(sigma(shorter) > (1.0 - _MAX_SIGMA_INCREASE) * sigma(length)):
             break
         length //= 2
     return length

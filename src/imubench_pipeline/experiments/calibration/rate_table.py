@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from imubench_pipeline.experiments.calibration.least_squares import (
-    LEVEL,
+    CONFIDENCE_LEVEL,
     Fit,
     LeastSquares,
     Limits,
@@ -49,15 +49,15 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.typing import Array
 
-_LEVEL = 1e-12
-"""rad/s of the Earth's rate that may be open."""
+_MAX_UNKNOWN_RATE = 1e-12
+"""Largest unknown part of the Earth's rate along the axis that is ignored, rad/s."""
 
 _NO_SCALE = NotObservable(
     "asymmetry", "the gyro does not follow the table: there is no scale factor to be a fraction of"
 )
 
-_SAME = 1e-9
-"""Relative difference of two rates that is rounding."""
+_RATE_TOLERANCE = 1e-9
+"""Relative difference below which two rates are equal up to rounding."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Linearity:
         The limits hold of all rates together (Bonferroni): noise alone makes the largest of many
         deviations large.
         """
-        half = half_width(1.0 - (1.0 - LEVEL) / self.sigma.size) * self.sigma
+        half = half_width(1.0 - (1.0 - CONFIDENCE_LEVEL) / self.sigma.size) * self.sigma
         size = np.abs(self.deviation)
         return np.maximum(size - half, 0.0).max(axis=1), (size + half).max(axis=1)
 
@@ -179,7 +179,11 @@ class RateTable:
     ) -> None:
         if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
             raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")
-        if pointing is not None and pointing.heading is None and pointing.half_width > _LEVEL:
+        if (
+            pointing is not None
+            and pointing.heading is None
+            and pointing.half_width > _MAX_UNKNOWN_RATE
+        ):
             raise ValueError(
                 "the heading of the table's axis is not known: give it, or leave the direction out "
                 "and the Earth's rate is a part of the bias"
@@ -318,7 +322,7 @@ def calibrate(
 def _levels(rate: Array) -> NDArray[np.int64]:
     """Return the number of each rate among the different ones, which rounding does not split."""
     order = np.argsort(rate, kind="stable")
-    risen = np.diff(rate[order], prepend=rate[order[0]]) > _SAME * np.abs(rate).max()
+    risen = np.diff(rate[order], prepend=rate[order[0]]) > _RATE_TOLERANCE * np.abs(rate).max()
     levels = np.empty(len(rate), dtype=np.int64)
     levels[order] = np.cumsum(risen)
     return levels

@@ -1,12 +1,12 @@
-"""The bias of a gyro that stands still at a known place, and what a single position cannot tell.
+"""The bias of a gyro at rest at a known place, and the quantities that are not observable.
 
     bias = mean reading - w,    w the Earth's rate along the axis (`pointing`).
 
-This is the run without turning that Silva et al. leave for later (003 section 9). Given the rate,
-it tells the bias; it does not tell the rate, whatever filter it is fed to: bias and rate enter as
-a sum. The fixed bias is what the gyro has at the first sample, by generalised least squares; the
-present one is what it has drifted to in the last block, by the filter of the two-position
-experiment with a rate that is known.
+This is the run without turning that Silva et al. leave for later (section 9). With a known rate it
+determines the bias. No filter can determine the rate from it, since bias and rate enter as a sum.
+The fixed bias is the bias at the first sample, by generalised least squares. The present bias is
+the mean of bias and drift over the last block, by the filter of the two-position experiment with a
+known rate.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.typing import Array
 
-_LEVEL = 1e-9
-"""Part of the Earth's rate below which an axis sees nothing of the heading."""
+_MIN_HEADING_SENSITIVITY = 1e-9
+"""Least share of the Earth's rate along an axis that may depend on the heading."""
 
 
 @dataclass(frozen=True)
@@ -47,18 +47,18 @@ class StillBias:
     fixed_noise_sigma: float  # its standard error by the noise model, rad/s
     present: Array  # shape (runs,); mean of bias and slow noise over the last block, rad/s
     present_noise_sigma: float  # its standard error by the noise model, rad/s
-    # the Earth's rate along the axis that was taken off, rad/s; with an unknown heading the middle
-    # of what it may be
+    # the subtracted Earth's rate along the axis, rad/s; with an unknown heading the middle of its
+    # range
     rate: float
-    # standard deviation of that, which both biases have beside their noise, rad/s
+    # its standard deviation, which adds to the noise of both biases, rad/s
     rate_sigma: float
-    # where the heading is not known: how far the true rate is from that at most at the stated
+    # for an unknown heading: largest distance of the true rate from ``rate`` at the stated
     # elevation, rad/s
     bound: float | None
-    # what the spread of the elevation adds to that, at the heading where it is most, rad/s
+    # standard deviation from the elevation, at the worst heading, rad/s
     tilt_sigma: float
-    # shape (runs,); chance of a scatter of the block means at least as large, where the noise model
-    # is right; NaN for one block
+    # shape (runs,); probability of a scatter of the block means at least as large, if the noise
+    # model is right; NaN for one block
     p_value: Array
     not_observable: tuple[NotObservable, ...]
 
@@ -75,8 +75,8 @@ class StillBias:
     def fixed_interval(self) -> Limits:
         """Return confidence limits of the fixed bias, rad/s, shapes (runs,).
 
-        Where the heading is not known they are those of the noise, widened to either side by all
-        that the Earth's rate may be: they hold for every heading.
+        For an unknown heading the limits of the noise are widened to either side by the range of
+        the Earth's rate: they hold for every heading.
         """
         return self._interval(self.fixed, self.fixed_noise_sigma)
 
@@ -140,7 +140,7 @@ class StillRun:
 
 
 def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
-    """Return what one position does not tell of a gyro."""
+    """Return the quantities of a gyro that are not observable in one position."""
     quantities = [
         NotObservable(
             "earth_rate",
@@ -153,7 +153,9 @@ def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
             "of that rate times the error",
         ),
     ]
-    if pointing.heading is None and pointing.half_width > _LEVEL * abs(pointing.rate):
+    if pointing.heading is None and pointing.half_width > _MIN_HEADING_SENSITIVITY * abs(
+        pointing.rate
+    ):
         quantities.append(
             NotObservable(
                 "heading",
@@ -171,7 +173,8 @@ def bias_at_rest(
     """Return the bias of a gyro from a log at rest.
 
     The log is in rad/s, shape (n,); NaN where a sample is missing; the rate in Hz. A block has
-    ``longest`` samples at most; by default so many that nothing is lost.
+    ``longest`` samples at most; by default the longest without loss of
+    information.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""The Earth's rotation from a gyro that is turned between north and south (003 section 6, 7)."""
+"""The Earth's rotation from a gyro turned between north and south (Silva et al., section 6, 7)."""

@@ -1,4 +1,4 @@
-"""How the level of a log alternates from dwell to dwell, without the Earth's rate being known."""
+"""Alternation of the level of a log from dwell to dwell, for an unknown Earth's rate."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import numpy as np
 from imubench_pipeline.experiments.earth_rate.transients import LevelBlocks, calm_means
 from imubench_pipeline.typing import Array
 
-_SURE = 3.5
-"""Standard errors that the alternation must have before and after a turn too many."""
+_MIN_CONTRADICTION_SIGMAS = 3.5
+"""Least size, in standard errors, of the alternations before and after an extra turn."""
 
-_WHITE = 16.0 / 6.0
-"""Variance of a dwell's mean over that of its A-B-A difference / 4, where the noise is white."""
+_WHITE_VARIANCE_RATIO = 16.0 / 6.0
+"""Variance of the mean of a dwell over the variance of an A-B-A difference / 4, in white noise."""
 
 
 @dataclass(frozen=True)
 class Alternation:
-    """How far the dwells of the first sense lie above the mean, the others below it."""
+    """Mean of the dwells of the first sense less the mean of both senses."""
 
-    # value, sigma: rad/s; of one sense less the mean of both, and its standard error
+    # value, sigma: rad/s; the difference, and its standard error
     value: float
     sigma: float
 
@@ -35,10 +35,10 @@ class Alternation:
 def differences(
     blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]
 ) -> tuple[Array, Array]:
-    """Return the A-B-A differences of the dwells, the sign of the middle one taken off.
+    """Return the A-B-A differences of the dwells, with equal signs.
 
-    (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, in which a drift that is straight over three dwells is
-    not seen; of two dwells, half their difference.
+    They are (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, where a drift that is linear over three dwells
+    cancels. For two dwells, half their difference is returned.
 
     Parameters
     ----------
@@ -70,42 +70,42 @@ def differences(
 def alternation(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> Alternation:
     """Return the mean of the A-B-A differences, with its standard error.
 
-    The error is that of white noise of the scatter seen, and no less than the white noise of the
-    blocks says.
+    The error assumes white noise with the observed scatter, and at least the noise of the blocks.
 
     `blocks` and `stretches`: as of `differences`.
     """
     difference, white = differences(blocks, stretches)
-    return _mean(difference, white)
+    return _average(difference, white)
 
 
-def _mean(difference: Array, white: Array) -> Alternation:
+def _average(difference: Array, white: Array) -> Alternation:
     finite = np.isfinite(difference)
     if not finite.any():
         return Alternation(0.0, math.inf)
     n = int(finite.sum())
-    # Where dwells have no samples, few of the others are in a difference.
+    # If dwells have no samples, few of the others belong to a difference.
     variance = float(np.nanmean(white)) / min(len(white), n + 2)
     if n > 2:
-        variance = max(variance, _WHITE * float(np.var(difference[finite], ddof=1)) / (n + 2))
+        variance = max(
+            variance, _WHITE_VARIANCE_RATIO * float(np.var(difference[finite], ddof=1)) / (n + 2)
+        )
     return Alternation(float(difference[finite].mean()), math.sqrt(variance))
 
 
 def contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> int | None:
-    """Return the dwell from which on the log alternates the other way, if it does.
+    """Return the dwell from which the alternation has the opposite sign, or None.
 
-    A turn too many or too few turns the sign of all that follows. Nothing is decided by it: it is
-    a doubt.
+    An extra or a missed turn inverts the sign of all later dwells. The result only raises a doubt.
 
     `blocks` and `stretches`: as of `differences`.
     """
     difference, white = differences(blocks, stretches)
     if len(difference) < 6:
         return None
-    worst, place = _SURE, None
+    worst, place = _MIN_CONTRADICTION_SIGMAS, None
     for k in range(3, len(difference) - 2):
-        before = _mean(difference[:k], white[: k + 2]).z
-        after = _mean(difference[k:], white[k:]).z
+        before = _average(difference[:k], white[: k + 2]).z
+        after = _average(difference[k:], white[k:]).z
         size = min(abs(before), abs(after))
         if before * after < 0.0 and size > worst:
             worst, place = size, k + 1
@@ -115,19 +115,19 @@ def contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]])
 def best_shift(
     blocks: LevelBlocks, turns: Array, half_width: float, longest: float, duration: float
 ) -> tuple[float, float, float]:
-    """Return by how much the turns should come later to make the log alternate the most.
+    """Return the delay of the turns that maximises the alternation.
 
-    Only the constancy of the alternation is used, not its size or sign. Its standard error is taken
-    as the same for all shifts: z^2 is then twice the log-likelihood. Returned are the shift, s, and
-    the alternation in standard errors with it, and without.
+    Only the constancy of the alternation is used, not its size or sign. All shifts share one
+    standard error, so that z^2 is twice the log-likelihood. Returned are the shift, s, and the
+    alternation in standard errors with and without it.
 
     Parameters
     ----------
     blocks : LevelBlocks
     turns : ndarray, shape (n,)
-        Middle of the turns that the schedule says, s.
+        Middle of the turns of the schedule, s.
     half_width : float
-        Half of what is left out about a turn, s.
+        Half of the time that is left out about a turn, s.
     longest : float
         Largest shift to try to either side, s.
     duration : float
@@ -138,7 +138,7 @@ def best_shift(
     for shift in shifts:
         moved = turns + shift
         moved = moved[(moved > half_width) & (moved < duration - half_width)]
-        alternations.append(alternation(blocks, between(moved, half_width, duration)))
+        alternations.append(alternation(blocks, split_at_turns(moved, half_width, duration)))
     z = np.array([shifted.value for shifted in alternations]) / np.median(
         [shifted.sigma for shifted in alternations]
     )
@@ -146,11 +146,11 @@ def best_shift(
     return float(shifts[best]), float(z[best]), float(z[shifts == 0.0][0])
 
 
-def between(turns: Array, half_width: float, duration: float) -> list[tuple[float, float]]:
+def split_at_turns(turns: Array, half_width: float, duration: float) -> list[tuple[float, float]]:
     """Return the n + 1 stretches, start and stop in s, between turns.
 
-    The middles of the turns are of shape (n,), and half of what is left out about each and the
-    duration of the log are in s, too.
+    ``turns`` are their middles, shape (n,); ``half_width`` is half of the time that is left out
+    about each, ``duration`` the length of the log, all in s.
     """
     starts = np.concatenate(([0.0], turns + half_width))
     stops = np.concatenate((turns - half_width, [duration]))

@@ -1,12 +1,12 @@
 """The Earth's rate as an unknown constant, by Kalman filter and smoother.
 
-The paper's filter (003 eq. 15, 16) is given the rate that it finds; see `known_rate`. Here the rate
-w is a state beside the gyro's own error, seen with the sign of the dwell:
+The filter of Silva et al. (eq. 15, 16) needs the rate as an input; see `known_rate`. Here the rate
+w is a state in addition to the error of the gyro, observed with the sign of the dwell:
 
     x = [w, z_G ..., z_K],    mean of a block = s cos(latitude) w + mean of (z_G + ... + z_K) + v.
 
-The filter is that of `block_filter`, with one constant and one axis. Its roots keep their digits
-from a start of 1 rad/s, which stands for no knowledge at all, down to 1e-10 rad/s.
+The filter is that of `block_filter`, with one constant and one axis. Its square roots keep their
+precision from an uninformative start of 1 rad/s down to 1e-10 rad/s.
 
 References
 ----------
@@ -32,13 +32,13 @@ from imubench_pipeline.experiments.earth_rate.states import UNINFORMATIVE_SIGMA,
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_NOTHING = 1e-12
-"""Singular value of a predicted root, of unit rows, that is rounding alone."""
+_SINGULAR_TOLERANCE = 1e-12
+"""Relative singular value of a predicted root with unit rows, below which it is rounding."""
 
 
 @dataclass(frozen=True)
 class Filtered:
-    """What a filter knows after each block, from the data up to there."""
+    """Filtered estimates after each block, from the data up to its end."""
 
     time: Array  # shape (b,); end of each block, s from the first sample of the first
     rate: Array  # shape (runs, b); estimated Earth's rate, rad/s
@@ -62,8 +62,8 @@ class Filtered:
     def rate_nees(self, rate: float) -> Array:
         """Return the squared error of the rate over its variance, shape (runs, b).
 
-        Chi-squared of one degree of freedom, where the filter is consistent and what it knew at the
-        start no longer counts: once both positions have been seen. The true rate is in rad/s.
+        Chi-squared of one degree of freedom for a consistent filter, once both positions have been
+        observed and the prior no longer matters. The true rate is in rad/s.
         """
         return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
 
@@ -86,16 +86,15 @@ class Filtered:
 
 @dataclass(frozen=True)
 class Smoothed:
-    """What is known of each block from all the data."""
+    """Smoothed estimates of each block from all the data."""
 
-    # shape (runs,); estimated Earth's rate, rad/s: a constant, which the filter has found at the
-    # end
+    # shape (runs,); estimated Earth's rate, rad/s: a constant, equal to the last filtered value
     rate: Array
     rate_sigma: float  # its standard deviation, rad/s
     # shape (runs, b); mean of the gyro's slow error over each block, its bias included, rad/s
     drift: Array
     drift_sigma: Array  # shape (b,); its standard deviation, rad/s
-    states: Array  # shape (runs, b, m + 2); as those of `Filtered`
+    states: Array  # shape (runs, b, m + 2); as in `Filtered`
 
 
 class RateFilter:
@@ -108,10 +107,9 @@ class RateFilter:
         Its flicker noise is a bank of Gauss-Markov processes; a ramp and lines are estimated, see
         `states.block_states`.
     turn_on_bias : float
-        Standard deviation of the fixed bias, rad/s. By default it is not known at all.
+        Standard deviation of the fixed bias, rad/s. By default it is unknown.
     rate_sigma : float
-        Standard deviation of what is known of the rate at the start, about 0, rad/s; by default
-        so much that it adds nothing.
+        Standard deviation of the prior of the rate about 0, rad/s; by default uninformative.
 
     Raises
     ------
@@ -170,9 +168,9 @@ class RateFilter:
         )
 
     def smooth(self, filtered: Filtered) -> Smoothed:
-        """Smooth what `run` has filtered (Rauch, Tung and Striebel), with roots."""
+        """Smooth the result of `run` (Rauch, Tung and Striebel), with square roots."""
         states = filtered.states.copy()
-        gains, sigma = self._backward
+        gains, sigma = self._smoother_gains
         for k in range(len(self.blocks) - 2, -1, -1):
             transition, _ = self._filter.matrices(k + 1)
             predicted = filtered.states[:, k] @ transition.T
@@ -182,20 +180,20 @@ class RateFilter:
         )
 
     @cached_property
-    def _backward(self) -> tuple[Array, Array]:
-        """Gains of the smoother at each block but the last, and deviations of the drift at each."""
+    def _smoother_gains(self) -> tuple[Array, Array]:
+        """Gains of the smoother at all but the last block, and sigma of the drift at each."""
         root = self._filter.roots[-1]
         gains = np.empty((len(self.blocks) - 1, *root.shape))
         sigma = np.empty(len(self.blocks))
         sigma[-1] = deviation(root, -1)
         for k in range(len(gains) - 1, -1, -1):
-            gains[k], rest = self._smoothing(k)
+            gains[k], rest = self._compute_smoothing(k)
             root = triangle(np.concatenate([rest, gains[k] @ root], axis=1))
             sigma[k] = deviation(root, -1)
         return gains, sigma
 
-    def _smoothing(self, k: int) -> tuple[Array, Array]:
-        """Return the gain at a block, and a root of what the next one leaves unknown."""
+    def _compute_smoothing(self, k: int) -> tuple[Array, Array]:
+        """Return the smoother gain at a block, and a root of its covariance given the next one."""
         transition, noise = self._filter.matrices(k + 1)
         root = self._filter.roots[k]
         n = len(root)
@@ -203,8 +201,8 @@ class RateFilter:
         joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ root, noise, root
         after = triangle(joint)
         predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
-        # The mean of a block is a combination of the states where nothing drives them: no inverse.
+        # Without process noise the mean of a block depends on the states: no plain inverse.
         scale = np.linalg.norm(predicted, axis=1)
         unit = np.where(scale > 0.0, scale, 1.0)
-        gain = shared @ np.linalg.pinv(predicted / unit[:, None], rcond=_NOTHING) / unit
+        gain = shared @ np.linalg.pinv(predicted / unit[:, None], rcond=_SINGULAR_TOLERANCE) / unit
         return gain, rest

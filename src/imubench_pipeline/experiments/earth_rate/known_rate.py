@@ -1,19 +1,18 @@
-"""Bias tracking with known rate: the filter of the paper, for comparison (003 eq. 15, 16).
+"""Bias tracking with known rate: the filter of Silva et al. (eq. 15, 16), for comparison.
 
-It cannot find the Earth's rate. Its measurement y = w_ie - w~ is formed with the rate that is
-wanted: what it tracks is the gyro's error, and the reading less the error so tracked is, on
-average, the rate that was put in, whatever that was. Given twice the Earth's rate it "finds" twice
-the Earth's rate, as fast and as surely. The sign of the dwell, which alone tells the rate from a
-bias, is not in it, nor is the latitude. What it is good for is the error of a gyro that stands
-still at a known attitude.
+It cannot estimate the Earth's rate. Its measurement y = w_ie - w~ contains the unknown rate. It
+tracks the error of the gyro, so that the reading less the tracked error is, on average, the input
+rate. Given twice the Earth's rate it "finds" twice the Earth's rate, with the same speed and
+precision. The filter contains neither the latitude nor the sign of the dwell, which alone separates
+the rate from a bias. It is useful for the error of a gyro at rest at a known attitude.
 
-How the mean of what it calls the rate scatters is the same whatever it is given (`mean_sigma`):
-that of white noise, N / sqrt(t), once the filter has forgotten its start. The paper prints that
-start, P_0 = 0.1 I, without a unit (`STARTS`). In (deg/s)^2, as all else there is in degrees, the
-mean scatters less than white noise would at some 1,000 samples, in (rad/s)^2 it does not.
+The scatter of the mean of its "rate" is independent of the input rate (`mean_sigma`). It is the
+scatter of white noise, N / sqrt(t), once the filter has forgotten its start. The paper prints the
+start, P_0 = 0.1 I, without a unit (`STARTS`). In (deg/s)^2, since the paper uses degrees elsewhere,
+the mean scatters less than white noise at about 1,000 samples; in (rad/s)^2 it does not.
 
-As printed, eq. 13 is P+ = (I - K H)^-1 P-, where (I - K H) P- is meant: each measurement then
-adds to the covariance what it should take off, and P grows without bound (`as_printed`).
+Equation 13 is printed as P+ = (I - K H)^-1 P- instead of (I - K H) P-. Each measurement then
+increases the covariance instead of reducing it, and P grows without bound (`as_printed`).
 """
 
 from __future__ import annotations
@@ -30,32 +29,32 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 STARTS = {"degrees": 0.1 * math.radians(1.0) ** 2, "radians": 0.1}
-"""P_0 = 0.1 I of the paper in (rad/s)^2, by the unit that it may be meant in: it prints none."""
+"""P_0 = 0.1 I of Silva et al. in (rad/s)^2, by the assumed unit: the paper prints none."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """What comes of the filter that is given the rate, for the samples in dwells."""
+    """Result of the filter with known rate, for the samples in dwells."""
 
     sample: NDArray[np.int64]  # shape (n,); number of each sample in the log
     drift: Array  # shape (n,); tracked error of the gyro, z_f + z_rrw, rad/s
-    # shape (n,); cumulative mean of what it calls the Earth's rate, reading less drift, as in the
-    # paper's figures 10 to 13, rad/s
+    # shape (n,); cumulative mean of its "Earth's rate", the reading less the drift, rad/s, as in
+    # figures 10 to 13 of Silva et al.
     mean: Array
 
 
 @dataclass(frozen=True)
 class _Filter:
-    """Its matrices: F = diag(decay, 1), H = [1, 1], Q_d = diag(of_f, of_rrw), R_d = white."""
+    """Matrices: F = diag(decay, 1), H = [1, 1], Q_d = diag(of_f, of_rrw), R_d = white."""
 
     decay: float
     of_f: float
     of_rrw: float
     white: float
-    stationary: float  # variance of the process, which the approximate Q_d is not quite that of
+    stationary: float  # variance of the process; that of Q_d is approximate
 
 
-def _filter(model: NoiseModel, rate: float) -> _Filter:
+def _build_filter(model: NoiseModel, rate: float) -> _Filter:
     processes = [term.gauss_markov for term in model.terms if term.gauss_markov is not None]
     process = processes[0] if processes else None
     if model.N == 0 or (model.B > 0 and model.T_B is None):
@@ -77,29 +76,29 @@ def track(
     known_rate: float,
     start: float = STARTS["degrees"],
 ) -> Tracked:
-    """Track the bias of a gyro with the filter of the paper, which is given the Earth's rate.
+    """Track the bias of a gyro with the filter of Silva et al., which needs the Earth's rate.
 
     F = diag(e^(-T/T_B), 1), H = [1, 1], R_d = N^2/T, Q_d = T diag(S_B, S_K), x_0 = 0 as printed,
-    also where that is an approximation (the first entry of Q_d), P_0 = ``start`` I. Samples of
-    turning are left out, as if no time lay between dwells. The log, shape (samples,), is in rad/s,
-    NaN where a sample is missing, and so is the rate that the filter is given, and returns; the
-    start is in (rad/s)^2; of the model N, B with T_B, and K are used.
+    although the first entry of Q_d is an approximation; P_0 = ``start`` I. Samples of turning are
+    left out, as if no time lay between dwells. The log, shape (samples,), is in rad/s, NaN where a
+    sample is missing; the known rate is in rad/s, the start in (rad/s)^2. N, B with T_B, and K of
+    the model are used.
 
     Raises
     ------
     ValueError
         If the model has no white noise, or its B no correlation time.
     """
-    one = _filter(model, experiment.rate)
+    one = _build_filter(model, experiment.rate)
     sample = np.concatenate([np.arange(dwell.start, dwell.stop) for dwell in experiment.dwells])
     sample = sample[np.isfinite(log[sample])]
-    drift = _tracked(log[sample] - known_rate, start, one.decay, one.of_f, one.of_rrw, one.white)
+    drift = _run_filter(log[sample] - known_rate, start, one.decay, one.of_f, one.of_rrw, one.white)
     corrected = log[sample] - drift
     return Tracked(sample, drift, np.cumsum(corrected) / np.arange(1, len(sample) + 1))
 
 
 @njit(cache=True, nogil=True)
-def _tracked(
+def _run_filter(
     error: Array, start: float, decay: float, of_f: float, of_rrw: float, white: float
 ) -> Array:
     """Return z_f + z_rrw after each measurement of their sum."""
@@ -124,10 +123,10 @@ def _tracked(
 
 
 def settled(mean: Array, rate: float, known_rate: float, part: float = 0.1) -> float:
-    """Return from when on a mean stays near what the filter was given, s of data; inf: not yet.
+    """Return the time after which a mean stays near the known rate, s of data; inf: not yet.
 
-    Near is within a part of it; the mean is that of `track`, shape (n,), in rad/s as the known
-    rate, the rate that of sampling, Hz.
+    Near is within ``part`` of the known rate. The mean of `track`, shape (n,), and the known rate
+    are in rad/s, the sampling rate in Hz.
     """
     out = np.flatnonzero(np.abs(mean - known_rate) > part * abs(known_rate))
     if len(out) == 0:
@@ -141,16 +140,16 @@ def mean_sigma(
     """Return the standard deviation of the mean of `track` after each sample, rad/s, shape (n,).
 
     Exact, over the noise of the model and a fixed bias of the standard deviation ``turn_on_bias``,
-    rad/s: the covariance of the true errors, the tracked ones and the sum goes with the filter. It
-    is that whatever rate the filter is given. The start is in (rad/s)^2, the rate in Hz.
+    rad/s: the covariance of the true errors, the tracked errors and the sum is propagated with the
+    filter. It is independent of the known rate. The start is in (rad/s)^2, the rate in Hz.
 
     Raises
     ------
     ValueError
         As `track`.
     """
-    one = _filter(model, rate)
-    return _mean_sigma(
+    one = _build_filter(model, rate)
+    return _propagate_sigma(
         samples,
         start,
         np.array([one.decay, one.of_f, one.of_rrw, one.white]),
@@ -158,8 +157,8 @@ def mean_sigma(
     )
 
 
-def _mean_sigma(samples: int, start: float, matrices: Array, initial: Array) -> Array:
-    """Propagate the covariance of [z_f, z_rrw, tracked z_f, tracked z_rrw, sum of what is left]."""
+def _propagate_sigma(samples: int, start: float, matrices: Array, initial: Array) -> Array:
+    """Propagate the covariance of [z_f, z_rrw, tracked z_f, tracked z_rrw, sum of residuals]."""
     decay, of_f, of_rrw, white = matrices
     sigma = np.empty(samples)
     joint = np.zeros((5, 5))
@@ -188,15 +187,15 @@ def _mean_sigma(samples: int, start: float, matrices: Array, initial: Array) -> 
 def as_printed(model: NoiseModel, rate: float, steps: int, start: float) -> Array:
     """Return the trace of P after each measurement by eq. 13 as printed, (rad/s)^2, shape (steps,).
 
-    (I - K H)^-1 P in place of (I - K H) P. The start is in (rad/s)^2, the rate in Hz; where it
-    leaves all numbers the trace is infinite.
+    (I - K H)^-1 P replaces (I - K H) P. The start is in (rad/s)^2, the rate in Hz; on overflow the
+    trace is infinite.
 
     Raises
     ------
     ValueError
         As `track`.
     """
-    one = _filter(model, rate)
+    one = _build_filter(model, rate)
     moved, driven = np.diag([one.decay, 1.0]), np.diag([one.of_f, one.of_rrw])
     seen, covariance = np.ones((1, 2)), start * np.eye(2)
     traces = np.full(steps, math.inf)

@@ -1,14 +1,14 @@
 """The Earth's rate from pairs of dwells, with the standard error that the noise model gives.
 
-    w = (w_N - w_S) / (2 cos(latitude))    (003 eq. 14)
+    w = (w_N - w_S) / (2 cos(latitude))    (Silva et al., eq. 14)
 
-for each pair of dwells that follow each other, and the mean over pairs. What the gyro drifts
-between the two dwells is taken for rotation, now with one sign and now with the other where turns
-are alternate. A-B-A differences take out the part of it that is linear in time.
+for each pair of consecutive dwells, and the mean over pairs. A drift of the gyro between the two
+dwells appears as rotation, with alternating sign if the turns alternate. A-B-A differences remove
+the linear part of the drift.
 
 The weights of an estimate on the means of the dwells add up to 0: the fixed bias drops out. The
 standard error is the root of w^T C w with C the covariance of these means, in closed form
-(`covariance`), and not the scatter of the estimates, which is that of few and correlated ones.
+(`covariance`). The scatter of the estimates is not used, since they are few and correlated.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ class Differences:
     each_sigma: Array  # shape (p,); its standard error, rad/s
     rate: Array  # shape (runs, p); mean of the estimates up to each, rad/s
     sigma: Array  # shape (p,); its standard error, rad/s
-    # shape (runs, p); what the scatter would give for it, were the estimates independent, rad/s;
-    # NaN for one
+    # shape (runs, p); standard error from the scatter, for independent estimates, rad/s; NaN for
+    # one estimate
     scatter: Array
 
 
 def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
-    """Estimate the rate by 003 eq. 14 from pairs of dwells, each dwell in one pair at most.
+    """Estimate the rate from pairs of dwells, each in one pair at most (Silva et al., eq. 14).
 
-    A dwell that the same sense follows, a turn having been missed, is left out. The block means are
+    A dwell followed by one of the same sense (a missed turn) is left out. The block means are
     in rad/s, shape (runs, b); the noise model is for the standard errors.
 
     Raises
@@ -57,17 +57,19 @@ def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
             continue
         differences.append([(i, dwells.sense[i] / 2.0), (i + 1, dwells.sense[i + 1] / 2.0)])
         i += 2
-    return _estimated(differences, means, blocks, dwells, model, "pair of dwells north and south")
+    return _estimate_differences(
+        differences, means, blocks, dwells, model, "pair of dwells north and south"
+    )
 
 
 def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
-    """Estimate the rate by A-B-A differences: a drift that is linear in time is taken out.
+    """Estimate the rate by A-B-A differences, which remove a drift that is linear in time.
 
-    Of each three dwells of alternate sense that follow each other, the middle one is compared with
-    what the line through the outer two has at its mean time. Triples overlap: each dwell but the
-    first and the last is the middle of one.
+    Of three consecutive dwells of alternating sense, the middle one is compared with the line
+    through the outer two at its mean time. Triples overlap: each dwell except the first and the
+    last is the middle of one.
 
-    Its parameters are those of `by_pairs`.
+    The parameters are as in `by_pairs`.
 
     Raises
     ------
@@ -75,7 +77,7 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
         If there are no three such dwells.
     """
     dwells = blocks.of_dwells()
-    # The mean time of the samples present is that of the blocks they lie in.
+    # The mean time of the samples present is taken from their blocks.
     middle = blocks.means_of_dwells(blocks.middle[None, :])[0]
     differences = []
     for i in range(1, len(dwells) - 1):
@@ -86,10 +88,12 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
         differences.append(
             [(i - 1, -sense * (1.0 - part) / 2.0), (i, sense / 2.0), (i + 1, -sense * part / 2.0)]
         )
-    return _estimated(differences, means, blocks, dwells, model, "three dwells of alternate sense")
+    return _estimate_differences(
+        differences, means, blocks, dwells, model, "three dwells of alternate sense"
+    )
 
 
-def _estimated(
+def _estimate_differences(
     differences: list[list[tuple[int, float]]],
     means: Array,
     blocks: Blocks,
@@ -118,7 +122,7 @@ def _estimated(
     return Differences(
         dwells.end[last],
         each,
-        np.sqrt(np.maximum(np.diag(covariance), 0.0)),  # a ramp leaves nothing of triples
+        np.sqrt(np.maximum(np.diag(covariance), 0.0)),  # 0 for a ramp in triples
         rate,
         np.sqrt(np.maximum(total, 0.0)) / number,
         scatter,

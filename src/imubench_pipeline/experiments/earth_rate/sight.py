@@ -1,4 +1,4 @@
-"""Turns from what a log shows of them, and from the schedule where it shows nothing."""
+"""Find turns by the events of a log, and by the schedule where there are none."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.alternation import alternation, best_shift, between
+from imubench_pipeline.experiments.earth_rate.alternation import (
+    alternation,
+    best_shift,
+    split_at_turns,
+)
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import (
     EDGE_DWELL_FRACTION,
     choose,
@@ -24,22 +28,22 @@ from imubench_pipeline.experiments.earth_rate.transients import (
 from imubench_pipeline.experiments.earth_rate.turns import Turn
 from imubench_pipeline.typing import Array
 
-_ENOUGH = 0.4
-"""Part of the schedule's turns that must be seen, for what is seen to decide."""
+_MIN_SEEN_SHARE = 0.4
+"""Least share of the scheduled turns that must be detected for the events to decide."""
 
-_ALTERNATES = 3.0
-"""Standard errors of the alternation at which a log without transients is taken to be turned."""
+_MIN_ALTERNATION_SIGMAS = 3.0
+"""Least alternation, in standard errors, of a log without transients that was turned."""
 
-_SHIFTED = 6.0
-"""Standard errors of the alternation at which the start of the schedule is taken from it."""
+_MIN_SHIFT_SIGMAS = 6.0
+"""Least alternation, in standard errors, that may shift the start of the schedule."""
 
-_CALMING = 0.25
-"""Left out on either side of a knock, s."""
+_KNOCK_MARGIN = 0.25
+"""Margin that is left out on either side of a knock, s."""
 
 
 @dataclass(frozen=True)
 class TurnSchedule:
-    """The turns as they are stated, before the log is looked at."""
+    """The stated turns, before any analysis of the log."""
 
     # dwell, start, turning, margin: as
     # `imubench_pipeline.experiments.earth_rate.turning.find_turning` takes them, s
@@ -53,18 +57,18 @@ class TurnSchedule:
     duration: float  # of the log, s
 
 
-def by_sight(
+def find_turns(
     blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
 ) -> tuple[list[Turn], list[tuple[float, float]], list[str]]:
-    """Return turns (at least one), knocks and doubts where there is no column, in order.
+    """Return turns (at least one), knocks and doubts for a log without a column, in order.
 
-    Of events in order of time; ``trust`` takes the schedule's word where nothing is seen. Knocks
-    are start and stop of what is left out besides, s.
+    The events are in order of time; ``trust`` accepts the schedule if nothing is detected. Knocks
+    are the start and stop of further times to leave out, s.
 
     Raises
     ------
     ValueError
-        If nothing shows that the log was turned, and the schedule is not trusted.
+        If there is no evidence of turns, and the schedule is not trusted.
     """
     chosen = choose(events, schedule.dwell, schedule.tolerance, schedule.duration)
     declared = schedule.dwell
@@ -79,14 +83,14 @@ def by_sight(
         chosen = choose(events, schedule.dwell, schedule.tolerance, schedule.duration)
     expected = max(1.0, round((schedule.duration - schedule.start) / schedule.dwell) - 1.0)
     doubts: list[str] = []
-    if len(chosen) >= _ENOUGH * expected:
-        turns, rest = _of_events(events, chosen, schedule)
-        seen = _filled([events[k] for k in chosen], turns, schedule, blocks)
+    if len(chosen) >= _MIN_SEEN_SHARE * expected:
+        turns, rest = _merge_into_turns(events, chosen, schedule)
+        seen = _fill_gaps([events[k] for k in chosen], turns, schedule, blocks)
     else:
-        seen, rest, doubts = _scheduled(blocks, events, schedule, trust)
+        seen, rest, doubts = _follow_schedule(blocks, events, schedule, trust)
     quick = [e for e in rest if e.kind == "transient"]
     ends = sum(
-        _at_end(event, schedule) and event.likelihood > CLEAR_LOG_LIKELIHOOD for event in quick
+        _is_at_end(event, schedule) and event.likelihood > CLEAR_LOG_LIKELIHOOD for event in quick
     )
     if ends:
         doubts.append("handling at the ends of the log is left out")
@@ -99,10 +103,10 @@ def by_sight(
     return seen, disturbances(quick), doubts
 
 
-def _of_events(
+def _merge_into_turns(
     events: list[Event], chosen: Sequence[int], schedule: TurnSchedule
 ) -> tuple[list[Turn], list[Event]]:
-    """Return the turns of the events chosen, with what came of the same turn, and the others."""
+    """Return turns from the chosen events, merged with events of the same turn, and the others."""
     near = compute_min_calm(schedule.dwell)
     turns: list[Turn] = []
     used = set(chosen)
@@ -114,7 +118,7 @@ def _of_events(
             i = k + step
             while 0 <= i < len(events) and i not in used:
                 other = events[i]
-                # What is near belongs to the turn: it was overrun and came back.
+                # A near event belongs to the turn: overshoot and return.
                 gap = max(other.start - stop, start - other.stop)
                 if gap > near:
                     break
@@ -140,10 +144,10 @@ def _of_events(
     return turns, [event for i, event in enumerate(events) if i not in used]
 
 
-def _filled(
+def _fill_gaps(
     chosen: list[Event], turns: list[Turn], schedule: TurnSchedule, blocks: LevelBlocks
 ) -> list[Turn]:
-    """Put turns of the schedule where turns may be unseen: too weak, or without samples."""
+    """Insert scheduled turns where turns may be missed: too weak, or without samples."""
     silent = may_be_silent(chosen)
     time = np.array([turn.time for turn in turns])
     gaps = np.diff(time)
@@ -154,13 +158,13 @@ def _filled(
         more = np.arange(time[0] - usual, (EDGE_DWELL_FRACTION + 0.3) * schedule.dwell, -usual)[
             ::-1
         ]
-        filled += [_silent(float(at), schedule) for at in more]
+        filled += [_make_silent_turn(float(at), schedule) for at in more]
     for k, turn in enumerate(turns):
         many = max(1, round(float(gaps[k - 1]) / usual)) if k else 1
         missed = 0
         for at in np.linspace(time[k - 1], time[k], many + 1)[1:-1].tolist() if many > 1 else []:
-            if silent or _hole(blocks, at, schedule):
-                filled.append(_silent(at, schedule))
+            if silent or _is_gap(blocks, at, schedule):
+                filled.append(_make_silent_turn(at, schedule))
             else:
                 missed += 1
         if missed:
@@ -169,33 +173,39 @@ def _filled(
         filled.append(turn)
     if silent:
         last = schedule.duration - (EDGE_DWELL_FRACTION + 0.3) * schedule.dwell
-        filled += [_silent(float(at), schedule) for at in np.arange(time[-1] + usual, last, usual)]
+        filled += [
+            _make_silent_turn(float(at), schedule)
+            for at in np.arange(time[-1] + usual, last, usual)
+        ]
     return filled
 
 
-def _hole(blocks: LevelBlocks, time: float, schedule: TurnSchedule) -> bool:
-    """Tell whether the samples are missing where a turn would be."""
+def _is_gap(blocks: LevelBlocks, time: float, schedule: TurnSchedule) -> bool:
+    """Return whether the samples are missing where a turn would be."""
     first = max(0, int((time - 0.5 * schedule.turning) / blocks.length))
     last = int((time + 0.5 * schedule.turning) / blocks.length)
     return not blocks.present[first : last + 1].any()
 
 
-def _silent(time: float, schedule: TurnSchedule) -> Turn:
-    half = _half(schedule)
+def _make_silent_turn(time: float, schedule: TurnSchedule) -> Turn:
+    half = _compute_half_width(schedule)
     words = ("nothing is seen of it: the schedule says so",)
     return Turn(time - half, time + half, time, "schedule", None, words)
 
 
-def _half(schedule: TurnSchedule) -> float:
-    """Return half of what is left out about a turn that is not seen."""
+def _compute_half_width(schedule: TurnSchedule) -> float:
+    """Return half of the time that is left out about a turn that is not detected, s."""
     return min(schedule.tolerance + 0.5 * schedule.turning, 0.4 * schedule.dwell)
 
 
-def _scheduled(
+def _follow_schedule(
     blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
 ) -> tuple[list[Turn], list[Event], list[str]]:
-    """Return the turns of the schedule; where a clear transient is near one, that is it."""
-    half, longest = _half(schedule), schedule.duration - EDGE_DWELL_FRACTION * schedule.dwell
+    """Return the turns of the schedule, each replaced by a clear transient near it."""
+    half, longest = (
+        _compute_half_width(schedule),
+        schedule.duration - EDGE_DWELL_FRACTION * schedule.dwell,
+    )
     count = max(0, math.ceil((longest - schedule.start) / schedule.dwell))
     slots: Array = schedule.start + schedule.dwell * np.arange(1.0, count) + 0.5 * schedule.turning
     slots = slots[(slots > half) & (slots < longest)]
@@ -207,15 +217,15 @@ def _scheduled(
         calm, slots, 0.5 * schedule.turning, longest_shift, schedule.duration
     )
     doubts: list[str] = []
-    by_step = abs(z) > _SHIFTED and z**2 - unshifted**2 > 2.0 * CLEAR_LOG_LIKELIHOOD
+    by_step = abs(z) > _MIN_SHIFT_SIGMAS and z**2 - unshifted**2 > 2.0 * CLEAR_LOG_LIKELIHOOD
     if by_step:
         slots = slots + shift
         slots = slots[(slots > half) & (slots < schedule.duration - half)]
         doubts.append(f"the level alternates {shift:+.1f} s from the schedule: that is used")
     else:
-        # Of what is used, and not of the best shift: a search finds 3 in one log of 50 at rest.
-        size = abs(alternation(calm, between(slots, half, schedule.duration)).z)
-        if not (size >= _ALTERNATES or trust):
+        # At the used shift, not the best one: a search exceeds 3 in one of 50 logs at rest.
+        size = abs(alternation(calm, split_at_turns(slots, half, schedule.duration)).z)
+        if not (size >= _MIN_ALTERNATION_SIGMAS or trust):
             raise ValueError(
                 f"nothing shows that the log was turned every {schedule.dwell:g} s: no transients, "
                 f"and its level alternates by {size:.1f} standard errors (trust_schedule takes "
@@ -236,31 +246,31 @@ def _scheduled(
         if near:
             best = max(near, key=lambda k: events[k].likelihood)
             used.update(near)
-            turns += _of_events([events[best]], [0], schedule)[0]
+            turns += _merge_into_turns([events[best]], [0], schedule)[0]
         elif by_step:
             words = ("no transient: the level alternates with the schedule",)
             turns.append(Turn(slot - half, slot + half, slot, "step", None, words))
         else:
-            turns.append(_silent(slot, schedule))
+            turns.append(_make_silent_turn(slot, schedule))
     return turns, [e for k, e in enumerate(events) if k not in used], doubts
 
 
-def _at_end(event: Event, schedule: TurnSchedule) -> bool:
+def _is_at_end(event: Event, schedule: TurnSchedule) -> bool:
     edge = EDGE_DWELL_FRACTION * schedule.dwell
     return not event.haste and not edge <= event.time <= schedule.duration - edge
 
 
 def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
-    """Return start and stop, s, to leave out of transients that are no turns, and are not noise."""
+    """Return start and stop, s, of transients to leave out: neither turns nor noise."""
     return [
-        (event.start - _CALMING, event.stop + _CALMING)
+        (event.start - _KNOCK_MARGIN, event.stop + _KNOCK_MARGIN)
         for event in events
         if event.haste or event.likelihood > CLEAR_LOG_LIKELIHOOD
     ]
 
 
 def leave_out_knocks(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
-    """Return the blocks without those of knocks, from start to stop, s."""
+    """Return the blocks with the blocks of knocks, from start to stop, s, marked as missing."""
     present = blocks.present.copy()
     for start, stop in knocks:
         first, last = int(start / blocks.length), math.ceil(stop / blocks.length)

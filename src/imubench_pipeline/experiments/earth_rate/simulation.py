@@ -1,8 +1,8 @@
 """Simulated Earth-rate experiments: the block means of many runs, or a whole log.
 
-The runs of Silva et al. (003 section 6) are here as designs: 120, 12, 25 and 60 minutes at 32 Hz,
-turned every 30 s, with the parameters that the paper prints. Neither the latitude nor the time
-that turning takes is printed; both are assumed.
+The runs of Silva et al. (section 6) are here as designs: 120, 12, 25 and 60 minutes at 32 Hz,
+turned every 30 s, with the printed parameters. The paper prints neither the latitude nor the time
+of a turn; both are assumed.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from imubench_pipeline.typing import Array
 PAPER_MODEL = NoiseModel(
     N=math.radians(0.0122), B=math.radians(0.0027), T_B=238.1, K=math.radians(6.8314e-5)
 )
-"""SiRRS01-03, 003 section 5.1, SI."""
+"""SiRRS01-03 by Silva et al., section 5.1, SI."""
 
 PAPER_RATE = 32.0
-"""Sampling rate of the runs, Hz (003 section 6)."""
+"""Sampling rate of the runs, Hz (Silva et al., section 6)."""
 
 PAPER_PERIOD = 30.0
-"""Time between turns, s (003 section 6)."""
+"""Time between turns, s (Silva et al., section 6)."""
 
 PAPER_MINUTES = {"1": 120.0, "2": 12.0, "3": 25.0, "4": 60.0, "4, last 13 min": 13.0}
-"""Length of the runs, min (003 section 6); the last is a part of run 4."""
+"""Length of the runs, min (Silva et al., section 6); the last is a part of run 4."""
 
 ASSUMED_LATITUDE = math.radians(-23.3)
-"""Of Londrina, where the authors work, rad: the paper prints none."""
+"""Latitude of Londrina, where the authors work, rad: the paper prints none."""
 
 ASSUMED_TURNING = 2.0
-"""Time of each 30 s that turning takes, s: the paper prints none."""
+"""Time of a turn within each 30 s, s: the paper prints none."""
 
 
 def paper_run(minutes: float) -> Experiment:
-    """Return the design of a run of the paper: north first, a turn every 30 s, for so many min."""
+    """Return the design of a run of Silva et al.: north first, a turn every 30 s."""
     return Experiment.regular(
         dwell=PAPER_PERIOD - ASSUMED_TURNING,
         turning=ASSUMED_TURNING,
@@ -98,23 +98,23 @@ def simulate_log(
     transient: ArrayLike,
     rng: np.random.Generator,
 ) -> Array:
-    """Return a whole log of an experiment, turning samples among it, rad/s, shape (samples,).
+    """Return a whole log of an experiment, including turns, rad/s, shape (samples,).
 
-    While it turns, the axis goes from one position to the other at a speed that rises and falls as
-    a sine, and sees the Earth's rate by the cosine of the angle. The turn is about an axis across
-    it: of that turn itself it senses only what misalignment lets through, a pulse peak sin^2(pi t /
-    turning). The log begins with the first sample at 0 and ends with the last dwell; the bias of
-    the gyro's model is the fixed one of this run. The other parameters are those of `true_rate`.
+    During a turn, the axis moves from one position to the other with a sinusoidal speed, and senses
+    the Earth's rate times the cosine of the angle. The turn is about a perpendicular axis: only
+    misalignment makes it visible, as a pulse peak sin^2(pi t / turning). The log begins with the
+    first sample at 0 and ends with the last dwell. The bias of the model is the fixed bias of this
+    run. The other parameters are as in `true_rate`.
     """
     true = true_rate(experiment, earth_rate, transient)
     return simulate(model, experiment.rate, len(true), rng, true=lambda a, b: true[a:b])
 
 
 def true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
-    """Return what a gyro without errors senses in an experiment, rad/s, shape (samples,).
+    """Return the readings of an error-free gyro in an experiment, rad/s, shape (samples,).
 
-    To the end of the last dwell; ``transient`` is the peak of what is sensed of the turns, one, or
-    one a turn, and as the Earth's rate in rad/s.
+    They end with the last dwell. ``transient`` is the peak of the pulse of turns, one value or one
+    per turn, in rad/s as the Earth's rate.
     """
     dwells = experiment.dwells
     peaks = np.broadcast_to(np.asarray(transient, dtype=np.float64), len(dwells) - 1)

@@ -1,9 +1,9 @@
 """Dwells and turning points of a gyro that is turned end for end, from its log.
 
 Turning a sensitive axis end for end is a rotation about an axis perpendicular to it: the gyro
-senses cross-axis coupling and handling, which may be much or nothing. What is sensed decides
-where there is something, a column with the position where there is one, and the schedule where
-there is nothing. `stays` reads turns from such a column.
+senses cross-axis coupling and handling, which may be much or nothing. A column with the position
+decides if there is one, else the events in the log, and without these the schedule. `stays` reads
+turns from such a column.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from imubench_pipeline.experiments.earth_rate.alternation import alternation, co
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import EDGE_DWELL_FRACTION
 from imubench_pipeline.experiments.earth_rate.sight import (
     TurnSchedule,
-    by_sight,
     disturbances,
+    find_turns,
     leave_out_knocks,
 )
 from imubench_pipeline.experiments.earth_rate.transients import (
@@ -32,26 +32,31 @@ from imubench_pipeline.experiments.earth_rate.transients import (
     steps,
     transients,
 )
-from imubench_pipeline.experiments.earth_rate.turns import SURE, FoundDwell, Turn, Turning
+from imubench_pipeline.experiments.earth_rate.turns import (
+    DETECTION_ORDER,
+    FoundDwell,
+    Turn,
+    Turning,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_NEAR = 0.1
-"""Part of the distance of the two positions within which a sensor is in one of them."""
+_POSITION_TOLERANCE = 0.1
+"""Tolerance about a position, as a share of the distance between the two positions."""
 
 
 @dataclass(frozen=True)
 class Stays:
-    """Where the sensor stood."""
+    """Stays of the sensor in its positions."""
 
     # start, stop: shape (n,); s; what lies between two of them is turning
     start: Array
     stop: Array
     # shape (n,); whether it is the position of the larger number; alternates
     high: NDArray[np.bool_]
-    senses: bool  # whether the column has +1 and -1: then it says the sense itself
-    # whether more than a twentieth of the column is in neither position for longer than a turn
-    # takes: perhaps there are more than two
+    senses: bool  # whether the column has +1 and -1, and so gives the sense
+    # whether more than a twentieth of the column lies outside both positions, for longer than a
+    # turn: perhaps there are more than two positions
     away: bool
 
 
@@ -59,10 +64,10 @@ def stays(position: Array, rate: float, shortest: float) -> Stays:
     """Find the stays in two positions.
 
     The positions are the medians of the column's lower and upper half, by range. A sample within a
-    tenth of their distance of one is in it; other samples are turning, or overrun. Stays of the
-    same position that follow each other are one. The column, shape (n,), has two positions as
+    tenth of their distance of one is in it; other samples are turning, or overshoot. Consecutive
+    stays in the same position are merged. The column, shape (n,), has two positions as
     numbers in any unit, such as angles, 0 and 1, or -1 and +1; NaN where it is not known. An angle
-    must not wrap at one of them. The rate is in Hz; stays below the shortest, s, are overruns.
+    must not wrap at one of them. The rate is in Hz; stays below the shortest, s, are overshoots.
 
     Raises
     ------
@@ -77,7 +82,7 @@ def stays(position: Array, rate: float, shortest: float) -> Stays:
     if value.min() == value.max():
         raise ValueError(f"the position is {middle:g} throughout: the log never turns")
     low, high = float(np.median(value[value <= middle])), float(np.median(value[value > middle]))
-    near = _NEAR * (high - low)
+    near = _POSITION_TOLERANCE * (high - low)
     state = np.where(np.abs(value - high) <= near, 1, np.where(np.abs(value - low) <= near, 0, -1))
     change = np.flatnonzero(np.diff(state)) + 1
     first = np.concatenate(([0], change))
@@ -120,26 +125,26 @@ def find_turning(
 ) -> Turning:
     """Find the dwells and the turning points of a log.
 
-    A column with the position decides where there is one. Else transients and steps are chosen
-    that fit the schedule best (`experiments.earth_rate.choice_of_turns.choose`): a missed
-    turn makes a dwell twice as long, an overshoot belongs to its turn, a knock is left out. Turns
-    that leave too little to be seen are filled in from the schedule, between those seen; where
-    fewer than 40 % of the schedule's are seen, all of them are the schedule's.
+    A column with the position decides if there is one. Else the transients and steps that fit the
+    schedule best are chosen (`experiments.earth_rate.choice_of_turns.choose`): a missed turn makes
+    a dwell twice as long, an overshoot belongs to its turn, a knock is left out. Turns that are too
+    weak to detect are inserted from the schedule between the detected ones. If fewer than 40 % of
+    the scheduled turns are detected, the schedule gives all of them.
 
     A transient within a fifth of a dwell of an end of the log is handling, and cut off with that
-    end. Handling that lasts as long as a turn (0.2 s and more) is told from one by the schedule
-    alone: where dwells are unequal by more than some tenths, it is taken for a turn
-    (``benchmarks/dwell_detection.py`` says how often, and what peaks are found).
+    end. Only the schedule separates handling as long as a turn (0.2 s and more) from a turn: if the
+    dwells differ by more than some tenths, it is taken for a turn.
+    ``benchmarks/dwell_detection.py`` measures how often, and which peaks are found.
 
-    The sense alternates at each turn. A turn too many or too few reverses all senses after it;
-    where the level then alternates the other way clearly, a doubt says so. Which is first is what
-    ``first_sense`` says, or the column if it has +1 and -1. Otherwise +1 is assumed and the result
-    is ``ambiguous``: all senses may be the other way round, and so may be the sign of a rate
-    estimated from them. The known rate of the Earth chooses nothing.
+    The sense alternates at each turn. An extra or a missed turn inverts all later senses; if the
+    alternation then clearly has the opposite sign, the result has a doubt. The first sense is
+    ``first_sense``, or given by the column if it has +1 and -1. Otherwise +1 is assumed and the
+    result is ``ambiguous``: all senses may be inverted, and with them the sign of an estimated
+    rate. The known rate of the Earth is not used.
 
-    Without a transient, the log must alternate by 3 standard errors with the schedule: runs in
-    which chance hides the alternation are then refused, which favours large estimates.
-    ``trust_schedule`` takes the schedule's word instead.
+    Without a transient, the log must alternate by 3 standard errors with the schedule. Runs where
+    chance hides the alternation are then refused, which favours large estimates.
+    ``trust_schedule`` accepts the schedule instead.
 
     Parameters
     ----------
@@ -150,47 +155,49 @@ def find_turning(
     dwell : float
         Nominal time from the start of a turn to the start of the next, s.
     turning : float
-        Time that a turn takes, s; for turns that are not seen.
+        Time that a turn takes, s; for turns that are not detected.
     start : float
         When the first dwell of the schedule begins, s from the first sample; only for turns that
-        are not seen.
+        are not detected.
     first_sense : {1, -1}, optional
         Sense of the first dwell.
     position : ndarray, shape (n,), optional
-        How the sensor stands (`stays`), sampled as the log.
+        Position of the sensor (`stays`), sampled as the log.
     model : NoiseModel, optional
-        Noise of the sensor at rest, SI; without it, it is found in the log.
+        Noise of the sensor at rest, SI; by default estimated from the log.
     margin : float
-        Left out on both sides of a turn that is seen, s.
+        Margin that is left out on both sides of a detected turn, s.
     trust_schedule : bool
-        Take the schedule's word where the log shows no turns at all.
+        Accept the schedule if no turns are detected at all.
 
     Raises
     ------
     ValueError
-        If an argument is out of range; if the log is shorter than two dwells; if nothing in it
-        shows that it was turned.
+        If an argument is out of range; if the log is shorter than two dwells; if there is no
+        evidence of turns.
     """
     log = np.asarray(log, dtype=np.float64)
-    schedule = _checked(log, rate, dwell, turning, start, first_sense, margin)
+    schedule = _check_schedule(log, rate, dwell, turning, start, first_sense, margin)
     blocks = blocks_of(log, rate, dwell, model)
-    events = _seen(blocks, log, rate, dwell, model)
+    events = _detect_events(blocks, log, rate, dwell, model)
     doubts = []
     if blocks.rough:
         doubts.append("the noise of the log is not that of the model: the log's is used")
     column_sense = None
     if position is not None:
-        turns, knocks, column_sense, more_doubts = _by_column(position, log, rate, events, schedule)
+        turns, knocks, column_sense, more_doubts = _find_turns_in_column(
+            position, log, rate, events, schedule
+        )
     else:
-        turns, knocks, more_doubts = by_sight(blocks, events, schedule, trust_schedule)
+        turns, knocks, more_doubts = find_turns(blocks, events, schedule, trust_schedule)
     doubts += more_doubts
-    stretches, more_doubts = _stretches(turns, knocks, schedule)
+    stretches, more_doubts = _find_stretches(turns, knocks, schedule)
     doubts += more_doubts
-    knocks = sorted([*knocks, *_lone(outliers(blocks, log, rate), turns, knocks)])
+    knocks = sorted([*knocks, *_select_outliers(outliers(blocks, log, rate), turns, knocks)])
     knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
     signs = leave_out_knocks(blocks, knocks)
     size = alternation(signs, stretches)
-    first, more_doubts = _first_sense(first_sense, column_sense)
+    first, more_doubts = _choose_first_sense(first_sense, column_sense)
     doubts += more_doubts
     place = contradiction(signs, stretches)
     if place is not None:
@@ -200,7 +207,7 @@ def find_turning(
         )
     ambiguous = first_sense is None and column_sense is None
     return Turning(
-        tuple(_dwells(stretches, turns, first, schedule)),
+        tuple(_build_dwells(stretches, turns, first, schedule)),
         tuple(turns),
         tuple(knocks),
         ambiguous,
@@ -209,7 +216,7 @@ def find_turning(
     )
 
 
-def _checked(
+def _check_schedule(
     log: Array,
     rate: float,
     dwell: float,
@@ -237,15 +244,15 @@ def _checked(
     return TurnSchedule(dwell, start, turning, tolerance, margin, duration)
 
 
-def _seen(
+def _detect_events(
     blocks: LevelBlocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
 ) -> list[Event]:
-    """Return transients and steps in order of time, the greater where both are near."""
+    """Return transients and steps in order of time; of near ones, the greater."""
     events = transients(blocks, log, rate)
     near = max(3.0, 0.1 * dwell)
     for step in steps(blocks, dwell, model, rate):
         beside = [e for e in events if e.start - near < step.time < e.stop + near]
-        # The level follows a step at once, but for the blocks in which it comes about.
+        # The level follows a step at once, except in the blocks of the step itself.
         greater = [e for e in beside if e.kind == "transient" and e.peak > 1.5 * step.peak]
         if all(event.haste for event in greater):
             events = [e for e in events if e not in beside or e in greater]
@@ -253,7 +260,7 @@ def _seen(
     return sorted(events, key=lambda event: event.time)
 
 
-def _by_column(
+def _find_turns_in_column(
     position: Array, log: Array, rate: float, events: list[Event], schedule: TurnSchedule
 ) -> tuple[list[Turn], list[tuple[float, float]], int | None, list[str]]:
     if np.shape(position) != np.shape(log):
@@ -280,10 +287,10 @@ def _by_column(
     return turns, disturbances(rest), sense, doubts
 
 
-def _lone(
+def _select_outliers(
     out: Sequence[tuple[float, float]], turns: Sequence[Turn], knocks: Sequence[tuple[float, float]]
 ) -> list[tuple[float, float]]:
-    """Return the outliers that are not left out already."""
+    """Return the outliers outside of turns and knocks."""
     left_out = sorted([*knocks, *((turn.start, turn.stop) for turn in turns)])
     starts = np.array([start for start, _ in left_out])
     latest = np.maximum.accumulate([stop for _, stop in left_out])
@@ -295,7 +302,7 @@ def _lone(
     ]
 
 
-def _stretches(
+def _find_stretches(
     turns: Sequence[Turn], knocks: Sequence[tuple[float, float]], schedule: TurnSchedule
 ) -> tuple[list[tuple[float, float]], list[str]]:
     """Return start and stop of the dwells between turns; handling at the ends is cut off."""
@@ -311,8 +318,8 @@ def _stretches(
     return stretches, doubts
 
 
-def _first_sense(stated: int | None, column: int | None) -> tuple[int, list[str]]:
-    """Return the sense of the first dwell, and what to doubt about it."""
+def _choose_first_sense(stated: int | None, column: int | None) -> tuple[int, list[str]]:
+    """Return the sense of the first dwell, and the doubts about it."""
     if column is not None:
         if stated not in (None, column):
             return column, [f"the first sense is {column:+d} by the column, {stated:+d} was given"]
@@ -322,13 +329,13 @@ def _first_sense(stated: int | None, column: int | None) -> tuple[int, list[str]
     return 1, ["the sense of the first dwell is assumed: all may be the other way round"]
 
 
-def _dwells(
+def _build_dwells(
     stretches: Sequence[tuple[float, float]],
     turns: Sequence[Turn],
     first: int,
     schedule: TurnSchedule,
 ) -> list[FoundDwell]:
-    """Return the dwells with their senses; the sense goes on through one with no samples."""
+    """Return the dwells with their senses, which also alternate over an empty dwell."""
     dwells = []
     for k, (start, stop) in enumerate(stretches):
         beside = turns[max(0, k - 1) : k + 1]
@@ -337,7 +344,7 @@ def _dwells(
             doubts.append(f"it lasts {(stop - start) / schedule.dwell:.1f} dwells: a missed turn?")
         if stop <= start:
             continue
-        by = max((turn.found_by for turn in beside), key=SURE.index)
+        by = max((turn.found_by for turn in beside), key=DETECTION_ORDER.index)
         sense = first if k % 2 == 0 else -first
         dwells.append(FoundDwell(start, stop, sense, by, tuple(dict.fromkeys(doubts))))
     return dwells

@@ -226,7 +226,8 @@ def equations() -> Iterator[Claim]:
     )  # fmt: skip
     yield equation(
         21, "output", "H = [1 1]", _verbal_result(f"{space.output.astype(int).tolist()}"),
-                   **spaces)  # fmt: skip
+        **spaces,
+    )  # fmt: skip
     yield equation(
         22, "variance of a step of z_G over S_B T", "Q ≈ diag(S_B T, S_K T)", value=1.0,
         evaluate=_numeric_result(_step_noise, "exact: S_B T_B/2 (1 − e^(−2T/T_B))"), **spaces,
