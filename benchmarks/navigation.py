@@ -39,9 +39,9 @@ from imubench_pipeline.experiments.aided.measures import (
     root_mean_square,
     squares,
 )
-from imubench_pipeline.experiments.aided.runs import EPOCH, Drive, Outage, schedule
+from imubench_pipeline.experiments.aided.runs import FIX_INTERVAL, Drive, Outage, schedule
 from imubench_pipeline.experiments.aided.signals import Signals, Spreads, signals
-from imubench_pipeline.experiments.aided.trajectories import NAMES, trajectory
+from imubench_pipeline.experiments.aided.trajectories import TRAJECTORY_NAMES, trajectory
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.error_budget import Start, Uncalibrated, budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
@@ -69,7 +69,7 @@ def models(*, flicker: bool = False) -> dict[str, NoiseModel]:
     return {channel: of[channel.split("_")[0]] for channel in CHANNELS}
 
 
-def states(noise: dict[str, NoiseModel], shortest: float = EPOCH) -> list[AxisStates]:
+def states(noise: dict[str, NoiseModel], shortest: float = FIX_INTERVAL) -> list[AxisStates]:
     """Return the states of a filter with the true model."""
     return [
         axis_states(
@@ -94,12 +94,12 @@ def consistency(runs: int) -> int:
     failed = 0
     print("| trajectory | bias instability | epochs | " + " | ".join(GROUPS) + " |")
     print("|---" * (3 + len(GROUPS)) + "|")
-    for name in NAMES:
+    for name in TRAJECTORY_NAMES:
         for flicker in (False, True):
             noise = models(flicker=flicker)
             drive = Drive(trajectory(name, DURATION, RATE), schedule(DURATION, LENGTHS))
             # Biases are those of a bank: the states of flicker noise follow it to the sample.
-            tuned = {"true": states(noise, 1.0 / RATE if flicker else EPOCH)}
+            tuned = {"true": states(noise, 1.0 / RATE if flicker else FIX_INTERVAL)}
             outcome = drive.repeat(tuned, partial(of_run, drive, noise, name), runs, CORES)["true"]
             for length in (None, *LENGTHS):
                 shares = [inside(drive, outcome, group, length) for group in GROUPS]
@@ -269,7 +269,9 @@ def main() -> int:
     of_claim.add_argument("results", type=Path)
     of_claim.add_argument("sensors", nargs="+")
     of_claim.add_argument("--runs", type=int, default=100)
-    of_claim.add_argument("--trajectories", nargs="+", default=list(NAMES), choices=NAMES)
+    of_claim.add_argument(
+        "--trajectories", nargs="+", default=list(TRAJECTORY_NAMES), choices=TRAJECTORY_NAMES
+    )
     of_claim.add_argument("--simulated", help="list of the simulated recordings of that run")
     given = parser.parse_args()
     if given.what == "consistency":

@@ -6,10 +6,10 @@ from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from imubench_pipeline.experiments.aided.axis_states import AxisStates, axis_states
-from imubench_pipeline.experiments.aided.error_state import DEGREES, GROUPS
+from imubench_pipeline.experiments.aided.error_state import DEGREES_OF_FREEDOM, GROUPS
 from imubench_pipeline.experiments.aided.runs import (
-    HEADING,
-    TILT,
+    INITIAL_HEADING_SIGMA,
+    INITIAL_TILT_SIGMA,
     WARM_UP,
     Drive,
     Outage,
@@ -72,7 +72,17 @@ def plain_variances(drive: Drive, axes: list[AxisStates]) -> np.ndarray:
     """Variances of a filter that goes from sample to sample with matrices found by trying."""
     way, spaces = drive.trajectory, [axis.space for axis in axes]
     P = block_diag(
-        np.diag(np.array([*way.gnss.spread[:6], TILT, TILT, HEADING]) ** 2),
+        np.diag(
+            np.array(
+                [
+                    *way.gnss.spread[:6],
+                    INITIAL_TILT_SIGMA,
+                    INITIAL_TILT_SIGMA,
+                    INITIAL_HEADING_SIGMA,
+                ]
+            )
+            ** 2
+        ),
         *(space.initial_variance for space in spaces),
         *(np.array([[axis.scale**2]]) for axis in axes),
     )
@@ -141,7 +151,7 @@ def outcomes(request: pytest.FixtureRequest) -> dict:
 def inside(outcome: Outcome, chosen: np.ndarray, group: str) -> tuple[float, float]:
     """Share of the epochs in which NEES is within its 95 % bounds, and its standard error."""
     place = GROUPS.index(group)
-    low, high = chi2.ppf([0.025, 0.975], DEGREES[place])
+    low, high = chi2.ppf([0.025, 0.975], DEGREES_OF_FREEDOM[place])
     nees = outcome.normalised[:, chosen, place]
     of_runs = np.mean(
         (nees > low) & (nees < high), axis=1

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from imubench_pipeline.experiments.aided.trajectories import NAMES
+from imubench_pipeline.experiments.aided.trajectories import TRAJECTORY_NAMES
 from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.in_outages import outage_rows
@@ -93,4 +93,4 @@ def test_a_run_of_something_else_does_not_answer(changes: dict[str, Any]) -> Non
 
 
 def test_what_settings_and_requirements_may_ask_for_is_there() -> None:
-    assert set(Trajectory.__args__) == set(NAMES)
+    assert set(Trajectory.__args__) == set(TRAJECTORY_NAMES)

@@ -10,15 +10,15 @@ import r3f
 from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
 from imubench_pipeline.experiments.aided.strapdown import EARTH_RADIUS, inverse, mechanise
 from imubench_pipeline.experiments.aided.trajectories import (
-    LATITUDE,
-    NAMES,
+    DEFAULT_LATITUDE,
+    TRAJECTORY_NAMES,
     Trajectory,
     headings,
     trajectory,
 )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRAJECTORY_NAMES)
 def test_what_ideal_sensors_measure_leads_through_the_trajectory(name: str) -> None:
     way = trajectory(name, 600.0, 100.0)
     reached = mechanise(
@@ -32,7 +32,7 @@ def test_what_ideal_sensors_measure_leads_through_the_trajectory(name: str) -> N
 
 def test_at_rest_sensors_measure_the_earth() -> None:
     way = trajectory("rest", 10.0, 50.0)
-    north, down = EARTH_RATE * math.cos(LATITUDE), -EARTH_RATE * math.sin(LATITUDE)
+    north, down = EARTH_RATE * math.cos(DEFAULT_LATITUDE), -EARTH_RATE * math.sin(DEFAULT_LATITUDE)
     np.testing.assert_allclose(way.rate, np.tile([north, 0.0, down], (500, 1)), atol=1e-12)
     np.testing.assert_allclose(way.force, np.tile([0, 0, -STANDARD_GRAVITY], (500, 1)), atol=1e-9)
 
@@ -43,7 +43,7 @@ def _elsewhere(way: Trajectory, every: int) -> tuple[np.ndarray, np.ndarray, np.
     _, rate, force = inverse(
         way.position[0], way.velocity[::every], way.attitude[::every], T, way.earth
     )
-    llh = np.array([LATITUDE, 0.1, 0.0])
+    llh = np.array([DEFAULT_LATITUDE, 0.1, 0.0])
     start = r3f.dcm_to_rpy(way.attitude[0].T)
     padded = [np.vstack([samples, samples[-1:]]) for samples in (force, rate)]
     at, velocity, angles = inu.mech(

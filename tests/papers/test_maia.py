@@ -47,7 +47,12 @@ PRINTED = {
 @pytest.fixture(scope="module", params=few([60], [maia_printed.MEMBERS]))
 def members(request: pytest.FixtureRequest) -> Iterator[int]:
     """The number of reconstructions: less than what the page has, every day."""
-    cached = (maia_printed.lottery, maia_printed.readings, maia_printed._draws, maia._held)
+    cached = (
+        maia_printed.lottery,
+        maia_printed.readings,
+        maia_printed._simulate_deviations,
+        maia._count_in_range,
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(maia_printed, "MEMBERS", request.param)
         for function in cached:

@@ -30,8 +30,8 @@ from imubench_pipeline.experiments.aided.measures import (
     squares,
 )
 from imubench_pipeline.experiments.aided.runs import (
-    EPOCH,
-    RECOVERY,
+    FIX_INTERVAL,
+    RECOVERY_TIME,
     WARM_UP,
     Drive,
     Outcome,
@@ -138,7 +138,7 @@ def _with(how: NavigateSettings, asked: Sequence[tuple[Trajectory, str]]) -> Nav
     for _, length in asked:
         lengths.setdefault(quantity_to_si(length, "time"), length)
     courses = dict.fromkeys([*how.trajectories, *(course for course, _ in asked)])
-    least = WARM_UP + sum(lengths) + RECOVERY * (len(lengths) - 1) + EPOCH
+    least = WARM_UP + sum(lengths) + RECOVERY_TIME * (len(lengths) - 1) + FIX_INTERVAL
     longer = max(quantity_to_si(how.duration, "time"), least)
     return how.model_copy(
         update={
@@ -331,7 +331,7 @@ def _states(models: Models, sampling: float, spreads: Spreads, duration: float) 
             models[channel],
             sampling,
             turn_on=spreads.bias(channel),
-            shortest=EPOCH,
+            shortest=FIX_INTERVAL,
             longest=duration,
             scale=spreads.scale(channel),
         )

@@ -1,10 +1,10 @@
-"""The error-state filter of one run, compiled: strapdown, states of the sensors, fixes of GNSS.
+"""The compiled error-state filter of one run: strapdown, sensor states, GNSS fixes.
 
-The error states are true less estimated position, velocity and attitude (a turn in the frame), then
-the states of the noise of each axis, then errors of scale factors, as far as they are states. The
-strapdown runs at the sampling rate with what the filter knows of each axis taken off; transition
-and noise of the error states are accumulated over steps, linearised on the estimate itself, and the
-covariance goes from fix to fix. After each fix the error states go into the estimate (closed loop).
+The error states are true less estimated position, velocity and attitude (a turn in the frame), the
+states of the noise of each axis, and the scale-factor errors that are states. The strapdown runs at
+the sampling rate on samples corrected by the estimated errors. Transition and noise of the error
+states are accumulated over steps, linearised about the estimate, and the covariance is propagated
+from fix to fix. After each fix the error states correct the estimate (closed loop).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.experiments.aided.strapdown import (
-    GRADIENT,
+    GRAVITY_GRADIENT,
     copy,
     multiply,
     rotation,
@@ -25,23 +25,23 @@ from imubench_pipeline.experiments.aided.strapdown import (
 )
 from imubench_pipeline.typing import Array
 
-NAV = 9
-"""Position, velocity, attitude."""
+NAVIGATION_STATES = 9
+"""Number of states of position, velocity and attitude."""
 
 GROUPS = ("position", "velocity", "attitude", "gyro", "accel", "navigation")
-"""Groups of states whose normalised error squared is told: the biases are the sums of the states of
-an axis, ``navigation`` is the first three together."""
+"""Groups of states with a normalised squared error (NEES). The bias of an axis is the sum of its
+states; ``navigation`` is the first three groups together."""
 
-DEGREES = (3, 3, 3, 3, 3, 9)
-"""Degrees of freedom of each."""
+DEGREES_OF_FREEDOM = (3, 3, 3, 3, 3, 9)
+"""Degrees of freedom of each group."""
 
-ERRORS = 9
-"""Columns of the errors: position, velocity (north, east, down) and attitude."""
+ERROR_COLUMNS = 9
+"""Number of columns of the errors: position, velocity (north, east, down) and attitude."""
 
 
 @njit(cache=True, nogil=True)
-def _normalised(P: Array, e: Array, first: int, n: int) -> float:
-    """Return e^T P^-1 e of n states from a first on, by Cholesky; NaN where P is not positive."""
+def _normalise_square(P: Array, e: Array, first: int, n: int) -> float:
+    """Return e^T P^-1 e of n states from ``first``, by Cholesky; NaN if P is not positive."""
     L = np.zeros((n, n))
     y = np.empty(n)
     total = 0.0
@@ -100,52 +100,52 @@ def run(
     Parameters
     ----------
     rate, force : ndarray, shape (L, 3)
-        What the sensors give, rad/s and m/s^2.
+        Sensor readings, rad/s and m/s^2.
     T : float
         s.
     earth : ndarray, shape (3,)
     fixes : ndarray, shape (E, 7)
         Position, velocity and heading of GNSS at the end of each epoch.
     available : ndarray of bool, shape (E,)
-        Whether the filter is given them.
+        Whether the filter uses them.
     spread : ndarray, shape (7,)
-        Their standard deviations; an infinite one is not used.
+        Their standard deviations; a fix with an infinite one is not used.
     position, velocity, attitude : ndarray, shapes (E, 3), (E, 3), (E, 3, 3)
         The truth at these times.
     bias : ndarray, shape (E, 6)
-        True slow error of each axis there; NaN where it is not known.
+        True slow error of each axis there; NaN if unknown.
     p, v, C : ndarray, shapes (3,), (3,), (3, 3)
-        The start of the estimate.
+        Initial estimate.
     start : ndarray, shape (9, 9)
         Covariance of its error.
     first ... output
-        Of `axis_states.StackedStates`.
+        As in `axis_states.StackedStates`.
     width : int
         Samples of a step.
 
     Returns
     -------
     errors, variances : ndarray, shape (E, 9)
-        True less estimated, and what the filter takes for their variances.
+        True less estimated values, and their variances in the filter.
     normalised : ndarray, shape (E, 6)
         Normalised errors squared, by `GROUPS`.
     covariance : ndarray, shape (9 + m + s, 9 + m + s)
-        Of all states after the last epoch.
+        Covariance of all states after the last epoch.
     """
     E, steps = len(fixes), len(sum_observation)
     m = first[6]
     of_scale = np.full(6, -1)
-    total = NAV + m
+    total = NAVIGATION_STATES + m
     for a in range(6):
         if scale[a] > 0.0:
             of_scale[a] = total
             total += 1
-    n_states = total - NAV
+    n_states = total - NAVIGATION_STATES
     P = np.zeros((total, total))
     copy(start, P)
     for i in range(m):
         for j in range(m):
-            P[NAV + i, NAV + j] = start_of_states[i, j]
+            P[NAVIGATION_STATES + i, NAVIGATION_STATES + j] = start_of_states[i, j]
     for a in range(6):
         if of_scale[a] >= 0:
             P[of_scale[a], of_scale[a]] = scale[a] ** 2
@@ -156,24 +156,31 @@ def run(
     for a in range(6):
         axis_of[first[a] : first[a + 1]] = a
 
-    errors, variances = np.empty((E, ERRORS)), np.empty((E, ERRORS))
+    errors, variances = np.empty((E, ERROR_COLUMNS)), np.empty((E, ERROR_COLUMNS))
     normalised = np.full((E, 6), math.nan)
     room = np.empty((4, 3, 3))
     C_mid, turn, turned = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    A_step, A, A_new = np.empty((NAV, NAV)), np.empty((NAV, NAV)), np.empty((NAV, NAV))
-    M = np.empty((NAV, 6))
-    B, Qnx = np.empty((NAV, n_states)), np.empty((NAV, n_states))
-    B_new, Q_new = np.empty((NAV, n_states)), np.empty((NAV, n_states))
-    MSQ = np.empty((NAV, 6))
-    Qnn, through = np.empty((NAV, NAV)), np.empty((NAV, NAV))
+    A_step, A, A_new = (
+        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
+        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
+        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
+    )
+    M = np.empty((NAVIGATION_STATES, 6))
+    B, Qnx = np.empty((NAVIGATION_STATES, n_states)), np.empty((NAVIGATION_STATES, n_states))
+    B_new, Q_new = np.empty((NAVIGATION_STATES, n_states)), np.empty((NAVIGATION_STATES, n_states))
+    MSQ = np.empty((NAVIGATION_STATES, 6))
+    Qnn, through = (
+        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
+        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
+    )
     estimated, moved = np.zeros(6), np.zeros(6)
     w, f, mean_force, error = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    whole = np.empty(NAV)
+    whole = np.empty(NAVIGATION_STATES)
     dt = width * T
     k = 0
     for epoch in range(E):
         A[:] = 0.0
-        for i in range(NAV):
+        for i in range(NAVIGATION_STATES):
             A[i, i] = 1.0
         B[:] = 0.0
         Qnx[:] = 0.0
@@ -194,9 +201,9 @@ def run(
                     moved[i] += rate[k, i] * T
                     moved[3 + i] += force[k, i] * T
                     if of_scale[i] >= 0:
-                        w[i] -= rate[k, i] * x[of_scale[i] - NAV]
+                        w[i] -= rate[k, i] * x[of_scale[i] - NAVIGATION_STATES]
                     if of_scale[3 + i] >= 0:
-                        f[i] -= force[k, i] * x[of_scale[3 + i] - NAV]
+                        f[i] -= force[k, i] * x[of_scale[3 + i] - NAVIGATION_STATES]
                 if sample == width // 2:
                     if width % 2 == 1:  # the middle is that of the sample
                         rotation(0.5 * T * w[0], 0.5 * T * w[1], 0.5 * T * w[2], turn)
@@ -220,12 +227,12 @@ def run(
             # Transition of the errors over the step, and what errors of the sums add.
             fx, fy, fz = mean_force
             A_step[:] = 0.0
-            for i in range(NAV):
+            for i in range(NAVIGATION_STATES):
                 A_step[i, i] = 1.0
             for i in range(3):
                 A_step[i, 3 + i] = dt
-            A_step[3, 0] = A_step[4, 1] = -GRADIENT * dt
-            A_step[5, 2] = 2.0 * GRADIENT * dt
+            A_step[3, 0] = A_step[4, 1] = -GRAVITY_GRADIENT * dt
+            A_step[5, 2] = 2.0 * GRAVITY_GRADIENT * dt
             A_step[3, 4], A_step[3, 5] = 2.0 * dt * earth[2], -2.0 * dt * earth[1]
             A_step[4, 3], A_step[4, 5] = -2.0 * dt * earth[2], 2.0 * dt * earth[0]
             A_step[5, 3], A_step[5, 4] = 2.0 * dt * earth[1], -2.0 * dt * earth[0]
@@ -253,28 +260,28 @@ def run(
                     M[i, j] = dt / 3.0 * M[3 + i, j]
             # Covariances: first what the sums have in common with the errors so far.
             MSQ[:] = 0.0
-            for i in range(NAV):
+            for i in range(NAVIGATION_STATES):
                 for j in range(m):
                     MSQ[i, axis_of[j]] += Qnx[i, j] * first_observation[j]
-            for i in range(NAV):
+            for i in range(NAVIGATION_STATES):
                 for j in range(6):
                     s = 0.5 * M[i, j] * sum_variance[part, j]
-                    for r in range(NAV):
+                    for r in range(NAVIGATION_STATES):
                         if A_step[i, r] != 0.0:
                             s += A_step[i, r] * MSQ[r, j]
                     A_new[i, j] = s
             _sandwich(A_step, Qnn, through)
-            for i in range(NAV):
-                for j in range(NAV):
+            for i in range(NAVIGATION_STATES):
+                for j in range(NAVIGATION_STATES):
                     s = 0.0
                     for r in range(6):
                         s += A_new[i, r] * M[j, r] + M[i, r] * A_new[j, r]
                     Qnn[i, j] += s
-            for i in range(NAV):
+            for i in range(NAVIGATION_STATES):
                 for j in range(n_states):
                     B_new[i, j] = 0.0
                     Q_new[i, j] = 0.0
-                for r in range(NAV):
+                for r in range(NAVIGATION_STATES):
                     c = A_step[i, r]
                     if c != 0.0:
                         for j in range(n_states):
@@ -285,19 +292,19 @@ def run(
                     B_new[i, j] += M[i, axis_of[j]] * sum_observation[part, j]
                 for a in range(6):
                     if of_scale[a] >= 0:
-                        B_new[i, of_scale[a] - NAV] += M[i, a] * moved[a]
+                        B_new[i, of_scale[a] - NAVIGATION_STATES] += M[i, a] * moved[a]
             copy(B_new, B)
-            for i in range(NAV):
+            for i in range(NAVIGATION_STATES):
                 for a in range(6):
                     for j in range(first[a], first[a + 1]):
                         s = M[i, a] * sum_state_covariance[part, j]
                         for r in range(first[a], first[a + 1]):
                             s += D[j, r] * Q_new[i, r]
                         Qnx[i, j] = s
-            for i in range(NAV):
-                for j in range(NAV):
+            for i in range(NAVIGATION_STATES):
+                for j in range(NAVIGATION_STATES):
                     s = 0.0
-                    for r in range(NAV):
+                    for r in range(NAVIGATION_STATES):
                         if A_step[i, r] != 0.0:
                             s += A_step[i, r] * A[r, j]
                     A_new[i, j] = s
@@ -312,7 +319,7 @@ def run(
             multiply(turn, C, turned)
             copy(turned, C)
             for j in range(n_states):
-                x[j] += x_error[NAV + j]
+                x[j] += x_error[NAVIGATION_STATES + j]
         _orthonormal(C)
         # Errors: a turn in the frame that leads from the estimate to the truth.
         for i in range(3):
@@ -324,12 +331,12 @@ def run(
         turn_between(turn, turned, error)
         for i in range(3):
             whole[6 + i] = -error[i]
-        for i in range(NAV):
+        for i in range(NAVIGATION_STATES):
             errors[epoch, i] = whole[i]
             variances[epoch, i] = P[i, i]
         for g in range(3):
-            normalised[epoch, g] = _normalised(P, whole, 3 * g, 3)
-        normalised[epoch, 5] = _normalised(P, whole, 0, NAV)
+            normalised[epoch, g] = _normalise_square(P, whole, 3 * g, 3)
+        normalised[epoch, 5] = _normalise_square(P, whole, 0, NAVIGATION_STATES)
         for g in range(2):
             if not math.isnan(bias[epoch, 3 * g]):
                 normalised[epoch, 3 + g] = _of_biases(P, x, output, first, bias[epoch], 3 * g)
@@ -497,5 +504,7 @@ def _of_biases(P: Array, x: Array, output: Array, first: Array, true: Array, off
         for b in range(3):
             for i in own:
                 for j in range(first[offset + b], first[offset + b + 1]):
-                    covariance[a, b] += output[i] * output[j] * P[NAV + i, NAV + j]
-    return _normalised(covariance, error, 0, 3)
+                    covariance[a, b] += (
+                        output[i] * output[j] * P[NAVIGATION_STATES + i, NAVIGATION_STATES + j]
+                    )
+    return _normalise_square(covariance, error, 0, 3)

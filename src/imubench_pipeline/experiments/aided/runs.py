@@ -1,4 +1,4 @@
-"""Many runs of a filter, of several tunings on the same signals."""
+"""Repeat runs of a filter with several tunings on the same signals."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from imubench_pipeline.experiments.aided.strapdown import rotation
 from imubench_pipeline.experiments.aided.trajectories import Trajectory
 from imubench_pipeline.typing import Array
 
-EPOCH = 1.0
-"""From fix to fix, s, as near as samples allow."""
+FIX_INTERVAL = 1.0
+"""Time between two fixes, s, rounded to whole samples."""
 
-LONGEST_STEP = 0.1
-"""s, over which transition and noise are taken together."""
+MAX_STEP = 0.1
+"""Longest step over which transition and noise are accumulated, s."""
 
-TILT, HEADING = math.radians(0.5), math.radians(2.0)
-"""Standard deviations of the attitude at the start."""
+INITIAL_TILT_SIGMA, INITIAL_HEADING_SIGMA = math.radians(0.5), math.radians(2.0)
+"""Initial standard deviations of tilt and heading, rad."""
 
 WARM_UP = 120.0
-"""Time with GNSS before anything is measured, s."""
+"""Time with GNSS before the evaluation begins, s."""
 
 
-RECOVERY = 40.0
+RECOVERY_TIME = 40.0
 """Time with GNSS between two outages, s."""
 
 
@@ -48,7 +48,7 @@ class Outage:
 
 
 def schedule(duration: float, lengths: Sequence[float]) -> list[Outage]:
-    """Return outages of lengths in s, one after the other until a run, in s, ends."""
+    """Return outages with these lengths, s, repeated until a run of this duration, s, ends."""
     outages: list[Outage] = []
     begin = WARM_UP
     while True:
@@ -56,12 +56,12 @@ def schedule(duration: float, lengths: Sequence[float]) -> list[Outage]:
             if begin + length > duration:
                 return outages
             outages.append(Outage(begin, length))
-            begin += length + RECOVERY
+            begin += length + RECOVERY_TIME
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a tuning did, R runs of E fixes.
+    """Results of a tuning, from R runs of E fixes.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Outcome:
     normalised : ndarray, shape (R, E, 6)
         See `error_state.run`.
     states : int
-        Of the filter.
+        Number of states of the filter.
     """
 
     errors: Array
@@ -79,18 +79,18 @@ class Outcome:
 
 
 class Drive:
-    """A trajectory with outages, on which tunings are run."""
+    """A trajectory with outages, for runs of several tunings."""
 
     def __init__(self, trajectory: Trajectory, outages: Sequence[Outage]) -> None:
         self.trajectory = trajectory
         rate = trajectory.sampling
-        self.every = max(round(rate * EPOCH), 1)
-        self.width, self.steps = split_into_steps(self.every, math.ceil(rate * LONGEST_STEP))
+        self.every = max(round(rate * FIX_INTERVAL), 1)
+        self.width, self.steps = split_into_steps(self.every, math.ceil(rate * MAX_STEP))
         self.at: NDArray[np.int64] = np.arange(self.every, len(trajectory.rate) + 1, self.every)
         self.times = self.at / rate
         self.available = np.ones(len(self.at), dtype=np.bool_)
-        # An outage begins at a fix, and lasts until the first after its end: what a filter errs by
-        # after its very length lies between two epochs where these are no whole seconds.
+        # An outage lasts from a fix to the first one after its end. If its length is not a multiple
+        # of the period, the error at its exact end is interpolated between two epochs.
         self.period = self.every / rate
         begun = [(o, int(np.searchsorted(self.times, o.begin + 1e-9)) - 1) for o in outages]
         fitting = [
@@ -102,16 +102,23 @@ class Drive:
             self.available[last + 1 : last + 1 + self._epochs(outage.length)] = False
         gnss = trajectory.gnss
         self._spread = gnss.spread
-        sigmas = np.array([*self._spread[:6], TILT, TILT, min(HEADING, gnss.heading)])
+        sigmas = np.array(
+            [
+                *self._spread[:6],
+                INITIAL_TILT_SIGMA,
+                INITIAL_TILT_SIGMA,
+                min(INITIAL_HEADING_SIGMA, gnss.heading),
+            ]
+        )
         self._start = np.diag(sigmas**2)
         self._sigmas = sigmas
 
     def _epochs(self, length: float) -> int:
-        """Return how many epochs an outage of a length, s, takes."""
+        """Return the number of epochs of an outage of this length, s."""
         return math.ceil(length / self.period - 1e-6)
 
     def of_outages(self, length: float) -> NDArray[np.int64]:
-        """Return the epochs of each outage of a length, s, shape (outages, epochs)."""
+        """Return the epochs of each outage of this length, s, shape (outages, epochs)."""
         lasts = [
             last
             for outage, last in zip(self.outages, self.last_fixes, strict=True)
@@ -124,7 +131,7 @@ class Drive:
         return stack(axes, self.trajectory.sampling, self.width, self.steps)
 
     def filter(self, stacked: StackedStates, signals: Signals) -> tuple[Array, Array, Array, Array]:
-        """Run the filter once; see `error_state.run` for what it returns."""
+        """Run the filter once; the result is as in `error_state.run`."""
         way = self.trajectory
         off = self._sigmas * signals.start
         turn, C = np.empty((3, 3)), way.attitude[0]
@@ -167,7 +174,7 @@ class Drive:
         runs: int,
         threads: int = 1,
     ) -> dict[str, Outcome]:
-        """Run every tuning on the same signals, by the number of the run."""
+        """Run every tuning on the same signals; ``signals`` takes the number of the run."""
         stacked = {name: self.stacked(axes) for name, axes in tunings.items()}
 
         def once(number: int) -> dict[str, tuple[Array, ...]]:

@@ -1,4 +1,4 @@
-"""What sensors give in a run, simulated with the whole model of each axis, and fixes of GNSS."""
+"""Simulate sensor readings of a run, with the full model of each axis, and GNSS fixes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class Spreads:
-    """Standard deviations of what is another one at each switch-on, of gyros and accelerometers."""
+    """Standard deviations of run-to-run errors of gyros and accelerometers."""
 
     gyro_bias: float
     accel_bias: float
@@ -27,17 +27,17 @@ class Spreads:
     accel_scale: float = 0.0
 
     def bias(self, channel: str) -> float:
-        """Return that of the bias of a channel, rad/s or m/s^2."""
+        """Return the standard deviation of the bias of a channel, rad/s or m/s^2."""
         return self.gyro_bias if channel.startswith("gyro") else self.accel_bias
 
     def scale(self, channel: str) -> float:
-        """Return that of the relative error of its scale factor."""
+        """Return the standard deviation of its relative scale-factor error."""
         return self.gyro_scale if channel.startswith("gyro") else self.accel_scale
 
 
 @dataclass(frozen=True)
 class Signals:
-    """What a filter is given in a run, and what is known of the truth.
+    """Input of a filter in a run, and the known truth.
 
     Attributes
     ----------
@@ -46,9 +46,9 @@ class Signals:
     fixes : ndarray, shape (E, 7)
         Position, velocity and heading of GNSS, m, m/s and rad.
     bias : ndarray, shape (E, 6)
-        Slow error of each axis at the fixes: all but white noise; NaN where it is not known.
+        Slow error of each axis at the fixes, without white noise; NaN if unknown.
     start : ndarray, shape (9,)
-        Errors of the start in standard deviations.
+        Initial errors in standard deviations.
     """
 
     rate: Array
@@ -79,16 +79,16 @@ def signals(
         Of all six channels.
     spreads : Spreads
     every : int
-        Samples from fix to fix.
+        Samples between two fixes.
     seed : int
     names : tuple of str
-        Such as sensor, trajectory and number of the run: with the seed they determine all.
+        Such as sensor, trajectory and number of the run; with the seed they set all random numbers.
     block : int
-        Samples of the sensor whose mean is one of the trajectory: it samples faster by that.
+        Number of sensor samples per sample of the trajectory, which is their mean.
     temperature : callable, optional
         °C, as `simulate.simulation.simulate_blocks` takes it, at the samples of the sensor.
     added : mapping of str to ndarray, shape (L,)
-        Errors of channels to take instead of simulated noise: pieces of a log at rest.
+        Errors of channels that replace simulated noise: pieces of a log at rest.
     """
     L, rate = len(trajectory.rate), trajectory.sampling * block
     at = np.arange(every, L + 1, every)
@@ -102,16 +102,21 @@ def signals(
         if added is not None and channel in added:
             measured[i] = (1.0 + scale) * true[i] + turned_on + added[channel]
         elif _is_plain(model):
-            slow = _slow(model, rate, L * block, rng)
+            slow = _simulate_slow_errors(model, rate, L * block, rng)
             white = model.noise.N * np.sqrt(trajectory.sampling) * rng.standard_normal(L)
-            measured[i] = (1.0 + scale) * true[i] + _averaged(slow, block) + white
+            measured[i] = (1.0 + scale) * true[i] + _average_blocks(slow, block) + white
             bias[i] = slow[at * block - 1]
         else:
             course = np.repeat(true[i], block)
             log = simulate(
-                model, rate, L * block, rng, true=partial(_part, course), temperature=temperature
+                model,
+                rate,
+                L * block,
+                rng,
+                true=partial(_slice_course, course),
+                temperature=temperature,
             )
-            measured[i] = _averaged(log, block)
+            measured[i] = _average_blocks(log, block)
     rng = channel_rng(seed, *names, "gnss")
     heading = headings(trajectory.attitude[at])[:, None]
     exact = np.concatenate([trajectory.position[at], trajectory.velocity[at], heading], axis=1)
@@ -121,21 +126,23 @@ def signals(
     return Signals(measured[:3].T.copy(), measured[3:].T.copy(), fixes, bias.T.copy(), start)
 
 
-def _part(course: Array, start: int, stop: int) -> Array:
+def _slice_course(course: Array, start: int, stop: int) -> Array:
     return course[start:stop]
 
 
-def _averaged(log: Array, block: int) -> Array:
+def _average_blocks(log: Array, block: int) -> Array:
     return log if block == 1 else np.asarray(log.reshape(-1, block).mean(axis=1))
 
 
 def _is_plain(model: SensorModel) -> bool:
-    """Tell whether the log is the sum of motion and noise alone."""
+    """Return whether the log is just the sum of motion and noise."""
     behind = (model.low_pass, model.drift, model.full_scale)
     return behind == (None, None, None) and model.resolution == 0.0
 
 
-def _slow(model: SensorModel, rate: float, samples: int, rng: np.random.Generator) -> Array:
-    """Simulate all of the errors of an axis but its white noise."""
+def _simulate_slow_errors(
+    model: SensorModel, rate: float, samples: int, rng: np.random.Generator
+) -> Array:
+    """Simulate the errors of an axis without its white noise."""
     noise: NoiseModel = replace(model.noise, N=0.0)
     return simulate(replace(model, noise=noise, scale_error=0.0), rate, samples, rng)

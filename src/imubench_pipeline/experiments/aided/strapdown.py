@@ -28,10 +28,10 @@ from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
 from imubench_pipeline.typing import Array
 
 EARTH_RADIUS = 6371000.0
-"""Mean, m."""
+"""Mean radius, m."""
 
-GRADIENT = STANDARD_GRAVITY / EARTH_RADIUS
-"""1/s^2: gravity changes by so much a metre, sideways; twice that downwards."""
+GRAVITY_GRADIENT = STANDARD_GRAVITY / EARTH_RADIUS
+"""Horizontal gradient of gravity, 1/s^2; the vertical one is twice as large."""
 
 
 def earth_rate_at(latitude: float) -> Array:
@@ -78,7 +78,7 @@ def copy(a: Array, into: Array) -> None:
 def step(
     p: Array, v: Array, C: Array, w: Array, f: Array, T: float, earth: Array, room: Array
 ) -> None:
-    """Go on by a sampling interval; p, v, C are changed in place.
+    """Propagate by one sampling interval; p, v, C are changed in place.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def step(
     earth : ndarray, shape (3,)
         w_ie, rad/s.
     room : ndarray, shape (4, 3, 3)
-        Room to work in; [3, 0] is left with the specific force in the frame.
+        Work space; on return [3, 0] has the specific force in the frame.
     """
     middle, half, other = room[0], room[1], room[2]
     force, back = room[3, 0], -0.5 * T
@@ -103,9 +103,9 @@ def step(
     multiply(half, other, C)
     for i in range(3):
         force[i] = middle[i, 0] * f[0] + middle[i, 1] * f[1] + middle[i, 2] * f[2]
-    ax = force[0] - GRADIENT * p[0] - 2.0 * (earth[1] * v[2] - earth[2] * v[1])
-    ay = force[1] - GRADIENT * p[1] - 2.0 * (earth[2] * v[0] - earth[0] * v[2])
-    az = force[2] + (STANDARD_GRAVITY + 2.0 * GRADIENT * p[2])
+    ax = force[0] - GRAVITY_GRADIENT * p[0] - 2.0 * (earth[1] * v[2] - earth[2] * v[1])
+    ay = force[1] - GRAVITY_GRADIENT * p[1] - 2.0 * (earth[2] * v[0] - earth[0] * v[2])
+    az = force[2] + (STANDARD_GRAVITY + 2.0 * GRAVITY_GRADIENT * p[2])
     az -= 2.0 * (earth[0] * v[1] - earth[1] * v[0])
     p[0] += T * (v[0] + 0.5 * T * ax)
     p[1] += T * (v[1] + 0.5 * T * ay)
@@ -119,7 +119,7 @@ def step(
 def mechanise(
     p: Array, v: Array, C: Array, rate: Array, force: Array, T: float, earth: Array
 ) -> tuple[Array, Array, Array]:
-    """Return position, velocity and attitude from samples, the first being the start.
+    """Return position, velocity and attitude from samples; the first is the start.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def mechanise(
 
 @njit(cache=True, nogil=True)
 def turn_between(C: Array, after: Array, into: Array) -> None:
-    """Write the vector in rad by which a matrix is turned to another one: log(C^T after)."""
+    """Write the rotation vector from one matrix to another, rad: log(C^T after)."""
     trace = x = y = z = 0.0
     for i in range(3):
         trace += C[i, 0] * after[i, 0] + C[i, 1] * after[i, 1] + C[i, 2] * after[i, 2]
@@ -170,7 +170,7 @@ def turn_between(C: Array, after: Array, into: Array) -> None:
 def inverse(
     start: Array, velocity: Array, attitude: Array, T: float, earth: Array
 ) -> tuple[Array, Array, Array]:
-    """Return the positions, and the samples of ideal sensors that lead through them.
+    """Return the positions, and the samples of ideal sensors along them.
 
     Parameters
     ----------
@@ -203,10 +203,10 @@ def inverse(
         v, p = velocity[k], position[k]
         for i in range(3):
             a[i] = (velocity[k + 1, i] - v[i]) / T
-        a[0] += GRADIENT * p[0] + 2.0 * (earth[1] * v[2] - earth[2] * v[1])
-        a[1] += GRADIENT * p[1] + 2.0 * (earth[2] * v[0] - earth[0] * v[2])
+        a[0] += GRAVITY_GRADIENT * p[0] + 2.0 * (earth[1] * v[2] - earth[2] * v[1])
+        a[1] += GRAVITY_GRADIENT * p[1] + 2.0 * (earth[2] * v[0] - earth[0] * v[2])
         a[2] += 2.0 * (earth[0] * v[1] - earth[1] * v[0])
-        a[2] -= STANDARD_GRAVITY + 2.0 * GRADIENT * p[2]
+        a[2] -= STANDARD_GRAVITY + 2.0 * GRAVITY_GRADIENT * p[2]
         for i in range(3):
             force[k, i] = middle[0, i] * a[0] + middle[1, i] * a[1] + middle[2, i] * a[2]
             position[k + 1, i] = p[i] + 0.5 * T * (v[i] + velocity[k + 1, i])

@@ -2,8 +2,8 @@
 
 Speed, course and climb are sequences of stretches, rounded by a window of a second and more, so
 that specific force and rates are smooth. A wheeled vehicle rolls and pitches with the ground, a
-drone leans into its turns. From velocity and attitude the samples of ideal sensors follow by the
-inverse mechanisation.
+drone banks in turns. The inverse mechanisation gives the samples of ideal sensors from velocity and
+attitude.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.experiments.aided.strapdown import earth_rate_at, inverse
 from imubench_pipeline.typing import Array
 
-LATITUDE = math.radians(45.0)
+DEFAULT_LATITUDE = math.radians(45.0)
 
 
 @dataclass(frozen=True)
 class Gnss:
-    """What a receiver gives each second: standard deviations of white errors.
+    """Standard deviations of the white errors of a GNSS receiver.
 
     Attributes
     ----------
     position, velocity : float
         Of one axis, m and m/s.
     heading : float
-        rad; infinite: it has one antenna, and gives none.
+        rad; infinite for a receiver with one antenna, without heading.
     """
 
     position: float
@@ -39,7 +39,7 @@ class Gnss:
 
     @property
     def spread(self) -> Array:
-        """Those of position, velocity and heading, shape (7,)."""
+        """Standard deviations of position, velocity and heading, shape (7,)."""
         return np.array([*[self.position] * 3, *[self.velocity] * 3, self.heading])
 
 
@@ -72,12 +72,12 @@ class Trajectory:
     gnss: Gnss
 
 
-_RTK = Gnss(0.02, 0.03)
-_STANDALONE = Gnss(1.5, 0.1)
-_TWO_ANTENNAS = Gnss(1.5, 0.1, math.radians(0.5))
-"""At rest nothing else tells the heading. Without it a filter that is linearised on its estimate
-takes the drift of its heading for a turn, by which biases could be told from tilt: it is far too
-sure."""
+_RTK_RECEIVER = Gnss(0.02, 0.03)
+_STANDALONE_RECEIVER = Gnss(1.5, 0.1)
+_TWO_ANTENNA_RECEIVER = Gnss(1.5, 0.1, math.radians(0.5))
+"""Receiver for a vehicle at rest, where the heading is not observable otherwise. Without it, a
+filter that is linearised about its estimate takes the drift of its heading for a turn, which would
+separate biases from tilt: it becomes overconfident."""
 
 
 @dataclass(frozen=True)
@@ -91,10 +91,10 @@ class _Motion:
     pitch: Array
 
 
-def _sequence(
+def _build_sequence(
     time: Array, stretches: Sequence[tuple[float, float]], window: float, sampling: float
 ) -> Array:
-    """Return values held for a time in s each, over and over, rounded by a window in s."""
+    """Return a repeated sequence of values, each for its time, s, smoothed by a window, s."""
     ends = np.cumsum([length for length, _ in stretches])
     values = np.array([value for _, value in stretches])
     held = values[np.minimum(np.searchsorted(ends, time % ends[-1], "right"), len(values) - 1)]
@@ -103,66 +103,70 @@ def _sequence(
     return np.convolve(padded, shape / shape.sum(), "same")[len(shape) : -len(shape)]
 
 
-def _ground(time: Array, size: float, moving: Array) -> tuple[Array, Array]:
-    """Return roll and pitch of rough ground, rad, as far as the vehicle moves."""
+def _simulate_ground(time: Array, size: float, moving: Array) -> tuple[Array, Array]:
+    """Return roll and pitch on rough ground, rad, scaled by the motion of the vehicle."""
     roll = np.sin(2.0 * math.pi * 0.37 * time) + 0.6 * np.sin(2.0 * math.pi * 0.83 * time + 1.0)
     pitch = np.sin(2.0 * math.pi * 0.29 * time + 2.0) + 0.6 * np.sin(2.0 * math.pi * 0.71 * time)
     return size * moving * roll, size * moving * pitch
 
 
-def _field(time: Array, sampling: float) -> _Motion:
-    """1.5 m/s along rows of 45 m, half a turn of 2 m radius on each headland, left and right."""
+def _simulate_field(time: Array, sampling: float) -> _Motion:
+    """Return a field: 1.5 m/s along rows of 45 m, half turns of 2 m radius, left and right."""
     turn = math.pi / 6.0
-    rate = _sequence(time, [(30.0, 0.0), (6.0, turn), (30.0, 0.0), (6.0, -turn)], 2.0, sampling)
-    speed = _sequence(time, [(29.0, 1.5), (8.0, 1.0), (28.0, 1.5), (7.0, 1.0)], 2.0, sampling)
-    rolled, pitched = _ground(time, math.radians(1.5), speed / 1.5)
+    rate = _build_sequence(
+        time, [(30.0, 0.0), (6.0, turn), (30.0, 0.0), (6.0, -turn)], 2.0, sampling
+    )
+    speed = _build_sequence(time, [(29.0, 1.5), (8.0, 1.0), (28.0, 1.5), (7.0, 1.0)], 2.0, sampling)
+    rolled, pitched = _simulate_ground(time, math.radians(1.5), speed / 1.5)
     return _Motion(speed, np.cumsum(rate) / sampling, np.zeros_like(time), rolled, pitched)
 
 
-def _car(time: Array, sampling: float) -> _Motion:
-    """Streets: up to 14 m/s, turns by 90 degrees, stops at lights."""
+def _simulate_car(time: Array, sampling: float) -> _Motion:
+    """Return a drive in streets: up to 14 m/s, turns by 90 degrees, stops at lights."""
     quarter = math.pi / 2.0 / 5.0
-    speed = _sequence(
+    speed = _build_sequence(
         time,
         [(18.0, 12.0), (7.0, 5.0), (22.0, 14.0), (8.0, 0.0), (20.0, 13.0), (7.0, 5.0), (10.0, 9.0)],
         4.0,
         sampling,
     )
     turns = [(19.0, 0.0), (5.0, quarter), (45.0, 0.0), (6.5, 0.0), (5.0, -quarter), (11.5, 0.0)]
-    rate = _sequence(time, turns, 2.0, sampling) * np.minimum(speed / 4.0, 1.0)
-    rolled, pitched = _ground(time, math.radians(0.4), np.minimum(speed / 5.0, 1.0))
+    rate = _build_sequence(time, turns, 2.0, sampling) * np.minimum(speed / 4.0, 1.0)
+    rolled, pitched = _simulate_ground(time, math.radians(0.4), np.minimum(speed / 5.0, 1.0))
     return _Motion(speed, np.cumsum(rate) / sampling, np.zeros_like(time), rolled, pitched)
 
 
-def _drone(time: Array, sampling: float) -> _Motion:
-    """Eights of 8 m/s with climbs and descents, leaning into the turns."""
-    speed = _sequence(time, [(40.0, 8.0), (10.0, 4.0)], 4.0, sampling)
-    rate = _sequence(time, [(12.0, 0.5), (5.0, 0.0), (12.0, -0.5), (5.0, 0.0)], 3.0, sampling)
-    climb = _sequence(time, [(20.0, 0.0), (8.0, 1.5), (20.0, 0.0), (8.0, -1.5)], 3.0, sampling)
+def _simulate_drone(time: Array, sampling: float) -> _Motion:
+    """Return figures of eight at 8 m/s with climbs and descents, banked in turns."""
+    speed = _build_sequence(time, [(40.0, 8.0), (10.0, 4.0)], 4.0, sampling)
+    rate = _build_sequence(time, [(12.0, 0.5), (5.0, 0.0), (12.0, -0.5), (5.0, 0.0)], 3.0, sampling)
+    climb = _build_sequence(
+        time, [(20.0, 0.0), (8.0, 1.5), (20.0, 0.0), (8.0, -1.5)], 3.0, sampling
+    )
     roll = np.arctan(speed * rate / STANDARD_GRAVITY)
     pitch = -np.arctan(np.gradient(speed, 1.0 / sampling) / STANDARD_GRAVITY)
     return _Motion(speed, np.cumsum(rate) / sampling, climb, roll, pitch)
 
 
-def _rest(time: Array, sampling: float) -> _Motion:
-    """Nothing moves."""
+def _simulate_rest(time: Array, sampling: float) -> _Motion:
+    """Return no motion."""
     none = np.zeros_like(time)
     return _Motion(none, none, none, none, none)
 
 
 _MOTIONS: Mapping[str, tuple[Callable[[Array, float], _Motion], Gnss]] = {
-    "field": (_field, _RTK),
-    "car": (_car, _STANDALONE),
-    "drone": (_drone, _STANDALONE),
-    "rest": (_rest, _TWO_ANTENNAS),
+    "field": (_simulate_field, _RTK_RECEIVER),
+    "car": (_simulate_car, _STANDALONE_RECEIVER),
+    "drone": (_simulate_drone, _STANDALONE_RECEIVER),
+    "rest": (_simulate_rest, _TWO_ANTENNA_RECEIVER),
 }
 
-NAMES = tuple(_MOTIONS)
-"""What a trajectory may be called."""
+TRAJECTORY_NAMES = tuple(_MOTIONS)
+"""Names of the trajectories."""
 
 
 def trajectory(
-    name: str, duration: float, sampling: float, latitude: float = LATITUDE
+    name: str, duration: float, sampling: float, latitude: float = DEFAULT_LATITUDE
 ) -> Trajectory:
     """Return a trajectory of a length in s at a rate in Hz, at a latitude in rad.
 
@@ -172,7 +176,7 @@ def trajectory(
         If there is none of that name.
     """
     if name not in _MOTIONS:
-        raise ValueError(f"trajectory {name!r}, expected one of {', '.join(NAMES)}")
+        raise ValueError(f"trajectory {name!r}, expected one of {', '.join(TRAJECTORY_NAMES)}")
     moves, gnss = _MOTIONS[name]
     time = np.arange(round(duration * sampling) + 1) / sampling
     motion = moves(time, sampling)

@@ -1,4 +1,4 @@
-"""A triad of gyros and accelerometers at rest: its noise, where it is, and how it is turned."""
+"""A triad of gyros and accelerometers at rest: noise, site and positions."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 _NEAREST_POLE = 1e-6
-"""Least cosine of a latitude at which the Earth's rate points north."""
+"""Least cosine of the latitude; nearer to a pole there is no north."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Site:
-    """A place on the Earth, and what a triad at rest there is exposed to.
+    """A place on the Earth, with the rate and specific force of a triad at rest.
 
     Raises
     ------
@@ -44,7 +44,7 @@ class Site:
 
     @property
     def specific_force(self) -> Array:
-        """What carries a triad at rest, north, east and down, m/s^2."""
+        """Specific force of a triad at rest, north, east and down, m/s^2."""
         return np.array([0.0, 0.0, -self.gravity])
 
 
@@ -88,7 +88,7 @@ class Triad:
         gyro_bias: float,
         accelerometer_bias: float,
     ) -> Triad:
-        """Return a triad whose axes are alike; the biases are in rad/s and m/s^2."""
+        """Return a triad with equal axes; the biases are in rad/s and m/s^2."""
         return cls(
             gyros=(gyro,) * 3,
             accelerometers=(accelerometer,) * 3,
@@ -98,7 +98,7 @@ class Triad:
 
     @property
     def axes(self) -> list[tuple[NoiseModel, float]]:
-        """Noise and deviation of the fixed bias of gyros x, y, z and accelerometers x, y, z."""
+        """Noise and sigma of the fixed bias of gyros x, y, z and accelerometers x, y, z."""
         return [(model, self.gyro_bias) for model in self.gyros] + [
             (model, self.accelerometer_bias) for model in self.accelerometers
         ]
@@ -106,7 +106,7 @@ class Triad:
 
 @dataclass(frozen=True)
 class Positions:
-    """Blocks of a run at rest, in one position or in several that are known from the first.
+    """Blocks of a run at rest, in one position or in several with known turns from the first.
 
     Raises
     ------
@@ -115,7 +115,7 @@ class Positions:
     """
 
     blocks: Blocks  # neither their sense nor their latitude is used
-    # shape (dwells, 3, 3); turns vectors of the body frame in each dwell into that of the first
+    # shape (dwells, 3, 3); turns vectors of the body frame of each dwell into the first one
     turned: Array
 
     def __post_init__(self) -> None:
@@ -130,7 +130,7 @@ class Positions:
 
     @classmethod
     def at_rest(cls, duration: float, block: float, rate: float) -> Positions:
-        """Return one position, in blocks of so many s at most; the sampling rate is in Hz."""
+        """Return one position, in blocks of at most ``block`` s; the sampling rate is in Hz."""
         samples = max(round(duration * rate), 1)
         run = Experiment((Dwell(0, samples, 1),), rate, 0.0)
         return cls(run.blocks(max(round(block * rate), 1)), np.eye(3)[None])
@@ -139,11 +139,11 @@ class Positions:
     def turned_about_z(
         cls, headings: Sequence[float], *, dwell: float, turning: float, block: float, rate: float
     ) -> Positions:
-        """Return positions that differ by turns about the z axis, exactly known.
+        """Return positions that differ by exactly known turns about the z axis.
 
         The headings are angles from the first, rad; 0, pi is the classical pair. ``dwell`` is the
-        data in each position, ``turning`` the time between two, ``block`` that of a block at most,
-        s; the sampling rate is in Hz.
+        data in each position, ``turning`` the time between two, ``block`` the largest length of a
+        block, s; the sampling rate is in Hz.
         """
         run = Experiment.regular(
             dwell=dwell, turning=turning, dwells=len(headings), rate=rate, latitude=0.0

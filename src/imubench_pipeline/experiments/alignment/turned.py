@@ -1,4 +1,4 @@
-"""What a triad senses that is turned about its z axis from position to position."""
+"""Readings of an error-free triad that is turned about its z axis."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from imubench_pipeline.typing import Array
 def sensed(site: Site, attitude: Array, angle: Array, turning: Array) -> Array:
     """Return rate and specific force in the body frame, rad/s and m/s^2, shape (n, 6).
 
-    Gyros and accelerometers x, y, z without errors, in the place where the accelerometers are. The
-    attitude, shape (3, 3), is that of the first position; ``angle`` is that from it about z, rad,
-    and ``turning`` its rate, rad/s, shape (n,).
+    Gyros and accelerometers x, y, z are without errors, and the turns are about the accelerometers.
+    The attitude, shape (3, 3), belongs to the first position; ``angle`` is the angle from it about
+    z, rad, and ``turning`` the rate of this angle, rad/s, shape (n,).
     """
     cosine, sine = np.cos(angle), np.sin(angle)
     columns = []

@@ -1,25 +1,24 @@
-"""Scale factor and bias of a gyro from steady rates of a rate table, and whether a line fits.
+"""Scale factor, bias and linearity of a gyro from steady rates of a rate table.
 
     mean of a block = bias + S (table rate + Earth's rate along the axis) + noise
 
-by generalised least squares over all steady rates (`least_squares`): the gyro's drift from one rate
-to the next counts as what the noise model says it is. A line is what IEEE Std 952-2020 fits in its
-scale-factor tests; what it may hide is asked for: a quadratic term; an asymmetry, the scale factor
-of positive less that of negative rates as a fraction of their mean; and the linearity, the largest
-deviation of a rate from the line as a fraction of full scale, for which the largest rate of the
-test stands.
+by generalised least squares over all steady rates (`least_squares`): the noise model describes the
+drift of the gyro from one rate to the next. The scale-factor tests of IEEE Std 952-2020 fit a line.
+Further terms test the line: a quadratic term; the asymmetry, the difference of the scale factors of
+positive and negative rates as a fraction of their mean; and the linearity, the largest deviation of
+a rate from the line as a fraction of full scale, here the largest rate of the test.
 
-The axis is along that of the table. Then the Earth's rate along it is constant and, not known, it
-is a bias; across it, it averages out over whole turns. An angle a between the two axes lowers the
-scale factor by the factor cos(a), and is not told from it.
+The axis of the gyro is along the axis of the table. Then the Earth's rate along it is constant, and
+a part of the bias if it is unknown; the perpendicular part averages out over whole turns. An angle
+a between the two axes multiplies the scale factor by cos(a), and is not separable from it.
 
-What the line leaves of each steady rate, and how much of that is noise (`residuals`):
+The residuals of each steady rate and their covariance (`residuals`):
 
     r = A (m - X b),   cov(r) = A (C + D - X (X^T (C + D)^-1 X)^-1 X^T) A^T,
 
 m the block means, X and b the regressors and estimates of the line by generalised least squares, A
-the mean over the blocks of a steady rate, C the covariance of the noise model and D that of the
-true rates about the stated ones.
+the mean over the blocks of a steady rate, C the covariance of the noise model and D the covariance
+of the true rates about the stated ones.
 """
 
 from __future__ import annotations
@@ -70,7 +69,7 @@ class Term:
 
     @property
     def p_value(self) -> Array:
-        """Chance of a value at least as far from 0 where the line is right, shape (runs,)."""
+        """Probability of a value at least as far from 0 if the line is right, shape (runs,)."""
         return np.asarray(chi2.sf((self.value / self.sigma) ** 2, 1))
 
     def interval(self) -> Limits:
@@ -82,10 +81,10 @@ class Term:
 class Linearity:
     """The largest deviation of a rate from the line, over full scale, in runs of one design."""
 
-    deviation: Array  # shape (runs, levels); what each rate is above the line, over full scale
+    deviation: Array  # shape (runs, levels); deviation of each rate from the line, over full scale
     sigma: Array  # shape (levels,); its standard error by the noise model
     full_scale: float  # the largest rate of the test, rad/s
-    # shape (runs,); chance of deviations at least as large, all together, where the line is right
+    # shape (runs,); probability of deviations at least as large in total, if the line is right
     p_value: Array
 
     @property
@@ -96,8 +95,8 @@ class Linearity:
     def interval(self) -> Limits:
         """Return confidence limits of the largest true deviation, shapes (runs,).
 
-        The limits hold of all rates together (Bonferroni): noise alone makes the largest of many
-        deviations large.
+        The limits hold for all rates together (Bonferroni), since noise alone makes the largest of
+        many deviations large.
         """
         half = half_width(1.0 - (1.0 - CONFIDENCE_LEVEL) / self.sigma.size) * self.sigma
         size = np.abs(self.deviation)
@@ -111,12 +110,11 @@ class Calibration:
     line: Fit  # bias, rad/s, at the first sample of the first block, and scale factor
     # standard error of the bias, with that of the Earth's rate along the axis, rad/s
     bias_sigma: float
-    quadratic: Term | None  # coefficient of the square of the rate beside the line, s/rad
-    # scale factor of positive less that of negative rates over their mean, beside a bias that both
-    # share
+    quadratic: Term | None  # coefficient of the square of the rate, in addition to the line, s/rad
+    # difference of the scale factors of positive and negative rates over their mean, with one bias
     asymmetry: Term | None
     linearity: Linearity | None
-    # why there is no value of what is None, and what is a part of what
+    # reasons for missing values, and quantities that contain others
     not_observable: tuple[NotObservable, ...]
 
     @property
@@ -191,7 +189,7 @@ class RateTable:
         earth = 0.0 if pointing is None else pointing.rate
         self._earth_sigma = 0.0 if pointing is None else pointing.rate_sigma
         rate = schedule.of_blocks(blocks) + earth
-        self._levels = _levels(rate)
+        self._levels = _index_levels(rate)
         number = int(self._levels.max()) + 1
         self._rates = np.array([rate[self._levels == level][0] for level in range(number)])
         if number < 2:
@@ -246,24 +244,24 @@ class RateTable:
             If there is not one finite mean a block.
         """
         line = self._line.fit(means)
-        asymmetry = self._fraction(means)
+        asymmetry = self._fit_asymmetry(means)
         still = self._asymmetry is not None and asymmetry is None
         return Calibration(
             line,
             self.sigma[0],
-            _term(self._quadratic, means),
+            _fit_term(self._quadratic, means),
             asymmetry,
-            self._linearity(line, means),
+            self._test_linearity(line, means),
             (*self._open, *[_NO_SCALE] * still),
         )
 
-    def _linearity(self, line: Fit, means: Array) -> Linearity | None:
+    def _test_linearity(self, line: Fit, means: Array) -> Linearity | None:
         if self._each is None:
             return None
         each = self._each.fit(means)
         explained = np.maximum(line.chi_squared - each.chi_squared, 0.0)
         at_rates = np.column_stack([np.ones(len(self._rates)), self._rates])
-        # The line is fitted to the same means: what it takes of their noise is no deviation.
+        # The line is fitted to the same means, which reduces the covariance of the residuals.
         variance = np.diag(each.covariance - at_rates @ line.covariance @ at_rates.T)
         full_scale = float(np.abs(self._rates).max())
         return Linearity(
@@ -273,7 +271,7 @@ class RateTable:
             np.asarray(chi2.sf(explained, line.freedom - each.freedom)),
         )
 
-    def _fraction(self, means: Array) -> Term | None:
+    def _fit_asymmetry(self, means: Array) -> Term | None:
         """Return the asymmetry over the mean scale factor of both senses."""
         if self._asymmetry is None:
             return None
@@ -281,7 +279,7 @@ class RateTable:
         scale = fit.value[:, 1]
         if np.any(np.abs(scale) <= half_width() * fit.sigma[1]):
             return None
-        # The scale factor's own error is of second order.
+        # The error of the scale factor is of second order.
         sigma = float(self._asymmetry.sigma[-1] / np.abs(scale).mean())
         return Term(fit.value[:, -1] / scale, sigma)
 
@@ -296,8 +294,8 @@ def calibrate(
 ) -> tuple[Calibration, Measured]:
     """Return bias and scale factor of a gyro from a log on a rate table, and its block means.
 
-    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are those
-    of `RateTable`.
+    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are as
+    in `RateTable`.
 
     Raises
     ------
@@ -319,8 +317,8 @@ def calibrate(
     return table.fit(measured.means), measured
 
 
-def _levels(rate: Array) -> NDArray[np.int64]:
-    """Return the number of each rate among the different ones, which rounding does not split."""
+def _index_levels(rate: Array) -> NDArray[np.int64]:
+    """Return the index of each rate among the distinct ones, equal up to rounding."""
     order = np.argsort(rate, kind="stable")
     risen = np.diff(rate[order], prepend=rate[order[0]]) > _RATE_TOLERANCE * np.abs(rate).max()
     levels = np.empty(len(rate), dtype=np.int64)
@@ -328,7 +326,7 @@ def _levels(rate: Array) -> NDArray[np.int64]:
     return levels
 
 
-def _term(squares: LeastSquares | None, means: Array) -> Term | None:
+def _fit_term(squares: LeastSquares | None, means: Array) -> Term | None:
     if squares is None:
         return None
     return Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))
@@ -336,13 +334,12 @@ def _term(squares: LeastSquares | None, means: Array) -> Term | None:
 
 @dataclass(frozen=True)
 class Residuals:
-    """Steady rates and what the line leaves of them."""
+    """Residuals of steady rates from the line."""
 
-    # shape (k,); number of each among those of the schedule, from 0; one without samples is left
-    # out
+    # shape (k,); index in the schedule, from 0; rates without samples are left out
     dwell: NDArray[np.int64]
     mean: Array  # shape (k,); mean reading, rad/s
-    line: Array  # shape (k,); what the line has there, rad/s
+    line: Array  # shape (k,); value of the line, rad/s
     sigma: Array  # shape (k,); standard deviation of mean less line, rad/s
 
     @property
@@ -358,10 +355,10 @@ def residuals(
     model: NoiseModel,
     setting_sigma: float = 0.0,
 ) -> Residuals:
-    """Return what the line leaves of each steady rate, of a calibration of one run.
+    """Return the residuals of each steady rate, for a calibration of one run.
 
-    The rates, table and Earth, are those that each block sensed, shape (b,), rad/s; the true rate
-    is about the stated one by ``setting_sigma``, rad/s.
+    ``rates`` is the rate of table and Earth in each block, shape (b,), rad/s; ``setting_sigma`` is
+    the standard deviation of the true rate about the stated one, rad/s.
     """
     blocks = measured.blocks
     dwell, place = np.unique(blocks.dwell, return_inverse=True)

@@ -1,7 +1,7 @@
 """The steady rates of a rate table: from its schedule, or from a column with the table's rate.
 
-What lies between two steady rates, the table speeding up or slowing down, is left out, and so is a
-time after each ramp in which table and gyro settle.
+The ramps between two steady rates are left out, and a settling time of table and gyro after each
+ramp.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ class Schedule:
     Raises
     ------
     ValueError
-        If there is none, there is not one rate a stretch, one is not finite, or stretches overlap.
+        If there is none, there is not one rate for each stretch, one is not finite, or stretches
+        overlap.
     """
 
     stretches: Sequence[Dwell]
@@ -53,10 +54,10 @@ class Schedule:
     def from_steps(
         cls, steps: Sequence[tuple[float, float, float]], rate: float, *, settling: float = 0.0
     ) -> Schedule:
-        """Return the schedule of steps that are known.
+        """Return the schedule of known steps.
 
-        Each is start and end of a steady rate, s from the first sample, and the rate, rad/s; a time
-        of settling, s, is left out at its start. The sampling rate is in Hz.
+        Each step is start and end of a steady rate, s from the first sample, and the rate, rad/s.
+        The settling time, s, at its start is left out. The sampling rate is in Hz.
 
         Raises
         ------
@@ -65,7 +66,7 @@ class Schedule:
         """
         stretches = []
         for start, stop, table_rate in steps:
-            # The first sample that is not before a time; a last digit does not move it.
+            # The first sample not before a time, with a tolerance for rounding.
             first, last = (math.ceil(time * rate - 1e-6) for time in (start + settling, stop))
             if not 0 <= first < last:
                 raise ValueError(
@@ -81,9 +82,10 @@ class Schedule:
     ) -> Schedule:
         """Find the steady rates in a column with the table's rate.
 
-        A sample is steady where the column stays within the tolerance for half the shortest time
-        about it. Steady samples in a row are a stretch, if they last and if the column as a whole
-        stays within twice the tolerance: a slow ramp does not. The rate is the column's mean.
+        A sample is steady if the column stays within the tolerance for half the shortest time about
+        it. Consecutive steady samples are a stretch if they last long enough, and if the column
+        stays within twice the tolerance over all of them, which excludes slow ramps. The rate is
+        the mean of the column.
 
         Parameters
         ----------
@@ -92,9 +94,9 @@ class Schedule:
         rate : float
             Sampling rate, Hz.
         tolerance : float
-            Range of the column at a steady rate, noise of its own included, rad/s.
+            Range of the column at a steady rate, including its noise, rad/s.
         shortest : float
-            Stretches that are shorter are left out, s, before settling is taken off.
+            Shorter stretches are left out, s; the time includes settling.
         settling : float
             Time at the start of each stretch that is left out, s.
 
@@ -138,7 +140,7 @@ class Schedule:
 
     @property
     def experiment(self) -> Experiment:
-        """The stretches, whose block means are taken; the latitude is not used."""
+        """The stretches as dwells, for block means; the latitude is not used."""
         return Experiment(tuple(self.stretches), self.rate, 0.0)
 
     def of_blocks(self, blocks: Blocks) -> Array:

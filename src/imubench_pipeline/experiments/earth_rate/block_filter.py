@@ -1,14 +1,14 @@
-"""Constants seen through the errors of one or several axes: a square-root Kalman filter.
+"""A square-root Kalman filter for constants observed with the errors of one or several axes.
 
-The unknown constants c (the Earth's rate, small angles of attitude) stand beside the states of each
-axis' own error, and beside the mean of that error over the block that has just ended:
+The state contains the unknown constants c (the Earth's rate, small angles of attitude), the states
+of the error of each axis, and the mean of this error over the last block:
 
     x = [c, states of axis 1, 2 ..., means of axis 1, 2 ...],    y_i = seen_i c + mean_i + v_i.
 
-The mean is a state, so that what the states gain during the block and what the mean sees of it are
-correlated as they are (`states`). Covariances do not depend on the data: they are computed once, as
-triangular roots that are turned by QR (P. Park and T. Kailath 1995). A root keeps its digits from a
-start that stands for no knowledge at all, where a covariance would have lost them.
+The mean is a state, so that its correlation with the process noise of the block is exact
+(`states`). Covariances do not depend on the data: they are computed once, as triangular roots that
+are updated by QR (P. Park and T. Kailath 1995). From an uninformative start a root keeps its
+precision, while a covariance would lose it.
 
 References
 ----------
@@ -33,41 +33,43 @@ class BlockFilter:
     Parameters
     ----------
     axes : sequence of BlockStates
-        a of them, over the same blocks.
+        The a axes, over the same blocks.
     seen : ndarray, shape (b, a, p)
-        What the mean of each axis over each block sees of the constants.
+        Sensitivity of the mean of each axis over each block to the constants.
     start : ndarray, shape (p, p)
-        A root of the covariance of what is known of the constants at the start, about 0.
+        A root of the prior covariance of the constants about 0.
 
     Attributes
     ----------
     roots : ndarray, shape (b, n, n)
         Lower triangular roots of the covariances after each block.
     gains : ndarray, shape (b, n, a)
-        Of what is measured less what was predicted.
+        Kalman gains for the innovations.
     innovation_roots : ndarray, shape (b, a, a)
-        Lower triangular roots of the covariances of that.
+        Lower triangular roots of the covariances of the innovations.
     """
 
     def __init__(self, axes: Sequence[BlockStates], seen: Array, start: Array) -> None:
         b, a, p = seen.shape
         sizes = [len(axis.names) for axis in axes]
         self._which = axes[0].which
-        self._places = _places(p, sizes)
+        self._slices = _make_slices(p, sizes)
         n = p + sum(sizes) + a
-        self._matrices = [self._matrix(axes, kind, n, p) for kind in range(len(axes[0].steps))]
+        self._matrices = [
+            self._build_matrix(axes, kind, n, p) for kind in range(len(axes[0].steps))
+        ]
         self._seen = np.zeros((b, a, n))
         self._seen[:, :, :p] = seen
         self._seen[:, np.arange(a), n - a + np.arange(a)] = 1.0
         root = np.zeros((n, n))
         root[:p, :p] = start
-        for axis, place in zip(axes, self._places, strict=True):
+        for axis, place in zip(axes, self._slices, strict=True):
             root[place, place] = axis.initial
         white = np.stack([axis.white for axis in axes], axis=1)
         self.roots = np.empty((b, n, n))
         self.gains = np.empty((b, n, a))
         self.innovation_roots = np.empty((b, a, a))
-        self._cover(root, white)
+        self._propagate_covariance(root, white)
 
     def matrices(self, block: int) -> tuple[Array, Array]:
         """Return the transition into a block, (n, n), and a root of its noise, (n, r)."""
@@ -76,8 +78,8 @@ class BlockFilter:
     def run(self, means: Array) -> tuple[Array, Array]:
         """Filter runs of one design, from means of shape (runs, b, a).
 
-        Returned are the states after each block, shape (runs, b, n), and the innovations, what is
-        measured less what was predicted, shape (runs, b, a).
+        Returned are the states after each block, shape (runs, b, n), and the innovations
+        (measurement less prediction), shape (runs, b, a).
         """
         b, _, n = self._seen.shape
         states = np.empty((len(means), b, n))
@@ -90,13 +92,13 @@ class BlockFilter:
             states[:, k] = state
         return states, innovations
 
-    def _matrix(
+    def _build_matrix(
         self, axes: Sequence[BlockStates], kind: int, n: int, p: int
     ) -> tuple[Array, Array]:
         a = len(axes)
         transition, noise = np.zeros((n, n)), np.zeros((n, n - p))
         transition[:p, :p] = np.eye(p)
-        for i, (axis, place) in enumerate(zip(axes, self._places, strict=True)):
+        for i, (axis, place) in enumerate(zip(axes, self._slices, strict=True)):
             step, mean = axis.steps[kind], n - a + i
             transition[place, place] = step.transition[:-1]
             transition[mean, place] = step.transition[-1]
@@ -105,8 +107,8 @@ class BlockFilter:
             noise[mean, driven] = step.factor[-1]
         return transition, noise
 
-    def _cover(self, root: Array, white: Array) -> None:
-        """Carry the root of the covariance through the blocks."""
+    def _propagate_covariance(self, root: Array, white: Array) -> None:
+        """Propagate the root of the covariance through the blocks."""
         a = white.shape[1]
         for k in range(len(self._seen)):
             transition, noise = self.matrices(k)
@@ -123,15 +125,15 @@ class BlockFilter:
 
 
 def triangle(root: Array) -> Array:
-    """Return a lower triangular root, shape (n, n), of the covariance of one of shape (n, r)."""
+    """Return a lower triangular root, shape (n, n), of a covariance with a root (n, r)."""
     return np.asarray(np.linalg.qr(root.T, mode="r")).T
 
 
 def deviation(roots: Array, state: int) -> Array:
-    """Return the standard deviation of a state, shape (...), of roots of shape (..., n, n)."""
+    """Return the standard deviation of a state, shape (...), from roots of shape (..., n, n)."""
     return np.asarray(np.linalg.norm(roots[..., state, :], axis=-1))
 
 
-def _places(first: int, sizes: Sequence[int]) -> list[slice]:
+def _make_slices(first: int, sizes: Sequence[int]) -> list[slice]:
     edges = first + np.concatenate(([0], np.cumsum(sizes))).astype(int)
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]

@@ -1,9 +1,9 @@
-"""The estimates of an Earth-rate experiment by every method, as they grow with time.
+"""Estimates of an Earth-rate experiment by every method, over time.
 
-How sure their standard deviations are is told by their range over noise models (`sigma_ranges`):
-the noise model is an estimate with limits. Each standard deviation is computed again for models
-drawn from these; 95 % of the values lie between its limits. What weights that come of another
-model than the true one add to it is of the second order, and left out.
+The noise model is an estimate with limits, so that the standard deviations have a range, too
+(`sigma_ranges`). Each standard deviation is computed again for models drawn from these limits; 95 %
+of the values lie between its limits. The effect of weights from a wrong model is of second order
+and neglected.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from imubench_pipeline.noise.sigma_range import sigma_range
 from imubench_pipeline.typing import Array
 
 GIVEN = {"known_rate": STARTS["degrees"], "known_rate_radians": STARTS["radians"]}
-"""The methods that are given the rate, and cannot find it; with the start of each, (rad/s)^2."""
+"""The methods with known rate, which cannot estimate it, and the start of each, (rad/s)^2."""
 
 METHODS = ("pairs", "triples", "filter", "smoother", *GIVEN)
-"""In the order in which they are shown."""
+"""All methods, in the order of display."""
 
-_KEPT = 400
+_MAX_POINTS = 400
 
 Range = dict[str, float]
 
 
 @dataclass(frozen=True)
 class Course:
-    """What one method says as the data come in."""
+    """Estimates of one method over time."""
 
     method: str  # one of `METHODS`
     time: Array  # shape (k,); s from the first sample of the log
@@ -52,19 +52,19 @@ class Course:
     rate: Array
     sigma: Array | None  # shape (k,); its standard deviation, rad/s; None where the method has none
     reason: str | None = None  # why there is no estimate: the arrays are empty then
-    # s of data after which it stays within a tenth of the rate that it was given, where it was
+    # s of data after which it stays within a tenth of the known rate, for methods with one
     settled: float | None = None
 
 
 @dataclass(frozen=True)
 class Courses:
-    """The estimates of one experiment, and what they are made of."""
+    """The estimates of one experiment, and their data."""
 
-    courses: tuple[Course, ...]  # one a method
+    courses: tuple[Course, ...]  # one per method
     measured: Measured
-    longest: int  # samples of a block at most
+    longest: int  # largest number of samples of a block
     # drift_time, drift, drift_sigma: shape (b,); middle of each block in s from the first sample of
-    # the log; the gyro's slow error in it with its bias, from all of the data, and its standard
+    # the log; slow error of the gyro in it, including the bias, from all data, and its standard
     # deviation, rad/s
     drift_time: Array
     drift: Array
@@ -72,9 +72,9 @@ class Courses:
 
 
 def white_sigma(model: NoiseModel, blocks: Blocks) -> float:
-    """Return N / sqrt(T) / cos(latitude), rad/s, below which no estimate from T s of data can be.
+    """Return the lower limit of sigma, N / sqrt(T) / cos(latitude), rad/s, for T s of data.
 
-    T is the time that the samples of the blocks stand for.
+    T is the total time of the samples in the blocks.
     """
     return model.N / math.sqrt(blocks.time_in_blocks) / math.cos(blocks.latitude)
 
@@ -88,8 +88,8 @@ def estimate_courses(
 ) -> Courses:
     """Estimate the Earth's rate by every method.
 
-    The filter starts with the variance of the turn-on bias (of no knowledge, where it is not
-    stated), its Gauss-Markov processes with their stationary one.
+    The filter starts with the variance of the turn-on bias, or an uninformative one, and the
+    stationary variances of its Gauss-Markov processes.
 
     Parameters
     ----------
@@ -98,11 +98,11 @@ def estimate_courses(
     experiment : Experiment
         Dwells of both senses.
     model : NoiseModel
-        Of the gyro, with N.
+        Noise of the gyro, with N.
     papers : NoiseModel
-        N, B with T_B, and K, for the paper's filter.
+        N, B with T_B, and K, for the filter of Silva et al.
     turn_on_bias : float or None
-        Standard deviation of the fixed bias, rad/s; None: not known.
+        Standard deviation of the fixed bias, rad/s; None: unknown.
 
     Raises
     ------
@@ -120,12 +120,12 @@ def estimate_courses(
     )
     filtered = rate_filter.run(means)
     smoothed = rate_filter.smooth(filtered)
-    # Before the second position is seen the rate is not told from the bias.
+    # Before the second position the rate and the bias are not separable.
     from_second = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
     whole = np.array([first, first + blocks.duration])
     courses = (
-        _differences("pairs", blocks, lambda: by_pairs(means, blocks, model)),
-        _differences("triples", blocks, lambda: by_triples(means, blocks, model)),
+        _estimate_by_differences("pairs", blocks, lambda: by_pairs(means, blocks, model)),
+        _estimate_by_differences("triples", blocks, lambda: by_triples(means, blocks, model)),
         Course(
             "filter",
             first + filtered.time[from_second],
@@ -133,14 +133,16 @@ def estimate_courses(
             filtered.rate_sigma[from_second],
         ),
         Course("smoother", whole, np.full(2, smoothed.rate[0]), np.full(2, smoothed.rate_sigma)),
-        *(_tracked(log, experiment, papers, method) for method in GIVEN),
+        *(_track_known_rate(log, experiment, papers, method) for method in GIVEN),
     )
     return Courses(
         courses, measured, longest, first + blocks.middle, smoothed.drift[0], smoothed.drift_sigma
     )
 
 
-def _differences(method: str, blocks: Blocks, estimate: Callable[[], Differences]) -> Course:
+def _estimate_by_differences(
+    method: str, blocks: Blocks, estimate: Callable[[], Differences]
+) -> Course:
     try:
         differences = estimate()
     except ValueError as error:
@@ -149,7 +151,9 @@ def _differences(method: str, blocks: Blocks, estimate: Callable[[], Differences
     return Course(method, first + differences.time, differences.rate[0], differences.sigma)
 
 
-def _tracked(log: Array, experiment: Experiment, papers: NoiseModel, method: str) -> Course:
+def _track_known_rate(
+    log: Array, experiment: Experiment, papers: NoiseModel, method: str
+) -> Course:
     try:
         tracked = track(log, experiment, papers, EARTH_RATE, GIVEN[method])
     except ValueError as error:
@@ -164,15 +168,15 @@ def _tracked(log: Array, experiment: Experiment, papers: NoiseModel, method: str
 
 
 def thin(points: int) -> Iterator[int]:
-    """Yield places of a course that show it: as many at its begin as later, and its end.
+    """Yield the indices of points to display, half of them spaced logarithmically, half evenly.
 
-    About 400 are kept.
+    There are about 400.
     """
-    if points <= _KEPT:
+    if points <= _MAX_POINTS:
         yield from range(points)
         return
-    even = np.linspace(0, points - 1, _KEPT // 2)
-    early = np.geomspace(1, points, _KEPT // 2) - 1
+    even = np.linspace(0, points - 1, _MAX_POINTS // 2)
+    early = np.geomspace(1, points, _MAX_POINTS // 2) - 1
     yield from np.unique(np.rint(np.concatenate([even, early])).astype(np.int64)).tolist()
 
 
@@ -182,8 +186,8 @@ def sigma_ranges(
     """Return the limits of the standard deviation of each method at the end of a run.
 
     By method ``sigma_lower`` and ``sigma_upper``, rad/s, over models drawn from the limits of the
-    parameters of the estimated one; none where nothing is drawn, or the method has no estimate. The
-    standard deviation of the fixed bias is in rad/s; None: not known.
+    parameters of the estimated model. Methods without an estimate are left out, and all methods
+    without draws. The standard deviation of the fixed bias is in rad/s; None: unknown.
     """
     if not drawn:
         return {}
@@ -203,8 +207,8 @@ def sigma_ranges(
         try:
             limits = sigma_range(sigma, model, drawn)
         except (ValueError, LinAlgError):
-            continue  # no pair or triple in these dwells, which the estimate says
+            continue  # no pair or triple in these dwells; the estimate has the reason
         ranges[method] = {"sigma_lower": float(limits.lower), "sigma_upper": float(limits.upper)}
     if "filter" in ranges:
-        ranges["smoother"] = ranges["filter"]  # at the end of the run they are one
+        ranges["smoother"] = ranges["filter"]  # equal at the end of the run
     return ranges

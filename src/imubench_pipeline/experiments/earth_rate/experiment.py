@@ -1,9 +1,9 @@
 """An Earth-rate experiment: dwells at two opposite positions, and the means of blocks within them.
 
-At rest a gyro whose axis is horizontal and points north reads the Earth's rate times the cosine of
-the latitude, pointing south the same with the other sign, and its bias both times. All estimates
-here are made of means of blocks of samples. A block lies in one dwell, so that no turning enters
-it, and the times between the blocks are kept in whole samples.
+At rest a gyro with a horizontal axis to the north reads the Earth's rate times the cosine of the
+latitude, to the south the same with the opposite sign, and its bias both times. All estimates use
+means of blocks of samples. A block lies in one dwell, without turning, and the times between the
+blocks are whole numbers of samples.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from imubench_pipeline.typing import Array
 
 Integers = NDArray[np.int64]
 
-_LEAST_PRESENT = 0.5
-"""Part of the samples of a block that must be there: the mean of fewer is left out."""
+_MIN_PRESENT_SHARE = 0.5
+"""Least share of the samples of a block that must be present, or its mean is left out."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Dwell:
     Raises
     ------
     ValueError
-        If there is no sample, or the sense is neither.
+        If there is no sample, or the sense is neither 1 nor -1.
     """
 
     # start, stop: first sample of the log, and the one past the last
@@ -58,8 +58,8 @@ class Experiment:
         between the poles.
     """
 
-    # at least one; what lies between them is turning. Two that follow each other may have the same
-    # sense: a turn was missed
+    # at least one; the time between them is turning. Two consecutive ones have the same sense after
+    # a missed turn
     dwells: Sequence[Dwell]
     rate: float  # sampling rate, Hz
     latitude: float  # rad
@@ -90,9 +90,9 @@ class Experiment:
     ) -> Experiment:
         """Return an experiment that keeps to a schedule.
 
-        Data in each of so many dwells (at least one sample) and time between them are in s, taken
-        to the nearest whole number of samples; the rate is in Hz, the latitude in rad. ``first`` is
-        the sense of the first dwell.
+        ``dwell`` is the data in each dwell (at least one sample), ``turning`` the time between two,
+        in s, rounded to whole samples; the rate is in Hz, the latitude in rad. ``first`` is the
+        sense of the first dwell.
         """
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
@@ -104,7 +104,7 @@ class Experiment:
 
     @property
     def samples_in_dwells(self) -> int:
-        """How many samples lie in dwells."""
+        """Number of samples in dwells."""
         return sum(dwell.stop - dwell.start for dwell in self.dwells)
 
     def blocks(self, longest: int) -> Blocks:
@@ -119,7 +119,7 @@ class Experiment:
         """
         if longest < 1:
             raise ValueError(f"a block of {longest} samples is empty")
-        edges = [_edges(dwell, longest) for dwell in self.dwells]
+        edges = [_compute_edges(dwell, longest) for dwell in self.dwells]
         number = [len(of_dwell) - 1 for of_dwell in edges]
         start = np.concatenate([of_dwell[:-1] for of_dwell in edges])
         stop = np.concatenate([of_dwell[1:] for of_dwell in edges])
@@ -218,24 +218,24 @@ class Blocks:
 
 @dataclass(frozen=True)
 class Measured:
-    """The block means of a log, and what was left out."""
+    """The block means of a log, and the left-out samples."""
 
-    blocks: Blocks  # those of which enough samples are present
+    blocks: Blocks  # blocks with enough samples present
     means: Array  # shape (1, b); rad/s, a row for the one log
-    missing: int  # samples within dwells that are not there (NaN)
-    left_out: int  # samples present in blocks that have too few
+    missing: int  # samples within dwells that are missing (NaN)
+    left_out: int  # samples present in blocks with too few
     turning: int  # samples of the log, present or not, outside of dwells
 
 
 def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) -> Measured:
     """Return the means of blocks, of ``longest`` samples at most, of a log, in one pass.
 
-    The mean is over the samples present. White noise in it counts by their number; the slow noise
-    in it is taken as that of a complete block, which is why a block of which more than half is
-    missing is left out; the blocks beside it know how long that hole is. With a third of all
-    samples missing, a standard deviation is right to 1 %, and 3 % too small where most of the noise
-    is a process of a correlation time of two samples. The parts of the log are in order, rad/s,
-    each ndarray of one axis; NaN where a sample is missing.
+    The mean is over the samples present. Its white noise depends on their number; its slow noise is
+    taken as for a complete block. Therefore a block with more than half of its samples missing is
+    left out; its length still counts as a gap. With a third of all samples missing, a standard
+    deviation is right to 1 %, or 3 % too small if most of the noise is a process with a correlation
+    time of two samples. The parts of the log are in order, rad/s, each ndarray of one axis; NaN
+    where a sample is missing.
 
     Raises
     ------
@@ -257,7 +257,7 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
         count += np.bincount(place, minlength=len(whole))
     if length < whole.stop[-1]:
         raise ValueError(f"the log has {length} samples, the last dwell ends at {whole.stop[-1]}")
-    enough = count >= np.maximum(_LEAST_PRESENT * whole.count, 1)
+    enough = count >= np.maximum(_MIN_PRESENT_SHARE * whole.count, 1)
     if not enough.any():
         raise ValueError("no block has enough samples: all of the dwells is missing")
     return Measured(
@@ -269,7 +269,7 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
     )
 
 
-def _edges(dwell: Dwell, longest: int) -> Integers:
+def _compute_edges(dwell: Dwell, longest: int) -> Integers:
     length = dwell.stop - dwell.start
     number = -(-length // longest)
     return dwell.start + np.arange(number + 1) * length // number

@@ -69,7 +69,7 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     through the outer two at its mean time. Triples overlap: each dwell except the first and the
     last is the middle of one.
 
-    The parameters are as in `by_pairs`.
+    Parameters and shapes are as in `by_pairs`.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""How well a gyro can find the Earth's rate and north, before anything is measured: the best dwell.
+"""Predict the accuracy of the Earth's rate and north by a gyro, and the best dwell.
 
-All of it is the Cramér-Rao bound of runs of equal dwells (`experiments.earth_rate.bound`).
-`prediction_rows` gives what a gyro needs to find the rate and north: rows of the table.
+All results are the Cramér-Rao bound of runs of equal dwells (`experiments.earth_rate.bound`).
+`prediction_rows` gives the necessary turns and times as rows of the table.
 """
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ from imubench_pipeline.experiments.earth_rate.experiment import Experiment
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_SUMMED = 64
-"""Dwells that are computed; the information of more grows by what the latter half of them add."""
+_MAX_COMPUTED_DWELLS = 64
+"""Largest number of computed dwells; beyond, the information grows as over their latter half."""
 
-_LEAST_SUMMED = 8
-"""Dwells that are computed where they have so many blocks that 64 would be too many."""
+_MIN_COMPUTED_DWELLS = 8
+"""Least number of computed dwells, if 64 of them have too many blocks."""
 
-_ROUNDING = 1e-9
-"""Relative error of the information that rounding may make."""
+_INFORMATION_TOLERANCE = 1e-9
+"""Relative tolerance of the information for rounding."""
 
-_LITTLE = 0.01
-"""Relative rise of the standard deviation that is little."""
+_NEARLY_BEST_LOSS = 0.01
+"""Relative rise of the standard deviation within which a dwell is nearly the best."""
 
-_CURVE = 40
-"""Numbers of dwells on a curve over the dwell, about."""
+_DWELL_CURVE_POINTS = 40
+"""Approximate number of points on a curve over the dwell."""
 
-_BETWEEN = 15
-"""Numbers of dwells about the best of these."""
+_REFINEMENT_POINTS = 15
+"""Number of further points about the best one."""
 
 Row = dict[str, Any]
 
 MAX_TURNS = 10**12
-"""Turns of a goal; at one a second they take 30 000 years."""
+"""Largest number of turns of a goal; at one a second they take 30 000 years."""
 
-_POINTS = 60
-"""Numbers of turns on the curve over time."""
+_TIME_CURVE_POINTS = 60
+"""Number of points on the curve over time."""
 
-_MOST_TURNS = 20_000
-"""The curve over time goes no further; what is needed is found beyond."""
+_MAX_CURVE_TURNS = 20_000
+"""Largest number of turns on the curve over time; goals may need more."""
 
 
 @dataclass(frozen=True)
@@ -68,21 +68,21 @@ class Prediction:
 class DwellCurve:
     """The least standard deviation of the rate for a given run time, over the dwell."""
 
-    dwells: NDArray[np.int64]  # shape (k,); how many, rising
+    dwells: NDArray[np.int64]  # shape (k,); number of dwells, increasing
     dwell: Array  # shape (k,); data in each, s
     sigma: Array  # shape (k,); rad/s
 
     @property
     def best(self) -> int:
-        """Place of the least standard deviation."""
+        """Index of the least standard deviation."""
         return int(np.argmin(self.sigma))
 
     def nearly_best(self) -> tuple[float, float]:
-        """Return the dwells between which 1 % is lost at most: the best is mostly a broad one.
+        """Return the range of dwells with a loss of 1 % at most; the optimum is mostly broad.
 
         Shortest and longest dwell of the curve about the best one, s.
         """
-        little = self.sigma <= (1.0 + _LITTLE) * self.sigma[self.best]
+        little = self.sigma <= (1.0 + _NEARLY_BEST_LOSS) * self.sigma[self.best]
         worse = np.flatnonzero(~little)
         first = int(np.max(worse[worse < self.best], initial=-1)) + 1
         last = int(np.min(worse[worse > self.best], initial=len(little))) - 1
@@ -91,33 +91,33 @@ class DwellCurve:
 
 @dataclass(frozen=True)
 class Outlook:
-    """A gyro, a place and a way of turning it, of which the bound is wanted.
+    """A gyro, a place and the time of a turn, for the bound of the Earth's rate.
 
-    Beyond 64 dwells the information of the rate grows by as much a dwell as before: what turns
-    at a steady pace sees the noise at the frequency of the turns and its odd multiples alone.
+    Beyond 64 dwells the information grows linearly with the number of dwells: with periodic turns,
+    only noise at the frequency of the turns and its odd multiples matters.
     """
 
     model: NoiseModel
     latitude: float  # rad
     turning: float  # time that a turn takes, s
     rate: float  # sampling rate, Hz
-    # standard deviation of the fixed bias, rad/s; by default it is not known
+    # standard deviation of the fixed bias, rad/s; by default unknown
     turn_on_bias: float = math.inf
 
     def against_time(self, dwell: float, turns: int) -> Prediction:
-        """Return the bound after each turn and dwell, of so many s of data, up to the last turn."""
-        information = self._information(dwell, turns + 1)
+        """Return the bound after each turn and dwell up to the last turn; the dwell is in s."""
+        information = self._compute_information(dwell, turns + 1)
         number = np.arange(1, turns + 1)
         time = (number + 1) * dwell + number * self.turning
         return Prediction(number, time, sigma_of(information[1:]))
 
     def turns_needed(self, dwell: float, relative: float) -> int | None:
-        """Return how many turns give the Earth's rate to a relative standard deviation.
+        """Return the number of turns for a relative standard deviation of the Earth's rate.
 
         None: more than `MAX_TURNS`.
 
-        The run lasts (turns + 1) dwells, s of data each, and as many turns; ``relative`` is of the
-        Earth's rate: 0.01 is 1 %.
+        The run lasts (turns + 1) dwells, each with ``dwell`` s of data, and the turns. A
+        ``relative`` of 0.01 is 1 % of the Earth's rate.
 
         Raises
         ------
@@ -127,28 +127,28 @@ class Outlook:
         if not relative > 0:
             raise ValueError(f"relative is {relative}, expected a number above 0")
         wanted = (relative * EARTH_RATE) ** -2
-        information = self._information(dwell, _SUMMED)
-        reached = np.flatnonzero(information >= wanted * (1.0 - _ROUNDING))
+        information = self._compute_information(dwell, _MAX_COMPUTED_DWELLS)
+        reached = np.flatnonzero(information >= wanted * (1.0 - _INFORMATION_TOLERANCE))
         if len(reached):
             return int(reached[0])
-        left = (wanted - information[-1]) / max(_growth(information), math.ulp(0.0))
+        left = (wanted - information[-1]) / max(_compute_growth(information), math.ulp(0.0))
         if left > MAX_TURNS:
             return None
-        return _SUMMED - 1 + math.ceil(left - _ROUNDING * left)
+        return _MAX_COMPUTED_DWELLS - 1 + math.ceil(left - _INFORMATION_TOLERANCE * left)
 
     def sigma_after(self, dwell: float, turns: int) -> float:
         """Return the bound after a number of turns and the dwell after the last, rad/s."""
-        information = self._information(dwell, _SUMMED)
-        beyond = max(turns + 1 - _SUMMED, 0)
-        last = information[min(turns, _SUMMED - 1)] + (
-            _growth(information) * beyond if beyond else 0.0
+        information = self._compute_information(dwell, _MAX_COMPUTED_DWELLS)
+        beyond = max(turns + 1 - _MAX_COMPUTED_DWELLS, 0)
+        last = information[min(turns, _MAX_COMPUTED_DWELLS - 1)] + (
+            _compute_growth(information) * beyond if beyond else 0.0
         )
         return float(sigma_of(np.array([last]))[0])
 
     def time_needed(self, dwell: float, relative: float) -> float:
-        """Return how long a run gives the Earth's rate to a relative standard deviation, s.
+        """Return the run time for a relative standard deviation of the Earth's rate, s.
 
-        Infinity: it takes more than `MAX_TURNS`.
+        Infinity: more than `MAX_TURNS`.
         """
         turns = self.turns_needed(dwell, relative)
         return math.inf if turns is None else (turns + 1) * dwell + turns * self.turning
@@ -156,7 +156,7 @@ class Outlook:
     def over_dwell(self, run_time: float) -> DwellCurve:
         """Return the bound of a run of a length, s, over the dwell, from one turn to short dwells.
 
-        All of the run is dwell or turning; down to dwells of a fourth of the turning time, or of
+        The run consists of dwells and turns. The shortest dwell is a fourth of the turning time, or
         one second.
 
         Raises
@@ -168,23 +168,23 @@ class Outlook:
             raise ValueError(f"{run_time} s do not hold two dwells and a turn")
         shortest = max(self.turning / 4.0, 1.0, 2.0 / self.rate)
         most = max(int((run_time + self.turning) / (shortest + self.turning)), 2)
-        number = np.unique(np.rint(np.geomspace(2, most, _CURVE)).astype(np.int64))
-        sigma = self._of_run(run_time, number)
+        number = np.unique(np.rint(np.geomspace(2, most, _DWELL_CURVE_POINTS)).astype(np.int64))
+        sigma = self._compute_sigma(run_time, number)
         best = int(np.argmin(sigma))
         around = number[max(best - 1, 0)], number[min(best + 1, len(number) - 1)]
-        between = np.rint(np.linspace(*around, _BETWEEN)).astype(np.int64)
+        between = np.rint(np.linspace(*around, _REFINEMENT_POINTS)).astype(np.int64)
         between = np.setdiff1d(between, number)
-        sigma = np.concatenate([sigma, self._of_run(run_time, between)])
+        sigma = np.concatenate([sigma, self._compute_sigma(run_time, between)])
         number = np.concatenate([number, between])
         order = np.argsort(number)
         number = number[order]
         dwell = (run_time - (number - 1) * self.turning) / number
         return DwellCurve(number, dwell, sigma[order])
 
-    def _of_run(self, run_time: float, dwells: NDArray[np.int64]) -> Array:
-        """Return the bound of a run that is divided into so many dwells, shape (k,)."""
+    def _compute_sigma(self, run_time: float, dwells: NDArray[np.int64]) -> Array:
+        """Return the bound of a run for these numbers of dwells, shape (k,)."""
         last = [
-            self._information((run_time - (n - 1) * self.turning) / n, n)[-1]
+            self._compute_information((run_time - (n - 1) * self.turning) / n, n)[-1]
             for n in dwells.tolist()
         ]
         return sigma_of(np.array(last))
@@ -192,39 +192,40 @@ class Outlook:
     def heading(self, dwell: float, turns: int) -> Array:
         """Return the least standard deviation of the heading by gyrocompassing after each turn.
 
-        The axis lies across north, and is turned end for end: half the difference of its readings
-        is w_ie cos(latitude) times the (small) heading error. An error s of that half difference is
-        a heading error s / (w_ie cos(latitude)), the same as `error_budget.Gyrocompass` with two
-        positions; with s = sigma cos(latitude), sigma that of the rate. In rad, shape (turns,).
+        The axis is perpendicular to north, and is turned end for end: half the difference of its
+        readings is w_ie cos(latitude) times the (small) heading error. An error s of this half
+        difference is a heading error s / (w_ie cos(latitude)), as in `error_budget.Gyrocompass`
+        with two positions. Here s = sigma cos(latitude), with sigma of the rate. In rad, shape
+        (turns,).
         """
         of_axis = self.against_time(dwell, turns).sigma * math.cos(self.latitude)
         return np.asarray(of_axis / (EARTH_RATE * math.cos(self.latitude)))
 
-    def _information(self, dwell: float, dwells: int) -> Array:
+    def _compute_information(self, dwell: float, dwells: int) -> Array:
         """Return the information after each of a number of dwells."""
         design = Experiment.regular(
             dwell=dwell,
             turning=self.turning,
-            dwells=min(dwells, _SUMMED),
+            dwells=min(dwells, _MAX_COMPUTED_DWELLS),
             rate=self.rate,
             latitude=self.latitude,
         )
         longest = block_length(design, self.model)
         each = -(-design.samples_in_dwells // len(design.dwells) // longest)
-        summed = max(MAX_BLOCKS // each, _LEAST_SUMMED)
+        summed = max(MAX_BLOCKS // each, _MIN_COMPUTED_DWELLS)
         blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
         information = information_by_states(blocks, self.model, self.turn_on_bias)[last]
         more = np.arange(1, dwells - len(information) + 1)
         return (
-            np.concatenate([information, information[-1] + _growth(information) * more])
+            np.concatenate([information, information[-1] + _compute_growth(information) * more])
             if len(more)
             else information
         )
 
 
-def _growth(information: Array) -> float:
-    """Return what each of the latter half of the dwells adds on average."""
+def _compute_growth(information: Array) -> float:
+    """Return the mean information that a dwell of the latter half adds."""
     half = len(information) // 2
     return float(information[-1] - information[-1 - half]) / half
 
@@ -234,19 +235,21 @@ def prediction_rows(
 ) -> Iterator[Row]:
     """Yield the rows of the table ``earth_rate_prediction``, without the names.
 
-    ``dwell`` is the data in each, s; the goals are standard deviations relative to the Earth's
-    rate; the best dwell is sought for the run time, s.
+    ``dwell`` is the data in each dwell, s; the goals are standard deviations relative to the
+    Earth's rate; the best dwell is computed for the run time, s.
 
     Raises
     ------
     ValueError
         If the run time does not hold two dwells and a turn.
     """
-    for row in _rows(outlook, dwell, goals, run_time):
+    for row in _yield_rows(outlook, dwell, goals, run_time):
         yield {"latitude": outlook.latitude, **row}
 
 
-def _rows(outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float) -> Iterator[Row]:
+def _yield_rows(
+    outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float
+) -> Iterator[Row]:
     most = 1
     for goal in sorted(goals, reverse=True):
         turns = outlook.turns_needed(dwell, goal)
@@ -254,29 +257,32 @@ def _rows(outlook: Outlook, dwell: float, goals: Sequence[float], run_time: floa
             continue
         most = max(most, turns)
         time = (turns + 1) * dwell + turns * outlook.turning
-        # What is reached: the last turn that is needed may give far more than was asked for.
+        # The reached value: the last necessary turn may give far more than the goal.
         sigma = outlook.sigma_after(dwell, turns)
-        yield {"of": "goal", "goal": goal} | _row(dwell, turns, time, sigma)
-    course = outlook.against_time(dwell, min(max(most, 2), _MOST_TURNS))
-    shown = np.unique(np.rint(np.geomspace(1, len(course.turns), _POINTS)).astype(np.int64)) - 1
+        yield {"of": "goal", "goal": goal} | _make_row(dwell, turns, time, sigma)
+    course = outlook.against_time(dwell, min(max(most, 2), _MAX_CURVE_TURNS))
+    shown = (
+        np.unique(np.rint(np.geomspace(1, len(course.turns), _TIME_CURVE_POINTS)).astype(np.int64))
+        - 1
+    )
     for k in shown.tolist():
         point = int(course.turns[k]), float(course.time[k]), float(course.sigma[k])
-        yield {"of": "time"} | _row(dwell, *point)
+        yield {"of": "time"} | _make_row(dwell, *point)
     curve = outlook.over_dwell(run_time)
     low, high = curve.nearly_best()
     for k, number in enumerate(curve.dwells.tolist()):
         length = float(curve.dwell[k])
         yield (
             {"of": "dwell", "best": k == curve.best, "nearly_best": low <= length <= high}
-            | _row(length, number - 1, run_time, float(curve.sigma[k]))
+            | _make_row(length, number - 1, run_time, float(curve.sigma[k]))
         )
 
 
-def _row(dwell: float, turns: int, time: float, sigma: float) -> Row:
+def _make_row(dwell: float, turns: int, time: float, sigma: float) -> Row:
     finite_sigma = sigma if math.isfinite(sigma) else None
     relative = None if finite_sigma is None else finite_sigma / EARTH_RATE
-    # The heading that a gyro across north finds is off by sigma cos(latitude) over what it would
-    # see of the Earth's rate, w_ie cos(latitude): `Outlook.heading`.
+    # Heading error of a gyro perpendicular to north: sigma cos(latitude) over w_ie cos(latitude),
+    # see `Outlook.heading`.
     return {
         "dwell": dwell,
         "turns": turns,

@@ -1,10 +1,9 @@
-"""What a source prints of its runs, beside what the noise that it prints allows.
+"""Compare published Earth-rate estimates with the scatter that the published noise allows.
 
-A run is taken as its source describes it: a turn at each time of the run, and the noise of
-the printed figures. An estimate from pairs of dwells then scatters about the true rate with the
-standard deviation of `experiments.earth_rate.pairs`; a published one that is many of these
-away has other errors in it: a sensor that is warming up, an axis that is off, turns that are taken
-into the mean, or a sense that is wrong.
+A run is modelled as its source describes it: the schedule of turns, and the noise of the printed
+figures. An estimate from pairs of dwells then scatters about the true rate with the standard
+deviation of `experiments.earth_rate.pairs`. A published estimate many standard deviations away has
+other errors: warm-up of the sensor, a misaligned axis, turns within the mean, or a wrong sense.
 """
 
 from __future__ import annotations
@@ -24,8 +23,8 @@ from imubench_pipeline.noise import NoiseModel
 
 Row = dict[str, Any]
 
-_WITHIN = 1.96
-"""Standard deviations, of either sign, within which 95 % of the estimates lie."""
+_Z_95 = 1.96
+"""Half width, in standard deviations, of the interval with 95 % of the estimates."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +32,12 @@ class RunDesign:
     """A run as its source describes it."""
 
     dwell: float  # from turn to turn, s
-    turning: float  # of it that turning takes, s
+    turning: float  # turning time within it, s
     rate: float  # sampling rate, Hz
     latitude: float  # rad
 
     def experiment(self, duration: float) -> Experiment:
-        """Return the design of a run of so many s."""
+        """Return the design of a run of this duration, s."""
         return Experiment.regular(
             dwell=self.dwell - self.turning,
             turning=self.turning,
@@ -49,9 +48,10 @@ class RunDesign:
 
 
 def allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
-    """Return the standard deviations that noise gives the estimates of a run of so many s, rad/s.
+    """Return the standard deviations by noise of the estimates of a run, rad/s; duration in s.
 
-    ``white``, by white noise alone; ``sigma``, of the mean over pairs; ``sigma_filter``.
+    ``white``: by white noise alone; ``sigma``: of the mean over pairs; ``sigma_filter``: of the
+    filter.
     """
     design = run.experiment(duration)
     blocks = design.blocks(block_length(design, model))
@@ -64,14 +64,14 @@ def allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
 
 
 def published_row(value: float, run: RunDesign, duration: float, model: NoiseModel) -> Row:
-    """Return what noise says of a published estimate: columns of ``earth_rate_published``.
+    """Return the columns of ``earth_rate_published`` for a published estimate.
 
-    The value is in rad/s; the duration, s, that of the run or of the part of it; the noise model as
+    The value is in rad/s; the duration of the run, or of a part of it, in s; the noise model as
     published.
     """
     noise = allowed_sigmas(run, duration, model)
     off = (value - EARTH_RATE) / noise["sigma"]
-    verdict = "within the noise" if abs(off) <= _WITHIN else "beyond the noise"
+    verdict = "within the noise" if abs(off) <= _Z_95 else "beyond the noise"
     return noise | {
         "duration": duration,
         "published": value,

@@ -51,12 +51,12 @@ def first_order_of_noise_bandwidth(bandwidth: float) -> float:
     return 2.0 / math.pi * bandwidth
 
 
-def _published(
+def _evaluate_published(
     axis: Axis, place: str, parameter: str, times: float
 ) -> Callable[[Evidence], Result]:
-    """Return what the run finds of a figure that is printed of an axis.
+    """Return the evaluation of a printed figure of an axis from the run.
 
-    In the terms of what is printed, which is so many times the parameter.
+    The printed figure is ``times`` the parameter.
     """
 
     def evaluate(run: Evidence) -> Result:
@@ -117,7 +117,7 @@ def _of_axes() -> Iterator[Claim]:
         place = OF_BIAS[axis.sensor]
         yield in_unit("rate", Claim(
             place=place, quantity=f"fixed drift, {axis.name}", printed=f"{axis.bias_as} °/s",
-            value=axis.bias * DEGREE, evaluate=_published(axis, place, "bias", 1.0),
+            value=axis.bias * DEGREE, evaluate=_evaluate_published(axis, place, "bias", 1.0),
             basis="come back", page=axis.page, check=_OF_BOARD, tolerance=0.0,
             reason="temperature moves the mean; ours is that at the mean temperature"
         ))  # fmt: skip
@@ -126,7 +126,8 @@ def _of_axes() -> Iterator[Claim]:
         yield in_unit("rate", Claim(
             place=place, quantity=f"PSD, {axis.name}: N/60, the −½ line at 1 h",
             printed=f"{axis.psd_as} (°/s)/√Hz", value=axis.psd * DEGREE,
-            evaluate=_published(axis, place, "N", 1.0 / math.sqrt(READ_AT)), basis="come back",
+            evaluate=_evaluate_published(axis, place, "N", 1.0 / math.sqrt(READ_AT)),
+            basis="come back",
             page=axis.page, check=_OF_BOARD, reason="the log is one draw of the noise",
         ))  # fmt: skip
         yield _factor(axis, place)
@@ -140,7 +141,8 @@ def _of_axes() -> Iterator[Claim]:
         yield in_unit("rate", Claim(
             place=place, quantity=f"dynamic drift, {axis.name}: the floor, 0.664 B",
             printed=f"{axis.floor_as} (°/s)/K", value=axis.floor * DEGREE,
-            evaluate=_published(axis, place, "B", FLOOR), basis="come back", page=axis.page,
+            evaluate=_evaluate_published(axis, place, "B", FLOOR), basis="come back",
+            page=axis.page,
             check=_OF_BOARD,
             reason="a floor in °/s, printed as a coefficient of temperature; read from the curve "
             "it holds what N and temperature add", ))  # fmt: skip

@@ -1,4 +1,4 @@
-"""What Engers' figures show, by what he says of them: their curves are not in the text."""
+"""Claims of Engers about his figures; the text does not contain their curves."""
 
 from __future__ import annotations
 
@@ -35,17 +35,18 @@ from imubench_pipeline.model.estimates import (
 )
 
 _TEST = "tests/papers/test_engers.py"
-_SAMPLES = "tests/test_samples_of_models.py"
-_PASSED = 0.1
-"""Cluster time above which the low-passes of these sensors no longer show, s."""
+_TEST_OF_SAMPLES = "tests/test_samples_of_models.py"
+_MIN_TAU_ABOVE_LOW_PASS = 0.1
+"""Cluster time above which the low-passes of these sensors have no effect, s."""
 
-_MOSTLY = 80.0
-"""Per cent of a curve in a band of 95 % at each point, below which one in twenty is by chance."""
+_MIN_PERCENT_IN_BAND = 80.0
+"""Least share of a curve, in per cent, within a pointwise band of 95 %. By chance, one curve in
+twenty is below."""
 
-_ALIKE = 0.05
-"""Part by which two deviations of samples may differ and still look alike."""
+_MAX_DEVIATION_DIFFERENCE = 0.05
+"""Largest relative difference of two deviations of samples that look alike."""
 
-_PICTURES = {
+_PICTURE_FIGURES = {
     1: "a photograph of a BNO055", 2: "classes of gyroscopes, by another author",
     3: "the acceleration of Coriolis", 4: "a package", 5: "a chip",
     11: "the blocks of the simulator", 12: "a dialogue", 13: "a dialogue", 14: "a dialogue",
@@ -54,16 +55,16 @@ _PICTURES = {
     21: "photographs of the boards", 22: "a photograph", 33: "a dialogue", 37: "a dialogue",
     43: "a dialogue", 49: "a dialogue",
 }  # fmt: skip
-_DRAWN = {
+_TERM_FIGURES = {
     6: "slopes of the bias instability", 7: "slope of white noise",
     8: "correlation and density of white noise", 9: "normal distribution",
     10: "slopes of five noise terms",
 }  # fmt: skip
-_COURSES = {
+_LOG_FIGURES = {
     23: "scc2130", 24: "scc2130", 25: "mpu9250", 26: "mpu9250", 27: "bno055", 28: "bno055",
 }  # fmt: skip
-_MEASURED = {29: ("scc2130", "x"), 30: ("scc2130", "x")}
-_FITTED = {
+_MEASURED_FIGURES = {29: ("scc2130", "x"), 30: ("scc2130", "x")}
+_FITTED_FIGURES = {
     40: ("scc2130", "x"), 45: ("mpu9250", "x"), 46: ("mpu9250", "y"), 47: ("mpu9250", "z"),
     51: ("bno055", "x"), 52: ("bno055", "y"), 53: ("bno055", "z"),
 }  # fmt: skip
@@ -79,24 +80,24 @@ def figures() -> Iterator[Claim]:
         54: _by_the_datasheet_bno055(),
     }  # fmt: skip
     for figure in range(1, 55):
-        yield special[figure] if figure in special else _figure(figure)
+        yield special[figure] if figure in special else _make_figure(figure)
 
 
-def _figure(figure: int) -> Claim:
+def _make_figure(figure: int) -> Claim:
     place = f"Figure {figure}"
-    if figure in _PICTURES:
+    if figure in _PICTURE_FIGURES:
         return Claim(
-            place=place, quantity=_PICTURES[figure], printed="–", basis="checked",
+            place=place, quantity=_PICTURE_FIGURES[figure], printed="–", basis="checked",
             evaluate=lambda _: no_result("a picture, or a window of his program"), check=_TEST,
         )  # fmt: skip
-    if figure in _DRAWN:
+    if figure in _TERM_FIGURES:
         return Claim(
-            place=place, quantity=_DRAWN[figure], printed="–", basis="checked",
+            place=place, quantity=_TERM_FIGURES[figure], printed="–", basis="checked",
             evaluate=verbal_result("drawn from the terms themselves"), page="theory.html#terms",
             check="tests/noise/test_terms.py",
         )  # fmt: skip
-    if figure in _COURSES:
-        sensor = _COURSES[figure]
+    if figure in _LOG_FIGURES:
+        sensor = _LOG_FIGURES[figure]
         warm = figure % 2 == 0
         return Claim(
             place=place, quantity=f"{'temperature' if warm else 'samples'} over time, "
@@ -108,18 +109,18 @@ def _figure(figure: int) -> Claim:
             ),
             page=f"recordings/{sensor}/{RECORDING}.html", check=_TEST,
         )  # fmt: skip
-    if figure in _MEASURED:
-        sensor, axis = _MEASURED[figure]
+    if figure in _MEASURED_FIGURES:
+        sensor, axis = _MEASURED_FIGURES[figure]
         return Claim(
             place=place, quantity=f"Allan deviation of his log, {NAMES[sensor]} {axis}",
             printed="a curve", basis="simulated", page=page_of(sensor, axis), check=_TEST,
             evaluate=lambda _: no_result(
                 "the curve is not in the text; what he read of it is Table 5"),
         )  # fmt: skip
-    sensor, axis = _FITTED[figure]
+    sensor, axis = _FITTED_FIGURES[figure]
     return Claim(
         place=place, quantity=f"Allan deviation of log and fitted model, {NAMES[sensor]} {axis}",
-        printed="very much alike", evaluate=_inside(sensor, axis), basis="come back",
+        printed="very much alike", evaluate=_evaluate_band(sensor, axis), basis="come back",
         page=page_of(sensor, axis), check=f"{_TEST}::test_one_curve_in_twenty_is_less_in_its_band",
         reason="less of the curve is in the band than of nineteen in twenty by chance",
     )  # fmt: skip
@@ -158,7 +159,7 @@ def _larger() -> Claim:
         evaluate=verbal_result(
             f"a block that takes the figure of Table 5 as a power makes {ratio:.2f} times "
             "the deviation that N = 60 times the figure makes", "possible"),
-        basis="computed", page=_page_of_samples(axis.sensor), check=_TEST_OF_BLOCK,
+        basis="computed", page=_get_page_of_samples(axis.sensor), check=_TEST_OF_BLOCK,
         reason="he entered it as the noise power of a block (section 3.3), whose samples have the "
         "variance of power times rate; the gains beside it are not printed",
     )  # fmt: skip
@@ -172,8 +173,9 @@ def _zoomed(figure: int, of: str) -> Claim:
         place=f"Figure {figure}",
         quantity=f"the same, enlarged: {of} the fit, SCC2130",
         printed="alike" if of == "before" else "very much alike",
-        evaluate=_neighbours("scc2130", of), basis="come back", page=_page_of_samples("scc2130"),
-        check=_SAMPLES, reason="neighbouring samples go together otherwise",
+        evaluate=_evaluate_neighbours("scc2130", of), basis="come back",
+        page=_get_page_of_samples("scc2130"),
+        check=_TEST_OF_SAMPLES, reason="neighbouring samples go together otherwise",
     )  # fmt: skip
 
 
@@ -195,8 +197,9 @@ def _floor_missed() -> Claim:
 def _after_the_fit() -> Claim:
     return Claim(
         place="Figure 38", quantity="samples measured, and simulated after the fit, SCC2130",
-        printed="the simulation is slightly smaller", evaluate=_deviations("scc2130", "differs"),
-        basis="come back", page=_page_of_samples("scc2130"), check=_SAMPLES,
+        printed="the simulation is slightly smaller",
+        evaluate=_evaluate_deviations("scc2130", "differs"),
+        basis="come back", page=_get_page_of_samples("scc2130"), check=_TEST_OF_SAMPLES,
         reason="he turned gains until the Allan curves looked alike, and says that his model lacks "
         "lesser noise; the estimate here is of a log that has none beside the model",
     )  # fmt: skip
@@ -230,8 +233,8 @@ def _by_the_datasheet_scc2130() -> Claim:
 def _mpu9250_fitted() -> Claim:
     return Claim(
         place="Figure 44", quantity="samples measured, and simulated after the fit, MPU-9250",
-        printed="very much alike, above all z", evaluate=_deviations("mpu9250", "agrees"),
-        basis="come back", page=_page_of_samples("mpu9250"), check=_SAMPLES,
+        printed="very much alike, above all z", evaluate=_evaluate_deviations("mpu9250", "agrees"),
+        basis="come back", page=_get_page_of_samples("mpu9250"), check=_TEST_OF_SAMPLES,
         reason="the simulation has another deviation of samples",
     )  # fmt: skip
 
@@ -239,8 +242,8 @@ def _mpu9250_fitted() -> Claim:
 def _bno055_fitted() -> Claim:
     return Claim(
         place="Figure 50", quantity="samples simulated after the fit, BNO055",
-        printed="x and y much alike, as in the log; z steadier", evaluate=_between_axes("bno055"),
-        basis="come back", page=_page_of_samples("bno055"), check=_SAMPLES,
+        printed="x and y much alike, as in the log; z steadier", evaluate=_evaluate_axes("bno055"),
+        basis="come back", page=_get_page_of_samples("bno055"), check=_TEST_OF_SAMPLES,
         reason="the axes of the simulation differ in another way than those of the log",
     )  # fmt: skip
 
@@ -272,11 +275,11 @@ def _by_the_datasheet_bno055() -> Claim:
     )  # fmt: skip
 
 
-def _page_of_samples(sensor: str) -> str:
+def _get_page_of_samples(sensor: str) -> str:
     return f"recordings/{sensor}/{RECORDING}.html#gyro_x"
 
 
-def _inside(sensor: str, axis: str) -> Callable[[Evidence], Result]:
+def _evaluate_band(sensor: str, axis: str) -> Callable[[Evidence], Result]:
     """Return how much of the curve is in the band of the logs that the estimate makes."""
 
     def evaluate(run: Evidence) -> Result:
@@ -291,37 +294,37 @@ def _inside(sensor: str, axis: str) -> Callable[[Evidence], Result]:
             CompensatedAllanRow if method == "compensated" else AllanRow
         )
         measured = {row.tau: row.adev for row in run.of_log(curve, log)}
-        seen = [row for row in bands if row.tau >= _PASSED and row.tau in measured]
+        seen = [row for row in bands if row.tau >= _MIN_TAU_ABOVE_LOW_PASS and row.tau in measured]
         inside = sum(row.lower <= measured[row.tau] <= row.upper for row in seen)
         share = 100.0 * inside / len(seen)
         return Result(
-            words=f"of the simulated log {share:.0f} % above {_PASSED:g} s is in the 95 % band of "
-            f"logs of its estimate ({method}); one in twenty has less than {_MOSTLY:.0f} % by "
-            "chance",
-            verdict="agrees" if share >= _MOSTLY else "differs",
+            words=f"of the simulated log {share:.0f} % above {_MIN_TAU_ABOVE_LOW_PASS:g} s is in "
+            f"the 95 % band of logs of its estimate ({method}); one in twenty has less than "
+            f"{_MIN_PERCENT_IN_BAND:.0f} % by chance",
+            verdict="agrees" if share >= _MIN_PERCENT_IN_BAND else "differs",
         )
 
     return evaluate
 
 
-def _spread(run: Evidence, sensor: str) -> dict[tuple[str, str], float]:
+def _get_sample_deviations(run: Evidence, sensor: str) -> dict[tuple[str, str], float]:
     """Return the deviation of samples by channel, of the log and of the models; maybe none."""
     rows = run.rows(ModelSampleRow, sensor=sensor, recording=RECORDING, what="deviation")
     return {(row.channel, row.of): row.mean for row in rows if row.mean is not None}
 
 
-def _deviations(sensor: str, if_alike: str) -> Callable[[Evidence], Result]:
+def _evaluate_deviations(sensor: str, if_alike: str) -> Callable[[Evidence], Result]:
     """Return the deviation of the samples of the fitted model over that of the log."""
 
     def evaluate(run: Evidence) -> Result:
-        by = _spread(run, sensor)
+        by = _get_sample_deviations(run, sensor)
         ratios = [
             value / by[channel, "log"] for (channel, of), value in by.items() if of == "after"
         ]
         if not ratios:
             return no_result(NO_LOG)
         shown = ", ".join(f"{ratio:.3f}" for ratio in ratios)
-        alike = all(abs(ratio - 1.0) < _ALIKE for ratio in ratios)
+        alike = all(abs(ratio - 1.0) < _MAX_DEVIATION_DIFFERENCE for ratio in ratios)
         return Result(
             words=f"deviation of the samples {shown} times that of the simulated log",
             verdict="agrees" if alike and if_alike == "agrees" else "differs",
@@ -330,11 +333,11 @@ def _deviations(sensor: str, if_alike: str) -> Callable[[Evidence], Result]:
     return evaluate
 
 
-def _between_axes(sensor: str) -> Callable[[Evidence], Result]:
+def _evaluate_axes(sensor: str) -> Callable[[Evidence], Result]:
     """Return the deviation of the samples of y and z over that of x, of the log and the model."""
 
     def evaluate(run: Evidence) -> Result:
-        by = _spread(run, sensor)
+        by = _get_sample_deviations(run, sensor)
         if not by:
             return no_result(NO_LOG)
         ratios = {
@@ -347,7 +350,7 @@ def _between_axes(sensor: str) -> Callable[[Evidence], Result]:
                              ("after", "of the fitted model:"))
         )  # fmt: skip
         alike = all(
-            abs(model / log - 1.0) < _ALIKE
+            abs(model / log - 1.0) < _MAX_DEVIATION_DIFFERENCE
             for log, model in zip(ratios["log"], ratios["after"], strict=True)
         )
         return Result(words=words, verdict="agrees" if alike else "differs")
@@ -355,7 +358,7 @@ def _between_axes(sensor: str) -> Callable[[Evidence], Result]:
     return evaluate
 
 
-def _neighbours(sensor: str, of: str) -> Callable[[Evidence], Result]:
+def _evaluate_neighbours(sensor: str, of: str) -> Callable[[Evidence], Result]:
     """Return how neighbouring samples go together, of log and model, in a short stretch."""
 
     def evaluate(run: Evidence) -> Result:
@@ -369,7 +372,7 @@ def _neighbours(sensor: str, of: str) -> Callable[[Evidence], Result]:
         }
         if not all(stretches.values()):
             return no_result(NO_LOG)
-        log, model = (_correlation(values) for values in stretches.values())
+        log, model = (_compute_correlation(values) for values in stretches.values())
         error = math.sqrt(2.0 * (1.0 - log * log) / len(stretches["log"]))
         return Result(
             words=f"correlation of neighbouring samples {model:.2f}, of the simulated log "
@@ -380,7 +383,7 @@ def _neighbours(sensor: str, of: str) -> Callable[[Evidence], Result]:
     return evaluate
 
 
-def _correlation(values: Sequence[float]) -> float:
+def _compute_correlation(values: Sequence[float]) -> float:
     """Return the correlation of each value with the next."""
     samples = np.array(values)
     return float(np.corrcoef(samples[:-1], samples[1:])[0, 1])

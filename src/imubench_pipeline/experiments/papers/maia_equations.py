@@ -1,4 +1,4 @@
-"""The numbered equations of Maia et al., each held against what does not come from it."""
+"""The numbered equations of Maia et al., each compared with an independent result."""
 
 from __future__ import annotations
 
@@ -24,23 +24,24 @@ from imubench_pipeline.noise.variance_covariance import variance_covariance
 _MODEL = MTI_GYRO.table_2
 _RATE = MTI_GYRO.rate
 _TEST = "tests/papers/test_maia.py"
-_TAU = 100.0
+_DEFAULT_TAU = 100.0
 
 WEIGHED_AT = (10.0, 100.0, 1000.0)
-"""s; where the weight of equation 25 is held against the spread."""
+"""Cluster times, s, for the comparison of the weight of equation 25 with the spread."""
 
 
-def _process() -> GaussMarkov:
+def _get_process() -> GaussMarkov:
     assert _MODEL.T_B is not None
     return GaussMarkov(_MODEL.B, _MODEL.T_B)
 
 
 def by_integral(model: NoiseModel, tau: float) -> float:
-    """Return the Allan variance at a tau, s, as the integral of the density: truth of its own.
+    """Return the Allan variance at a tau, s, by integration of the density, as a reference.
 
     4 ∫ S(f) sin⁴(π f τ) / (π f τ)² df from 0, with x = π f τ.
     """
-    # The walk is steep at 0, and the white noise slow at the end, whose mean of sin⁴ is 3/8.
+    # The random walk is steep at 0. White noise converges slowly: its tail has the mean 3/8 of
+    # sin⁴.
     ends = np.concatenate(([1e-9, 1e-3, 1e-2, 0.1], np.pi * np.arange(0.5, 400.5, 0.5)))
     nodes, weights = np.polynomial.legendre.leggauss(12)
     half = np.diff(ends)[:, None] / 2.0
@@ -61,11 +62,11 @@ def as_printed(model: NoiseModel, tau: float) -> float:
     return model.N**2 / tau + driven + model.K**2 * tau / 3.0
 
 
-def spread_over_weight(tau: float = _TAU) -> tuple[float, float]:
-    """Return the standard deviation of an Allan variance over what a weight takes it for.
+def spread_over_weight(tau: float = _DEFAULT_TAU) -> tuple[float, float]:
+    """Return the standard deviation of an Allan variance over the one that a weight assumes.
 
-    First the weight meant, 2 √(n/2L) σ̂²; then that printed, 2 √(n/2L) σ̂, which has another
-    dimension, so that the ratio is another number in each unit. Of the MTi-7 gyro at a tau, s.
+    First for the intended weight, 2 √(n/2L) σ̂²; then for the printed one, 2 √(n/2L) σ̂. Its
+    dimension is wrong, so that the ratio depends on the unit. For the MTi-7 gyro at a tau, s.
     """
     samples, n = round(DURATION * _RATE), round(tau * _RATE)
     variance = float(_MODEL.allan_variance(tau, _RATE))
@@ -82,10 +83,10 @@ def _numeric_result(value: Callable[[], float], words: str = "") -> Callable[[Ev
     return lambda _: Result(value=value(), words=words)
 
 
-def _sign(_: Evidence) -> Result:
-    truth = by_integral(_MODEL, _TAU)
-    ours = float(_MODEL.allan_variance(_TAU)) / truth - 1.0
-    printed = as_printed(_MODEL, _TAU) / truth
+def _evaluate_sign(_: Evidence) -> Result:
+    truth = by_integral(_MODEL, _DEFAULT_TAU)
+    ours = float(_MODEL.allan_variance(_DEFAULT_TAU)) / truth - 1.0
+    printed = as_printed(_MODEL, _DEFAULT_TAU) / truth
     return Result(
         words=f"e^(−τ/T_B): {abs(ours):.0e} from the integral of the density at 100 s; as printed "
         f"it is {printed:.2g} times that",
@@ -93,7 +94,7 @@ def _sign(_: Evidence) -> Result:
     )
 
 
-def _weight(_: Evidence) -> Result:
+def _evaluate_weight(_: Evidence) -> Result:
     at = ", ".join(f"{spread_over_weight(tau)[0]:.2f} at {tau:,.0f} s" for tau in WEIGHED_AT)
     return Result(
         words=f"w = 1/(2 √(n/2L) σ̂²)²; the spread of σ̂², over 2 √(n/2L) σ̂²: {at}",
@@ -101,13 +102,15 @@ def _weight(_: Evidence) -> Result:
     )
 
 
-def _step_noise() -> float:
+def _compute_step_noise() -> float:
     """Return what Q_zd has for the process of equation 4, exactly, over S_B T."""
     space = _MODEL.state_space(_RATE)
-    return float(space.process_noise[0, 0]) / (driving_density(_MODEL.B, _process().T_B) / _RATE)
+    return float(space.process_noise[0, 0]) / (
+        driving_density(_MODEL.B, _get_process().T_B) / _RATE
+    )
 
 
-def _differences(samples: int, n: int) -> int:
+def _count_differences(samples: int, n: int) -> int:
     """Return how many differences of adjacent clusters there are, each begun at every sample."""
     return sum(1 for start in range(samples) if start + 2 * n <= samples)
 
@@ -131,7 +134,7 @@ def equations() -> Iterator[Claim]:
             **about,  # type: ignore[arg-type]  # fields of a claim, of several types
         )
 
-    process, T = _process(), 1.0 / _RATE
+    process, T = _get_process(), 1.0 / _RATE
     simulated = {"page": "theory.html#simulated", "check": "tests/sensor_model/test_simulation.py"}
     curve = {"page": "theory.html#reading", "check": f"{_TEST}::test_lines_and_floor"}
     spaces = {"check": f"{_TEST}::test_the_discrete_model"}
@@ -143,8 +146,8 @@ def equations() -> Iterator[Claim]:
     parts = [NoiseModel(N=_MODEL.N), NoiseModel(B=_MODEL.B, T_B=_MODEL.T_B), NoiseModel(K=_MODEL.K)]
     yield equation(
         2, "AV of z over those of z_N, z_B and z_K together", "z = z_N + z_B + z_K", value=1.0,
-        evaluate=_numeric_result(lambda: float(_MODEL.allan_variance(_TAU)
-                                    / sum(part.allan_variance(_TAU) for part in parts))),
+        evaluate=_numeric_result(lambda: float(_MODEL.allan_variance(_DEFAULT_TAU)
+                                    / sum(part.allan_variance(_DEFAULT_TAU) for part in parts))),
         tolerance=1e-9,
     )  # fmt: skip
     yield equation(3, "white noise", "z_N = ω_N", _verbal_result("new in every sample"))
@@ -185,7 +188,7 @@ def equations() -> Iterator[Claim]:
     )  # fmt: skip
     yield equation(
         10, "differences in the sum, of ten samples with n = 2", "L − 2n", value=6.0, tolerance=0.0,
-        evaluate=_numeric_result(lambda: float(_differences(10, 2)), "L − 2n + 1"),
+        evaluate=_numeric_result(lambda: float(_count_differences(10, 2)), "L − 2n + 1"),
         reason="clusters begin at L − 2n + 1 samples; the paper leaves out the last, which it may",
         page="theory.html#allan", check="tests/test_allan.py",
     )  # fmt: skip
@@ -230,7 +233,8 @@ def equations() -> Iterator[Claim]:
     )  # fmt: skip
     yield equation(
         22, "variance of a step of z_G over S_B T", "Q ≈ diag(S_B T, S_K T)", value=1.0,
-        evaluate=_numeric_result(_step_noise, "exact: S_B T_B/2 (1 − e^(−2T/T_B))"), **spaces,
+        evaluate=_numeric_result(_compute_step_noise, "exact: S_B T_B/2 (1 − e^(−2T/T_B))"),
+        **spaces,
     )  # fmt: skip
     yield equation(
         23, "variance of white noise in a sample", "S_N/T", value=_MODEL.N**2 / T,
@@ -244,7 +248,7 @@ def equations() -> Iterator[Claim]:
         **fit,
     )  # fmt: skip
     yield equation(
-        25, "weight of a cluster time", "1/(2 √(n/2L) σ̂)²", _weight,
+        25, "weight of a cluster time", "1/(2 √(n/2L) σ̂)²", _evaluate_weight,
         reason="σ̂² has the standard deviation 2 √(n/2L) σ̂², and with σ̂ the weight has not the "
         "dimension of the cost; how little that hurts, the panel above says",
         page="theory.html#methods", check=f"{_TEST}::test_the_weight_of_equation_25",
@@ -252,5 +256,5 @@ def equations() -> Iterator[Claim]:
     sign = {"page": "theory.html#bias-instability",
             "check": f"{_TEST}::test_the_sign_of_equation_26",
             "reason": "with e^(+τ/T_B) the bracket grows without bound"}  # fmt: skip
-    yield equation(26, "parametric AV", "… − 4 e^(+τ/T_B) + e^(−2τ/T_B) …", _sign, **sign)
-    yield equation(27, "the same, of θ", "… − 4 e^(+τ/θ₄) + e^(−2τ/θ₄) …", _sign, **sign)
+    yield equation(26, "parametric AV", "… − 4 e^(+τ/T_B) + e^(−2τ/T_B) …", _evaluate_sign, **sign)
+    yield equation(27, "the same, of θ", "… − 4 e^(+τ/θ₄) + e^(−2τ/θ₄) …", _evaluate_sign, **sign)

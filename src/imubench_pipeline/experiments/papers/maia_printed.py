@@ -1,4 +1,4 @@
-"""The tables of Maia et al., typed by hand from the paper, and what follows from them alone."""
+"""The tables of Maia et al., typed by hand, and results that follow from them alone."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DURATION = 36_000.0
 """s; assumed, since the paper recommends ten hours and does not say how long its logs are."""
 
 MEMBERS = 200
-"""Reconstructions of each set of parameters, and logs that they are held against."""
+"""Number of reconstructions of each set of parameters, and of logs for the comparison."""
 
 Grid = Literal["steps", "every"]
 
@@ -27,8 +27,8 @@ GRIDS: dict[Grid, str] = {"steps": "nine τ a decade", "every": "every n of equa
 """The paper does not print at which tau it compares two curves: the program that it names plots
 1, 2, ... 9, 10, 20, ... samples; its equation 10 has every n up to half of the log."""
 
-_STRIPS = 100
-"""Every n is too many: the middle of each of so many equal parts stands for it."""
+_CLUSTER_SIZES = 100
+"""Number of cluster sizes in place of every n: the middles of equal parts."""
 
 
 @dataclass(frozen=True)
@@ -44,29 +44,29 @@ class Channel:
     table_3: tuple[float, float]  # RMS of one reconstruction by Table 1, and by Table 2
 
 
-def _model(N: float, B: float, K: float, T_B: float) -> NoiseModel:
+def _make_model(N: float, B: float, K: float, T_B: float) -> NoiseModel:
     return NoiseModel(N=N, B=B, T_B=T_B, K=K)
 
 
 CHANNELS = (
     Channel(
         "MTi-7 accelerometer", "mti_7", "accel_x", 100.0,
-        _model(9.5e-4, 3.6e-4, 1.5e-5, 84.6), _model(9.6e-4, 3.4e-4, 1.7e-5, 38.3),
+        _make_model(9.5e-4, 3.6e-4, 1.5e-5, 84.6), _make_model(9.6e-4, 3.4e-4, 1.7e-5, 38.3),
         (3.9e-4, 1.0e-4),
     ),
     Channel(
         "MTi-7 gyro", "mti_7", "gyro_x", 100.0,
-        _model(8.5e-5, 5.7e-5, 1.0e-6, 223.5), _model(8.4e-5, 6.7e-5, 8.2e-7, 89.5),
+        _make_model(8.5e-5, 5.7e-5, 1.0e-6, 223.5), _make_model(8.4e-5, 6.7e-5, 8.2e-7, 89.5),
         (4.2e-5, 8.6e-6),
     ),
     Channel(
         "C102-F9R accelerometer", "c102_f9r", "accel_x", 50.0,
-        _model(1.1e-3, 7.2e-4, 1.5e-5, 18.5), _model(1.1e-3, 7.2e-4, 2.0e-5, 148.9),
+        _make_model(1.1e-3, 7.2e-4, 1.5e-5, 18.5), _make_model(1.1e-3, 7.2e-4, 2.0e-5, 148.9),
         (4.2e-4, 1.2e-4),
     ),
     Channel(
         "C102-F9R gyro", "c102_f9r", "gyro_x", 50.0,
-        _model(5.8e-3, 3.0e-3, 1.3e-4, 29.0), _model(5.7e-3, 3.4e-3, 8.7e-5, 68.3),
+        _make_model(5.8e-3, 3.0e-3, 1.3e-4, 29.0), _make_model(5.7e-3, 3.4e-3, 8.7e-5, 68.3),
         (1.8e-3, 5.0e-4),
     ),
 )  # fmt: skip
@@ -77,7 +77,7 @@ TABLE_4 = {
     "N": {"accel_x": 12.0e-4, "gyro_x": 12.0e-5},
     "B": {"accel_x": 3.0e-4, "gyro_x": 4.8e-5},
 }
-"""What the manufacturer says of the MTi-7, as the paper prints it."""
+"""Figures of the manufacturer for the MTi-7, as the paper prints them."""
 
 
 Range = tuple[float, float, float]
@@ -99,7 +99,9 @@ def sizes(channel: Channel, grid: Grid) -> NDArray[np.int64]:
     """Return the cluster sizes of a grid up to half of the log, shape (m,)."""
     longest = round(DURATION * channel.rate) // 2
     if grid == "every":
-        return np.rint((np.arange(_STRIPS) + 0.5) * longest / _STRIPS).astype(np.int64)
+        return np.rint((np.arange(_CLUSTER_SIZES) + 0.5) * longest / _CLUSTER_SIZES).astype(
+            np.int64
+        )
     decades = 10 ** np.arange(len(str(longest)))
     steps = np.outer(decades, np.arange(1, 10)).ravel()
     return steps[steps <= longest]
@@ -113,7 +115,7 @@ def lottery(channel: Channel, grid: Grid) -> Lottery:
     by Table 1 and, of other draws, by Table 2.
     """
     n = sizes(channel, grid)
-    measured, *drawn = (curves[grid] for curves in _draws(channel))
+    measured, *drawn = (curves[grid] for curves in _simulate_deviations(channel))
     of_each = [rms(one[:, None, :], measured[None, :, :]) for one in drawn]
     chances = [
         beats(first, second) for first, second in zip(of_each[0].T, of_each[1].T, strict=True)
@@ -124,8 +126,8 @@ def lottery(channel: Channel, grid: Grid) -> Lottery:
         for values, printed in zip(of_each, channel.table_3, strict=True)
     ]
     return Lottery(
-        _range(of_each[0]),
-        _range(of_each[1]),
+        _compute_range(of_each[0]),
+        _compute_range(of_each[1]),
         float(np.mean(chances)),
         (beyond[0], beyond[1]),
         float(square[:, n > 300.0 * channel.rate].sum() / square.sum()),
@@ -138,26 +140,28 @@ def readings(channel: Channel) -> dict[str, Range]:
 
     N is read at 1 s, K at a ninth of the log, B and T_B at the lowest point between them.
     """
-    tau = _read_at(channel) / channel.rate
-    curves = _draws(channel)[0]["read"]
+    tau = _select_reading_sizes(channel) / channel.rate
+    curves = _simulate_deviations(channel)[0]["read"]
     return {
-        "N": _range(curves[:, 0] * math.sqrt(tau[0])),
-        "B": _range(curves.min(axis=1) / FLOOR),
-        "K": _range(curves[:, -1] * math.sqrt(3.0 / tau[-1])),
-        "T_B": _range(tau[curves.argmin(axis=1)] / PEAK_TAU),
+        "N": _compute_range(curves[:, 0] * math.sqrt(tau[0])),
+        "B": _compute_range(curves.min(axis=1) / FLOOR),
+        "K": _compute_range(curves[:, -1] * math.sqrt(3.0 / tau[-1])),
+        "T_B": _compute_range(tau[curves.argmin(axis=1)] / PEAK_TAU),
     }
 
 
-def _read_at(channel: Channel) -> NDArray[np.int64]:
+def _select_reading_sizes(channel: Channel) -> NDArray[np.int64]:
     """Return the cluster sizes at which a curve is read, shape (m,)."""
-    return np.rint(np.geomspace(1.0, DURATION / 9.0, _STRIPS) * channel.rate).astype(np.int64)
+    return np.rint(np.geomspace(1.0, DURATION / 9.0, _CLUSTER_SIZES) * channel.rate).astype(
+        np.int64
+    )
 
 
 @lru_cache(maxsize=len(CHANNELS))
-def _draws(channel: Channel) -> tuple[dict[str, Array], ...]:
+def _simulate_deviations(channel: Channel) -> tuple[dict[str, Array], ...]:
     """Return Allan deviations: of logs of Table 2, of draws by Table 1, of others by Table 2."""
     grids: dict[str, NDArray[np.int64]] = {grid: sizes(channel, grid) for grid in GRIDS}
-    grids["read"] = _read_at(channel)
+    grids["read"] = _select_reading_sizes(channel)
     together = np.unique(np.concatenate(list(grids.values())))
     samples = round(DURATION * channel.rate)
 
@@ -173,7 +177,7 @@ def _draws(channel: Channel) -> tuple[dict[str, Array], ...]:
     )
 
 
-def _range(values: Array) -> Range:
+def _compute_range(values: Array) -> Range:
     lower, median, upper = np.quantile(values, [0.05, 0.5, 0.95]).tolist()
     return lower, median, upper
 

@@ -46,7 +46,7 @@ def minimum_of_the_curve() -> tuple[float, float]:
     return float(tau[place]), math.sqrt(float(variance[place]))
 
 
-def _parameter(name: str) -> Callable[[Evidence], Result]:
+def _evaluate_parameter(name: str) -> Callable[[Evidence], Result]:
     def evaluate(run: Evidence) -> Result:
         row = run.parameter(AT_REST, name, "likelihood_gm")
         if row is None:
@@ -59,7 +59,7 @@ def _parameter(name: str) -> Callable[[Evidence], Result]:
     return evaluate
 
 
-def _read(name: str) -> Callable[[Evidence], Result]:
+def _evaluate_reading(name: str) -> Callable[[Evidence], Result]:
     """Return what reading the simulated curve gives, as the paper read its own."""
 
     def evaluate(run: Evidence) -> Result:
@@ -183,13 +183,13 @@ def _noise() -> Iterator[Claim]:
     for name, value, printed, unit, shown in degrees:
         yield Claim(
             place="Section 5.1", quantity=name, printed=printed, value=value, unit=unit,
-            printed_unit=shown, scale=DEGREE, evaluate=_parameter(name), basis="come back",
+            printed_unit=shown, scale=DEGREE, evaluate=_evaluate_parameter(name), basis="come back",
             page=page, check="tests/test_simulated_logs.py",
             reason="the log is one draw of the noise",
         )  # fmt: skip
     yield Claim(
         place="Section 5.1", quantity="T_B", printed="238.1 s", value=238.1, unit="s",
-        evaluate=_parameter("T_B"), basis="come back", page=page,
+        evaluate=_evaluate_parameter("T_B"), basis="come back", page=page,
         check="tests/test_simulated_logs.py", reason="the log is one draw of the noise",
     )  # fmt: skip
     tau, level = minimum_of_the_curve()
@@ -221,7 +221,8 @@ def _noise() -> Iterator[Claim]:
         value = {"N": PAPER_MODEL.N, "B": PAPER_MODEL.B, "K": PAPER_MODEL.K}[name]
         yield Claim(
             place="Figure 3", quantity=f"{name}, read from a simulated curve", printed=printed,
-            value=value, unit=unit, printed_unit=shown, scale=DEGREE, evaluate=_read(name),
+            value=value, unit=unit, printed_unit=shown, scale=DEGREE,
+            evaluate=_evaluate_reading(name),
             basis="simulated", page=page, check="tests/test_estimation.py",
             reason="read where the other terms add to it",
         )  # fmt: skip
@@ -258,7 +259,7 @@ def _future() -> Iterator[Claim]:
         )  # fmt: skip
 
 
-def _aligned(run: Evidence) -> Result:
+def _evaluate_alignment(run: Evidence) -> Result:
     rows = run.rows(
         CalibrationRow, sensor=f"{SENSOR}_triad", recording="sim_aligned", parameter="heading"
     )
@@ -283,7 +284,7 @@ def _aligned(run: Evidence) -> Result:
 def _triad() -> Iterator[Claim]:
     yield Claim(
         place="Section 9", quantity="a triad that aligns itself", printed="left for later",
-        evaluate=_aligned, basis="simulated", page="earth_rate.html#positions",
+        evaluate=_evaluate_alignment, basis="simulated", page="earth_rate.html#positions",
         check="tests/alignment/test_positions.py",
     )  # fmt: skip
 

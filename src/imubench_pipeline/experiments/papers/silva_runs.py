@@ -44,11 +44,11 @@ PRINTED = {
 DESIGN = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
 SENSOR = "sirrs01_03"
 NO_LOG = "it takes the simulated log of this sensor"
-_LIMIT = 1.96
+_Z_95 = 1.96
 _TEST = "tests/papers/test_silva.py"
-_SETTLING = f"{_TEST}::test_runs_settle_after_minutes_and_not_by_the_unit_of_the_start"
-_CAUSES = "tests/earth_rate/test_hypotheses.py"
-_GIVEN = "tests/earth_rate/test_known_rate.py"
+_TEST_OF_SETTLING = f"{_TEST}::test_runs_settle_after_minutes_and_not_by_the_unit_of_the_start"
+_TEST_OF_CAUSES = "tests/earth_rate/test_hypotheses.py"
+_TEST_OF_KNOWN_RATE = "tests/earth_rate/test_known_rate.py"
 
 
 def page_of(run: str) -> str:
@@ -90,14 +90,14 @@ def turned() -> Iterator[Claim]:
         yield Claim(
             place=f"Figure {figure}", quantity=f"turns of run {run}",
             printed=f"{PAPER_MINUTES[run]:g} min, turned every 30 s: so {turns} turns",
-            value=float(turns), evaluate=_turns(run), basis="come back", page=page_of(run),
+            value=float(turns), evaluate=_evaluate_turns(run), basis="come back", page=page_of(run),
             tolerance=0.0, check="benchmarks/dwell_detection.py", reason="turns that do not show",
         )  # fmt: skip
     for run, value in PRINTED.items():
         yield Claim(
             place="Section 6", quantity=f"Earth's rate, run {run}", printed=f"{value:g} °/s",
             value=value * DEGREE, unit="rad/s", printed_unit="°/s", scale=DEGREE,
-            evaluate=_allowed(run), basis="computed", page="earth_rate.html#published",
+            evaluate=_evaluate_allowed(run), basis="computed", page="earth_rate.html#published",
             check="tests/earth_rate/test_published.py::test_the_runs_of_the_paper",
             reason="beyond what the noise of the printed figures allows: another error of that "
             "run; what each cause asks for stands below",
@@ -119,7 +119,7 @@ def turned() -> Iterator[Claim]:
     yield from _hypotheses()
 
 
-def _turns(run: str) -> Callable[[Evidence], Result]:
+def _evaluate_turns(run: str) -> Callable[[Evidence], Result]:
     def evaluate(evidence: Evidence) -> Result:
         rows = evidence.rows(
             EarthRateRow, sensor=SENSOR, recording=f"sim_run_{run}", part="whole", method="pairs"
@@ -130,9 +130,9 @@ def _turns(run: str) -> Callable[[Evidence], Result]:
     return evaluate
 
 
-def _allowed(run: str) -> Callable[[Evidence], Result]:
+def _evaluate_allowed(run: str) -> Callable[[Evidence], Result]:
     def evaluate(_: Evidence) -> Result:
-        half = _LIMIT * printed_run(run).sigma
+        half = _Z_95 * printed_run(run).sigma
         return Result(
             value=EARTH_RATE,
             lower=EARTH_RATE - half,
@@ -159,7 +159,7 @@ def _hypotheses() -> Iterator[Claim]:
         return Claim(
             place="Section 6", quantity=f"hypothesis: {quantity}", printed=printed,
             evaluate=verbal_result(words, verdict), reason=reason, basis="computed",
-            page="earth_rate.html#published", check=_CAUSES,
+            page="earth_rate.html#published", check=_TEST_OF_CAUSES,
         )  # fmt: skip
 
     warmed = causes.warm_up(drift(first), drift(last), runs["4"].duration, last.duration)
@@ -181,7 +181,8 @@ def _hypotheses() -> Iterator[Claim]:
     yield cause(
         "turns miscounted",
         "–",
-        "wrong senses for " + asks(lambda run: f"{100 * (_wrong(run) or 0.0):.0f} % of the time"),
+        "wrong senses for "
+        + asks(lambda run: f"{100 * (_compute_wrong_part(run) or 0.0):.0f} % of the time"),
         "possible",
         "it can explain all of them, and why all lie between −ω and ω: one miscount each in runs 2 "
         f"and 3, two in run 4, as one leaves {alone:.1f} "
@@ -191,7 +192,9 @@ def _hypotheses() -> Iterator[Claim]:
     yield cause(
         "samples of the turns in the means",
         "outliers were removed",
-        "an angle of " + asks(lambda run: f"{_angle(run) / DEGREE:.3f}°") + " left in each dwell",
+        "an angle of "
+        + asks(lambda run: f"{_compute_angle(run) / DEGREE:.3f}°")
+        + " left in each dwell",
         "possible",
         "so little of the 180° is enough to explain each run; the same throughout, it does "
         f"not explain that the parts of run 4 are {causes.apart(last, first):.1f} σ apart",
@@ -212,7 +215,7 @@ def _hypotheses() -> Iterator[Claim]:
     yield cause(
         "axis off the meridian",
         "–",
-        "off by " + asks(lambda run: f"{(_heading(run) or 0.0) / DEGREE:.0f}°"),
+        "off by " + asks(lambda run: f"{(_compute_heading(run) or 0.0) / DEGREE:.0f}°"),
         "refuted",
         "nobody lays an axis that far off, on a support for alignment, and another way in each run",
     )
@@ -227,7 +230,7 @@ def _hypotheses() -> Iterator[Claim]:
     yield cause(
         "more noise than at rest",
         "–",
-        "noise of " + asks(lambda run: f"{abs(off(run)) / run.sigma / _LIMIT:.1f} times"),
+        "noise of " + asks(lambda run: f"{abs(off(run)) / run.sigma / _Z_95:.1f} times"),
         "refuted",
         "N of those runs would show in each sample of Figures 6 to 8, and run 1 is within "
         "the noise at rest",
@@ -241,15 +244,15 @@ def _hypotheses() -> Iterator[Claim]:
     )
 
 
-def _wrong(run: PrintedRun) -> float | None:
+def _compute_wrong_part(run: PrintedRun) -> float | None:
     return causes.wrong_part(run.value, EARTH_RATE)
 
 
-def _heading(run: PrintedRun) -> float | None:
+def _compute_heading(run: PrintedRun) -> float | None:
     return causes.heading_needed(run.value, EARTH_RATE)
 
 
-def _angle(run: PrintedRun) -> float:
+def _compute_angle(run: PrintedRun) -> float:
     return abs(causes.angle_needed(off(run), PAPER_PERIOD - ASSUMED_TURNING, ASSUMED_LATITUDE))
 
 
@@ -261,7 +264,7 @@ def filtered() -> Iterator[Claim]:
             "no unit: as (°/s)² 3.05 × 10⁻⁵ (rad/s)², as (rad/s)² 3,283 times that",
             "misprint"),
         reason="all else in the paper is in degrees; both are shown", basis="checked",
-        page=page_of("2"), check=f"{_GIVEN}::test_its_start_has_no_unit_in_print",
+        page=page_of("2"), check=f"{_TEST_OF_KNOWN_RATE}::test_its_start_has_no_unit_in_print",
     )  # fmt: skip
     yield Claim(
         place="Figure 9", quantity="run 2: cumulative mean of the samples without correction",
@@ -279,7 +282,7 @@ def filtered() -> Iterator[Claim]:
             quantity=f"run {run}: time after which the cumulative mean stays at the true rate",
             printed="about 10³ samples, 30 to 60 s", value=1000.0 / PAPER_RATE, unit="s",
             evaluate=evaluate_settling(run, SENSOR, NO_LOG), basis="simulated",
-            page=f"{page_of(run)}#estimates", check=_SETTLING,
+            page=f"{page_of(run)}#estimates", check=_TEST_OF_SETTLING,
             reason="within a tenth of it; the mean has the white noise of all samples so far, "
             "whether the filter is given the rate or not. A single run says little: runs differ by "
             "more than the units of P₀",
@@ -292,10 +295,12 @@ def filtered() -> Iterator[Claim]:
         place="Section 7", quantity="error of the cumulative mean after 10³ samples, 1 σ",
         printed="aligned with the true rate",
         evaluate=verbal_result(
-            f"{_of_rate(scatter['degrees'])} °/h of the Earth's rate with P₀ in (°/s)², "
-            f"{_of_rate(scatter['radians'])} in (rad/s)², of {_hours(EARTH_RATE)} °/h", "refuted"),
+            f"{_format_rate(scatter['degrees'])} °/h of the Earth's rate with P₀ in (°/s)², "
+            f"{_format_rate(scatter['radians'])} in (rad/s)², of {_format_hours(EARTH_RATE)} °/h",
+            "refuted"),
         reason=f"a mean over 31 s of this noise is not better, even of a filter that is given the "
-        f"rate; a pair of dwells, 60 s, tells it to {_hours(_of_one_pair())} °/h without",
+        "rate; a pair of dwells, 60 s, tells it to "
+        f"{_format_hours(_compute_pair_sigma())} °/h without",
         basis="computed", page=page_of("1"),
         check=f"{_TEST}::test_errors_are_those_of_the_earths_rate",
     )  # fmt: skip
@@ -313,15 +318,15 @@ def filtered() -> Iterator[Claim]:
     )  # fmt: skip
 
 
-def _of_one_pair() -> float:
+def _compute_pair_sigma() -> float:
     """Return the standard deviation of the Earth's rate from one pair of dwells, rad/s."""
     return float(allowed_sigmas(DESIGN, 2.0 * PAPER_PERIOD, PAPER_MODEL)["sigma"])
 
 
-def _of_rate(along_axis: float) -> str:
+def _format_rate(along_axis: float) -> str:
     """Return an error along the axis as one of the Earth's rate, of which it sees cos φ."""
-    return _hours(along_axis / math.cos(ASSUMED_LATITUDE))
+    return _format_hours(along_axis / math.cos(ASSUMED_LATITUDE))
 
 
-def _hours(rate: float) -> str:
+def _format_hours(rate: float) -> str:
     return f"{rate / DEGREE * 3600.0:.1f}"
