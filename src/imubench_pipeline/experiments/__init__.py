@@ -1,4 +1,4 @@
-"""What is found with known rates: the Earth's rate, biases and scale factors, attitude.
+"""Experiments with known rates: the Earth's rate, biases and scale factors, attitude.
 
 Arrays in, estimates out; `steps` reads the logs for them.
 """

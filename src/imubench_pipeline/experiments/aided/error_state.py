@@ -205,7 +205,7 @@ def run(
                     if of_scale[3 + i] >= 0:
                         f[i] -= force[k, i] * x[of_scale[3 + i] - NAVIGATION_STATES]
                 if sample == width // 2:
-                    if width % 2 == 1:  # the middle is that of the sample
+                    if width % 2 == 1:  # the middle of the step is in a sample
                         rotation(0.5 * T * w[0], 0.5 * T * w[1], 0.5 * T * w[2], turn)
                         multiply(C, turn, C_mid)
                     else:

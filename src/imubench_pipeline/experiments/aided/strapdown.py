@@ -1,20 +1,21 @@
-"""The strapdown mechanisation, and its inverse: motion from inertial samples, and the other way.
+"""Strapdown mechanisation (motion from inertial samples), and its inverse.
 
-The frame is that of the plane which touches the Earth where a drive begins: x north, y east, z
-down, turning with the Earth. In it
+The frame is the tangent plane of the Earth where a drive begins: x north, y east, z down, turning
+with the Earth. In it
 
     p' = v,    v' = C f + g(p) - 2 w_ie x v,    C' = C [w x] - [w_ie x] C,
 
 with C from the axes of the sensor to the frame, f the specific force and w the rate that it senses.
-Gravity points to the centre of the Earth and falls off with height, to first order of the way, so
-that there is Schuler feedback; a drive of some 10 km is well within that.
+Gravity points to the centre of the Earth and decreases with height, to first order of the distance
+from the start. This includes Schuler feedback, and holds for a drive of some 10 km.
 
 A sample is the mean of w and f over the interval that it ends, as of an integrating sensor. In an
-interval the mechanisation is of second order, and `inverse` is exactly its inverse: what it gives,
-`mechanise` takes back to rounding. So an error of navigation is one of sensors, GNSS or the start.
+interval the mechanisation is of second order, and `inverse` is its exact inverse: `mechanise`
+reproduces the motion up to rounding. Therefore navigation errors come from sensors, GNSS or the
+start alone.
 
-Kernels loop over scalars: what numba compiles of an assignment to a slice, or of a sum of arrays,
-takes longer than the kernel itself.
+Kernels loop over scalars, since numba compiles assignments to slices and sums of arrays into code
+that takes longer than the kernel itself.
 """
 
 from __future__ import annotations

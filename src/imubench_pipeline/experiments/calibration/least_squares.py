@@ -117,7 +117,7 @@ class LeastSquares:
         With some noise in every sample.
     regressors : ndarray, shape (b, p)
     further : ndarray, shape (b, b), optional
-        Covariance that is added to that of the noise, (rad/s)^2.
+        Covariance that is added to the covariance of the noise, (rad/s)^2.
     names : sequence of str
         Of the regressors, for the error.
 

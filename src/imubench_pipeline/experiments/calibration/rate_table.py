@@ -108,7 +108,7 @@ class Calibration:
     """Bias and scale factor in runs of one design."""
 
     line: Fit  # bias, rad/s, at the first sample of the first block, and scale factor
-    # standard error of the bias, with that of the Earth's rate along the axis, rad/s
+    # standard error of the bias, including the Earth's rate along the axis, rad/s
     bias_sigma: float
     quadratic: Term | None  # coefficient of the square of the rate, in addition to the line, s/rad
     # difference of the scale factors of positive and negative rates over their mean, with one bias

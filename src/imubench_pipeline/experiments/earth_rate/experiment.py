@@ -153,7 +153,7 @@ class Blocks:
 
     @property
     def seen(self) -> Array:
-        """What each sees of the Earth's rate: sense times cos(latitude), shape (b,)."""
+        """Sensitivity of each to the Earth's rate: sense times cos(latitude), shape (b,)."""
         return self.sense * math.cos(self.latitude)
 
     @property

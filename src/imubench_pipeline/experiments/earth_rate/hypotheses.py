@@ -41,7 +41,7 @@ class PrintedRun:
         """Return a run without its last part, whose pairs are disjoint from the others."""
         rest = self.duration - last.duration
         value = (self.duration * self.value - last.duration * last.value) / rest
-        # Disjoint pairs: the variance of the whole is that of both parts by their lengths squared.
+        # Disjoint pairs: the variances of both parts add up, weighted by their lengths squared.
         squares = (self.duration * self.sigma) ** 2 - (last.duration * last.sigma) ** 2
         return PrintedRun(rest, value, math.sqrt(max(squares, 0.0)) / rest)
 

@@ -5,7 +5,7 @@ w is a state in addition to the error of the gyro, observed with the sign of the
 
     x = [w, z_G ..., z_K],    mean of a block = s cos(latitude) w + mean of (z_G + ... + z_K) + v.
 
-The filter is that of `block_filter`, with one constant and one axis. Its square roots keep their
+The filter is a `block_filter` with one constant and one axis. Its square roots keep their
 precision from an uninformative start of 1 rad/s down to 1e-10 rad/s.
 
 References

@@ -156,7 +156,7 @@ def _estimate_sigma(residual: Array) -> float:
 def transients(blocks: LevelBlocks, log: Array, rate: float) -> list[Event]:
     """Return the transients in order of time.
 
-    A window of n blocks whose mean square is r times that of the noise has the log-likelihood ratio
+    A window of n blocks with a mean square of r times the noise has the log-likelihood ratio
     (n/2) (r - 1 - ln r) of a larger variance, maximised over its length and place. If blocks of
     the calm parts are correlated, n is divided by an upper bound on the largest eigenvalue of their
     correlation, 1 + 2 sum (1 - k/n) rho_k, which sets the decay of the tail of r. The log is the

@@ -1,1 +1,1 @@
-"""What the papers behind this project print, line by line, beside what is found here."""
+"""Claims of the papers behind this project, with the results of this project."""

@@ -1,4 +1,4 @@
-"""The papers, and the words of their lines: what shows the table ``published`` needs these."""
+"""The papers, and the terms of their claims, for the display of the table ``published``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Basis = Literal["come back", "simulated", "computed", "checked"]
-"""What ours rests on; `BASES` says it in words."""
+"""Basis of a result; `BASES` describes it."""
 
 BASES: dict[Basis, str] = {
     "come back": "the log is simulated from this very figure: it comes back, which says that the "
@@ -35,13 +35,13 @@ VERDICTS: dict[Verdict, str] = {
 
 @dataclass(frozen=True)
 class Drawn:
-    """A curve that stands for figures of a paper."""
+    """A curve that corresponds to figures of a paper."""
 
     figures: str  # of the paper
     sensor: str
     recording: str
     channel: str
-    methods: str  # whose curves are drawn, beside that of the log
+    methods: str  # methods with a curve, in addition to the curve of the log
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,7 @@ class About:
 
     key: str  # "maia"
     name: str  # "Maia et al."
-    title: str  # what it is of
+    title: str  # subject of the paper
     # sensor and recording of the logs that stand for its own; a run that has none leaves it out
     logs: tuple[tuple[str, str], ...]
     # sentences: what is assumed, whose input comes back, what is typed by hand

@@ -32,7 +32,7 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class Axis:
-    """What tables 2 to 7 print of an axis, digit by digit."""
+    """An axis as in tables 2 to 7, digit by digit."""
 
     sensor: str
     axis: str

@@ -280,7 +280,7 @@ def _get_page_of_samples(sensor: str) -> str:
 
 
 def _evaluate_band(sensor: str, axis: str) -> Callable[[Evidence], Result]:
-    """Return how much of the curve is in the band of the logs that the estimate makes."""
+    """Return the evaluation of the share of the curve within the band of simulated logs."""
 
     def evaluate(run: Evidence) -> Result:
         log = Log(sensor, RECORDING, f"gyro_{axis}")
@@ -314,7 +314,7 @@ def _get_sample_deviations(run: Evidence, sensor: str) -> dict[tuple[str, str], 
 
 
 def _evaluate_deviations(sensor: str, if_alike: str) -> Callable[[Evidence], Result]:
-    """Return the deviation of the samples of the fitted model over that of the log."""
+    """Return the evaluation of the deviation of samples, fitted model over log."""
 
     def evaluate(run: Evidence) -> Result:
         by = _get_sample_deviations(run, sensor)
@@ -334,7 +334,7 @@ def _evaluate_deviations(sensor: str, if_alike: str) -> Callable[[Evidence], Res
 
 
 def _evaluate_axes(sensor: str) -> Callable[[Evidence], Result]:
-    """Return the deviation of the samples of y and z over that of x, of the log and the model."""
+    """Return the evaluation of the deviations of y and z over x, of log and model."""
 
     def evaluate(run: Evidence) -> Result:
         by = _get_sample_deviations(run, sensor)
@@ -359,7 +359,7 @@ def _evaluate_axes(sensor: str) -> Callable[[Evidence], Result]:
 
 
 def _evaluate_neighbours(sensor: str, of: str) -> Callable[[Evidence], Result]:
-    """Return how neighbouring samples go together, of log and model, in a short stretch."""
+    """Return the evaluation of the correlation of adjacent samples, of log and model."""
 
     def evaluate(run: Evidence) -> Result:
         rows = run.rows(

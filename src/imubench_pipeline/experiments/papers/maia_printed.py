@@ -86,7 +86,7 @@ Range = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Lottery:
-    """How single reconstructions score against single logs of Table 2, by one grid of tau."""
+    """Scores of single reconstructions against single logs of Table 2, for one grid of tau."""
 
     state_space: Range  # reconstructed by Table 1
     optimised: Range  # by Table 2 itself
@@ -109,7 +109,7 @@ def sizes(channel: Channel, grid: Grid) -> NDArray[np.int64]:
 
 @lru_cache(maxsize=len(CHANNELS) * len(GRIDS))
 def lottery(channel: Channel, grid: Grid) -> Lottery:
-    """Return how Table 3 would spread, had the logs been the model of Table 2.
+    """Return the spread of Table 3 for logs with the model of Table 2.
 
     Each of `MEMBERS` logs stands for the measured one, and is held against as many reconstructions
     by Table 1 and, of other draws, by Table 2.

@@ -37,7 +37,7 @@ Values = Mapping[str, float | None]
 def panel_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
     """Yield the rows of the table ``accuracy``.
 
-    The likelihood is that of the papers' model, up to half of the sampling rate.
+    The likelihood uses the model of the papers, up to half of the sampling rate.
     """
     model = MTI_GYRO.table_2
     bounds = bounds_of(model, _RATE, DURATION, _RATE / 2.0)

@@ -1,4 +1,4 @@
-"""The runs that Silva et al. turned between north and south, and what their filter makes of it."""
+"""Claims of Silva et al. about the runs turned between north and south, and their filter."""
 
 from __future__ import annotations
 
@@ -65,12 +65,12 @@ def printed_run(run: str) -> PrintedRun:
 
 
 def off(run: PrintedRun) -> float:
-    """Return by how much a printed estimate is off the Earth's rate, rad/s."""
+    """Return the error of a printed estimate of the Earth's rate, rad/s."""
     return run.value - EARTH_RATE
 
 
 def gain_of_the_filter(run: str) -> float:
-    """Return by which part the sigma of a filter, the rate unknown, is less than that of pairs."""
+    """Return the relative reduction of sigma by a filter with unknown rate, against pairs."""
     sigmas = allowed_sigmas(DESIGN, 60.0 * PAPER_MINUTES[run], PAPER_MODEL)
     return float(1.0 - sigmas["sigma_filter"] / sigmas["sigma"])
 
@@ -324,7 +324,7 @@ def _compute_pair_sigma() -> float:
 
 
 def _format_rate(along_axis: float) -> str:
-    """Return an error along the axis as one of the Earth's rate, of which it sees cos φ."""
+    """Return an error along the axis as an error of the Earth's rate, divided by cos φ."""
     return _format_hours(along_axis / math.cos(ASSUMED_LATITUDE))
 
 
