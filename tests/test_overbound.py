@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.export.growth import growth
 from imubench_pipeline.export.overbound import Overbound, limits_of, overbound, simultaneous_upper
-from imubench_pipeline.export.smallest_model import FAMILIES, Family, smallest
+from imubench_pipeline.export.smallest_model import FAMILIES, Family, find_smallest
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.typing import Array
@@ -90,7 +90,7 @@ def test_it_lies_above_everything_that_was_measured_and_fitted(
 @pytest.mark.parametrize("family", few(["N+GM+K"], ["N+K", "N+GM"]))
 def test_no_term_of_it_can_be_smaller(family: Family) -> None:
     limits = limits_of(measured(GYRO), GYRO, RATE, 60.0, 60.0, (1 / 600, RATE / 2))
-    model = smallest(limits, family, (0.4, 1800.0))
+    model = find_smallest(limits, family, (0.4, 1800.0))
 
     def inside(trial: NoiseModel) -> bool:
         return all(

@@ -15,7 +15,7 @@ from imubench_pipeline.experiments.aided.runs import Drive, Outage
 from imubench_pipeline.experiments.aided.signals import Spreads, signals
 from imubench_pipeline.experiments.aided.trajectories import trajectory
 from imubench_pipeline.export.imu import AxisNoise, Imu
-from imubench_pipeline.export.matrices import FOLLOWED
+from imubench_pipeline.export.matrices import FLICKER_TAU_OVER_HORIZON
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
@@ -130,7 +130,7 @@ def test_exported_matrices_navigate_as_the_model(
             RATE,
             turn_on=SPREADS.bias(channel),
             shortest=1.0 / RATE,
-            longest=FOLLOWED * HORIZON,
+            longest=FLICKER_TAU_OVER_HORIZON * HORIZON,
         )
         for channel in CHANNELS
     ]

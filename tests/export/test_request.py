@@ -11,7 +11,7 @@ from imubench_pipeline.allan import AllanCurve, cluster_sizes
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.export.imu import ExportError
-from imubench_pipeline.export.request import Request, imu_of, load, made
+from imubench_pipeline.export.request import Request, build_imu, load, make_content
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
@@ -62,7 +62,7 @@ REQUEST = Request(sensor="mti_7", target="kalibr")
 
 
 def test_the_file_of_the_worst_axes(tables: dict[str, pa.Table]) -> None:
-    text = made(tables, REQUEST)
+    text = make_content(tables, REQUEST)
     assert isinstance(text, str)
     found = yaml.safe_load(text)
     assert found["gyroscope_noise_density"] == 2e-4
@@ -81,31 +81,33 @@ def judged(tables: dict[str, pa.Table], **changes: object) -> dict[str, pa.Table
 def test_an_unfit_recording_is_exported_with_a_reason_alone(tables: dict[str, pa.Table]) -> None:
     moved = judged(tables, decides=False, fitness="unfit", doubts="motion (gyro_x)")
     with pytest.raises(ExportError, match=r"sim_a does not decide: motion \(gyro_x\); .*--because"):
-        made(moved, REQUEST)
-    text = made(moved, replace(REQUEST, because="the car stood still"))
+        make_content(moved, REQUEST)
+    text = make_content(moved, replace(REQUEST, because="the car stood still"))
     assert isinstance(text, str)
     said = " ".join(text.replace("#", "").split())
     assert "CAUTION: sim_a does not decide: motion (gyro_x); used all the same" in said
     assert "because: the car stood still." in said
-    assert yaml.safe_load(text) == yaml.safe_load(str(made(tables, REQUEST)))
+    assert yaml.safe_load(text) == yaml.safe_load(str(make_content(tables, REQUEST)))
 
 
 def test_doubts_stand_in_the_file(tables: dict[str, pa.Table]) -> None:
     doubted = judged(tables, decides=True, doubts="lines (gyro_x)")
-    assert "CAUTION: sim_a is in doubt: lines (gyro_x)." in str(made(doubted, REQUEST))
-    assert made(judged(tables, decides=True, doubts=""), REQUEST) == made(tables, REQUEST)
+    assert "CAUTION: sim_a is in doubt: lines (gyro_x)." in str(make_content(doubted, REQUEST))
+    assert make_content(judged(tables, decides=True, doubts=""), REQUEST) == make_content(
+        tables, REQUEST
+    )
 
 
 def test_axes_and_recordings_that_are_left_out_are_named(tables: dict[str, pa.Table]) -> None:
     (about,) = tables["recordings"].to_pylist()
     bad = about | {"recording": "bad", "status": "rejected", "reason": "line 3: found 'x'"}
     several = tables | {"recordings": build("recordings", [about, bad])}
-    said = " ".join(str(made(several, REQUEST)).replace("#", "").split())
+    said = " ".join(str(make_content(several, REQUEST)).replace("#", "").split())
     assert "gyro: axes left out, less noise at 60 s: gyro_x of sim_a." in said
     assert "axes left out, no recording has an estimate: gyro_z." in said
     assert "CAUTION: left out: bad is rejected: line 3: found 'x'." in said
     gyros = several | {"parameters": tables["parameters"].slice(0, 8)}
-    alone = made(gyros, replace(REQUEST, target="json"))
+    alone = make_content(gyros, replace(REQUEST, target="json"))
     assert "accel left out: there is no estimate of it." in json.loads(alone)["about"]
 
 
@@ -121,7 +123,7 @@ def test_the_temperature_of_the_recording_that_is_exported_is_in_the_file(
     ]  # fmt: skip
     warm = judged(tables, temperature_min=20.0, temperature_max=40.0)
     warm["temperature"] = build("temperature", rows)
-    text = str(made(warm, replace(REQUEST, target="px4")))
+    text = str(make_content(warm, replace(REQUEST, target="px4")))
     assert "TC_G0_X1_0\t0.0002\t9" in text and "TC_G0_TREF\t30\t9" in text
     assert "TC_G0_X1_1\t0\t9" in text and "TC_A0" not in text
 
@@ -132,8 +134,8 @@ def test_the_tables_of_a_run_are_found_in_its_folder(
     (tmp_path / "tables").mkdir()
     for name, table in tables.items():
         write_arrow(table, tmp_path / "tables" / f"{name}.parquet")
-    assert made(load(tmp_path), REQUEST) == made(load(tmp_path / "tables"), REQUEST)
-    assert made(load(tmp_path), REQUEST) == made(tables, REQUEST)
+    assert make_content(load(tmp_path), REQUEST) == make_content(load(tmp_path / "tables"), REQUEST)
+    assert make_content(load(tmp_path), REQUEST) == make_content(tables, REQUEST)
     with pytest.raises(ExportError, match="recordings"):
         load(tmp_path / "elsewhere")
 
@@ -143,7 +145,7 @@ def test_an_overbound_has_the_terms_that_the_program_holds(
     tables: dict[str, pa.Table], name: str
 ) -> None:
     gyros = tables | {"parameters": tables["parameters"].slice(0, 8)}
-    sensor = imu_of(gyros, replace(REQUEST, target=name, overbound=True))
+    sensor = build_imu(gyros, replace(REQUEST, target=name, overbound=True))
     assert sensor.gyro is not None
     assert set(sensor.gyro.model.name.split("+")) <= set(TARGETS[name].family.split("+"))
     both = replace(sensor, accel=sensor.gyro)
@@ -163,13 +165,15 @@ def test_an_overbound_lies_above_the_draws_of_the_recording(
         drawn = JointDraws(first, np.empty((40, 0, 2)))
         rows = draw_rows(Key("mti_7", "sim_a", "gyro_y"), Estimate("likelihood", {}, draws=drawn))
         write("draws", rows, tmp_path / "mti_7/sim_a/draws.parquet")
-        found = imu_of(
+        found = build_imu(
             tables, replace(REQUEST, overbound=True, horizon=600.0, most_excess=20.0), tmp_path
         )
         assert found.gyro is not None
         return found.gyro.model
 
-    without = imu_of(tables, replace(REQUEST, overbound=True, horizon=600.0, most_excess=20.0)).gyro
+    without = build_imu(
+        tables, replace(REQUEST, overbound=True, horizon=600.0, most_excess=20.0)
+    ).gyro
     # Sure of the fit, only the measured curve is widened; else the bound is as much larger.
     assert without is not None
     sure, unsure = bounded(1.001), bounded(2.0)
@@ -179,13 +183,13 @@ def test_an_overbound_lies_above_the_draws_of_the_recording(
 
 @pytest.fixture(scope="module")
 def bounded(tables: dict[str, pa.Table]) -> str:
-    return str(made(tables, replace(REQUEST, overbound=True)))
+    return str(make_content(tables, replace(REQUEST, overbound=True)))
 
 
 def test_an_overbound_is_larger_and_says_what_it_is(
     tables: dict[str, pa.Table], bounded: str
 ) -> None:
-    plain, text = yaml.safe_load(made(tables, REQUEST)), bounded
+    plain, text = yaml.safe_load(make_content(tables, REQUEST)), bounded
     found = yaml.safe_load(text)
     for key in ("gyroscope_noise_density", "gyroscope_random_walk", "accelerometer_random_walk"):
         assert plain[key] < found[key] < 2.0 * plain[key]
@@ -201,10 +205,11 @@ def test_the_head_of_an_overbound_says_where_its_density_holds(
     joined = bounded.replace("\n#  ", "")
     assert "the bound on the spectral density holds above 0.00167 Hz only" in joined
     assert "averages for longer than 600 s" in joined
-    matrices = json.loads(made(tables, replace(REQUEST, target="json", overbound=True)))
+    matrices = json.loads(make_content(tables, replace(REQUEST, target="json", overbound=True)))
     assert matrices["gyro"]["density_bounded"] == pytest.approx([0.1 / 60.0, RATE / 2.0])
     assert (
-        json.loads(made(tables, replace(REQUEST, target="json")))["gyro"]["density_bounded"] is None
+        json.loads(make_content(tables, replace(REQUEST, target="json")))["gyro"]["density_bounded"]
+        is None
     )
 
 
@@ -219,7 +224,7 @@ def test_a_walk_that_cannot_follow_is_refused(tables: dict[str, pa.Table]) -> No
 
 @pytest.mark.release
 def test_a_walk_that_cannot_follow_is_warned_of(tables: dict[str, pa.Table]) -> None:
-    text = made(tables, replace(REQUEST, overbound=True, horizon=150.0))
+    text = make_content(tables, replace(REQUEST, overbound=True, horizon=150.0))
     assert isinstance(text, str)
     joined = text.replace("\n#  ", "")
     assert "WARNING: the Allan deviation of the smallest N+K is" in joined
@@ -230,7 +235,7 @@ def test_gravity_and_rate_and_inflation(tables: dict[str, pa.Table]) -> None:
     asked = replace(
         REQUEST, latitude=0.0, rate=200.0, inflation=2.0, because="it flies", axis="serial 1"
     )
-    sensor = imu_of(tables, asked)
+    sensor = build_imu(tables, asked)
     assert sensor.gravity == pytest.approx(9.7803253359)
     assert sensor.rate == 200.0
     assert sensor.axes["accel"].model.N == pytest.approx(2.2e-3)
@@ -251,7 +256,7 @@ def test_what_cannot_be_made_says_why(
     tables: dict[str, pa.Table], wrong: dict[str, object], words: str
 ) -> None:
     with pytest.raises(ExportError, match=words):
-        made(tables, replace(REQUEST, **wrong))  # type: ignore[arg-type]  # wrong on purpose
+        make_content(tables, replace(REQUEST, **wrong))  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_a_run_leaves_a_file_a_program_and_says_what_it_cannot(

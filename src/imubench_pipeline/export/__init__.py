@@ -1,6 +1,6 @@
-"""What a filter or a simulator can load: noise models as files of public programs.
+"""Export noise models as input files of public filters and simulators.
 
-One module a program, each a pure function of an `imubench_pipeline.export.imu.Imu` with the
-convention of its program and where it is documented; `targets` lists them, `request` makes a file
-from the tables of a run.
+Each program has a module with a pure function of an `imubench_pipeline.export.imu.Imu`. The module
+describes the convention of the program and cites its documentation. `targets` lists the programs;
+`request` makes a file from the tables of a run.
 """

@@ -2,8 +2,8 @@
 
 ``accel_noise_std`` and ``gyro_noise_std`` are N, ``accel_bias_std`` and ``gyro_bias_std`` K:
 continuous in time, vectors of three axes; Basalt multiplies the first by sqrt(imu_update_rate)
-and divides the weight of a change of bias by sqrt(dt). (Older releases hold scalars.) A Basalt
-calibration also has cameras: these fields go into the ``value0`` of the file at hand.
+and divides the weight of a change of bias by sqrt(dt). (Older releases take scalars.) A Basalt
+calibration file also has cameras: copy these fields into the ``value0`` of your own file.
 
 Sources: VladyslavUsenko/basalt, data/euroc_ds_calib.json (form);
 basalt-headers, include/basalt/calibration/calibration.hpp ("continuous time noise standard

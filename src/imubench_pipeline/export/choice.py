@@ -1,4 +1,4 @@
-"""Which axis stands for a sensor: the worst, the median one, or the worst of a device."""
+"""Choose the axis that represents a sensor: the worst, the median, or the worst of a device."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _Estimated = tuple[str, str, str]  # and method
 
 WORST, MEDIAN = "worst", "median"
 
-_NAMED = 40
-"""Recordings of a reason that are named; of more the number."""
+_MAX_NAMED_RECORDINGS = 40
+"""Max. recordings that are named for a reason; further ones are counted."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The axis that was chosen, of `of` axes; Allan deviation of its model at the horizon, SI."""
+    """The chosen axis, of `of` axes, and the Allan deviation of its model at the horizon, SI."""
 
     recording: str
     channel: str
@@ -44,11 +44,11 @@ def choose(
     devices: Mapping[str, str] | None = None,
     method: str | None = None,
 ) -> Choice:
-    """Choose the axis whose noise stands for a quantity of a sensor.
+    """Choose the axis whose noise represents a quantity of a sensor.
 
-    Axes are ordered by the Allan deviation of their model at the horizon h: sqrt(2) h times it is
-    the deviation of the angle or velocity after h without a measurement, with a bias averaged over
-    h before. All parameters are those of one axis, never a mix.
+    Axes are ordered by the Allan deviation of their model at the horizon h. Times sqrt(2) h, it is
+    the standard deviation of the angle or velocity after h without a measurement, with a bias that
+    was averaged over the preceding h. All parameters come from one axis.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def choose(
         Of one sensor.
     quantity : {"gyro", "accel"}
     axis : str
-        ``worst``, ``median`` (of an even number the larger of the two in the middle), or a device
-        or recording, of which the worst.
+        ``worst``, ``median`` (the upper median of an even number), or the name of a device or
+        recording, whose worst axis is chosen.
     horizon : float
         s.
     devices : mapping of str to str, optional
@@ -85,7 +85,7 @@ def choose(
         if everywhere and not estimated:
             present = sorted({device[recording] for recording, _, _ in everywhere})
             raise ExportError(f"no {quantity} of device {axis!r}; there are: {', '.join(present)}")
-    ranked = _ranked(estimated, horizon)
+    ranked = _rank_axes(estimated, horizon)
     if not ranked:
         raise ExportError(f"no estimate of a {quantity} with white noise")
     place = len(ranked) // 2 if axis == MEDIAN else len(ranked) - 1
@@ -109,15 +109,15 @@ def choose(
         elif key != (recording, channel, used):
             why = "not the median" if axis == MEDIAN else "less noise"
             others.setdefault(f"{why} at {horizon:g} s", []).append(key[:2])
-    notes = [*_left_out(others, channel), *parameter_notes(estimate)]
-    noise = AxisNoise(estimate.model, origin, notes, _least_walk(estimate))
+    notes = [*_describe_other_axes(others, channel), *parameter_notes(estimate)]
+    noise = AxisNoise(estimate.model, origin, notes, _find_limit_of_absent_walk(estimate))
     return Choice(recording, channel, used, noise, deviation, len(ranked))
 
 
-def _ranked(
+def _rank_axes(
     estimated: Mapping[_Estimated, Sequence[ParameterRow]], horizon: float
 ) -> list[tuple[float, _Estimated, Estimate]]:
-    """Return the axes with white noise, in the order of their Allan deviation at the horizon."""
+    """Return the axes with white noise, sorted by their Allan deviation at the horizon."""
     ranked = []
     for key, rows in estimated.items():
         estimate = estimate_of(key[2], rows)
@@ -127,8 +127,8 @@ def _ranked(
     return sorted(ranked, key=lambda entry: entry[0])
 
 
-def _left_out(others: Mapping[str, Sequence[Key]], chosen: str) -> list[str]:
-    """Say which axes do not stand for the quantity of the chosen one, and why."""
+def _describe_other_axes(others: Mapping[str, Sequence[Key]], chosen: str) -> list[str]:
+    """List the axes of the same quantity that were not chosen, by reason."""
     quantity, _ = chosen.split("_")
     statements = []
     for why, keys in others.items():
@@ -136,9 +136,9 @@ def _left_out(others: Mapping[str, Sequence[Key]], chosen: str) -> list[str]:
         for recording, channel in keys:
             of.setdefault(recording, []).append(channel)
         named = [f"{' and '.join(channels)} of {recording}" for recording, channels in of.items()]
-        more = len(named) - _NAMED
+        more = len(named) - _MAX_NAMED_RECORDINGS
         statements.append(
-            f"axes left out, {why}: {'; '.join(named[:_NAMED])}"
+            f"axes left out, {why}: {'; '.join(named[:_MAX_NAMED_RECORDINGS])}"
             + (f"; and those of {more} more recordings" if more > 0 else "")
         )
     channels = {chosen, *(channel for keys in others.values() for _, channel in keys)}
@@ -149,17 +149,17 @@ def _left_out(others: Mapping[str, Sequence[Key]], chosen: str) -> list[str]:
 
 
 def parameter_notes(estimate: Estimate) -> list[str]:
-    """Say what was done with the parameters that have no plain value."""
+    """Describe the treatment of the parameters without a plain value."""
     notes = []
     for number, name, parameter in estimate.components():
         label = name if number == 1 else f"{name} of component {number}"
-        note = _note(parameter)
+        note = _describe_substitute(parameter)
         if note:
             notes.append(f"{label} {note}")
     return notes
 
 
-def _note(parameter: Parameter) -> str | None:
+def _describe_substitute(parameter: Parameter) -> str | None:
     reason = f" ({parameter.reason})" if parameter.reason else ""
     status = parameter.status.replace("_", " ")
     between = ""
@@ -176,7 +176,7 @@ def _note(parameter: Parameter) -> str | None:
     return None
 
 
-def _least_walk(estimate: Estimate) -> float | None:
-    """Return the upper limit of a K that the model does not have."""
+def _find_limit_of_absent_walk(estimate: Estimate) -> float | None:
+    """Return the upper limit of K if K is not in the model."""
     K = estimate.parameters.get("K")
     return K.upper if K is not None and K.in_model is None else None

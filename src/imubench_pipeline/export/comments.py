@@ -1,4 +1,4 @@
-"""What stands at the head of every file: where its numbers come from, and their convention."""
+"""Header comments of exported files: source of the numbers, and their convention."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import textwrap
 from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.mapping import Mapped, named
+from imubench_pipeline.export.mapping import Mapped, describe_terms
 from imubench_pipeline.tables.texts import printable
 
-_WIDTH = 96
-_WHITE = re.compile(r"[\t\n]")
+_LINE_WIDTH = 96
+_TAB_OR_NEWLINE = re.compile(r"[\t\n]")
 
 
 def heading(imu: Imu, program: str, convention: str, *, temperature: bool = False) -> list[str]:
-    """Return what is to be said of every file, printable statements.
+    """Return the header of a file as printable statements.
 
-    `program` is what loads the file, `convention` that of its numbers, in words; `temperature`:
-    it holds how the biases follow the temperature.
+    `program` is the program that loads the file; `convention` describes its numbers; `temperature`:
+    the file contains the effect of temperature on the biases.
     """
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
@@ -34,7 +34,7 @@ def heading(imu: Imu, program: str, convention: str, *, temperature: bool = Fals
     ]
     for name, axis in imu.axes.items():
         statements.append(f"{name}: {axis.origin}.")
-        terms = named((estimated[name] or axis).model.terms)
+        terms = describe_terms((estimated[name] or axis).model.terms)
         statements.append(f"{name} model ({units[name]}; N two-sided): {terms}.")
         statements += [f"{name}: {note}." for note in axis.notes]
     if temperature:
@@ -54,11 +54,11 @@ def heading(imu: Imu, program: str, convention: str, *, temperature: bool = Fals
             f"INFLATED: from here on all densities and amplitudes are {imu.inflation:g} times "
             f"those above, because: {imu.because}."
         )
-    return [_on_one_line(words) for words in statements]
+    return [_join_lines(words) for words in statements]
 
 
 def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
-    """Return what was replaced in the models, one statement each."""
+    """Return the replacements in the models, one statement each."""
     return [
         f"{name}: {words}." for name, replacement in mapped.items() for words in replacement.words
     ]
@@ -67,13 +67,13 @@ def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
 def commented(statements: Sequence[str], mark: str = "#") -> str:
     """Return statements as comment lines, each beginning with a mark.
 
-    What no comment can hold in every format, such as a line end of Unicode in the name of a
-    recording, is written as its escape, and a longer word than a line is divided.
+    Characters that are not safe in a comment of every format, such as a Unicode line separator in
+    the name of a recording, are escaped. Words longer than a line are divided.
     """
     lines = []
     for statement in statements:
         wrapped = textwrap.wrap(
-            _on_one_line(statement), _WIDTH - len(mark) - 1, subsequent_indent="  "
+            _join_lines(statement), _LINE_WIDTH - len(mark) - 1, subsequent_indent="  "
         )
         lines += [f"{mark} {line}" for line in wrapped]
     return "\n".join(lines) + "\n"
@@ -82,14 +82,14 @@ def commented(statements: Sequence[str], mark: str = "#") -> str:
 def commented_python(statements: Sequence[str]) -> str:
     """Return statements as comments at the top of a file of Python.
 
-    Its encoding stands before them: Python takes it from the words of the first comments, which
-    hold names that others gave (PEP 263).
+    The first line declares the encoding (PEP 263). Without it, Python could take an encoding from
+    the comments, which contain names chosen by users.
     """
     return "# -*- coding: utf-8 -*-\n" + commented(statements)
 
 
-def _on_one_line(statement: str) -> str:
-    return printable(_WHITE.sub(" ", statement))
+def _join_lines(statement: str) -> str:
+    return printable(_TAB_OR_NEWLINE.sub(" ", statement))
 
 
 def setting(key: str, value: str, comment: str, indent: str = "") -> str:
@@ -98,7 +98,7 @@ def setting(key: str, value: str, comment: str, indent: str = "") -> str:
 
 
 def number(value: float) -> str:
-    """Return a number as every YAML reader takes it for one: with a point, the exponent signed."""
+    """Return a number as a float of every YAML reader: with a point and a signed exponent."""
     return f"{value:.6e}"
 
 

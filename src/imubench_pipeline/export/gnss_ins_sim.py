@@ -1,12 +1,12 @@
 """gnss-ins-sim: the dictionary of errors of an IMU.
 
 ``gyro_arw`` in deg/sqrt(h) and ``accel_vrw`` in m/s/sqrt(h) are N, two-sided (a sample gets
-N / sqrt(dt)). ``*_b_stability`` with ``*_b_corr`` is a first-order Gauss-Markov process by its
-standard deviation, deg/h and m/s^2, which is not the bias instability B of IEEE Std 952:
+N / sqrt(dt)). ``*_b_stability`` with ``*_b_corr`` is the standard deviation of a first-order
+Gauss-Markov process, deg/h and m/s^2; it is not the bias instability B of IEEE Std 952:
 
     stability = sqrt(S_B T_B / 2) = 1.076 B.
 
-The process is discretised as x' = (1 - dt / T_B) x + w, near enough where T_B is many samples, and
+The process is discretised as x' = (1 - dt / T_B) x + w, accurate where T_B is many samples, and
 starts at 0. Without ``*_b_corr`` (or inf) the program draws white noise, so it is always given.
 There is no random walk.
 
@@ -28,8 +28,8 @@ _CONVENTION = (
     "*_arw and *_vrw are N (two-sided) an hour; *_b_stability is the standard deviation of a "
     "first-order Gauss-Markov process (1.076 B), *_b_corr its T_B in s. Fixed biases are 0."
 )
-_FEW = 20.0
-"""Samples in T_B below which the program's discretisation is off by more than 3 %."""
+_MIN_SAMPLES_IN_T_B = 20.0
+"""With fewer samples in T_B, the program's discretisation is off by more than 3 %."""
 
 
 def write(imu: Imu) -> str:
@@ -39,7 +39,7 @@ def write(imu: Imu) -> str:
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     about = [*heading(imu, "gnss-ins-sim", _CONVENTION), *mapping_words(mapped)]
     for name, process in mapped.items():
-        if process.model.T_B is not None and process.model.T_B * imu.rate < _FEW:
+        if process.model.T_B is not None and process.model.T_B * imu.rate < _MIN_SAMPLES_IN_T_B:
             about.append(
                 f"{name}: T_B is {process.model.T_B * imu.rate:.3g} samples; the program's "
                 "discretisation of so short a process is coarse."
@@ -48,11 +48,15 @@ def write(imu: Imu) -> str:
     entries = [
         ("gyro_b", 0.0, "deg/h, fixed bias"),
         ("gyro_arw", gyro.N * degrees * 60.0, "deg/sqrt(h), N"),
-        ("gyro_b_stability", _deviation(gyro) * degrees * 3600.0, "deg/h, 1 sigma"),
+        (
+            "gyro_b_stability",
+            _compute_stationary_deviation(gyro) * degrees * 3600.0,
+            "deg/h, 1 sigma",
+        ),
         ("gyro_b_corr", gyro.T_B or imu.horizon, "s, T_B"),
         ("accel_b", 0.0, "m/s^2, fixed bias"),
         ("accel_vrw", accel.N * 60.0, "m/s/sqrt(h), N"),
-        ("accel_b_stability", _deviation(accel), "m/s^2, 1 sigma"),
+        ("accel_b_stability", _compute_stationary_deviation(accel), "m/s^2, 1 sigma"),
         ("accel_b_corr", accel.T_B or imu.horizon, "s, T_B"),
     ]
     lines = [
@@ -62,7 +66,7 @@ def write(imu: Imu) -> str:
     return commented_python(about) + "import numpy as np\n\nimu_err = {\n" + "".join(lines) + "}\n"
 
 
-def _deviation(model: NoiseModel) -> float:
+def _compute_stationary_deviation(model: NoiseModel) -> float:
     if model.T_B is None or model.B == 0.0:
         return 0.0
     return math.sqrt(driving_density(model.B, model.T_B) * model.T_B / 2.0)

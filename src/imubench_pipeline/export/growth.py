@@ -1,13 +1,14 @@
-"""How the errors of an integration grow from a moment at which all is known.
+"""Growth of the variance of integrated noise, from known initial states.
 
-A filter that knows the states of its noise model at a moment predicts from there on, without a
-measurement, the variance of the angle or velocity (the first integral of the noise) and of the
-position (the second integral of an accelerometer's), t later. With h(s) the response of the noise
-to its driving white noise of density S, integrated once or twice,
+A filter that knows the states of its noise model at time 0 predicts, without a measurement, the
+variance of the angle or velocity (the first integral of the noise) and of the position (the second
+integral of the noise of an accelerometer) at time t. Let h(s) be the impulse response from the
+driving white noise of density S to the noise, integrated once or twice. Then
 
-    Var(t) = S int_0^t h(s)^2 ds:
+    Var(t) = S int_0^t h(s)^2 ds.
 
-white noise N^2 t and N^2 t^3 / 3, and so for each term (`noise.terms.Term.growth_from_known`).
+For white noise this is N^2 t and N^2 t^3 / 3; for other terms see
+`noise.terms.Term.growth_from_known`.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from numpy.typing import ArrayLike
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_BEYOND_HORIZON = 4.0
-"""Flicker noise is followed up to so many times the longest time asked for."""
+_FLICKER_TAU_RATIO = 4.0
+"""Longest tau of the approximation of flicker noise, over the longest time of the growth."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,11 @@ class Growth:
     Attributes
     ----------
     time : ndarray
-        Since all was known, s.
+        Since the states were known, s.
     first : ndarray
         Of angle, rad^2, or velocity, (m/s)^2.
     second : ndarray
-        Of the integral of that: rad^2 s^2, or position, m^2.
+        Of the integral of angle, rad^2 s^2, or of velocity (position), m^2.
     """
 
     time: Array
@@ -46,20 +47,20 @@ class Growth:
 def growth(model: NoiseModel, time: ArrayLike, rate: float) -> Growth:
     """Return the variances of the integrals of the noise of a model.
 
-    They are of white noise, Gauss-Markov processes, random walk and flicker noise. What is
-    deterministic (ramp, lines) and what does not grow (quantization) has no part in it.
+    They contain white noise, Gauss-Markov processes, random walk and flicker noise. Deterministic
+    terms (ramp, lines) and quantization noise, which does not grow, do not contribute.
 
     Parameters
     ----------
     model : NoiseModel
     time : array_like, shape (m,)
-        Since all was known, s.
+        Since the states were known, s.
     rate : float
-        Hz; the processes that stand for flicker noise begin at half its period.
+        Hz; the processes that approximate flicker noise begin at half its period.
     """
     t = np.atleast_1d(np.asarray(time, dtype=np.float64))
     first, second = np.zeros_like(t), np.zeros_like(t)
-    for term in model.realised(1.0 / rate, max(_BEYOND_HORIZON * float(t.max()), 2.0 / rate)):
+    for term in model.realised(1.0 / rate, max(_FLICKER_TAU_RATIO * float(t.max()), 2.0 / rate)):
         of_first, of_second = term.growth_from_known(t)
         first += of_first
         second += of_second

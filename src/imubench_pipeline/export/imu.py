@@ -1,4 +1,4 @@
-"""The noise of an inertial sensor as it is handed to another program."""
+"""Noise model of an inertial sensor, as the export to other programs takes it."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from imubench_pipeline.noise import NoiseModel
 
 
 class ExportError(ValueError):
-    """What a program cannot load, with what is missing or what to do."""
+    """Raised for an export that the program cannot load; says what is missing, or what to do."""
 
 
 @dataclass(frozen=True)
 class AxisNoise:
-    """The noise model of one axis, SI, which stands for all axes of its quantity.
+    """Noise model of one axis, SI, used for all axes of its quantity.
 
     Attributes
     ----------
     origin : str
-        In words: which axis of which recording, by which method.
+        Axis, recording and method of the model, in words.
     notes : sequence of str
-        What a reader must know of single parameters: not identified, absent, and what was done.
+        Remarks on parameters without a plain value (not identified, absent) and their treatment.
     least_walk : float or None
-        Upper limit of K, where K is absent: what stands in a program that needs a random walk.
+        Upper limit of K, where K is absent; used for programs that need a random walk.
     bounded : tuple of float, or None
-        Lowest and highest frequency, Hz, between which the model is above the spectral density:
-        of an overbound. None: it is no bound.
+        Of an overbound: lowest and highest frequency, Hz, between which the model is above the
+        spectral density. None: the model is not an overbound.
     """
 
     model: NoiseModel
@@ -50,20 +50,20 @@ class Imu:
     gyro, accel : AxisNoise or None
         None: no estimate.
     horizon : float
-        How long the program goes without a measurement, s: where a model that a program cannot
-        hold is replaced by a nearby one, they agree there.
+        Longest time that the program predicts without a measurement, s. A replacement for a model
+        that the program does not support has the same Allan variance at this time.
     gravity : float
         m/s^2.
     inflation : float
         Factor on all densities and amplitudes, not on variances.
     because : str or None
-        The reason for it, or for the use of a recording that does not decide.
+        Reason of the inflation, or of the use of a recording that is excluded from decisions.
     simulated : bool
-        The recordings are.
+        Whether the recordings are simulated.
     cautions : sequence of str
-        What speaks against the recordings that were used, and which were left out.
+        Doubts about the recordings that were used, and the recordings that were left out.
     temperature : mapping of str to TemperatureEffect
-        How the biases follow the temperature, by quantity.
+        Effect of the temperature on the biases, by quantity.
 
     Raises
     ------
@@ -102,7 +102,7 @@ class Imu:
         return {
             name: replace(
                 axis,
-                model=inflated(axis.model, self.inflation),
+                model=inflate(axis.model, self.inflation),
                 least_walk=axis.least_walk and axis.least_walk * self.inflation,
             )
             for name, axis in both.items()
@@ -110,7 +110,7 @@ class Imu:
         }
 
     def both(self) -> tuple[AxisNoise, AxisNoise]:
-        """Return gyro and accelerometer; ExportError if one is missing, which the program needs."""
+        """Return gyro and accelerometer; ExportError if one is missing: the program needs both."""
         axes = self.axes
         missing = [name for name in ("gyro", "accel") if name not in axes]
         if missing:
@@ -120,7 +120,7 @@ class Imu:
         return axes["gyro"], axes["accel"]
 
 
-def inflated(model: NoiseModel, factor: float) -> NoiseModel:
+def inflate(model: NoiseModel, factor: float) -> NoiseModel:
     """Return a model with all densities and amplitudes times a factor; times stay."""
     return NoiseModel(
         Q=model.Q * factor,

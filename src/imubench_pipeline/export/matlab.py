@@ -1,20 +1,20 @@
-"""MATLAB: a script that makes an ``imuSensor`` of the Navigation and Sensor Fusion toolboxes.
+"""MATLAB: a script that creates an ``imuSensor`` of the Navigation and Sensor Fusion toolboxes.
 
 With ``NoiseType`` "single-sided" a sample gets NoiseDensity sqrt(SampleRate) of white noise, and a
 step of the random walk RandomWalk / sqrt(SampleRate): NoiseDensity is N and RandomWalk is K, in the
-two-sided sense of IEEE Std 952. (With the default, "double-sided", SampleRate / 2 stands in both
-places: N would have to be sqrt(2) times larger, a one-sided density as on datasheets, and K sqrt(2)
-times smaller.)
+two-sided convention of IEEE Std 952. (With the default, "double-sided", SampleRate / 2 replaces
+SampleRate in both: N would have to be sqrt(2) times larger, a one-sided density as on datasheets,
+and K sqrt(2) times smaller.)
 
-BiasInstability is the deviation of white samples that BiasInstabilityCoefficients filter. A first-
-order filter 1 / (1 - p z^-1), p = e^(-dt / T_B), makes the Gauss-Markov process exactly, with
-B' = sqrt(S_B T_B / 2 (1 - p^2)). ``fractalcoef`` makes flicker noise with B' = B: its spectrum
-B^2 / |1 - e^(-i omega)| is cut off at low frequencies by the number of poles; with as many poles
-as samples the Allan deviation is within 7 % at that many samples and 11 % at twice. The default
-of one pole is no flicker noise.
+BiasInstability is the standard deviation of white samples, which the filter
+BiasInstabilityCoefficients shapes. The first-order filter 1 / (1 - p z^-1), p = e^(-dt / T_B),
+gives the exact Gauss-Markov process with B' = sqrt(S_B T_B / 2 (1 - p^2)). ``fractalcoef`` gives
+flicker noise with B' = B: its spectrum B^2 / |1 - e^(-i omega)| is cut off at low frequencies by
+the number of poles. With n poles the Allan deviation is within 7 % at n samples and 11 % at 2 n.
+The default of one pole is not flicker noise.
 
-TemperatureBias (T - 25) is added at the temperature T of the sensor, degC; 25 is fixed. A
-ConstantBias of s (25 - T_0) makes it s (T - T_0), and the script sets T to T_0.
+TemperatureBias (T - 25) is added at the temperature T of the sensor, degC; the 25 is fixed. A
+ConstantBias of s (25 - T_0) changes this to s (T - T_0), and the script sets T to T_0.
 
 Sources: MathWorks, reference pages of imuSensor ("Algorithms"), gyroparams, accelparams and
 fractalcoef (R2023b); the example "Inertial Sensor Noise Analysis Using Allan Variance"; C code
@@ -40,12 +40,12 @@ _CONVENTION = (
     "single-sided; BiasInstability drives the filter of BiasInstabilityCoefficients, made for "
     "SampleRate = {rate:g} Hz. R2023b or newer."
 )
-_MOST_POLES = 2000
-_PROGRAM_REFERENCE = 25.0
-"""degC; where TemperatureBias adds nothing."""
+_MAX_POLES = 2000
+_REFERENCE_TEMPERATURE = 25.0
+"""Temperature at which TemperatureBias adds nothing, degC."""
 
-_REACH = 5.0
-"""Samples a pole up to which the Allan deviation of flicker noise is within 11 %."""
+_MAX_SAMPLES_PER_POLE = 5.0
+"""Max. samples per pole; up to them the Allan deviation of flicker noise is within 11 %."""
 
 
 @dataclass(frozen=True)
@@ -57,15 +57,15 @@ class _Parameters:
 
 
 def write(imu: Imu) -> str:
-    """Return the script; it leaves ``IMU``, an imuSensor."""
+    """Return the script; it creates ``IMU``, an imuSensor."""
     mapped: dict[str, Mapped] = {}
     parameters: dict[str, _Parameters] = {}
     for name, axis in imu.axes.items():
-        mapped[name], parameters[name] = _parameters(axis, imu)
+        mapped[name], parameters[name] = _map_parameters(axis, imu)
     convention = _CONVENTION.format(rate=imu.rate)
     about = heading(imu, "MATLAB imuSensor", convention, temperature=True)
     about += mapping_words(mapped)
-    biases = {name: _temperature(imu.temperature.get(name)) for name in parameters}
+    biases = {name: _map_temperature(imu.temperature.get(name)) for name in parameters}
     about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
     text = commented(about, "%") + "IMU = imuSensor('accel-gyro');\n"
     text += f"IMU.SampleRate = {imu.rate:.9g};  % Hz\n"
@@ -76,9 +76,13 @@ def write(imu: Imu) -> str:
         unit = units[name]
         lines = [
             ("'NoiseType'", "'single-sided'", "two-sided density, see above"),
-            ("'NoiseDensity'", _vector(figures.noise_density), f"N, {unit}/sqrt(Hz)"),
-            ("'RandomWalk'", _vector(figures.random_walk), f"K, {unit} sqrt(Hz)"),
-            ("'BiasInstability'", _vector(figures.bias_instability), f"of the drive, {unit}"),
+            ("'NoiseDensity'", _format_equal_vector(figures.noise_density), f"N, {unit}/sqrt(Hz)"),
+            ("'RandomWalk'", _format_equal_vector(figures.random_walk), f"K, {unit} sqrt(Hz)"),
+            (
+                "'BiasInstability'",
+                _format_equal_vector(figures.bias_instability),
+                f"of the drive, {unit}",
+            ),
             *biases[name][0],
             ("'BiasInstabilityCoefficients'", figures.coefficients, "of the filter"),
         ]
@@ -96,8 +100,10 @@ def write(imu: Imu) -> str:
     return text
 
 
-def _temperature(effect: TemperatureEffect | None) -> tuple[list[tuple[str, str, str]], list[str]]:
-    """Return the settings with which a bias follows the temperature, and what is left out."""
+def _map_temperature(
+    effect: TemperatureEffect | None,
+) -> tuple[list[tuple[str, str, str]], list[str]]:
+    """Return the settings of the effect of temperature on a bias, and remarks on omitted axes."""
     if effect is None:
         return [], []
     words = [
@@ -107,22 +113,22 @@ def _temperature(effect: TemperatureEffect | None) -> tuple[list[tuple[str, str,
     slopes = [0.0 if axis in effect.square else effect.slope.get(axis, 0.0) for axis in AXES]
     if not any(slopes):
         return [], words
-    at_25 = [slope * (_PROGRAM_REFERENCE - effect.reference) for slope in slopes]
+    at_25 = [slope * (_REFERENCE_TEMPERATURE - effect.reference) for slope in slopes]
     return [
-        ("'ConstantBias'", _listed(at_25), "at 25 degC, so that it is 0 at T_0"),
-        ("'TemperatureBias'", _listed(slopes), "a kelvin"),
+        ("'ConstantBias'", _format_vector(at_25), "at 25 degC, so that it is 0 at T_0"),
+        ("'TemperatureBias'", _format_vector(slopes), "a kelvin"),
     ], words
 
 
-def _parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
+def _map_parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
     model = axis.model
     samples = imu.horizon * imu.rate
     flickers = model.B > 0 and model.T_B is None and not model.further
-    if flickers and not model.R and samples <= _REACH * _MOST_POLES:
-        poles = min(math.ceil(2.0 * samples), _MOST_POLES)
+    if flickers and not model.R and samples <= _MAX_SAMPLES_PER_POLE * _MAX_POLES:
+        poles = min(math.ceil(2.0 * samples), _MAX_POLES)
         words = [
             f"flicker noise B = {model.B:.3e} is made by {poles} poles; its Allan deviation is "
-            f"within 11 % up to {_REACH * poles / imu.rate:.4g} s"
+            f"within 11 % up to {_MAX_SAMPLES_PER_POLE * poles / imu.rate:.4g} s"
         ]
         rest = NoiseModel(Q=model.Q, N=model.N, K=model.K, sinusoids=model.sinusoids)
         with_walk = as_process(rest, imu.horizon, imu.rate, walk=True)
@@ -140,11 +146,11 @@ def _parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
     return mapped, _Parameters(process.N, process.K, drive, coefficients)
 
 
-def _vector(value: float) -> str:
-    return _listed([value] * 3)
+def _format_equal_vector(value: float) -> str:
+    return _format_vector([value] * 3)
 
 
-def _listed(values: Sequence[float]) -> str:
+def _format_vector(values: Sequence[float]) -> str:
     return f"[{', '.join(f'{value:.9g}' for value in values)}]"
 
 

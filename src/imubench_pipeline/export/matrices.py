@@ -1,8 +1,8 @@
 """The matrices of a Kalman filter, as JSON and as ``.npz``.
 
-Every term of a model has its states: none for white noise, one for a Gauss-Markov process and a
-random walk, two for a ramp, a line and quantization noise; flicker noise is a bank of Gauss-Markov
-processes followed up to four times the horizon. Continuous in time
+The states depend on the terms: none for white noise; one for a Gauss-Markov process and a random
+walk; two for a ramp, a line and quantization noise. Flicker noise is approximated by a bank of
+Gauss-Markov processes up to four times the horizon. In continuous time
 
     x' = F x + w, E[w w'] = Q delta, z = H x + v, E[v v'] = R delta,
 
@@ -25,13 +25,13 @@ from scipy.linalg import block_diag
 
 from imubench_pipeline.export.comments import heading
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.mapping import named
+from imubench_pipeline.export.mapping import describe_terms
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-FOLLOWED = 4.0
-"""Tau over the horizon up to which flicker noise is followed."""
+FLICKER_TAU_OVER_HORIZON = 4.0
+"""Longest tau of the approximation of flicker noise, over the horizon."""
 
 _CONVENTION = (
     "SI; densities are two-sided. Continuous: x' = F x + w, z = H x + v with densities Q and R of "
@@ -55,7 +55,7 @@ class Matrices:
     H, x0 : ndarray, shape (m,)
     R_d : float
     states : sequence of str
-        What each state of the discrete model belongs to.
+        Term of each state of the discrete model.
     """
 
     F: Array
@@ -73,7 +73,7 @@ class Matrices:
 
 def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
     """Return the matrices of a model at a rate, Hz; flicker noise up to four times `horizon`, s."""
-    longest = max(FOLLOWED * horizon, 4.0 / rate)
+    longest = max(FLICKER_TAU_OVER_HORIZON * horizon, 4.0 / rate)
     terms = model.realised(1.0 / rate, longest)
     discrete = model.state_space(rate, longest)
     spaces = [term.continuous_space() for term in terms]
@@ -90,12 +90,12 @@ def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
         R_d=discrete.measurement_noise,
         x0=discrete.initial_mean,
         P0=discrete.initial_variance,
-        states=[named([t]) for t in terms for _ in t.state_space(1.0 / rate).output],
+        states=[describe_terms([t]) for t in terms for _ in t.state_space(1.0 / rate).output],
     )
 
 
 def write_json(imu: Imu) -> str:
-    """Return all matrices of gyro and accelerometer, as far as there are estimates, as JSON."""
+    """Return all matrices as JSON; a quantity without an estimate is absent."""
     content: dict[str, object] = {
         "about": heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)),
         "sensor": imu.sensor,
@@ -109,7 +109,7 @@ def write_json(imu: Imu) -> str:
         content[name] = {
             "model": axis.model.name,
             "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
-            "parameters": _parameters(axis.model),
+            "parameters": _list_parameters(axis.model),
             "density_bounded": list(axis.bounded) if axis.bounded else None,
             "states": list(of_axis.states),
             "continuous": {
@@ -130,7 +130,7 @@ def write_json(imu: Imu) -> str:
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
-def _parameters(model: NoiseModel) -> dict[str, object]:
+def _list_parameters(model: NoiseModel) -> dict[str, object]:
     parameters: dict[str, object] = {
         name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")
     }

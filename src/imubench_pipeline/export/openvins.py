@@ -30,18 +30,18 @@ def write(imu: Imu) -> str:
         "%YAML:1.0\n\n"
         + commented(about)
         + "imu0:\n"
-        + _matrix("T_i_b", 4)
+        + _format_matrix("T_i_b", 4)
         + densities(mapped, indent)
         + setting("rostopic", TOPIC, "of sensor_msgs/Imu", indent)
         + setting("time_offset", plain(0.0), "s", indent)
         + setting("update_rate", plain(imu.rate), "Hz", indent)
         + setting("model", '"kalibr"', "of the intrinsics", indent)
-        + "".join(_matrix(name, 3) for name in ("Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC"))
-        + _matrix("Tg", 3, diagonal="0.0")
+        + "".join(_format_matrix(name, 3) for name in ("Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC"))
+        + _format_matrix("Tg", 3, diagonal="0.0")
     )
 
 
-def _matrix(name: str, size: int, diagonal: str = "1.0") -> str:
+def _format_matrix(name: str, size: int, diagonal: str = "1.0") -> str:
     rows = [
         "    - [" + ", ".join(diagonal if i == j else "0.0" for j in range(size)) + "]\n"
         for i in range(size)

@@ -1,7 +1,7 @@
-"""The smallest noise model that lies above a measured curve: a safe one for a filter.
+"""Overbounding: the smallest noise model that lies above a measured Allan variance curve.
 
-A filter that loads too little noise is overconfident; multiplying everything by ten wastes the
-sensor. Wanted is the smallest model of a family (N+K, N+GM, N+GM+K) for which
+A filter with too small a noise model is overconfident; a model that is ten times too large wastes
+the sensor. This module finds the smallest model of a family (N+K, N+GM, N+GM+K) for which
 
 - the Allan variance lies above the upper limit of the measured one at every tau up to the longest;
 - the spectral density lies above the fitted one in a band, by default from a tenth of 1 / horizon
@@ -9,29 +9,33 @@ sensor. Wanted is the smallest model of a family (N+K, N+GM, N+GM+K) for which
 - the variances of the first and the second integral lie above the fitted ones at every time up to
   the horizon (`imubench_pipeline.export.growth`).
 
-The Allan variance alone does not do it: it says little of how the power lies within an octave or
-two, and a filter sees that. A spectral density that lies above at every frequency bounds the
-covariance of any linear filter that is stationary in time [1, 2].
+A bound on the Allan variance alone is not enough. It hardly resolves how the power is distributed
+within an octave or two, and the covariance of a filter depends on that distribution. A spectral
+density that lies above the true one at every frequency bounds the covariance of any linear filter
+that is stationary in time [1, 2].
 
-The limits of a measured curve hold at each tau; the true curve leaves them somewhere in a fifth to
-a third of the logs. The limits used here hold for the curve as a whole: at each tau the chance
-of an error is 5 % over the number of octaves of the curve, since Allan variances an octave apart
-are nearly independent. Density and integrals are bounded by noise models that the log allows, drawn
-jointly from the posterior of the fit: their limits lie above 95 % of the models everywhere at once.
-Of a fit without draws they are widened as the measured curve is, which is less sure, at the same
-time scale: the density at f by the factor at tau = 0.37 / f, where the Allan variance looks, the
-integrals at t by that at tau = t. Widened so, on 100 simulated logs of 10 h of each of three
-sensors (``benchmarks/overbound.py``), the models lay above the true curve in 99 or
-100, and a filter that loads them was overconfident in one at most. With the noise of the MTi-7's
-gyro their Allan variance was 1.18 (N+K) and 1.12 times the true one at its minimum, in the median.
-No random walk lies close above flicker noise: there it was 5.0 times, 4.5 of them the family's.
+The confidence limits of a measured curve hold at each tau separately; the true curve leaves them
+somewhere in a fifth to a third of the logs. The limits used here hold simultaneously for the whole
+curve: the error probability at each tau is 5 % over the number of octaves of the curve (Bonferroni
+correction), since Allan variances an octave apart are nearly independent.
 
-A random walk cannot follow a Gauss-Markov process: beyond 2 T_B it must lie ever further above it,
-and below the band its density still rises. So what a family costs is told with the model, and one
-whose Allan deviation must be more than three times its limit is refused, with what the other
-families would come to.
+Density and integrals are bounded by noise models that are drawn jointly from the posterior of the
+fit: their limits lie above 95 % of the models at all frequencies and times simultaneously. Without
+draws, the fitted density and integrals are widened by the factors of the measured curve, which is
+less reliable. The time scale is the same: the density at f is widened by the factor at
+tau = 0.37 / f, where the transfer function of the Allan variance has its maximum, and the integrals
+at t by the factor at tau = t. With this widening, on 100 simulated logs of 10 h of each of three
+sensors (``benchmarks/overbound.py``), the models lay above the true curve in 99 or 100 logs, and a
+filter with these models was overconfident in one at most. With the noise of the MTi-7's gyro their
+Allan variance was 1.18 (N+K) and 1.12 times the true one at its minimum, in the median. No random
+walk lies close above flicker noise: there it was 5.0 times, and 4.5 times come from the family.
 
-The search for it is in `imubench_pipeline.export.smallest_model`.
+A random walk cannot follow a Gauss-Markov process: beyond 2 T_B its Allan variance must lie ever
+further above that process, and below the band its density still rises. The excess of a family is
+therefore reported with the model. A model whose Allan deviation must be more than three times its
+limit is refused, and the error names the excess of the other families.
+
+`imubench_pipeline.export.smallest_model` does the search.
 
 References
 ----------
@@ -56,31 +60,34 @@ from imubench_pipeline.export.smallest_model import (
     Family,
     Limits,
     count_of_points,
-    smallest,
+    find_smallest,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_LOOKS_AT = 0.37
-"""f tau at which the Allan variance looks: where sin^4(x) / x^2 is largest, over pi."""
+_ALLAN_PEAK_FREQUENCY = 0.37
+"""f tau at the maximum of the transfer function of the Allan variance.
 
-_MEMORY = 0.1
-"""Lowest frequency times the horizon, by default."""
+The function is sin^4(x) / x^2 with x = pi f tau; the constant is x at its maximum, over pi."""
+
+_MIN_FREQUENCY_TIMES_HORIZON = 0.1
+"""Default of the lowest frequency of the band, in 1 / horizon."""
 
 _POINTS_A_DECADE = 12
-_BEYOND = 30.0
-"""Longest correlation time tried over the longest tau or the horizon."""
+_MAX_TIME_RATIO = 30.0
+"""Max. T_B of the search, over the larger of the longest tau and the horizon."""
 
-MOST_EXCESS = 3.0
-"""Largest Allan deviation of a model over the limit that it must lie above, by default."""
+MAX_EXCESS = 3.0
+"""Default of the max. ratio of a model's Allan deviation to its limit."""
 
-_WALK_FOLLOWS = 2.0
-"""Horizon over T_B up to which a random walk follows a Gauss-Markov process."""
+_MAX_HORIZON_OVER_T_B = 2.0
+"""Max. horizon over T_B for which a random walk can replace a Gauss-Markov process."""
 
-_BELOW_BAND = 1e-4
-"""Lowest frequency over that of the band down to which the densities are compared."""
+_MIN_FREQUENCY_RATIO = 1e-4
+"""Lowest frequency at which densities are compared, over the lowest of the band."""
 
-_TOUCHES = 1.01
+_MAX_RATIO_AT_CONTACT = 1.01
+"""Max. ratio of a model to a limit for which the model is reported to touch the limit."""
 
 
 @dataclass(frozen=True)
@@ -96,17 +103,18 @@ class Overbound:
     tau, ratio : ndarray, shape (m,)
         Allan variance of the model over the measured one, at tau up to ``longest``.
     at_minimum : float
-        That ratio at the minimum of the measured curve.
+        ``ratio`` at the minimum of the measured curve.
     touches : mapping of str to float
-        Where the model comes within 1 % of its limits: kind, and tau, frequency or time.
+        Tau, frequency or time where the model is closest to a limit, by kind of limit; only limits
+        that are within 1 %.
     excess : (float, float)
-        Largest Allan deviation of the model over its limit, and the tau where that is, s: what
-        the family costs, however long the log.
+        Max. ratio of the model's Allan deviation to its limit, and its tau, s. It depends on the
+        family; a longer log does not reduce it.
     passed_below : float or None
-        Frequency, Hz, below which the fitted density is above that of the model; None: as far as
-        a ten-thousandth of the lowest of the band it nowhere is.
+        Frequency, Hz, below which the fitted density is above the density of the model; None: it
+        is not, down to a ten-thousandth of the lowest frequency of the band.
     warning : str or None
-        The family does not suit the horizon, in words; with what the others would come to.
+        Why the family does not suit the horizon, with the excess of the other families.
     """
 
     model: NoiseModel
@@ -124,7 +132,7 @@ class Overbound:
 
     @property
     def words(self) -> str:
-        """What the model is, for the head of a file."""
+        """Description of the model, for the head of a file."""
         return (
             f"this is the smallest {self.family} that lies above the measured Allan variance at "
             f"every tau up to {self.longest:.4g} s (95 % for all together), above the fitted "
@@ -136,7 +144,7 @@ class Overbound:
 
     @property
     def density_words(self) -> str:
-        """Above which frequency the density is bounded, for the head of a file."""
+        """Range of frequencies where the density is bounded, for the head of a file."""
         low = self.band[0]
         if self.passed_below is None:
             below = "the fitted density is nowhere above it there, but it is less sure"
@@ -149,15 +157,17 @@ class Overbound:
 
 
 def simultaneous_upper(curve: AllanCurve, longest: float, confidence: float = 0.95) -> Array:
-    """Return upper limits of an Allan variance that hold at every tau together.
+    """Return simultaneous upper confidence limits of an Allan variance.
+
+    They follow from the limits at single tau by a Bonferroni correction for the number of octaves.
 
     Parameters
     ----------
     curve : AllanCurve
     longest : float
-        Longest tau that counts, s.
+        Longest tau for which the limits hold, s.
     confidence : float
-        Chance that the true curve lies below the limits at every tau up to ``longest``.
+        Probability that the true curve lies below the limits at every tau up to ``longest``.
 
     Returns
     -------
@@ -181,7 +191,7 @@ def overbound(
     band: tuple[float | None, float | None] = (None, None),
     confidence: float = 0.95,
     drawn: Sequence[NoiseModel] = (),
-    most_excess: float = MOST_EXCESS,
+    most_excess: float = MAX_EXCESS,
 ) -> Overbound:
     """Return the smallest model that lies above a measured curve and its fit.
 
@@ -190,26 +200,26 @@ def overbound(
     curve : AllanCurve
         Measured.
     fitted : NoiseModel
-        Fitted to the same log; ramps and lines have no density and do not grow like noise: where
-        the curve shows them, they count.
+        Fitted to the same log. Ramps and lines have no density and do not grow like noise: they
+        count only by their part of the measured curve.
     rate : float
         Hz.
     family : {"N+K", "N+GM", "N+GM+K"}
         Terms that the model may have.
     horizon : float
-        How long the filter goes without a measurement, s.
+        Longest time that the filter predicts without a measurement, s.
     longest : float, optional
         Longest tau, s; the horizon by default.
     band : (float or None, float or None)
-        Lowest and highest frequency of the density, Hz; by default a tenth of 1 / horizon, and
-        half the rate. A sensor that is filtered below half the rate may say so here.
+        Lowest and highest frequency of the bounded density, Hz; by default a tenth of 1 / horizon,
+        and half the rate. Lower the upper end for a sensor that is filtered below half the rate.
     confidence : float
-        Of the limits, for all tau together.
+        Of the limits, simultaneously for all tau.
     drawn : sequence of NoiseModel
-        Models that the log allows, drawn jointly from the posterior of the fit; without them the
-        fitted model is widened as the measured curve is.
+        Models drawn jointly from the posterior of the fit. Without them the fitted model is
+        widened by the factors of the measured curve.
     most_excess : float
-        Largest Allan deviation of the model over the limit that it must lie above.
+        Max. ratio of the model's Allan deviation to its limit.
 
     Raises
     ------
@@ -219,15 +229,15 @@ def overbound(
         not reach ``longest``.
     """
     reach = longest or horizon
-    ends = (band[0] or _MEMORY / horizon, band[1] or 0.5 * rate)
+    ends = (band[0] or _MIN_FREQUENCY_TIMES_HORIZON / horizon, band[1] or 0.5 * rate)
     limits = limits_of(curve, fitted, rate, horizon, reach, ends, confidence, drawn)
-    times = (2.0 / rate, _BEYOND * max(horizon, reach))
-    model = smallest(limits, family, times)
-    excess = _excess(limits[0], model)
-    unsuited = _unsuited(fitted, family, max(horizon, reach))
+    times = (2.0 / rate, _MAX_TIME_RATIO * max(horizon, reach))
+    model = find_smallest(limits, family, times)
+    excess = _find_excess(limits[0], model)
+    unsuited = _describe_unsuited_family(fitted, family, max(horizon, reach))
     warning = None
     if excess[0] > most_excess or unsuited:
-        offer = _offer(limits, family, times, excess, unsuited, most_excess)
+        offer = _compare_families(limits, family, times, excess, unsuited, most_excess)
         if excess[0] > most_excess:
             raise ValueError(f"{offer}; at most {most_excess:g} times is allowed")
         warning = offer
@@ -237,7 +247,7 @@ def overbound(
     touches = {}
     for limit in limits:
         above = limit.ratio(model)
-        if above.min() < _TOUCHES:
+        if above.min() < _MAX_RATIO_AT_CONTACT:
             touches[limit.kind] = float(limit.x[np.argmin(above)])
     lowest = float(ratio[np.argmin(measured)])
     return Overbound(
@@ -251,31 +261,31 @@ def overbound(
         lowest,
         touches,
         excess,
-        _passed_below(model, fitted, rate, ends[0]),
+        _find_crossing_frequency(model, fitted, rate, ends[0]),
         warning,
     )
 
 
-def _excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
-    """Return the largest deviation of a model over a limit, and where that is."""
+def _find_excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
+    """Return the max. ratio of a model's Allan deviation to a limit, and its tau, s."""
     above = limit.ratio(model)
     worst = int(np.argmax(above))
     return math.sqrt(float(above[worst])), float(limit.x[worst])
 
 
-def _unsuited(fitted: NoiseModel, family: Family, horizon: float) -> str | None:
-    """Say so where a random walk is to follow a Gauss-Markov process beyond 2 T_B."""
+def _describe_unsuited_family(fitted: NoiseModel, family: Family, horizon: float) -> str | None:
+    """Describe a family whose random walk would have to follow a process beyond 2 T_B."""
     processes = [term.gauss_markov for term in fitted.terms if term.gauss_markov is not None]
     times = [process.T_B for process in processes]
-    if "GM" in family or not times or horizon <= _WALK_FOLLOWS * min(times):
+    if "GM" in family or not times or horizon <= _MAX_HORIZON_OVER_T_B * min(times):
         return None
     return (
         f"a random walk cannot follow a Gauss-Markov process of T_B = {min(times):.4g} s beyond "
-        f"2 T_B = {_WALK_FOLLOWS * min(times):.4g} s"
+        f"2 T_B = {_MAX_HORIZON_OVER_T_B * min(times):.4g} s"
     )
 
 
-def _offer(
+def _compare_families(
     limits: Sequence[Limits],
     family: Family,
     times: tuple[float, float],
@@ -283,13 +293,13 @@ def _offer(
     unsuited: str | None,
     most_excess: float,
 ) -> str:
-    """Return how far a family is above its limits, why, and how far the others would be."""
+    """Describe the excess of a family, its reason, and the excess of the other families."""
     words = (
         f"the Allan deviation of the smallest {family} is {excess[0]:.3g} times its limit at "
         f"{excess[1]:.4g} s"
     )
     others = {
-        other: _excess(limits[0], smallest(limits, other, times))[0]
+        other: _find_excess(limits[0], find_smallest(limits, other, times))[0]
         for other in FAMILIES
         if other != family
     }
@@ -304,11 +314,11 @@ def _offer(
     return f"{words}{reason}; no family comes closer than {least:.3g} times"
 
 
-def _passed_below(
+def _find_crossing_frequency(
     model: NoiseModel, fitted: NoiseModel, rate: float, lowest: float
 ) -> float | None:
-    """Return the frequency below the band from which on the fitted density is the larger."""
-    frequency = np.geomspace(lowest, _BELOW_BAND * lowest, 400)
+    """Return the highest frequency below the band where the fitted density is the larger."""
+    frequency = np.geomspace(lowest, _MIN_FREQUENCY_RATIO * lowest, 400)
     passed = np.flatnonzero(fitted.psd(frequency, rate) > model.psd(frequency))
     return float(frequency[passed[0]]) if len(passed) else None
 
@@ -323,7 +333,7 @@ def limits_of(
     confidence: float = 0.95,
     drawn: Sequence[NoiseModel] = (),
 ) -> list[Limits]:
-    """Return what a model must lie above: Allan variance, density, two integrals (`overbound`)."""
+    """Return the limits on Allan variance, density and two integrals (see `overbound`)."""
     if not 2.0 / rate < horizon:
         raise ValueError(f"the horizon of {horizon:g} s is shorter than two samples")
     if longest > curve.tau[-1] * (1.0 + 1e-9):
@@ -340,9 +350,9 @@ def limits_of(
         return np.concatenate((model.psd(frequency, rate), grown.first, grown.second))
 
     if drawn:
-        wider = of_model(fitted) * _above_draws(of_model(fitted), map(of_model, drawn), confidence)
+        wider = of_model(fitted) * _bound_draws(of_model(fitted), map(of_model, drawn), confidence)
     else:
-        looked = np.concatenate((_LOOKS_AT / frequency, time, time))
+        looked = np.concatenate((_ALLAN_PEAK_FREQUENCY / frequency, time, time))
         factors = np.interp(np.log(looked), np.log(curve.tau), upper / curve.variance)
         wider = of_model(fitted) * factors
     density, first, second = np.split(wider, [len(frequency), len(frequency) + len(time)])
@@ -355,11 +365,12 @@ def limits_of(
     ]
 
 
-def _above_draws(fitted: Array, drawn: Iterable[Array], confidence: float) -> Array:
-    """Return factors of a fit that lie above a share of the draws, at every place at once.
+def _bound_draws(fitted: Array, drawn: Iterable[Array], confidence: float) -> Array:
+    """Return factors on a fit that bound a share of the draws simultaneously at every point.
 
-    In units of the spread of its logarithm at each place, every draw has one place where it is
-    furthest above the fit: the limit lies as many above as that share of the draws stays below.
+    The logarithm of draw over fit is divided by its root mean square at each point. Each draw has
+    a maximum of this quotient over all points. The limit is the quantile of these maxima, as for a
+    simultaneous (sup-t) confidence band.
     """
     above = np.log(np.array([*drawn]) / fitted)
     spread = np.maximum(np.sqrt(np.mean(above**2, axis=0)), 1e-12)

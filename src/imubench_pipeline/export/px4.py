@@ -1,18 +1,20 @@
 """PX4: parameters of its estimator EKF2, as a file that QGroundControl loads.
 
-``EKF2_GYR_NOISE`` and ``EKF2_ACC_NOISE`` are deviations a step of the filter, not densities: a step
-of dt adds (dt noise)^2 to the variance of the angle or velocity increment, and (dt noise)^2 with
-``EKF2_GYR_B_NOISE`` and ``EKF2_ACC_B_NOISE`` to that of the bias. With N^2 dt and K^2 dt
+``EKF2_GYR_NOISE`` and ``EKF2_ACC_NOISE`` are standard deviations per filter step, not densities. A
+step of dt adds (dt noise)^2 to the variance of the angle or velocity increment, and (dt b_noise)^2,
+with b_noise ``EKF2_GYR_B_NOISE`` or ``EKF2_ACC_B_NOISE``, to the variance of the bias. These must
+equal N^2 dt and K^2 dt:
 
     EKF2_GYR_NOISE = N / sqrt(dt),   EKF2_GYR_B_NOISE = K / sqrt(dt),
 
-where dt is EKF2_PREDICT_US, 10 ms by default and whatever the rate of the sensor. The parameters
-have ranges; values outside are set to their end, and said.
+where dt is EKF2_PREDICT_US, 10 ms by default, independent of the rate of the sensor. The parameters
+have ranges; values outside are clipped, and the file notes this.
 
-Where the log tells how the biases follow the temperature, ``TC_G0_*`` and ``TC_A0_*`` hold it: the
-program takes x0 + x1 dT + x2 dT^2 + x3 dT^3 from a reading, dT = T - TREF, T clipped to TMIN and
-TMAX. They do nothing before the device is named and the correction is switched on. x0 is 0: the
-bias at T_0 is for the calibration of the vehicle, and an accelerometer's holds gravity.
+If the log determines the effect of temperature on the biases, ``TC_G0_*`` and ``TC_A0_*`` contain
+it. PX4 subtracts x0 + x1 dT + x2 dT^2 + x3 dT^3 from a reading, with dT = T - TREF and T clipped to
+TMIN and TMAX. The parameters have no effect until the device is named and the correction is
+switched on. x0 is 0: the calibration of the vehicle determines the bias at T_0, and the mean of an
+accelerometer contains gravity.
 
 Sources: PX4/PX4-Autopilot, src/modules/ekf2/EKF/covariance.cpp (predictCovariance),
 src/modules/ekf2/EKF/python/ekf_derivation/derivation.py (predict_covariance),
@@ -32,19 +34,19 @@ from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES
 from imubench_pipeline.export.walks import walks
 
-PERIOD = 10_000
-"""EKF2_PREDICT_US by default, us."""
+DEFAULT_PERIOD = 10_000
+"""Default of EKF2_PREDICT_US, us."""
 
-_PERIODS = (1_000, 20_000)
-_RANGES = {
+_PERIOD_RANGE = (1_000, 20_000)
+_PARAMETER_RANGES = {
     "EKF2_ACC_NOISE": (0.01, 1.0),
     "EKF2_GYR_NOISE": (1e-4, 0.1),
     "EKF2_ACC_B_NOISE": (0.0, 0.01),
     "EKF2_GYR_B_NOISE": (0.0, 0.01),
 }
-_REAL, _INTEGER = 9, 6  # MAV_PARAM_TYPE
-_LETTERS = {"gyro": "G", "accel": "A"}
-_WORDS = {"gyro": "GYRO", "accel": "ACC"}
+_REAL32_TYPE, _INT32_TYPE = 9, 6  # MAV_PARAM_TYPE
+_TC_PREFIX_LETTERS = {"gyro": "G", "accel": "A"}
+_CAL_PREFIXES = {"gyro": "GYRO", "accel": "ACC"}
 
 _CONVENTION = (
     "Noise a step of the filter of {step:g} ms: N / sqrt(dt) and K / sqrt(dt), dt = "
@@ -54,7 +56,7 @@ _CONVENTION = (
 )
 
 
-def write(imu: Imu, period: int = PERIOD) -> str:
+def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
     """Return a parameter file for a `period`, EKF2_PREDICT_US, in us.
 
     Raises
@@ -62,8 +64,10 @@ def write(imu: Imu, period: int = PERIOD) -> str:
     ExportError
         If gyro or accelerometer has no estimate, or the period is outside its range.
     """
-    if not _PERIODS[0] <= period <= _PERIODS[1]:
-        raise ExportError(f"EKF2_PREDICT_US is {period}, expected {_PERIODS[0]} to {_PERIODS[1]}")
+    if not _PERIOD_RANGE[0] <= period <= _PERIOD_RANGE[1]:
+        raise ExportError(
+            f"EKF2_PREDICT_US is {period}, expected {_PERIOD_RANGE[0]} to {_PERIOD_RANGE[1]}"
+        )
     mapped = walks(imu)
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     step = math.sqrt(period * 1e-6)
@@ -77,7 +81,7 @@ def write(imu: Imu, period: int = PERIOD) -> str:
     about = heading(imu, "PX4 EKF2", convention, temperature=True) + mapping_words(mapped)
     rows = []
     for name, (value, comment) in values.items():
-        low, high = _RANGES[name]
+        low, high = _PARAMETER_RANGES[name]
         clipped = min(max(value, low), high)
         if clipped != value:
             about.append(
@@ -85,17 +89,19 @@ def write(imu: Imu, period: int = PERIOD) -> str:
                 "set."
             )
         about.append(f"{name} = {clipped:.6g} {comment}.")
-        rows.append(f"1\t1\t{name}\t{clipped:.9g}\t{_REAL}\n")
-    rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INTEGER}\n")
+        rows.append(f"1\t1\t{name}\t{clipped:.9g}\t{_REAL32_TYPE}\n")
+    rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INT32_TYPE}\n")
     for quantity in imu.temperature:
-        corrections = _corrections(imu, quantity)
-        rows += [f"1\t1\t{name}\t{value:.9g}\t{_REAL}\n" for name, value in corrections.items()]
+        corrections = _list_corrections(imu, quantity)
+        rows += [
+            f"1\t1\t{name}\t{value:.9g}\t{_REAL32_TYPE}\n" for name, value in corrections.items()
+        ]
         if corrections:
-            letter = _LETTERS[quantity]
+            letter = _TC_PREFIX_LETTERS[quantity]
             about.append(
                 f"TC_{letter}0_*: x, y and z of the log are taken for the axes of the device, and "
                 "its temperature for that of the driver; nothing is corrected before "
-                f"TC_{letter}0_ID names the device, as CAL_{_WORDS[quantity]}0_ID does, and "
+                f"TC_{letter}0_ID names the device, as CAL_{_CAL_PREFIXES[quantity]}0_ID does, and "
                 f"TC_{letter}_ENABLE is 1. The noise above is that of the log as it is, the "
                 "temperature's part included; --method compensated gives what is left."
             )
@@ -103,15 +109,15 @@ def write(imu: Imu, period: int = PERIOD) -> str:
     return commented(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)
 
 
-def _corrections(imu: Imu, quantity: str) -> dict[str, float]:
-    """Return the parameters of the correction for temperature; none where no axis is told."""
+def _list_corrections(imu: Imu, quantity: str) -> dict[str, float]:
+    """Return the parameters of the temperature correction; none if no axis has an estimate."""
     effect = imu.temperature[quantity]
     if not effect.slope:
         return {}
-    name = f"TC_{_LETTERS[quantity]}0_"
+    name = f"TC_{_TC_PREFIX_LETTERS[quantity]}0_"
     parameters = {"TREF": effect.reference, "TMIN": effect.low, "TMAX": effect.high}
     for number, axis in enumerate(AXES):
-        # All four: what an earlier calibration left would stay else.
+        # All four, to overwrite the values of an earlier calibration.
         parameters[f"X0_{number}"] = parameters[f"X3_{number}"] = 0.0
         parameters[f"X1_{number}"] = effect.slope.get(axis, 0.0)
         parameters[f"X2_{number}"] = effect.square.get(axis, 0.0)

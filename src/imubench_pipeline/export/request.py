@@ -1,4 +1,4 @@
-"""From the tables of a run to the file of a program."""
+"""Make the file of a program from the tables of a run."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.rows import draws
 from imubench_pipeline.export.choice import WORST, Choice, choose
 from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
-from imubench_pipeline.export.mapping import named
-from imubench_pipeline.export.overbound import MOST_EXCESS, overbound
+from imubench_pipeline.export.mapping import describe_terms
+from imubench_pipeline.export.overbound import MAX_EXCESS, overbound
 from imubench_pipeline.export.smallest_model import FAMILIES, Family
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.export.temperature import TemperatureEffect, temperature_effect
@@ -35,7 +35,7 @@ NEEDED = ("recordings", "parameters", "allan", "temperature")
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What a file is to be made of.
+    """Options of an exported file.
 
     Attributes
     ----------
@@ -44,18 +44,17 @@ class Request:
     horizon : float
         s.
     because : str or None
-        Reason of the inflation, or of the use of recordings that do not decide.
+        Reason of the inflation, or of the use of recordings that are excluded from decisions.
     overbound : bool
-        The smallest model that lies above the measured curve, in place of the fitted one.
+        Export the smallest model that lies above the measured curve instead of the fitted one.
     most_excess : float
-        Largest Allan deviation of an overbound over the limit that it must lie above: a model that
-        is larger is refused.
+        Max. ratio of the Allan deviation of an overbound to its limit; a larger model is refused.
     method : str or None
         Estimation method; None: the recommended one.
     latitude : float or None
-        Degrees: for gravity; None: standard gravity.
+        For gravity, degrees; None: standard gravity.
     rate : float or None
-        Of the samples that the program will get, Hz; None: that of the recording.
+        Of the samples that the program will get, Hz; None: the rate of the recording.
     """
 
     sensor: str
@@ -65,14 +64,14 @@ class Request:
     inflation: float = 1.0
     because: str | None = None
     overbound: bool = False
-    most_excess: float = MOST_EXCESS
+    most_excess: float = MAX_EXCESS
     method: str | None = None
     latitude: float | None = None
     rate: float | None = None
 
 
 def load(path: Path) -> dict[str, pa.Table]:
-    """Read the tables of a run, of the folder of its results or of ``tables`` in it.
+    """Read the tables of a run from the folder of its results, or from ``tables`` in it.
 
     Raises
     ------
@@ -87,42 +86,42 @@ def load(path: Path) -> dict[str, pa.Table]:
 
 
 def recordings_of(path: Path) -> Path:
-    """Return the folder of the recordings of a run, of a path as `load` takes it."""
+    """Return the folder of the recordings of a run, for a path as in `load`."""
     return tables_folder(path).parent / "recordings"
 
 
-def made(tables: Tables, request: Request, recordings: Path | None = None) -> str | bytes:
+def make_content(tables: Tables, request: Request, recordings: Path | None = None) -> str | bytes:
     """Return the content of the file.
 
     Parameters
     ----------
     tables : mapping of str to pyarrow.Table
-        Those of `NEEDED`, of a run.
+        The tables `NEEDED` of a run.
     request : Request
     recordings : Path, optional
-        Folder of the recordings of the run: their tables ``draws`` say how sure a fit is that is to
-        be bounded.
+        Folder of the recordings of the run. Their tables ``draws`` contain the posterior of the
+        fits, for an overbound.
 
     Raises
     ------
     ExportError
-        If the sensor or target is not known, or the target cannot hold what there is.
+        If the sensor or target is not known, or the target does not support the estimates.
     """
     if request.target not in TARGETS:
         raise ExportError(
             f"target {request.target!r} is not known; there are: {', '.join(TARGETS)}"
         )
-    return TARGETS[request.target].write(imu_of(tables, request, recordings))
+    return TARGETS[request.target].write(build_imu(tables, request, recordings))
 
 
-def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
-    """Return the sensor's noise as a request asks for it (see `made`)."""
-    recordings = _rows(RecordingRow, tables, sensor=request.sensor)
+def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
+    """Return the noise of the sensor of a request (see `make_content`)."""
+    recordings = _select_rows(RecordingRow, tables, sensor=request.sensor)
     if not recordings:
         sensors = sorted(set(tables["recordings"]["sensor"].to_pylist()))
         raise ExportError(f"no sensor {request.sensor!r}; there are: {', '.join(sensors)}")
     by_name = {row.recording: row for row in recordings}
-    rows, cautions = _deciding(tables, request, recordings)
+    rows, cautions = _select_deciding(tables, request, recordings)
     axes: dict[str, AxisNoise] = {}
     rates: list[float] = []
     effects: dict[str, TemperatureEffect] = {}
@@ -144,13 +143,13 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
         simulated = simulated or about.simulated
         if about.rate is None:
             raise ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
-        rates.append(float(f"{about.rate:.9g}"))  # stamps are not sure of more
+        rates.append(float(f"{about.rate:.9g}"))  # time stamps are not more accurate
         axes[quantity] = choice.axis
         place = {"sensor": request.sensor, "recording": choice.recording}
-        warmed = _rows(TemperatureRow, tables, **place)
+        warmed = _select_rows(TemperatureRow, tables, **place)
         effects[quantity] = temperature_effect(warmed, about, quantity, request.horizon)
         if request.overbound:
-            axes[quantity] = _bounded(tables, choice, request, about.rate, folder)
+            axes[quantity] = _bound_axis(tables, choice, request, about.rate, folder)
     if not axes:
         reasons = "; ".join(row.reason for row in recordings if row.reason)
         raise ExportError(f"{request.sensor}: no estimate; its recordings are left out: {reasons}")
@@ -170,11 +169,11 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
     )
 
 
-def _deciding(
+def _select_deciding(
     tables: Tables, request: Request, recordings: Sequence[RecordingRow]
 ) -> tuple[list[ParameterRow], list[str]]:
-    """Return the estimates that an export may stand on, and what is to be said of the others."""
-    rows = _rows(ParameterRow, tables, sensor=request.sensor)
+    """Return the estimates that an export may use, and cautions about the others."""
+    rows = _select_rows(ParameterRow, tables, sensor=request.sensor)
     apart = left_out(recordings)
     without = [
         f"left out: {row.recording} is {row.status}: {row.reason}"
@@ -195,21 +194,21 @@ def _deciding(
     return deciding, [f"left out: {reasons}", *without]
 
 
-def _drawn(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseModel]:
-    """Return the noise models that the log of the chosen axis allows; none where none are kept."""
+def _load_draws(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseModel]:
+    """Return posterior draws of the noise model of the chosen axis; none if none were stored."""
     path = folder / sensor / choice.recording / "draws.parquet" if folder is not None else None
     drawn = draws(path).get((choice.channel, choice.method)) if path and path.is_file() else None
     return () if drawn is None else [drawn.model(number) for number in range(len(drawn))]
 
 
-def _bounded(
+def _bound_axis(
     tables: Tables, choice: Choice, request: Request, rate: float, folder: Path | None
 ) -> AxisNoise:
-    """Return the smallest model above the measured curve of the axis that was chosen."""
+    """Return the smallest model above the measured curve of the chosen axis."""
     family = TARGETS[request.target].family
-    drawn = _drawn(folder, request.sensor, choice)
+    drawn = _load_draws(folder, request.sensor, choice)
     place = {"sensor": request.sensor, "recording": choice.recording, "channel": choice.channel}
-    curve = curve_of(_rows(AllanRow, tables, **place))
+    curve = curve_of(_select_rows(AllanRow, tables, **place))
     try:
         bound = overbound(
             curve,
@@ -222,19 +221,19 @@ def _bounded(
         )
     except ValueError as error:
         raise ExportError(
-            f"{choice.channel} of {choice.recording}: {error}{_holding(family)}; or take a horizon "
-            f"shorter than {request.horizon:g} s, or the fitted model without overbound, or allow "
-            "a larger excess"
+            f"{choice.channel} of {choice.recording}: {error}{_name_larger_programs(family)}; or "
+            f"take a horizon shorter than {request.horizon:g} s, or the fitted model without "
+            "overbound, or allow a larger excess"
         ) from error
-    fitted = f"the fitted model was: {named(choice.axis.model.terms)}"
+    fitted = f"the fitted model was: {describe_terms(choice.axis.model.terms)}"
     notes = [bound.words, bound.density_words, fitted, *choice.axis.notes]
     if bound.warning:
-        notes.insert(0, f"WARNING: {bound.warning}{_holding(family)}")
+        notes.insert(0, f"WARNING: {bound.warning}{_name_larger_programs(family)}")
     return replace(choice.axis, model=bound.model, notes=notes, bounded=bound.band)
 
 
-def _holding(family: Family) -> str:
-    """Name the programs that hold more terms than a family has."""
+def _name_larger_programs(family: Family) -> str:
+    """Name the programs that support more terms than a family has."""
     kinds = {
         other: ", ".join(name for name, target in TARGETS.items() if target.family == other)
         for other in FAMILIES
@@ -244,7 +243,7 @@ def _holding(family: Family) -> str:
 
 
 def curve_of(rows: Sequence[AllanRow]) -> AllanCurve:
-    """Return the curve of rows of the table ``allan`` of one channel; ExportError without any."""
+    """Return the curve of one channel from rows of ``allan``; ExportError without any."""
     if not rows:
         raise ExportError("the channel has no Allan variance")
     return AllanCurve(
@@ -256,7 +255,7 @@ def curve_of(rows: Sequence[AllanRow]) -> AllanCurve:
     )
 
 
-def _rows(of: type[R], tables: Tables, **wanted: str) -> list[R]:
+def _select_rows(of: type[R], tables: Tables, **wanted: str) -> list[R]:
     table = tables[of.table]
     for name, value in wanted.items():
         table = table.filter(pc.equal(table[name], value))

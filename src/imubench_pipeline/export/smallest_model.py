@@ -1,9 +1,10 @@
-"""The smallest noise model of a family that lies above limits: linear programs over its densities.
+"""Find the smallest noise model of a family above limits, by linear programs over its densities.
 
-All is linear in the densities N^2, S_B and K^2 at a given T_B: programs inside a search over T_B.
-Smallest is the model with the least mean, over log tau, of the logarithm of its Allan variance over
-the limit. (Its mean ratio, one program, lets the largest ratios rule: where a random walk must be
-far above the curve at long tau, white noise would be raised to make room.)
+For a given T_B all limits are linear in the densities N^2, S_B and K^2. Linear programs are
+therefore solved inside a one-dimensional search over T_B. The smallest model is the model with the
+least mean, over log tau, of the logarithm of the ratio of its Allan variance to the limit. (The
+mean ratio would need one program only, but the largest ratios would dominate it: where a random
+walk must be far above the curve at long tau, the program would raise the white noise instead.)
 """
 
 from __future__ import annotations
@@ -30,29 +31,31 @@ Family = Literal["N+K", "N+GM", "N+GM+K"]
 
 FAMILIES: Sequence[Family] = get_args(Family)
 
-_TIMES_A_DECADE = 6
-"""Correlation times tried before the best is sought between its neighbours."""
+_TIMES_PER_DECADE = 6
+"""Correlation times of the grid search, which a bounded search refines."""
 
-_MOST_PROGRAMS = 12
-_SAME = 1e-6
-"""The programs have come to an end where the mean logarithm falls by less."""
+_MAX_PROGRAMS = 12
+"""Max. number of successive linear programs for one T_B."""
 
-_ABOVE = 1e-9
-"""The model is larger by this, so that no rounding puts it below a limit."""
+_CONVERGED_DECREASE = 1e-6
+"""Converged where the mean logarithm decreases by less."""
+
+_ROUNDING_MARGIN = 1e-9
+"""Relative increase of the densities, so that rounding does not put the model below a limit."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a model must lie above.
+    """Lower limits of a model.
 
     Attributes
     ----------
     kind : str
-        In words.
+        Name of the limited quantity, for texts.
     x, value : ndarray, shape (m,)
-        Tau or time in s, or frequency in Hz, and the least value there.
+        Tau or time in s, or frequency in Hz, and the lower limit there.
     of_term : callable
-        Term -> what is bounded, of this term, at ``x``.
+        Term -> contribution of this term to the limited quantity at ``x``.
     """
 
     kind: str
@@ -61,15 +64,17 @@ class Limits:
     of_term: Callable[[Term], Array]
 
     def ratio(self, model: NoiseModel) -> Array:
-        """Return how many times the limit a model has, shape (m,)."""
+        """Return the ratio of a model to its limit, shape (m,)."""
         return np.asarray(np.sum([self.of_term(term) for term in model.terms], axis=0) / self.value)
 
 
-def smallest(limits: Sequence[Limits], family: Family, times: tuple[float, float]) -> NoiseModel:
+def find_smallest(
+    limits: Sequence[Limits], family: Family, times: tuple[float, float]
+) -> NoiseModel:
     """Return the smallest model of a family that lies above limits.
 
-    The first of the `limits` are those of the Allan variance: there the model is kept close.
-    `times`: shortest and longest T_B to try, s.
+    The first of the `limits` must be on the Allan variance: the model is minimised there.
+    `times`: shortest and longest T_B of the search, s.
 
     Raises
     ------
@@ -81,14 +86,16 @@ def smallest(limits: Sequence[Limits], family: Family, times: tuple[float, float
     walks = family.endswith("K")
     fixed: list[Term] = [WhiteNoise(1.0)] + [RandomWalk(1.0)] * walks
     if "GM" not in family:
-        cost, powers = _program(limits, fixed)
+        cost, powers = _minimise_mean_log_ratio(limits, fixed)
         T_B = None
     else:
-        tried = np.log(np.geomspace(*times, count_of_points(*times, _TIMES_A_DECADE)))
+        tried = np.log(np.geomspace(*times, count_of_points(*times, _TIMES_PER_DECADE)))
 
         def solved(log_time: float) -> tuple[float, Array]:
             time = math.exp(log_time)
-            return _program(limits, [*fixed, GaussMarkov(bias_instability(1.0, time), time)])
+            return _minimise_mean_log_ratio(
+                limits, [*fixed, GaussMarkov(bias_instability(1.0, time), time)]
+            )
 
         costs = [solved(float(x))[0] for x in tried]
         best = int(np.argmin(costs))
@@ -99,7 +106,7 @@ def smallest(limits: Sequence[Limits], family: Family, times: tuple[float, float
         T_B = math.exp(place)
     if not math.isfinite(cost):
         raise ValueError(f"no model {family} lies above the limits")
-    powers = powers * (1.0 + _ABOVE)
+    powers = powers * (1.0 + _ROUNDING_MARGIN)
     B = bias_instability(float(powers[-1]), T_B) if T_B else 0.0
     return NoiseModel(
         N=math.sqrt(powers[0]),
@@ -109,11 +116,13 @@ def smallest(limits: Sequence[Limits], family: Family, times: tuple[float, float
     )
 
 
-def _program(limits: Sequence[Limits], terms: Sequence[Term]) -> tuple[float, Array]:
-    """Return the mean log ratio of the Allan variance to its limit, and the powers of the terms.
+def _minimise_mean_log_ratio(
+    limits: Sequence[Limits], terms: Sequence[Term]
+) -> tuple[float, Array]:
+    """Minimise the mean log ratio of Allan variance to limit; return it, and the densities.
 
-    The logarithm is concave: each program lies on its tangent at the last answer, so that the mean
-    falls from program to program.
+    The objective is a sum of logarithms, which are concave. Each program minimises their tangent at
+    the last solution, an upper bound (majorise-minimise), so that the mean decreases monotonically.
     """
     parts = [
         np.column_stack([limit.of_term(term) for term in terms]) / limit.value[:, None]
@@ -124,18 +133,18 @@ def _program(limits: Sequence[Limits], terms: Sequence[Term]) -> tuple[float, Ar
     curve, rows = parts[0] / scale, rows / scale
     weights = _log_weights(limits[0].x)
     cost, powers, ratio = math.inf, np.zeros(len(terms)), np.ones(len(curve))
-    for _ in range(_MOST_PROGRAMS):
+    for _ in range(_MAX_PROGRAMS):
         answer = linprog(
             (weights / ratio) @ curve, A_ub=-rows, b_ub=-np.ones(len(rows)), method="highs"
         )
         if answer.status != 0 or answer.x is None:
             break
-        # What the solver's tolerance leaves below a limit is made up for.
+        # Scale up, since the tolerance of the solver allows values slightly below a limit.
         solution = np.maximum(answer.x, 0.0)
         solution /= min(float(np.min(rows @ solution)), 1.0)
         ratio = curve @ solution
         lower = float(weights @ np.log(ratio))
-        if lower > cost - _SAME:
+        if lower > cost - _CONVERGED_DECREASE:
             break
         cost, powers = lower, solution
     return cost, np.asarray(powers / scale)
@@ -150,5 +159,5 @@ def _log_weights(x: Array) -> Array:
 
 
 def count_of_points(start: float, stop: float, a_decade: int) -> int:
-    """Return how many points an interval takes, so many a decade."""
+    """Return the number of log-spaced points in an interval, for a number per decade."""
     return 2 + math.ceil(a_decade * math.log10(stop / start))

@@ -1,16 +1,16 @@
-"""Python that needs NumPy alone: the matrices of the noise at any rate, and a prediction.
+"""A Python program with NumPy only: the noise matrices at any rate, and a prediction.
 
-Held are white noise, Gauss-Markov processes, a random walk, and flicker noise as a bank of
-Gauss-Markov processes (`noise.terms.flicker`) from the period of the samples to four times the
-horizon. Ramps, lines and quantization noise are not.
+It supports white noise, Gauss-Markov processes, a random walk, and flicker noise as a bank of
+Gauss-Markov processes (`noise.terms.flicker`) from the sampling period to four times the horizon.
+Ramps, lines and quantization noise are left out.
 """
 
 from __future__ import annotations
 
 from imubench_pipeline.export.comments import commented_python, heading
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.mapping import named
-from imubench_pipeline.export.matrices import FOLLOWED
+from imubench_pipeline.export.mapping import describe_terms
+from imubench_pipeline.export.matrices import FLICKER_TAU_OVER_HORIZON
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise.terms.base import drives_of
 
@@ -74,8 +74,8 @@ def write(imu: Imu) -> str:
     for name, axis in imu.axes.items():
         others = [term for term in axis.model.terms if term.drive is None]
         if others:
-            left_out.append(f"{name}: not held: {named(others)}.")
-        longest = max(FOLLOWED * imu.horizon, 4.0 / imu.rate)
+            left_out.append(f"{name}: not held: {describe_terms(others)}.")
+        longest = max(FLICKER_TAU_OVER_HORIZON * imu.horizon, 4.0 / imu.rate)
         drives = drives_of(axis.model.realised(1.0 / imu.rate, longest))
         white = float(drives.white)
         walk = float(sum(walk.density for walk in drives.walks))

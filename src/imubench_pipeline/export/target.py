@@ -1,4 +1,4 @@
-"""What is declared of a program that a noise model can be written for."""
+"""Declaration of a program that a noise model can be exported to."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from imubench_pipeline.export.smallest_model import Family
 
 @dataclass(frozen=True)
 class Target:
-    """A program; its module declares it beside the function that writes its file.
+    """A program, declared in the module of the function that writes its file.
 
     Attributes
     ----------
     name, program : str
-        What the command and the settings call it, and what people do.
+        Identifier in commands and settings, and the name for people.
     file_name : str
-        Its usual one.
+        The usual name of its file.
     write : callable
-        Imu -> content of the file: str, or bytes. Raises ExportError where the program needs what
-        has no estimate, or a density above 0.
+        Imu -> content of the file: str, or bytes. Raises ExportError if the program needs a
+        quantity without estimate, or a density above 0.
     family : str
-        Terms that it holds: those of an overbound for it.
+        Terms that the program supports; an overbound for it has these.
     """
 
     name: str

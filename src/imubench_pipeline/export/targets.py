@@ -1,4 +1,4 @@
-"""The programs that a noise model can be written for: each is declared in its module."""
+"""The programs that a noise model can be exported to; each is declared in its module."""
 
 from __future__ import annotations
 
@@ -34,4 +34,4 @@ TARGETS: Mapping[str, Target] = {
         snippet.TARGET,
     )
 }
-"""Every target, by the name that the command takes."""
+"""All targets by their name in commands and settings."""

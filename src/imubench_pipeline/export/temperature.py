@@ -1,10 +1,10 @@
-"""How the bias follows the temperature, for programs that correct it or simulate it.
+"""Effect of temperature on the bias, for programs that correct or simulate it.
 
     bias(T) - bias(T_0) = s (T - T_0) + q (T - T_0)^2,
 
-as `estimators.thermal` fits it to one recording of one device. A correction that is wrong is
-worse than none, and no program here has a lag: an axis is left out, with the reason, unless the log
-tells s well enough for these uses.
+as `estimators.thermal` fits it to one recording of one device. A wrong correction is worse than
+none, and none of the programs models a thermal lag. An axis is therefore left out, with the reason,
+unless the log determines s accurately enough.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from imubench_pipeline.model.recordings import RecordingRow
 
 AXES = "xyz"
 
-_LEAST_KNOWN = 0.5
-"""Half of the 95 % interval over s, at most: a correction then leaves half of the effect."""
+_MAX_RELATIVE_ERROR = 0.5
+"""Max. half-width of the 95 % interval over s; a correction then removes at least half."""
 
-_LEAST_RANGE = 2.0
-"""K; PX4 changes a correction after a change of 1 K only (update_offsets_gyro): in a smaller range
-about T_0 it would correct nothing."""
+_MIN_TEMPERATURE_RANGE = 2.0
+"""K. PX4 updates a correction only after a change of 1 K (update_offsets_gyro); in a smaller range
+about T_0 it would not correct anything."""
 
 
 @dataclass(frozen=True)
 class TemperatureEffect:
-    """What temperature adds to the axes of a quantity.
+    """Effect of temperature on the biases of a quantity.
 
     Attributes
     ----------
     reference : float
-        T_0, where it adds nothing, °C.
+        T_0, the temperature of zero effect, °C.
     low, high : float
-        Temperatures of the recording, between which it holds, °C.
+        Range of the temperature of the recording, where the effect is valid, °C.
     slope, square : dict of str to float
-        s and q of each axis that is told, rad/s or m/s² per K and K²; the square only of those that
-        have one.
+        s and q of each axis with a usable estimate, rad/s or m/s² per K and K²; q only for axes
+        with a quadratic term.
     notes : list of str
-        What each axis is from, and why others are left out.
+        Source of each axis, and reasons for omitted axes.
     """
 
     reference: float = 0.0
@@ -53,10 +53,10 @@ class TemperatureEffect:
 def temperature_effect(
     rows: Iterable[TemperatureRow], recording: RecordingRow, quantity: str, horizon: float
 ) -> TemperatureEffect:
-    """Return what temperature adds to the axes of a quantity in one recording.
+    """Return the effect of temperature on a quantity in one recording.
 
-    `rows` are those of the recording. A sensor that may follow the temperature later than the
-    `horizon`, how long the program goes without a measurement, s, is left out.
+    `rows` are the rows of the recording. An axis whose thermal lag may exceed the `horizon` is left
+    out; the horizon is the longest time that the program predicts without a measurement, s.
     """
     low, high = recording.temperature_min, recording.temperature_max
     by_axis: dict[str, dict[str, TemperatureRow]] = {}
@@ -67,7 +67,7 @@ def temperature_effect(
     if not by_axis or low is None or high is None:
         why = f"{recording.recording} has no readings of the temperature"
         return TemperatureEffect(notes=[f"left out: {why}"])
-    reference = _value(min(by_axis.items())[1]["T_0"])
+    reference = _require_value(min(by_axis.items())[1]["T_0"])
     unit = {"gyro": "rad/s", "accel": "m/s^2"}[quantity]
     slope: dict[str, float] = {}
     square: dict[str, float] = {}
@@ -80,45 +80,47 @@ def temperature_effect(
             notes.append(f"axis {axis} left out: no fit of the temperature")
             continue
         fit = by_axis[axis]
-        reason = _reason_against(fit, high - low, horizon)
+        reason = _find_objection(fit, high - low, horizon)
         if reason is not None:
             notes.append(f"axis {axis} left out: {reason}")
             continue
         s, q = fit["sensitivity"], fit["quadratic"].value or 0.0
         # The axes of one quantity may come from files whose mean temperatures differ.
-        slope[axis] = _value(s) + 2.0 * q * (reference - _value(fit["T_0"]))
+        slope[axis] = _require_value(s) + 2.0 * q * (reference - _require_value(fit["T_0"]))
         if q:
             square[axis] = q
         bends = f", square {q:.3e} {unit}/K^2" if q else ""
         notes.append(
             f"axis {axis}: {s.value:.4e} {unit}/K, 95 % limits {s.lower:.3e} to "
-            f"{s.upper:.3e}{bends}; {_lag_words(fit['lag'])}"
+            f"{s.upper:.3e}{bends}; {_describe_lag(fit['lag'])}"
         )
     return TemperatureEffect(reference, float(low), float(high), slope, square, notes)
 
 
-def _value(row: TemperatureRow) -> float:
-    """Return the value of T_0, or of a sensitivity that is safe to correct with."""
+def _require_value(row: TemperatureRow) -> float:
+    """Return the value of T_0 or of a usable sensitivity; ValueError if it has none."""
     if row.value is None:
         raise ValueError(f"{row.channel}: {row.parameter} has no value: {row.reason}")
     return row.value
 
 
-def _reason_against(fit: Mapping[str, TemperatureRow], span: float, horizon: float) -> str | None:
-    """Return why a fit is not safe to correct with; None where it is."""
+def _find_objection(fit: Mapping[str, TemperatureRow], span: float, horizon: float) -> str | None:
+    """Return the reason against a correction with a fit; None if it is safe."""
     s, lag = fit["sensitivity"], fit["lag"]
     if s.value is None or s.lower is None or s.upper is None:
         return f"the sensitivity is {s.status.replace('_', ' ')}: {s.reason}"
     if not s.compensated:
         return f"the log does not show it: {s.reason}"
     error = 0.5 * (s.upper - s.lower) / abs(s.value)
-    if error > _LEAST_KNOWN:
+    if error > _MAX_RELATIVE_ERROR:
         return (
             f"it is known to {100 * error:.0f} % only, by the noise and by what the register of "
-            f"the temperature leaves open; {100 * _LEAST_KNOWN:.0f} % is needed"
+            f"the temperature leaves open; {100 * _MAX_RELATIVE_ERROR:.0f} % is needed"
         )
-    if span < _LEAST_RANGE:
-        return f"the temperature varies by {span:.2g} K only; {_LEAST_RANGE:g} K is needed"
+    if span < _MIN_TEMPERATURE_RANGE:
+        return (
+            f"the temperature varies by {span:.2g} K only; {_MIN_TEMPERATURE_RANGE:g} K is needed"
+        )
     if lag.status != "absent":
         longest = lag.upper
         if longest is None:
@@ -131,7 +133,7 @@ def _reason_against(fit: Mapping[str, TemperatureRow], span: float, horizon: flo
     return None
 
 
-def _lag_words(lag: TemperatureRow) -> str:
+def _describe_lag(lag: TemperatureRow) -> str:
     if lag.upper is None:
         return "no lag"
     return f"a lag of up to {lag.upper:.3g} s is not corrected"

@@ -2,14 +2,14 @@
 
 The configuration calls them standard deviations and gives no unit. The propagation takes them per
 sample, discrete in time: a step of dt adds (dt / 2)^2 (n_k^2 + n_(k+1)^2) to the variance of
-angle and velocity, with both samples' noises independent and of ``*_n``, and (dt ``*_w``)^2 to
-that of the bias. The error is N^2 dt and K^2 dt, so
+angle and velocity, where the noises of both samples are independent and equal ``*_n``, and
+(dt ``*_w``)^2 to the variance of the bias. The true increments are N^2 dt and K^2 dt, so
 
     acc_n = N sqrt(2 rate),   acc_w = K sqrt(rate).
 
-A sample has the deviation N sqrt(rate). The further sqrt(2) undoes what the midpoint rule takes
-away: each sample enters two steps, and the propagation takes it for two independent ones of half
-the weight. With N sqrt(rate) the covariance would be half of the true one.
+A sample has the standard deviation N sqrt(rate). The factor sqrt(2) compensates for the midpoint
+rule: each sample enters two steps with half the weight, and the propagation treats it as two
+independent samples. With N sqrt(rate) the covariance would be half of the true one.
 
 Sources: HKUST-Aerial-Robotics/VINS-Fusion, vins_estimator/src/factor/integration_base.h
 (``noise``, ``V`` of the midpoint integration), vins_estimator/src/estimator/parameters.cpp and

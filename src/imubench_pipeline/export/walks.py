@@ -1,4 +1,4 @@
-"""White noise and random walk, N and K: all that most filters take of a gyro or accelerometer."""
+"""White noise and random walk, N and K: the noise model of most navigation filters."""
 
 from __future__ import annotations
 

@@ -202,7 +202,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
 
 def _export(options: argparse.Namespace) -> int:
     from imubench_pipeline.export.imu import ExportError
-    from imubench_pipeline.export.request import Request, load, made, recordings_of
+    from imubench_pipeline.export.request import Request, load, make_content, recordings_of
 
     if options.inflate != 1.0 and not options.because:
         print("--inflate needs its reason; expected --because '...'", file=sys.stderr)
@@ -221,7 +221,7 @@ def _export(options: argparse.Namespace) -> int:
         rate=options.rate,
     )
     try:
-        content = made(load(options.results), asked, recordings_of(options.results))
+        content = make_content(load(options.results), asked, recordings_of(options.results))
     except ExportError as error:
         print(error, file=sys.stderr)
         return 2
@@ -269,8 +269,8 @@ def _check(options: argparse.Namespace) -> int:
         worst = max(worst, int(bool(serious)))
         status = quality.recording["status"]
         status = status if status != "ok" or not serious else "warnings"
-        made = ", simulated" * bool(quality.recording.get("simulated"))
-        print(f"{sensor}/{recording}: {status}{made}")
+        make_content = ", simulated" * bool(quality.recording.get("simulated"))
+        print(f"{sensor}/{recording}: {status}{make_content}")
         for finding in quality.findings:
             line = f"  {finding.severity:8} {finding.finding}: {printable(finding.detail)}"
             if sys.stdout.isatty():  # elsewhere one line each, for programs such as grep

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from imubench_pipeline.export.imu import ExportError
-from imubench_pipeline.export.request import Request, Tables, load, made, recordings_of
+from imubench_pipeline.export.request import Request, Tables, load, make_content, recordings_of
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.settings.config import ExportSettings
 from imubench_pipeline.tables import making, write_content
@@ -24,7 +24,7 @@ def exports(
 
     A place is ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` is for what a
     program cannot hold. `tables` and `recordings` are as
-    `imubench_pipeline.export.request.made` takes them.
+    `imubench_pipeline.export.request.make_content` takes them.
     """
     for sensor in dict.fromkeys(tables["parameters"]["sensor"].to_pylist()):
         refused = []
@@ -40,7 +40,7 @@ def exports(
                 most_excess=settings.most_excess,
             )
             try:
-                content = made(tables, request, recordings)
+                content = make_content(tables, request, recordings)
             except ExportError as error:
                 refused.append(printable(f"{target}: {error}"))
                 continue
@@ -52,6 +52,6 @@ def exports(
 def write_exports(tables: Path, settings: str, folder: Path) -> None:
     """Write a folder a sensor, with a file a program; all appear together."""
     how = ExportSettings.model_validate_json(settings)
-    with making(folder) as made:
+    with making(folder) as make_content:
         for place, content in exports(load(tables), how, recordings_of(tables)):
-            write_content(content, made / place)
+            write_content(content, make_content / place)
