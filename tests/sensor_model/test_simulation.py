@@ -7,10 +7,10 @@ from scipy.stats import chi2
 
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.simulate.imu import BLOCK, ImuModel, simulate_imu
+from imubench_pipeline.simulate.imu import SAMPLES_PER_BLOCK, ImuModel, simulate_imu
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
 from imubench_pipeline.simulate.profiles import Constant, DayCycle, Profile, WarmUp
-from imubench_pipeline.simulate.simulation import CHUNK, simulate, simulate_blocks
+from imubench_pipeline.simulate.simulation import SAMPLES_PER_CHUNK, simulate, simulate_blocks
 from tests.conftest import few
 from tests.sensor_model import theory
 
@@ -215,7 +215,7 @@ def test_rounding_with_noise_of_a_step_is_white_noise() -> None:
         assert np.mean(np.diff(means) ** 2) / 2 == pytest.approx(variance, rel=0.02)
 
 
-@pytest.mark.parametrize("block", [1, 77, CHUNK - 1, 3 * CHUNK])
+@pytest.mark.parametrize("block", [1, 77, SAMPLES_PER_CHUNK - 1, 3 * SAMPLES_PER_CHUNK])
 def test_a_log_does_not_depend_on_the_size_of_its_blocks(block: int) -> None:
     noise = NoiseModel(Q=1e-3, N=1, B=1, K=1, R=1, sinusoids=[Sinusoid(1.0, 13.0)])
     model = SensorModel(
@@ -230,7 +230,7 @@ def test_a_log_does_not_depend_on_the_size_of_its_blocks(block: int) -> None:
 
     parts = blocks(block)
     assert {len(part) for part in parts[:-1]} <= {block}
-    np.testing.assert_array_equal(np.concatenate(parts), np.concatenate(blocks(CHUNK)))
+    np.testing.assert_array_equal(np.concatenate(parts), np.concatenate(blocks(SAMPLES_PER_CHUNK)))
 
 
 IMU = ImuModel(
@@ -249,7 +249,7 @@ IMU = ImuModel(
 
 
 def joined(threads: int = 1, imu: ImuModel = IMU, **given: object) -> dict[str, np.ndarray]:
-    blocks = list(simulate_imu(imu, RATE, BLOCK + 1000, 3, ("board", "run"), **given))
+    blocks = list(simulate_imu(imu, RATE, SAMPLES_PER_BLOCK + 1000, 3, ("board", "run"), **given))
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
@@ -282,7 +282,7 @@ def test_axes_share_motion_and_temperature() -> None:
     )
     cycle = DayCycle(mean=25.0, amplitude=5.0, period=1000.0, highest=100.0)
     found = joined(imu=silent, motion={"gyro_y": cycle}, temperature=cycle)
-    t = np.arange(BLOCK + 1000) / RATE
+    t = np.arange(SAMPLES_PER_BLOCK + 1000) / RATE
     wave = 25.0 + 5.0 * np.cos(2 * np.pi * (t - 100.0) / 1000.0)
     np.testing.assert_allclose(found["gyro_x"], 0.02 * wave + 0.1 * (wave - 20.0), atol=1e-12)
     np.testing.assert_allclose(found["gyro_z"], -0.01 * 1.01 * wave, atol=1e-12)

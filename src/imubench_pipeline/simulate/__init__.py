@@ -1,7 +1,7 @@
-"""Simulated noise of a model: call it, as in ``simulate(model, "100 Hz", duration="1 h", seed=1)``.
+"""Simulated noise; call the package: ``simulate(model, "100 Hz", duration="1 h", seed=1)``.
 
-``help(simulate.simulate)`` says what it takes. The rest of the room is a whole sensor: noise,
-drift, low-pass, register and motion of all axes, from settings, a datasheet or estimates.
+For the parameters see ``help(simulate.simulate)``. The other modules simulate a complete sensor
+(noise, drift, low-pass, register and motion of all axes) from settings, a datasheet or estimates.
 """
 
 import sys
@@ -14,7 +14,7 @@ __all__ = ["simulate"]
 
 
 class _Room(ModuleType):
-    """A room that is called as its one function is: they have one name."""
+    """A package that is callable like its function of the same name."""
 
     __call__ = staticmethod(simulate)
     __signature__: Signature = signature(simulate)

@@ -1,16 +1,17 @@
-"""From continuous time to samples, exactly: slow noise states, and what a low-pass lacks of them.
+"""Exact discretisation of slow noise states and of the low-pass filter that they drive.
 
 A slow state x (a Gauss-Markov process, or a random walk with 1/T = 0) and the states v of a filter
-that it drives are one linear system. It is written in x and e = v - p x, where p are the states of
-the filter at rest under a unit input:
+that it drives form one linear system. It is written in x and the filter deviation e = v - p x,
+where p is the steady state of the filter for a unit input:
 
     dx = -x/T dt + dw,    de = (F e + p x/T) dt - p dw,    y = x + c e.
 
-e is small where x is slow, so that nothing is lost between a correlation time of days and a filter
-of milliseconds. The covariances over a sampling interval are integrated over a short step by
-Gauss-Legendre quadrature, exact to rounding, and doubled to the interval as triangular factors: no
-difference is formed, no exponential overflows, and the covariance cannot become indefinite.
-(Van Loan 1978 in one step would do both with a filter far faster than the sampling.)
+e is small where x is slow. This avoids cancellation between a correlation time of days and a filter
+of milliseconds. The covariances are integrated over a short step by Gauss-Legendre quadrature,
+exact to rounding. They are then doubled to the sampling interval as triangular factors. No
+differences are formed, no exponential overflows, and the covariance cannot become indefinite.
+(The single-step method of Van Loan, 1978, has both problems if the filter is much faster than the
+sampling.)
 """
 
 from __future__ import annotations
@@ -24,43 +25,40 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.typing import Array
 
-_NODES = 14
-"""Quadrature nodes of a step that is short beside all time constants."""
+_QUADRATURE_NODES = 14
+"""Quadrature nodes of a step that is short compared with all time constants."""
 
-_SERIES = 20
-"""Terms of the exponential over such a step: 1 / 21! is left out."""
+_SERIES_TERMS = 20
+"""Terms of the power series of the exponential over such a step; the remainder is 1 / 21!."""
 
 
 @dataclass(frozen=True)
 class SlowSources:
-    """Slow states and the filter's lack of each, over one sampling interval.
+    """Discrete slow states x and their filter deviations e, over one sampling interval.
 
-    The density of every driving noise is 1; all arrays are for n sources and a filter of order m.
+    All driving noises have density 1. The arrays are for n sources and a filter of order m.
     """
 
-    decay: Array  # shape (n,); e^(-interval / T); 1 of a random walk
-    lost: Array  # shape (n,); 1 - decay, without loss of digits
+    decay: Array  # shape (n,); e^(-interval / T); 1 for a random walk
+    lost: Array  # shape (n,); 1 - decay, without cancellation
     own: Array  # shape (n,); standard deviation of the noise of x
-    coupling: Array  # shape (n, m); what e gains from x
-    shared: Array  # shape (n, m); what e gains from the noise of x of unit variance
-    # shape (n, m, m); factors of the rest of the noise of e: its covariance is ``residual.T @
-    # residual``
+    coupling: Array  # shape (n, m); transition from x to e
+    shared: Array  # shape (n, m); gain from the noise of x, at unit variance, to e
+    # shape (n, m, m); factors of the noise of e that is independent of the noise of x: its
+    # covariance is ``residual.T @ residual``
     residual: Array
 
 
 def filter_transition(low_pass: LowPass, interval: float) -> Array:
-    """Return what becomes of the states of a filter in an interval, s, without input.
-
-    e^(F interval), shape (m, m).
-    """
+    """Return the transition matrix of a filter over an interval, s: e^(F interval), (m, m)."""
     return np.asarray(expm(low_pass.transition * interval))
 
 
 def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> SlowSources:
     """Discretise Gauss-Markov processes and random walks, and the filter that they drive.
 
-    The correlation times, s, shape (n,), are infinite for a random walk; the interval is that of
-    sampling, s. Without a filter m = 0.
+    The correlation times, s, shape (n,), are infinite for a random walk. The interval is the
+    sampling interval, s. Without a filter m = 0.
     """
     n, m = len(times), low_pass.order if low_pass else 0
     x = interval / times
@@ -78,7 +76,9 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
     system[:, 1:, 0] = low_pass.steady_state / times[:, None]
     system[:, 1:, 1:] = low_pass.transition
     impulse = np.concatenate(([1.0], -low_pass.steady_state))
-    transition, factor = _integrated(system, np.broadcast_to(impulse, (n, 1 + m)), interval)
+    transition, factor = _integrate_covariance(
+        system, np.broadcast_to(impulse, (n, 1 + m)), interval
+    )
     sign = np.sign(factor[:, 0, 0])
     return SlowSources(
         decay, lost, own, transition[:, 1:, 0], factor[:, 0, 1:] * sign[:, None], factor[:, 1:, 1:]
@@ -86,29 +86,31 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
 
 
 def white_factor(low_pass: LowPass, interval: float) -> Array:
-    """Return a factor R of the noise that white noise of density 1 leaves in the filter.
+    """Return a factor R of the process noise of a filter driven by white noise of density 1.
 
-    The covariance is R.T @ R; the interval is in s, the shape (m, m).
+    The covariance over the interval, s, is R.T @ R; R has shape (m, m).
     """
-    _, factor = _integrated(low_pass.transition[None], low_pass.input[None], interval)
+    _, factor = _integrate_covariance(low_pass.transition[None], low_pass.input[None], interval)
     return np.asarray(factor[0])
 
 
-def _integrated(system: Array, impulse: Array, interval: float) -> tuple[Array, Array]:
-    """Return transitions, and factors of the integral of g g' with g = e^(system t) impulse.
+def _integrate_covariance(system: Array, impulse: Array, interval: float) -> tuple[Array, Array]:
+    """Return transition matrices, and factors of the integral of g g', g = e^(system t) impulse.
 
-    Of systems of shape (n, k, k) and impulses of shape (n, k).
+    The systems have shape (n, k, k) and the impulses shape (n, k). The integral over a step of
+    interval / 2^d is doubled d times: with the factor R and the transition P of one step, the QR
+    factor of the rows R P' and R is the factor of two steps.
     """
     fastest = float(np.abs(system).sum(axis=2).max()) * interval
     doublings = max(0, math.ceil(math.log2(max(fastest, 1.0))))
     step = interval / 2.0**doublings
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    # (system step)^k / k!, and the same of the impulse: over a short step their sums converge at
-    # once and lose no digit, and they are far cheaper than an exponential a node.
+    nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
+    # Power series (system step)^k / k!, and its product with the impulse. Over a short step the
+    # sums converge fast without cancellation, and cost less than a matrix exponential per node.
     transition = np.broadcast_to(np.eye(system.shape[1]), system.shape)
     part, response = transition, impulse
-    responses = np.repeat(impulse[:, None, :], _NODES, axis=1)
-    for k in range(1, _SERIES + 1):
+    responses = np.repeat(impulse[:, None, :], _QUADRATURE_NODES, axis=1)
+    for k in range(1, _SERIES_TERMS + 1):
         part = part @ system * (step / k)
         transition = transition + part
         response = np.einsum("nij,nj->ni", system, response) * (step / k)
@@ -124,23 +126,23 @@ def _integrated(system: Array, impulse: Array, interval: float) -> tuple[Array, 
 
 @dataclass(frozen=True)
 class HeldInput:
-    """What a filter lacks of an input that is linear between samples, over one interval."""
+    """Response of the filter deviation e to an input that is linear between samples."""
 
-    step: Array  # shape (m,); e gains ``step`` times the change of the input
+    step: Array  # shape (m,); e changes by ``step`` times the change of the input
     # lag_decay, lag_step: the lag ε = lagged - input of a first-order lag becomes ``lag_decay * ε +
     # lag_step * change``
     lag_decay: float
     lag_step: float
-    # lag_coupling, lagged_step: shape (m,); e gains ``lag_coupling * ε + lagged_step * change`` of
-    # an input that is lagged
+    # lag_coupling, lagged_step: shape (m,); for a lagged input e changes by ``lag_coupling * ε +
+    # lagged_step * change``
     lag_coupling: Array
     lagged_step: Array
 
 
 def held_input(low_pass: LowPass | None, lag: float, interval: float) -> HeldInput:
-    """Discretise filter and thermal lag for an input with first-order hold, exactly.
+    """Return the exact discretisation of filter and thermal lag for a first-order hold input.
 
-    Lag (a time constant; 0: none) and interval are in s.
+    The lag (a time constant; 0: none) and the interval are in s.
     """
     m = low_pass.order if low_pass else 0
     x = interval / lag if lag > 0 else math.inf
@@ -169,14 +171,14 @@ def held_input(low_pass: LowPass | None, lag: float, interval: float) -> HeldInp
 def stationary(
     times: Array, densities: Array, white: float, low_pass: LowPass
 ) -> tuple[Array, Array]:
-    """Return how the filter's lack e is distributed while all runs on for ever.
+    """Return the stationary distribution of the filter deviation e, given x.
 
     Parameters
     ----------
     times : ndarray, shape (n,)
         Correlation times, s; infinite for a random walk, whose x starts at 0.
     densities : ndarray, shape (n,)
-        Of the driving noises.
+        Densities of the driving noises.
     white : float
         Density of white noise at the input, N^2.
     low_pass : LowPass
@@ -188,12 +190,13 @@ def stationary(
     covariance_given_x : ndarray, shape (m, m)
         Covariance of e for a given x.
     """
-    # In units of the filter's own time, for the sake of the equations' condition.
+    # In units of the time constant of the filter, for well-conditioned equations.
     unit = low_pass.angular_cutoff
     F, p = low_pass.transition / unit, low_pass.steady_state
     b = low_pass.input / unit
     rates = 1.0 / (times * unit)
-    # With P the variance of x: F r - r/T - p P/T = 0, so r / P has no P; 0 for a random walk.
+    # r = E[e x] and P = E[x^2] satisfy F r - r/T - p P/T = 0: r / P is independent of P, and 0 for
+    # a random walk.
     means = np.array([np.linalg.solve(F - rate * np.eye(len(p)), p * rate) for rate in rates])
     means = means.reshape(len(times), len(p))
     drive = white * unit * np.outer(b, b)

@@ -1,10 +1,10 @@
-"""Flicker noise in continuous time, as it enters a filter: a bank of Gauss-Markov processes.
+"""Approximate flicker noise at the input of a filter by a bank of Gauss-Markov processes.
 
-`noise.terms.flicker.bank` has the Allan variance of flicker noise that is sampled without a
-filter. Before a filter whose cut-off may lie above Nyquist, the density B^2 / (2 pi f) itself is
-needed, far beyond the cut-off. Processes of equal variance (ln r / pi) B^2 whose correlation
-times have the ratio r make up that density: the ripple is 4 e^(-pi^2 / ln r), below 1e-3 for two
-a decade.
+`noise.terms.flicker.bank` approximates the Allan variance of flicker noise that is sampled without
+a filter. At the input of a filter, whose cut-off may lie above the Nyquist frequency, the density
+B^2 / (2 pi f) itself must be approximated far beyond the cut-off. Processes of equal variance
+(ln r / pi) B^2 whose correlation times have the ratio r approximate this density. The relative
+ripple is 4 e^(-pi^2 / ln r), below 1e-3 for two processes per decade.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from scipy.optimize import nnls
 from imubench_pipeline.noise.terms import GaussMarkov, bias_instability
 from imubench_pipeline.typing import Array
 
-ABOVE = 30.0
-"""How far above the cut-off frequency the density is followed: there, a filter of first order has
-taken away 99.9 % of the power."""
+MAX_FREQUENCY_RATIO = 30.0
+"""Highest frequency of the approximation, over the cut-off frequency. There a filter of first order
+attenuates the power by 99.9 %."""
 
-_MEMBERS_A_DECADE = 2.0
-_POINTS_A_DECADE = 20
-_BEYOND = 4.0
-"""How far the correlation times go beyond both ends of the band, in 1 / (2 pi f)."""
+_MEMBERS_PER_DECADE = 2.0
+_POINTS_PER_DECADE = 20
+_BAND_EXTENSION = 4.0
+"""Factor by which the correlation times extend the band 1 / (2 pi f) at both ends."""
 
 
 def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
-    """Return Gauss-Markov processes that together have the density of flicker noise.
+    """Return Gauss-Markov processes whose sum has the density of flicker noise.
 
     The variances are fitted by non-negative least squares of the relative error. B is the bias
     instability, rad/s or m/s^2, whose plateau is 0.664 B; the band is in Hz.
@@ -41,7 +41,7 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     """
     if not 0 < lowest < highest:
         raise ValueError(f"the band from {lowest} to {highest} Hz is empty")
-    times, variances = _unit_bank(round(math.log10(highest / lowest), 6))
+    times, variances = _fit_unit_bank(round(math.log10(highest / lowest), 6))
     processes = []
     for time, variance in zip(times / (2.0 * math.pi * lowest), variances, strict=True):
         if variance > 0:
@@ -51,20 +51,19 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
 
 
 def ripple(lowest: float, highest: float) -> float:
-    """Return the largest relative error of the density of a bank inside its band, Hz, of any B."""
+    """Return the max. relative error of the density of a bank in its band, Hz, for any B."""
     terms = bank(1.0, lowest, highest)
     decades = math.log10(highest / lowest)
-    f = np.geomspace(lowest, highest, 2 + math.ceil(decades * 10 * _POINTS_A_DECADE))
+    f = np.geomspace(lowest, highest, 2 + math.ceil(decades * 10 * _POINTS_PER_DECADE))
     density = np.sum([term.psd(f) for term in terms], axis=0)
     return float(np.max(np.abs(density * 2.0 * np.pi * f - 1.0)))
 
 
 def mixture(shortest: float, longest: float) -> tuple[Array, float]:
-    """Return correlation times of equal processes that make up flicker noise of B = 1.
+    """Return correlation times and common variance of processes that sum to flicker noise, B = 1.
 
-    They go from the shortest to the longest, s, well beyond the band in which the sum is needed,
-    evenly spaced in log, five a decade: a ripple below 1e-8. Beside them stands the variance of
-    each.
+    The times are log-spaced from the shortest to the longest, s, five per decade; the ripple is
+    below 1e-8. Both ends must lie well outside the band in which the sum is used.
     """
     count = 2 + math.ceil(5.0 * math.log10(longest / shortest))
     times = np.geomspace(shortest, longest, count)
@@ -72,13 +71,13 @@ def mixture(shortest: float, longest: float) -> tuple[Array, float]:
 
 
 @lru_cache(maxsize=16)
-def _unit_bank(decades: float) -> tuple[Array, Array]:
+def _fit_unit_bank(decades: float) -> tuple[Array, Array]:
     """Return correlation times and variances for B = 1 from 1 to 10^decades rad/s."""
-    first, last = 10.0**-decades / _BEYOND, _BEYOND
-    members = 2 + math.ceil(math.log10(last / first) * _MEMBERS_A_DECADE)
+    first, last = 10.0**-decades / _BAND_EXTENSION, _BAND_EXTENSION
+    members = 2 + math.ceil(math.log10(last / first) * _MEMBERS_PER_DECADE)
     times = np.geomspace(first, last, members)
-    omega = np.geomspace(1.0, 10.0**decades, 2 + int(decades * _POINTS_A_DECADE))
-    # Relative to 1 / omega.
+    omega = np.geomspace(1.0, 10.0**decades, 2 + int(decades * _POINTS_PER_DECADE))
+    # Density of each process relative to 1 / omega.
     shapes = 2.0 * times * omega[:, None] / (1.0 + (omega[:, None] * times) ** 2)
     variances, _ = nnls(shapes, np.ones_like(omega))
     return times, variances

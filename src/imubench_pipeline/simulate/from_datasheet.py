@@ -1,4 +1,4 @@
-"""The model of a sensor that its datasheet describes; what it leaves open is assumed, and said."""
+"""Build the model of a sensor from its datasheet; missing figures are assumed and listed."""
 
 from __future__ import annotations
 
@@ -18,21 +18,20 @@ from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
 from imubench_pipeline.units import dimension_of, quantity_to_si, to_si
 
-_REGISTER = 1 << 15
-"""Steps of a register of 16 bits on each side of 0."""
+_STEPS_PER_SIDE = 1 << 15
+"""Steps on each side of 0 of a 16-bit register."""
 
 
 def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
-    """Build the model that the datasheet of a sensor, by the name of its file, describes.
+    """Build the model of a sensor from its datasheet; ``name`` is the name of the sensor file.
 
-    Typical figures are taken. The bias is the printed offset with a sign that is drawn by the seed,
-    and so is the coefficient of temperature; bias instability is flicker noise where no correlation
-    time is printed.
+    Typical figures are used. Bias and temperature coefficient are the printed figures with random
+    signs from the seed. Bias instability is flicker noise if no correlation time is printed.
 
     Raises
     ------
     ConfigError
-        If no noise is printed for any channel of its log format.
+        If no noise is printed for any channel of the log format.
     """
     document = sensor.datasheet.document or "the sensor file"
     origin = Origin(ImuModel(axes={}), f"the datasheet of {name}: {document}", sensor=name)
@@ -57,7 +56,7 @@ def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
 
 
 class _Printed:
-    """What a datasheet prints of one axis."""
+    """The printed figures of one axis."""
 
     def __init__(self, sensor: Sensor, channel: str, origin: Origin) -> None:
         self._sensor, self._channel = sensor, channel
@@ -69,7 +68,7 @@ class _Printed:
 
     def noise(self) -> NoiseModel | None:
         rows = [row for row in comparables(self._sensor.datasheet, self._channel) if row.value]
-        density = _best([row for row in rows if row.statistic == "N"])
+        density = _select_best([row for row in rows if row.statistic == "N"])
         if density is None or density.value is None:
             return None
         self._note("N", density)
@@ -79,9 +78,9 @@ class _Printed:
                 f"{self._quantity}: the printed noise density is one-sided (N is it / sqrt(2))",
             )
         B = T_B = K = None
-        floor = _best([row for row in rows if row.statistic == "adev_minimum"])
-        time = _best([row for row in rows if row.statistic == "T_B"])
-        walk = _best([row for row in rows if row.statistic == "K"])
+        floor = _select_best([row for row in rows if row.statistic == "adev_minimum"])
+        time = _select_best([row for row in rows if row.statistic == "T_B"])
+        walk = _select_best([row for row in rows if row.statistic == "K"])
         if floor is not None and floor.value:
             self._note("bias instability", floor)
             B, T_B = floor.value / FLOOR, time.value if time else None
@@ -161,8 +160,8 @@ class _Printed:
             ranges = [to_si(each, figure.unit, dimension) for each in values]
             chosen = len(ranges) - 1
             if step is not None and len(ranges) > 1:
-                # The sensitivity is printed for the range that a register of 16 bits then has.
-                chosen = int(np.argmin(np.abs(np.log(np.array(ranges) / (step * _REGISTER)))))
+                # The printed sensitivity belongs to the range that it gives with a 16-bit register.
+                chosen = int(np.argmin(np.abs(np.log(np.array(ranges) / (step * _STEPS_PER_SIDE)))))
             text = f"full scale {values[chosen]:g} {figure.unit}: datasheet"
             self._remarks.append(Remark("register", text))
             if len(ranges) > 1:
@@ -174,7 +173,7 @@ class _Printed:
         return None
 
     def _single(self, name: str, topic: Topic, label: str) -> float | None:
-        """Return a figure that is one number, in SI."""
+        """Return a figure with a single value, in SI; None if none is printed."""
         (dimension,) = FIGURE_DIMENSIONS[self._quantity][name]
         for figure in self._typical(name):
             value = figure.on_axis(self._axis)
@@ -201,8 +200,8 @@ class _Printed:
         self._remarks.append(Remark("noise", text))
 
 
-def _best(rows: Sequence[Comparable]) -> Comparable | None:
-    """Return the figure that leaves least to assume: typical, and of a stated side."""
+def _select_best(rows: Sequence[Comparable]) -> Comparable | None:
+    """Return the figure with the fewest assumptions: typical, and of known sidedness."""
 
     def doubt(row: Comparable) -> tuple[bool, bool, bool]:
         assert row.figure is not None  # it has a value

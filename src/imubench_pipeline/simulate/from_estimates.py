@@ -1,4 +1,4 @@
-"""The model of a sensor as a run has estimated it, in the place of what its datasheet prints."""
+"""Build the model of a sensor from the estimates of a run, which replace datasheet figures."""
 
 from __future__ import annotations
 
@@ -10,12 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.estimators.rows import estimate_of
-from imubench_pipeline.model.estimates import (
-    FixedBiasRow,
-    LowPassRow,
-    ParameterRow,
-    TemperatureRow,
-)
+from imubench_pipeline.model.estimates import FixedBiasRow, LowPassRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.settings.sensor import CHANNELS, quantity_of
@@ -25,18 +20,17 @@ from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, befo
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
 
-_NEEDED = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
+_NEEDED_TABLES = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
 
 
 def with_estimates(
     printed: Origin, results: Path, name: str, recording: str | None = None
 ) -> Origin:
-    """Put what a run has estimated in the place of printed figures, of which there may be none.
+    """Replace printed figures by the estimates of a run; there may be no printed figures.
 
-    They are those of the longest recording, or of the one that is named: the noise, by the
-    recommended method, and the bias; where temperature was taken out, the noise that it leaves, the
-    bias and the drift; the cut-off where it is told. Resolution and full scale stay as the
-    datasheet has them.
+    The estimates are from the longest recording, or from the named one: noise (recommended method)
+    and bias. If a temperature effect was compensated, the compensated noise, the bias and the drift
+    are used. The cut-off is used if it has a value. Resolution and full scale stay as printed.
 
     Raises
     ------
@@ -45,17 +39,17 @@ def with_estimates(
     """
     folder = tables_folder(results)
     try:
-        paths = tables_of_run(results, _NEEDED)
+        paths = tables_of_run(results, _NEEDED_TABLES)
         tables = {table: read(table, [path]) for table, path in paths.items()}
     except (OSError, ValueError) as error:
         raise ConfigError(str(error)) from error
-    recorded = _recording(tables["recordings"], folder, name, recording)
+    recorded = _select_recording(tables["recordings"], folder, name, recording)
     chosen = recorded.recording
     of_log = {
         table: tables[table].filter(
             (pc.field("sensor") == name) & (pc.field("recording") == chosen)
         )
-        for table in _NEEDED[1:]
+        for table in _NEEDED_TABLES[1:]
     }
     axes: dict[str, SensorModel] = {}
     figures: dict[str, list[Remark]] = {}
@@ -66,7 +60,7 @@ def with_estimates(
         )
         if of_channel.parameters:
             axis = _Axis(printed, channel, of_channel, f"{name}/{chosen}")
-            axes[channel] = axis.model(_rate(recorded))
+            axes[channel] = axis.model(_require_rate(recorded))
             topics.append({remark.topic for remark in axis.remarks})
             of_datasheet = printed.figures.get(channel, [])
             figures[channel] = [
@@ -91,8 +85,10 @@ def with_estimates(
     return origin
 
 
-def _recording(recordings: pa.Table, folder: Path, name: str, asked: str | None) -> RecordingRow:
-    """Return the row of the recording to take: that asked for, or the longest."""
+def _select_recording(
+    recordings: pa.Table, folder: Path, name: str, asked: str | None
+) -> RecordingRow:
+    """Return the row of the requested recording, or of the longest one."""
     of_sensor = RecordingRow.rows_of(recordings.filter(pc.field("sensor") == name))
     usable = {row.recording: row for row in of_sensor if row.status == "ok"}
     if not usable:
@@ -106,7 +102,7 @@ def _recording(recordings: pa.Table, folder: Path, name: str, asked: str | None)
     return usable[asked or longest]
 
 
-def _rate(recording: RecordingRow) -> float:
+def _require_rate(recording: RecordingRow) -> float:
     if recording.rate is None:
         raise ConfigError(f"{recording.sensor}/{recording.recording}: its rate is not known")
     return recording.rate
@@ -114,7 +110,7 @@ def _rate(recording: RecordingRow) -> float:
 
 @dataclass(frozen=True)
 class _Estimated:
-    """What the tables of a run have of one channel."""
+    """Rows of one channel in the tables of a run."""
 
     parameters: Sequence[ParameterRow]
     fixed_bias: Sequence[FixedBiasRow]
@@ -136,7 +132,7 @@ class _Estimated:
 
 
 class _Axis:
-    """What a run has found of one channel."""
+    """Model of one channel from the estimates of a run."""
 
     def __init__(self, printed: Origin, channel: str, found: _Estimated, log: str) -> None:
         self._printed = printed.imu.axes.get(channel) or SensorModel()
@@ -146,7 +142,7 @@ class _Axis:
         self.remarks: list[Remark] = []
 
     def model(self, rate: float) -> SensorModel:
-        """Return the model; ``remarks`` then has what its figures are from. The rate is in Hz."""
+        """Return the model, and add the sources of its figures to ``remarks``; rate in Hz."""
         printed = replace(self._printed, low_pass=self._filter(), drift=self._drift())
         method = "compensated" if self._compensated else None
         rows = [

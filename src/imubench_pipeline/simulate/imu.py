@@ -1,4 +1,4 @@
-"""Several axes that share one motion and one temperature, simulated side by side."""
+"""Simulate several axes with common motion and temperature, in parallel."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.sensor import CHANNELS, TEMPERATURE, quantity_of
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.simulate.profiles import Profile
-from imubench_pipeline.simulate.simulation import CHUNK, Signal, simulate_blocks
+from imubench_pipeline.simulate.simulation import SAMPLES_PER_CHUNK, Signal, simulate_blocks
 from imubench_pipeline.typing import Array
 
-BLOCK = 8 * CHUNK
-"""Samples that `simulate_imu` gives at a time."""
+SAMPLES_PER_BLOCK = 8 * SAMPLES_PER_CHUNK
+"""Samples per block of `simulate_imu`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,10 +26,10 @@ class ImuModel:
     Parameters
     ----------
     axes : mapping of str to SensorModel
-        By channel, ``gyro_x`` to ``accel_z``, as many as the sensor has.
+        By channel, ``gyro_x`` to ``accel_z``, for the axes of the sensor.
     misalignment : mapping of str to ndarray, shape (3, 3)
-        By quantity: what the axes x, y, z sense of a unit rate or specific force along the true
-        x, y, z, their scale errors apart. The unit matrix where a quantity is not named.
+        By quantity: response of the axes x, y, z (rows) to a unit rate or specific force along the
+        true x, y, z, without scale errors. The identity for a quantity that is not named.
     temperature_step : float
         Step of the register of temperature, K; 0: not rounded.
 
@@ -53,9 +53,9 @@ class ImuModel:
             raise ValueError(f"temperature_step is {self.temperature_step}, expected from 0")
 
     def sensed(self, channel: str) -> dict[str, float]:
-        """Return which true channels an axis, such as ``gyro_x``, senses, and how much of each.
+        """Return the sensitivity of an axis, such as ``gyro_x``, to the true channels.
 
-        Those of which it senses nothing are left out.
+        Channels with zero sensitivity are left out.
         """
         quantity, row = quantity_of(channel), "xyz".index(channel[-1])
         matrix = np.asarray(self.misalignment.get(quantity, np.eye(3)))
@@ -74,9 +74,9 @@ def simulate_imu(
     temperature: Profile | None = None,
     threads: int = 1,
 ) -> Iterator[dict[str, Array]]:
-    """Yield the log of a sensor in blocks of `BLOCK` samples; memory does not grow with it.
+    """Yield the log of a sensor in blocks of `SAMPLES_PER_BLOCK` samples, with constant memory.
 
-    The channels are in SI, ``temperature`` in °C, as its register has it, where it is given.
+    The channels are in SI. ``temperature``, if given, is in °C and rounded to its register.
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ def simulate_imu(
         Hz.
     samples : int
     seed : int
-        With the names it determines every sample: an axis does not depend on which others are
-        simulated, nor on the number of threads.
+        Seed and names determine all samples. An axis does not depend on the other simulated axes
+        or on the number of threads.
     names : tuple of str
         Such as sensor and recording.
     motion : mapping of str to Profile, optional
@@ -94,7 +94,7 @@ def simulate_imu(
     temperature : Profile, optional
         °C. Without one there is no drift.
     threads : int
-        Axes that are simulated at the same time.
+        Number of axes that are simulated in parallel.
     """
     shared = _Shared(rate, motion or {}, temperature)
     streams = {
@@ -105,13 +105,13 @@ def simulate_imu(
             channel_rng(seed, *names, channel),
             true=shared.along(imu.sensed(channel)),
             temperature=shared.temperature_signal,
-            block=BLOCK,
+            block=SAMPLES_PER_BLOCK,
         )
         for channel, model in imu.axes.items()
     }
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        for start in range(0, samples, BLOCK):
-            shared.advance(start, min(start + BLOCK, samples))
+        for start in range(0, samples, SAMPLES_PER_BLOCK):
+            shared.advance(start, min(start + SAMPLES_PER_BLOCK, samples))
             blocks = dict(zip(streams, pool.map(next, streams.values()), strict=True))
             if shared.temperature is not None:
                 block, step = shared.temperature, imu.temperature_step

@@ -1,20 +1,19 @@
-"""The model of one axis of a sensor: from the true rate or specific force to what is logged.
+"""Model of one sensor axis, from the true rate or specific force to the logged samples.
 
     u(t) = (1 + scale error) true + bias + drift(temperature, lagged) + noise(t)
     y(t) = low-pass of u, in continuous time
     logged = rounding of the saturation of (y at the sampling times + quantization noise)
 
-What passes the low-pass is everything in front of it: white noise (N is its density before the
-filter), Gauss-Markov processes, flicker noise, random walk, ramp, lines, bias, drift and motion.
-Quantization noise Q stands behind it: it is what a converter that counts increments of angle or
-velocity leaves, -dq/dt over a sampling interval. It is not the rounding to the resolution (LSB) of
-a register of rate, which is done as such, to the nearest step; with noise of at least half a step
-it adds LSB^2 / 12 to the variance of each sample, and that is what spectrum and Allan variance
-count for it. A sensor has one of the two, seldom both: an estimate of N from a log that is rounded
-contains the rounding already.
+The low-pass filters white noise (N is its density before the filter), Gauss-Markov processes,
+flicker noise, random walk, ramp, lines, bias, drift and motion. Quantization noise Q is added after
+the filter: it is the error -dq/dt, over a sampling interval, of a converter that counts increments
+of angle or velocity. It differs from the rounding to the resolution (LSB) of a rate register, which
+is simulated as rounding to the nearest step. With noise of at least half a step, rounding adds
+LSB^2 / 12 to the variance of each sample; spectrum and Allan variance use this value. A sensor
+seldom has both: an estimate of N from a rounded log already contains the rounding.
 
-White noise before the low-pass and rounding is not N as a log shows it (`in_the_log`): sampling
-folds into the log what lies above Nyquist, and a register adds LSB^2 / 12 a sample.
+N before low-pass and rounding differs from N of a log (`in_the_log`): sampling aliases the noise
+above the Nyquist frequency, and a register adds LSB^2 / 12 per sample.
 """
 
 from __future__ import annotations
@@ -33,8 +32,8 @@ from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.simulate import flicker_band, spectra
 from imubench_pipeline.typing import Array
 
-_LOW = 1e-4
-"""rad a sample, far below every cut-off."""
+_LOW_FREQUENCY = 1e-4
+"""Frequency far below any cut-off, rad/sample."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +48,7 @@ class TemperatureDrift:
     sensitivity : float
         rad/s/K or m/s^2/K.
     reference : float
-        Temperature without drift, °C.
+        Temperature of zero drift, °C.
     quadratic : float
         rad/s/K^2 or m/s^2/K^2.
     lag : float
@@ -91,12 +90,12 @@ class SensorModel:
     resolution : float
         Step of the register (LSB), rad/s or m/s^2; 0: not rounded.
     full_scale : float, optional
-        Largest magnitude that is logged, rad/s or m/s^2.
+        Magnitude at which the output saturates, rad/s or m/s^2.
 
     Raises
     ------
     ValueError
-        If a figure is out of its range, or a further term drives no filter.
+        If a figure is out of its range, or a further term has no `Term.drive`.
     """
 
     noise: NoiseModel = field(default_factory=NoiseModel)
@@ -123,11 +122,11 @@ class SensorModel:
                 raise ValueError(f"{term} drives no filter (`Term.drive`): no sensor can have it")
 
     def psd(self, frequency: ArrayLike) -> Array:
-        """Return the two-sided power spectral density of the noise behind the low-pass.
+        """Return the two-sided power spectral density of the noise after the low-pass.
 
-        In (rad/s)²/Hz or (m/s²)²/Hz, in the shape of the frequencies, Hz, not 0: in continuous
-        time, before sampling folds it and adds quantization and rounding. Lines and a ramp have
-        none.
+        In (rad/s)²/Hz or (m/s²)²/Hz, in the shape of the frequencies, Hz, not 0. It is the density
+        in continuous time, without aliasing, quantization and rounding. Lines and a ramp have no
+        density.
         """
         f = np.asarray(frequency, dtype=np.float64)
         parts = [term.psd(f) for term in self.noise.terms if term.drive is not None]
@@ -135,10 +134,10 @@ class SensorModel:
         return density * self.low_pass.power(f) if self.low_pass else density
 
     def sampled_spectrum(self, omega: ArrayLike, rate: float) -> Array:
-        """Return the spectrum of the samples, with everything that sampling folds into it, SI^2.
+        """Return the spectrum of the samples, with aliasing, SI^2, in the shape of omega.
 
-        At omega, rad a sample, not 0, and in its shape; the rate is in Hz. Its mean over -pi..pi is
-        the variance of the samples. Rounding counts as white.
+        omega is in rad/sample, not 0; the rate is in Hz. The mean of the spectrum over -pi..pi is
+        the variance of the samples. Rounding counts as white noise.
         """
         w = np.asarray(omega, dtype=np.float64)
         rounding = self.resolution**2 / 12.0
@@ -151,11 +150,10 @@ class SensorModel:
         return np.asarray(spectrum + spectra.sampled_spectrum(self.sources, self.low_pass, w, rate))
 
     def allan_variance(self, tau: ArrayLike, rate: float) -> Array:
-        """Return the Allan variance of the samples, exactly, (rad/s)² or (m/s²)².
+        """Return the exact Allan variance of the samples, (rad/s)² or (m/s²)², in the shape of tau.
 
-        In the shape of the cluster lengths tau, s, taken to the nearest whole number of samples, at
-        least one; the rate is in Hz. Rounding counts as white noise; drift and motion are not in
-        it.
+        The cluster lengths tau, s, are rounded to whole numbers of samples, at least one; the rate
+        is in Hz. Rounding counts as white noise; drift and motion are not included.
         """
         t = np.asarray(tau, dtype=np.float64)
         n = np.maximum(np.rint(t * rate), 1.0)
@@ -171,14 +169,15 @@ class SensorModel:
 
     @property
     def sources(self) -> spectra.Sources:
-        """The noise that a low-pass is driven by, with flicker noise as a number of its own."""
+        """The noise at the input of the low-pass, with flicker noise as a separate number."""
         return sources_of(self.noise.terms)
 
 
 def sources_of(terms: Sequence[Term]) -> spectra.Sources:
-    """Return the terms that drive a filter with a density.
+    """Return the noise terms at the input of a filter.
 
-    White and flicker noise, Gauss-Markov processes and random walks; others have no density.
+    These are white and flicker noise, Gauss-Markov processes and random walks; others have no
+    density.
     """
     drives = drives_of(terms)
     slow = [(part.T_B, part.density) for part in (*drives.processes, *drives.walks)]
@@ -187,38 +186,40 @@ def sources_of(terms: Sequence[Term]) -> spectra.Sources:
 
 
 def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMarkov]:
-    """Return the processes that stand for flicker noise in front of the model's filter.
+    """Return the processes that approximate flicker noise at the input of the model's filter.
 
-    There are none without flicker noise, or without a filter. The rate is in Hz; the density is
-    followed down to 1 / (2 duration), s.
+    The list is empty without flicker noise, or without a filter. The rate is in Hz. The density is
+    approximated down to the frequency 1 / (2 duration), with the duration in s.
     """
     processes: list[GaussMarkov] = []
     for term in model.noise.terms:
         if term.drive is not None and term.drive.flicker and model.low_pass is not None:
-            highest = flicker_band.ABOVE * max(model.low_pass.cutoff, rate / 2.0)
+            highest = flicker_band.MAX_FREQUENCY_RATIO * max(model.low_pass.cutoff, rate / 2.0)
             processes += flicker_band.bank(term.drive.flicker, 0.5 / duration, highest)
     return processes
 
 
 def in_the_log(model: SensorModel, rate: float) -> float:
-    """Return N as the low frequencies of a log of a rate in Hz show it, SI."""
-    return math.sqrt(model.noise.N**2 * folding(model, rate) + _rounding(model, rate))
+    """Return N at the low frequencies of a log, SI, with aliasing and rounding; rate in Hz."""
+    return math.sqrt(
+        model.noise.N**2 * folding(model, rate) + _compute_rounding_density(model, rate)
+    )
 
 
 def before_the_filter(model: SensorModel, noise: NoiseModel, rate: float) -> NoiseModel:
-    """Return noise with N as it is before filter and rounding, from N as a log shows it.
+    """Return noise with N before filter and rounding, from noise with N of a log.
 
-    Of the model filter and resolution are taken; the rate is that of the log, Hz.
+    Only filter and resolution of the model are used; the rate is the rate of the log, Hz.
     """
-    left = max(noise.N**2 - _rounding(model, rate), 0.0)
+    left = max(noise.N**2 - _compute_rounding_density(model, rate), 0.0)
     return replace(noise, N=math.sqrt(left / folding(model, rate)))
 
 
 def folding(model: SensorModel, rate: float) -> float:
-    """Return how many times N^2 the density of the samples is at low frequencies."""
+    """Return the density of the samples at low frequencies over N^2 (aliasing factor)."""
     unit = replace(model, noise=NoiseModel(N=1.0), resolution=0.0)
-    return float(unit.sampled_spectrum(np.array([_LOW]), rate)[0]) / rate
+    return float(unit.sampled_spectrum(np.array([_LOW_FREQUENCY]), rate)[0]) / rate
 
 
-def _rounding(model: SensorModel, rate: float) -> float:
+def _compute_rounding_density(model: SensorModel, rate: float) -> float:
     return model.resolution**2 / (12.0 * rate)

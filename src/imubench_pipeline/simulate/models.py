@@ -1,4 +1,4 @@
-"""Sensor models from settings, and what is true of them in the terms of what is estimated."""
+"""Sensor models from settings, and their true values of the estimated parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, in_the_log
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
-_OF_NOISE = ("N", "B", "T_B", "K", "R", "Q")
+_NOISE_PARAMETERS = ("N", "B", "T_B", "K", "R", "Q")
 
 
 def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
@@ -33,7 +33,7 @@ def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
     drift, low_pass = settings.drift, settings.low_pass
     return SensorModel(
         noise=NoiseModel(
-            **{name: figures[name] for name in _OF_NOISE if name in figures},
+            **{name: figures[name] for name in _NOISE_PARAMETERS if name in figures},
             further=[GaussMarkov(**term.si(quantity)) for term in settings.further],
             sinusoids=[Sinusoid(**term.si(quantity)) for term in settings.sinusoids],
         ),
@@ -49,7 +49,7 @@ def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
 
 
 def imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> ImuModel:
-    """Return the model of a sensor, in SI, of its axes by channel and what these have together.
+    """Return the model of a sensor, in SI, from its axes by channel and their common settings.
 
     Raises
     ------
@@ -72,20 +72,20 @@ def imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> Im
 
 @dataclass(frozen=True)
 class TrueFigure:
-    """One true figure."""
+    """True value of one parameter."""
 
-    name: str  # of the parameter, as the tables have it
+    name: str  # of the parameter in the tables
     value: float  # SI; degC for a temperature
     unit: str
-    setting: str  # key of `AxisSettings` that it is from
+    setting: str  # its key in `AxisSettings`
     component: int = 1  # number of a repeated term, from 1
 
 
 def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[TrueFigure]:
-    """Yield the true figures of an axis, in a log of a rate in Hz.
+    """Yield the true values of the parameters of an axis, in a log of a rate in Hz.
 
-    N is the density at low frequencies of the log; N_sensor is the density before the low-pass,
-    where there is one.
+    N is the density at low frequencies of the log; N_sensor is the density before the low-pass, if
+    there is one.
     """
     quantity = quantity_of(channel)
     units, plain = SI_UNITS[quantity], SI_UNITS[quantity]["B"]
@@ -99,7 +99,7 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Tr
             yield TrueFigure(name, value, units[name], name)
         elif name == "bias":
             yield TrueFigure(name, value, plain, name)
-    for number, (figures, setting) in enumerate(_processes(settings, channel), start=1):
+    for number, (figures, setting) in enumerate(_sort_processes(settings, channel), start=1):
         for name, value in figures.items():
             yield TrueFigure(name, value, units[name], setting, number)
     lines = sorted((line.si(quantity) for line in settings.sinusoids), key=lambda f: f["frequency"])
@@ -119,8 +119,8 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Tr
         yield TrueFigure("cutoff", model.low_pass.cutoff, "Hz", "low_pass")
 
 
-def _processes(settings: AxisSettings, channel: str) -> list[tuple[dict[str, float], str]]:
-    """Return B and T_B of each process as estimates number them: flicker noise first, then T_B."""
+def _sort_processes(settings: AxisSettings, channel: str) -> list[tuple[dict[str, float], str]]:
+    """Return B and T_B of the processes in the order of estimates: flicker noise, then by T_B."""
     own = settings.si(channel)
     processes = [(process.si(quantity_of(channel)), "further") for process in settings.further]
     if "B" in own:

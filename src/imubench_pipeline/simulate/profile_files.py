@@ -1,8 +1,8 @@
 """Profiles in CSV or Parquet files: columns over time, read as a stream.
 
-A column is named for what it holds, with its unit in brackets: ``time [s]``, ``temperature
-[degC]``, ``gyro_z [deg/s]``. Without a unit it is in SI, and temperature in °C. Only the rows about
-the times that are asked for are in memory.
+The name of a column is its quantity, with the unit in brackets: ``time [s]``, ``temperature
+[degC]``, ``gyro_z [deg/s]``. Without a unit it is in SI, and temperature in °C. Only the rows near
+the requested times are in memory.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS, UnitError, conversion
 
-_HEADING = re.compile(r"^\s*(\w+)\s*(?:[\[(]\s*(.+?)\s*[\])])?\s*$")
-_TIME = "time"
-_ROWS = 1 << 16
-_AS_TEXT = "commas between columns, points before decimals, and one line of names"
+_HEADING_PATTERN = re.compile(r"^\s*(\w+)\s*(?:[\[(]\s*(.+?)\s*[\])])?\s*$")
+_TIME_COLUMN = "time"
+_ROWS_PER_BATCH = 1 << 16
+_EXPECTED_CSV = "commas between columns, points before decimals, and one line of names"
 
 
 class FileSeries:
@@ -37,25 +37,25 @@ class FileSeries:
     Raises
     ------
     ConfigError
-        If the file is not there, cannot be read, or has no column ``time``.
+        If the file does not exist, cannot be read, or has no column ``time``.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._headings = self._read_headings()
         self._asked: dict[str, tuple[str, float, float]] = {}
-        self.take(_TIME, "time")
+        self.take(_TIME_COLUMN, "time")
         self._batches: Iterator[tuple[int, pa.RecordBatch]] | None = None
         self._window: dict[str, Array] = {}
         self._trimmed = False
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the file has columns of, time apart."""
-        return tuple(name for name in self._headings if name != _TIME)
+        """Quantities of the columns, without time."""
+        return tuple(name for name in self._headings if name != _TIME_COLUMN)
 
     def take(self, name: str, dimension: str) -> None:
-        """Say that a column, named without its unit, will be asked for, in its dimension.
+        """Request a column by name, without its unit, and dimension.
 
         Raises
         ------
@@ -76,7 +76,7 @@ class FileSeries:
         self._batches = None
 
     def span(self) -> tuple[float, float]:
-        """Return the first and the last time, s; the whole file is read for it.
+        """Return the first and the last time, s; this reads the whole file.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class FileSeries:
         """
         first, last = np.nan, np.nan
         for row, batch in self._read():
-            times = self._columns(batch, row, last)[_TIME]
+            times = self._columns(batch, row, last)[_TIME_COLUMN]
             if len(times):
                 first = times[0] if np.isnan(first) else first
                 last = times[-1]
@@ -94,9 +94,10 @@ class FileSeries:
         return float(first), float(last)
 
     def at(self, name: str, times: Array) -> Array:
-        """Return a column that was taken (`take`), in SI, temperature in °C, shape (k,).
+        """Return a requested column (`take`), in SI, temperature in °C, shape (k,).
 
-        It is linear between rows, its ends held; the times, shape (k,), are in s, ascending.
+        It is linear between rows and constant beyond them. The times, shape (k,), are in s,
+        ascending.
 
         Raises
         ------
@@ -106,33 +107,35 @@ class FileSeries:
         if not len(times):
             return np.empty(0)
         self._reach(float(times[0]), float(times[-1]))
-        return np.interp(times, self._window[_TIME], self._window[name])
+        return np.interp(times, self._window[_TIME_COLUMN], self._window[name])
 
     def _reach(self, first: float, last: float) -> None:
-        """Have in memory the rows from the one before ``first`` to the one after ``last``."""
-        if self._batches is None or (self._trimmed and first < self._window[_TIME][0]):
+        """Load the rows from the last one before ``first`` to the first one after ``last``."""
+        if self._batches is None or (self._trimmed and first < self._window[_TIME_COLUMN][0]):
             self._batches = self._read()
             self._window = {name: np.empty(0) for name in self._asked}
             self._trimmed = False
         parts = [self._window]
-        reached = float(self._window[_TIME][-1]) if len(self._window[_TIME]) else -np.inf
+        reached = (
+            float(self._window[_TIME_COLUMN][-1]) if len(self._window[_TIME_COLUMN]) else -np.inf
+        )
         while not reached >= last:
             row_and_batch = next(self._batches, None)
             if row_and_batch is None:
                 break
             row, batch = row_and_batch
             columns = self._columns(batch, row, reached)
-            if len(columns[_TIME]):
+            if len(columns[_TIME_COLUMN]):
                 parts.append(self._from(columns, first))
-                reached = float(columns[_TIME][-1])
+                reached = float(columns[_TIME_COLUMN][-1])
         joined = {name: np.concatenate([part[name] for part in parts]) for name in self._asked}
-        if not len(joined[_TIME]):
+        if not len(joined[_TIME_COLUMN]):
             raise ConfigError(f"{self.path}: has no rows")
         self._window = self._from(joined, first)
 
     def _from(self, columns: dict[str, Array], first: float) -> dict[str, Array]:
-        """Leave out the rows that are no longer needed."""
-        begin = max(0, int(np.searchsorted(columns[_TIME], first, side="right")) - 1)
+        """Return the columns without the rows that are no longer needed."""
+        begin = max(0, int(np.searchsorted(columns[_TIME_COLUMN], first, side="right")) - 1)
         self._trimmed = self._trimmed or begin > 0
         return {name: values[begin:] for name, values in columns.items()}
 
@@ -151,7 +154,9 @@ class FileSeries:
                     "one a row: leave out the row, or fill it in"
                 )
             columns[name] = raw * factor + offset
-        times = np.concatenate(([before if np.isfinite(before) else -np.inf], columns[_TIME]))
+        times = np.concatenate(
+            ([before if np.isfinite(before) else -np.inf], columns[_TIME_COLUMN])
+        )
         rises = np.diff(times) > 0
         if not rises.all():
             at = int(np.argmin(rises))
@@ -167,12 +172,12 @@ class FileSeries:
         for heading, unit in self._schema():
             if self.path.suffix != ".parquet" and (";" in heading or "\t" in heading):
                 raise ConfigError(
-                    f"{self.path}: found the line of names {heading!r}; expected {_AS_TEXT}"
+                    f"{self.path}: found the line of names {heading!r}; expected {_EXPECTED_CSV}"
                 )
-            match = _HEADING.match(heading)
+            match = _HEADING_PATTERN.match(heading)
             if match:
                 headings[match[1]] = (heading, match[2] or unit)
-        if _TIME not in headings:
+        if _TIME_COLUMN not in headings:
             raise ConfigError(
                 f"{self.path}: no column 'time'; it has {', '.join(headings) or 'none'}; expected "
                 "such as 'time [s]'"
@@ -180,7 +185,7 @@ class FileSeries:
         return headings
 
     def _schema(self) -> list[tuple[str, str | None]]:
-        """Return headings, and the units that stand in the metadata of Parquet columns."""
+        """Return headings, and the units in the metadata of Parquet columns."""
         try:
             if self.path.suffix == ".parquet":
                 schema = pq.read_schema(self.path)
@@ -200,11 +205,11 @@ class FileSeries:
 
     def _unreadable(self, error: Exception) -> ConfigError:
         text = self.path.suffix != ".parquet" and isinstance(error, pa.ArrowException)
-        expected = f"; expected {_AS_TEXT}" if text else ""
+        expected = f"; expected {_EXPECTED_CSV}" if text else ""
         return ConfigError(f"{self.path}: cannot be read: {error}{expected}")
 
     def _read(self) -> Iterator[tuple[int, pa.RecordBatch]]:
-        """Yield batches, each with the number of its first row, the one under the names being 1."""
+        """Yield the number of the first row, from 1 below the line of names, and the batch."""
         row = 1
         for batch in self._batches_of_file():
             yield row, batch
@@ -215,7 +220,9 @@ class FileSeries:
         try:
             if self.path.suffix == ".parquet":
                 with pq.ParquetFile(self.path) as file:
-                    yield from file.iter_batches(_ROWS, columns=headings, use_threads=False)
+                    yield from file.iter_batches(
+                        _ROWS_PER_BATCH, columns=headings, use_threads=False
+                    )
             else:
                 chosen = pacsv.ConvertOptions(
                     include_columns=headings, column_types=dict.fromkeys(headings, pa.float64())

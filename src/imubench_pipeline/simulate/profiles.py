@@ -1,4 +1,4 @@
-"""Motion and temperature over time, in SI: what the forms of `profile_forms` stand for."""
+"""Profiles of motion and temperature over time, in SI, from the settings in `profile_forms`."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Constant(Profile):
 
 @dataclass(frozen=True)
 class Steps(Profile):
-    """Values that hold from their times on; the first one also before."""
+    """Piecewise constant values from their times on; the first one also before."""
 
     times: tuple[float, ...]
     values: tuple[float, ...]
@@ -102,7 +102,7 @@ class Sum(Profile):
 
 @dataclass(frozen=True)
 class FileColumn(Profile):
-    """A column of a file, linear between its rows, and its ends held beyond them."""
+    """A column of a file, linear between its rows and constant beyond them."""
 
     series: FileSeries
     name: str
@@ -113,7 +113,7 @@ class FileColumn(Profile):
 
 
 def profiles_of(around: Surroundings, folder: Path) -> tuple[dict[str, Profile], Profile | None]:
-    """Return motion by channel, and temperature, in SI; files are named from a folder.
+    """Return motion by channel, and temperature, in SI; file names are relative to a folder.
 
     Raises
     ------
@@ -134,8 +134,8 @@ def profiles_of(around: Surroundings, folder: Path) -> tuple[dict[str, Profile],
 def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSeries]) -> Profile:
     """Return a profile, in SI, of a channel or of ``temperature``.
 
-    Files, which are named from a folder, are opened once; one that is read for this profile is
-    added to those that are.
+    File names are relative to the folder. A file is opened once: a newly opened file is added to
+    ``opened``.
 
     Raises
     ------
@@ -152,11 +152,11 @@ def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSer
         column = form.column or name
         opened[path].take(column, dimension)
         return FileColumn(opened[path], column)
-    return _formula(form, dimension)
+    return _make_formula_profile(form, dimension)
 
 
-def _formula(form: Formula, dimension: str, *, difference: bool = False) -> Profile:
-    """Return a profile of a value, or of what is added to one: 5 degC and 5 K are the same then."""
+def _make_formula_profile(form: Formula, dimension: str, *, difference: bool = False) -> Profile:
+    """Return a profile of a value, or of a difference, for which 5 degC and 5 K are the same."""
     convert: Callable[[str, str], float] = difference_to_si if difference else quantity_to_si
 
     def time(text: str) -> float:
@@ -177,5 +177,5 @@ def _formula(form: Formula, dimension: str, *, difference: bool = False) -> Prof
             start, end = value(form.start), value(form.end)
             return WarmUp(start, end, time(form.time_constant), time(form.begin))
     first, *others = form.parts
-    added = (_formula(part, dimension, difference=True) for part in others)
-    return Sum((_formula(first, dimension), *added))
+    added = (_make_formula_profile(part, dimension, difference=True) for part in others)
+    return Sum((_make_formula_profile(first, dimension), *added))

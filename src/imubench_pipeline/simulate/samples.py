@@ -1,4 +1,4 @@
-"""Samples of noise models, at a rate and of a length that may have their units."""
+"""Simulate samples of noise models; rate and duration may have units."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from imubench_pipeline.units import in_si
 
 
 class HasModel(Protocol):
-    """What has a noise model, such as an estimate."""
+    """An object with a noise model, such as an estimate."""
 
     @property
     def model(self) -> NoiseModel:
@@ -59,18 +59,18 @@ def simulate(
     Parameters
     ----------
     model : NoiseModel, an estimate, or a mapping of channels to either
-        A mapping, such as what `imubench_pipeline.estimate` returns, has a log for each channel.
+        Of a mapping, such as the result of `imubench_pipeline.estimate`, all are simulated.
     rate : float or str
         Hz, or with its unit: ``"100 Hz"``.
     samples : int, optional
         Length of the log; this, or the duration.
     rng : numpy.random.Generator, optional
-        This, or a seed; by default other samples each time.
+        This, or a seed; by default the samples differ in each call.
     duration : float or str, optional
         s, or with its unit: ``"2 h"``.
     seed : int, optional
-        The same seed gives the same samples, and each channel of a mapping its own, whichever the
-        others are.
+        The same seed gives the same samples. The channels of a mapping have independent samples,
+        which do not depend on the other channels.
 
     Returns
     -------
@@ -93,18 +93,22 @@ def simulate(
     (60000,)
     """
     frequency = in_si(rate, "frequency", "rate")
-    number = _length(samples, duration, frequency)
+    number = _count_samples(samples, duration, frequency)
     if rng is not None and seed is not None:
         raise ValueError("rng and seed are both given; expected one of them")
     if isinstance(model, Mapping):
         return {
-            name: noise.simulate(_model(each), frequency, number, stream)
-            for (name, each), stream in zip(model.items(), _streams(model, rng, seed), strict=True)
+            name: noise.simulate(_require_model(each), frequency, number, stream)
+            for (name, each), stream in zip(
+                model.items(), _make_streams(model, rng, seed), strict=True
+            )
         }
-    return noise.simulate(_model(model), frequency, number, rng or np.random.default_rng(seed))
+    return noise.simulate(
+        _require_model(model), frequency, number, rng or np.random.default_rng(seed)
+    )
 
 
-def _model(source: object) -> NoiseModel:
+def _require_model(source: object) -> NoiseModel:
     model = source if isinstance(source, NoiseModel) else getattr(source, "model", None)
     if not isinstance(model, NoiseModel):
         raise ValueError(
@@ -114,7 +118,7 @@ def _model(source: object) -> NoiseModel:
     return model
 
 
-def _streams(
+def _make_streams(
     channels: Mapping[str, object], rng: np.random.Generator | None, seed: int | None
 ) -> list[np.random.Generator]:
     if rng is not None:
@@ -124,7 +128,7 @@ def _streams(
     return [noise.channel_rng(seed, name) for name in channels]
 
 
-def _length(samples: int | None, duration: float | str | None, rate: float) -> int:
+def _count_samples(samples: int | None, duration: float | str | None, rate: float) -> int:
     if (samples is None) == (duration is None):
         raise ValueError(
             "expected either samples (such as 60000) or duration (such as '10 min'): "

@@ -1,12 +1,14 @@
-"""Logs from the model of an axis, exactly, block by block.
+"""Simulate the log of a sensor axis block by block, with exact discretisation.
 
 True motion and temperature are given at the sampling times and are linear in between (first-order
-hold); a step is a ramp over one sampling interval. Filter and thermal lag are exact for that; so
-is the linear part of the drift with temperature behind both, while its quadratic part is linear
-between samples. Before the first sample everything was for ever as it is there: the filter and
-the lag are at rest, the ramp has always been rising, Gauss-Markov processes and what the filter
-does with all noise are in their stationary distribution. The random walk is 0 at the first
-sample, and the filter knows where it came from. The recursion of one axis is compiled (`run`).
+hold); a step is a ramp over one sampling interval. For this input, filter and thermal lag are
+exact, as is the linear part of the temperature drift through both. The quadratic part of the drift
+is interpolated linearly between samples.
+
+The initial state is stationary: the filter and the lag are at rest, the ramp has always been
+rising, and Gauss-Markov processes and the filter noise have their stationary distribution. The
+random walk is 0 at the first sample, and the filter state is consistent with its past. The
+recursion of one axis is compiled (`run`).
 """
 
 from __future__ import annotations
@@ -32,18 +34,17 @@ from imubench_pipeline.simulate.model import SensorModel, bank_for, sources_of
 from imubench_pipeline.typing import Array
 
 STARTED, INPUT, TEMPERATURE, LAG = range(4)
-"""Places in the memory of a recursion: has it begun, and what it had at the sample before."""
+"""Indices in the memory of the recursion: whether it has begun, and values of the last sample."""
 
-
-# Sums may be taken in another order: with many slow states that is twice as fast.
-CHUNK = 1 << 14
-"""Samples that are worked on at a time, whatever blocks are asked for: the last digit of a sample
-must not depend on these."""
+SAMPLES_PER_CHUNK = 1 << 14
+"""Samples per call of the recursion, for any block size: the last digit of a sample must not depend
+on the block size."""
 
 Signal = Callable[[int, int], Array]
-"""Gives the values at samples ``start`` to ``stop``."""
+"""Returns the values at samples ``start`` to ``stop``."""
 
 
+# Reordered sums are allowed: with many slow states this is twice as fast.
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
 def run(
     log: Array,
@@ -67,32 +68,32 @@ def run(
     lagged_step: Array,
     drift: Array,
 ) -> None:
-    """Write samples; the states are left as they are at the last of them.
+    """Write samples to ``log``, and update the states to the last sample.
 
     Parameters
     ----------
     log : ndarray, shape (L,)
-        Written: what comes out of the filter.
+        Written: output of the filter.
     entering : ndarray, shape (L,)
-        The input at the samples without noise and drift; linear in between.
+        Input at the samples without noise and drift; linear in between.
     temperature : ndarray, shape (L,)
         °C; empty: no drift.
     normal : ndarray, shape (L, n + max(m, 1))
-        Normal deviates. The first row ever is not used by the states.
+        Normal deviates. The states do not use the row of the first sample of the log.
     memory, x, e : ndarray, shapes (4,), (n,), (m,)
         The states, changed in place.
     decay, own, coupling, shared : ndarray, shapes (n,), (n,), (m, n), (m, n)
-        Of the slow states.
+        Matrices of the slow states.
     transition, factor, output : ndarray, shapes (m, m), (m, m), (m,)
-        Of the filter; its own noise is normal @ factor.
+        Matrices of the filter; its own noise is normal @ factor.
     white : float
-        Standard deviation of white noise a sample, where there is no filter.
+        Standard deviation of white noise per sample, if there is no filter.
     step : ndarray, shape (m,)
-        What the filter's lack gains of a unit change of the input (`discretisation.HeldInput`).
+        Change of the filter deviation e for a unit change of the input (`HeldInput`).
     lag : ndarray, shape (2,)
-        Decay of the lag of the temperature over a sample, and what it gains of a change of 1 K.
+        Decay of the temperature lag over a sample, and its change for a change of 1 K.
     lag_coupling, lagged_step : ndarray, shape (m,)
-        What the filter's lack gains of a lag of 1 K and of a change of 1 K, of a drift of 1 SI a K.
+        Change of e for a lag of 1 K and for a change of 1 K, with a drift of 1 SI unit per K.
     drift : ndarray, shape (3,)
         Sensitivity, SI/K, quadratic, SI/K², and reference, °C.
     """
@@ -164,7 +165,7 @@ def simulate_blocks(
     *,
     true: Signal | None = None,
     temperature: Signal | None = None,
-    block: int = CHUNK,
+    block: int = SAMPLES_PER_CHUNK,
 ) -> Iterator[Array]:
     """Yield a simulated log of one axis in blocks; the log does not depend on their size.
 
@@ -176,10 +177,10 @@ def simulate_blocks(
     samples : int
         Length of the log.
     rng : numpy.random.Generator
-        Such as `imubench_pipeline.noise.simulate.channel_rng` gives for a channel.
+        For a channel, see `imubench_pipeline.noise.simulate.channel_rng`.
     true : callable, optional
-        True rate or specific force along the axis, rad/s or m/s², from the numbers of the first
-        sample and the one past the last; 0 by default.
+        Returns the true rate or specific force along the axis, rad/s or m/s², for the indices of
+        the first sample and one past the last; 0 by default.
     temperature : callable, optional
         °C, likewise; the reference of the drift by default.
     block : int
@@ -193,15 +194,15 @@ def simulate_blocks(
     Raises
     ------
     ValueError
-        If the rate is not above 0, or what `true` or `temperature` give is not finite.
+        If the rate is not above 0, or a value of `true` or `temperature` is not finite.
     """
     if not (math.isfinite(rate) and rate > 0):
         raise ValueError(f"the rate is {rate} Hz, expected a frequency above 0")
     axis = _Axis(model, rate, samples, rng)
     waiting: list[Array] = []
     ready = 0
-    for start in range(0, samples, CHUNK):
-        stop = min(start + CHUNK, samples)
+    for start in range(0, samples, SAMPLES_PER_CHUNK):
+        stop = min(start + SAMPLES_PER_CHUNK, samples)
         waiting.append(axis.samples(start, stop, true, temperature))
         ready += stop - start
         while ready >= block:
@@ -233,17 +234,17 @@ class _Axis:
     ) -> None:
         self._model, self._rate = model, rate
         interval = 1.0 / rate
-        slow_terms = _realised(model, rate, max(samples, 2) * interval)
+        slow_terms = _realise_terms(model, rate, max(samples, 2) * interval)
         sources = sources_of(slow_terms)
         self._times, self._densities = sources.times, sources.densities
         self._white = sources.white
         begin, self._noise, self._lines, self._counts = rng.spawn(4)
-        self._discrete = self._discretised(interval)
+        self._discrete = self._discretise(interval)
         slow, hold = self._discrete.slow, self._discrete.input_hold
         self._coupling = np.ascontiguousarray(slow.coupling.T)
         self._shared = np.ascontiguousarray(slow.shared.T)
         self._lag = np.array([hold.lag_decay, hold.lag_step])
-        self._x, self._e = self._start(begin)
+        self._x, self._e = self._draw_initial_states(begin)
         self._memory = np.zeros(4)
         self._sinusoids = [
             (line, self._lines.uniform(0.0, 2.0 * math.pi)) for line in model.noise.sinusoids
@@ -255,7 +256,7 @@ class _Axis:
             drift = model.drift
             self._drift[:] = drift.sensitivity, drift.quadratic, drift.reference
 
-    def _discretised(self, interval: float) -> _Discrete:
+    def _discretise(self, interval: float) -> _Discrete:
         low_pass, lag = self._model.low_pass, self._model.drift.lag if self._model.drift else 0.0
         slow = slow_sources(self._times, interval, low_pass)
         scale = np.sqrt(self._densities)
@@ -268,7 +269,7 @@ class _Axis:
             none = np.zeros((0, 0))
             white = math.sqrt(self._white / interval)
             return _Discrete(driven, none, none, np.zeros(0), white, hold)
-        # What is left to the filter itself: all its noise that is not in a slow state.
+        # Noise of the filter that is independent of the noise of the slow states.
         m = low_pass.order
         parts = (slow.residual * scale[:, None, None]).reshape(-1, m)
         white_part = math.sqrt(self._white) * white_factor(low_pass, interval)
@@ -276,7 +277,7 @@ class _Axis:
         transition = filter_transition(low_pass, interval)
         return _Discrete(driven, transition, factor, low_pass.output, 0.0, hold)
 
-    def _start(self, rng: np.random.Generator) -> tuple[Array, Array]:
+    def _draw_initial_states(self, rng: np.random.Generator) -> tuple[Array, Array]:
         """Draw the states at the first sample."""
         walk = np.isinf(self._times)
         spread = np.where(walk, 0.0, np.sqrt(self._densities * np.where(walk, 0, self._times) / 2))
@@ -289,7 +290,7 @@ class _Axis:
         )
         values, vectors = np.linalg.eigh(covariance_given_x)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
-        # A ramp that has always been rising leaves the filter behind by F^-1 p R.
+        # For a ramp that has always been rising, e is constant: F^-1 p R.
         ramp = np.linalg.solve(low_pass.transition, low_pass.steady_state) * self._model.noise.R
         return x, x @ mean_given_x + root @ rng.standard_normal(low_pass.order) + ramp
 
@@ -301,12 +302,12 @@ class _Axis:
         size = stop - start
         entering = np.full(size, model.bias)
         if true is not None:
-            entering += (1.0 + model.scale_error) * _checked(true(start, stop), size, "motion")
+            entering += (1.0 + model.scale_error) * _check_signal(true(start, stop), size, "motion")
         if model.noise.R:
             entering += model.noise.R / self._rate * np.arange(start, stop)
         temperatures = np.empty(0)
         if temperature is not None and model.drift is not None:
-            temperatures = _checked(temperature(start, stop), size, "temperature")
+            temperatures = _check_signal(temperature(start, stop), size, "temperature")
         own = max(len(self._e), 1)
         normal = self._noise.standard_normal((size, len(self._x) + own))
         log = np.empty(size)
@@ -333,23 +334,23 @@ class _Axis:
             self._drift,
         )
         for line, phase in self._sinusoids:
-            log += self._line(line, phase, start, stop)
+            log += self._simulate_line(line, phase, start, stop)
         if self._Q:
             counts = self._counts.standard_normal(size)
             log += self._Q * self._rate * np.diff(counts, prepend=self._counted)
             self._counted = counts[-1]
-        return _registered(log, model)
+        return _apply_register(log, model)
 
-    def _line(self, line: Sinusoid, phase: float, start: int, stop: int) -> Array:
+    def _simulate_line(self, line: Sinusoid, phase: float, start: int, stop: int) -> Array:
         response = self._model.low_pass.response(line.frequency) if self._model.low_pass else 1.0
-        # Whole turns are taken away first: they would cost digits after 10^9 samples.
+        # Remove whole periods first: they would cost precision after 10^9 samples.
         turns = np.arange(start, stop) * (line.frequency / self._rate) % 1.0
         shift = phase + np.angle(response)
         return np.asarray(line.amplitude * abs(response) * np.cos(2.0 * math.pi * turns + shift))
 
 
-def _registered(log: Array, model: SensorModel) -> Array:
-    """Saturate and round, as a register does."""
+def _apply_register(log: Array, model: SensorModel) -> Array:
+    """Apply the saturation and rounding of a register."""
     if model.full_scale is not None:
         np.clip(log, -model.full_scale, model.full_scale, out=log)
     if model.resolution > 0.0:
@@ -359,7 +360,7 @@ def _registered(log: Array, model: SensorModel) -> Array:
     return log
 
 
-def _realised(model: SensorModel, rate: float, duration: float) -> list[Term]:
+def _realise_terms(model: SensorModel, rate: float, duration: float) -> list[Term]:
     """Return the terms with flicker noise as a bank of processes."""
     flicker = [term for term in model.noise.terms if term.drive is not None and term.drive.flicker]
     others = [term for term in model.noise.terms if term not in flicker]
@@ -368,7 +369,7 @@ def _realised(model: SensorModel, rate: float, duration: float) -> list[Term]:
     return [*others, *(part for term in flicker for part in term.realised(1.0 / rate, duration))]
 
 
-def _checked(values: Array, size: int, what: str) -> Array:
+def _check_signal(values: Array, size: int, what: str) -> Array:
     signal = np.ascontiguousarray(values, dtype=np.float64)
     if signal.shape != (size,):
         raise ValueError(f"{what} has shape {signal.shape}, expected ({size},)")

@@ -1,4 +1,4 @@
-"""A model to simulate, and what it stands on: each figure with its source, and what is assumed."""
+"""A simulated model with its provenance: the source of each figure, and assumptions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.models import imu_model
 
 Topic = Literal["noise", "bias", "drift", "low-pass", "register", "log"]
-"""Part of a model; ``log``: what the log that is written stands for."""
+"""Part of a model; ``log``: remarks on the written log."""
 
 
 @dataclass(frozen=True)
@@ -27,17 +27,17 @@ class Remark:
 
 @dataclass
 class Origin:
-    """A model, and what it stands on."""
+    """A model and its provenance."""
 
     imu: ImuModel
-    source: str  # what the figures are from, in words
-    # the figures of each channel, with their source
+    source: str  # source of the figures, in words
+    # remarks on the figures of each channel, with their source
     figures: dict[str, list[Remark]] = field(default_factory=dict)
-    assumed: list[Remark] = field(default_factory=list)  # what no source says
-    sensor: str | None = None  # name of the sensor file that its logs go with
+    assumed: list[Remark] = field(default_factory=list)  # figures without a source
+    sensor: str | None = None  # name of the sensor file of its logs
 
     def assume(self, topic: Topic, text: str) -> None:
-        """Add what no source says, once."""
+        """Add an assumption, unless it is already listed."""
         remark = Remark(topic, text)
         if remark not in self.assumed:
             self.assumed.append(remark)
@@ -49,7 +49,7 @@ def from_file(path: Path) -> Origin:
     Raises
     ------
     ConfigError
-        If it is not there, or a figure cannot be used.
+        If the file does not exist, or a figure cannot be used.
     """
     settings = read_settings(ModelSettings, path)
     named = f"{path.name}" + (f" ({settings.source})" if settings.source else "")
@@ -63,7 +63,7 @@ def from_file(path: Path) -> Origin:
 
 
 def select_channels(origin: Origin, channels: Sequence[str]) -> Origin:
-    """Return a model with some of its channels.
+    """Return a model with the given channels only.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Spectrum and Allan variance of noise behind a low-pass, as sampled: in closed form.
+"""Spectrum and Allan variance of sampled noise after a low-pass filter, in closed form.
 
 Both follow from the exact discrete state space of the process and its filter. Flicker noise is a
-sum of Gauss-Markov processes without end in both directions, cut where nothing is left of them.
+sum of Gauss-Markov processes; it is truncated at correlation times with a negligible contribution.
 """
 
 from __future__ import annotations
@@ -21,19 +21,20 @@ from imubench_pipeline.simulate.discretisation import (
 from imubench_pipeline.simulate.flicker_band import mixture
 from imubench_pipeline.typing import Array
 
-_CHUNK = 2048
-"""Frequencies that are worked on at a time."""
+_FREQUENCIES_PER_CHUNK = 2048
+"""Frequencies per block of the computation."""
 
-_FASTEST = 1e-5
-"""Shortest correlation time of flicker noise, in 1 / (angular cut-off frequency)."""
+_MIN_TIME_RATIO = 1e-5
+"""Shortest correlation time of flicker noise, over the time constant of the filter or the sampling
+interval, whichever is shorter."""
 
-_SLOWEST = 1e5
-"""Longest, in the longest time that is asked for."""
+_MAX_TIME_RATIO = 1e5
+"""Longest correlation time of flicker noise, over the longest requested time."""
 
 
 @dataclass(frozen=True)
 class Sources:
-    """What drives a filter."""
+    """Noise at the input of a filter."""
 
     white: float  # N^2
     flicker: float  # B^2 of flicker noise
@@ -43,20 +44,20 @@ class Sources:
     densities: Array
 
     def realised(self, low_pass: LowPass, interval: float, longest: float) -> tuple[Array, Array]:
-        """Return times and densities with those of the processes that make up flicker noise, (n,).
+        """Return times and densities, (n,), with the processes that approximate flicker noise.
 
-        The sampling interval and the longest time that is asked for are in s.
+        The sampling interval and the longest requested time are in s.
         """
         if self.flicker == 0.0:
             return self.times, self.densities
-        shortest = _FASTEST * min(1.0 / low_pass.angular_cutoff, interval)
-        times, variance = mixture(shortest, _SLOWEST * longest)
+        shortest = _MIN_TIME_RATIO * min(1.0 / low_pass.angular_cutoff, interval)
+        times, variance = mixture(shortest, _MAX_TIME_RATIO * longest)
         densities = self.flicker * 2.0 * variance / times
         return np.concatenate([self.times, times]), np.concatenate([self.densities, densities])
 
 
 def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: float) -> Array:
-    """Return the spectrum of the samples, SI^2, in the shape of omega, rad a sample, not 0.
+    """Return the spectrum of the samples, SI^2, in the shape of omega, rad/sample, not 0.
 
     The rate is in Hz.
     """
@@ -68,8 +69,8 @@ def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: fl
     transition = filter_transition(low_pass, interval)
     white = white_factor(low_pass, interval)
     spectrum = np.empty_like(flat)
-    for begin in range(0, len(flat), _CHUNK):
-        w = flat[begin : begin + _CHUNK]
+    for begin in range(0, len(flat), _FREQUENCIES_PER_CHUNK):
+        w = flat[begin : begin + _FREQUENCIES_PER_CHUNK]
         turn = np.exp(1j * w)[:, None, None] * np.eye(low_pass.order)
         # g = c (z - A)^-1, shape (frequencies, m)
         g = np.linalg.solve(
@@ -78,28 +79,28 @@ def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: fl
         )[..., 0]
         power = sources.white * (np.abs(g @ white.T) ** 2).sum(axis=1)
         if len(times):
-            # z - e^(-interval/T), where both may be all but 1
+            # z - e^(-interval/T), without cancellation where both are close to 1
             gap = (-2.0 * np.sin(w / 2.0) ** 2 + 1j * np.sin(w))[:, None] + slow.lost
             through = (1.0 + g @ slow.coupling.T) / gap
             first = np.abs(through * slow.own + g @ slow.shared.T) ** 2
             rest = (np.abs(np.einsum("wm,nkm->wnk", g, slow.residual)) ** 2).sum(axis=2)
             power += (first + rest) @ densities
-        spectrum[begin : begin + _CHUNK] = power
+        spectrum[begin : begin + _FREQUENCIES_PER_CHUNK] = power
     return spectrum.reshape(np.shape(omega))
 
 
 def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -> Array:
-    """Return the Allan variance of the samples, SI^2, in the shape of n, samples a cluster.
+    """Return the Allan variance of the samples, SI^2, in the shape of n, samples per cluster.
 
     The difference of the sums over two adjacent clusters is a linear function of the state before
-    them and of the noise inside them. Both are built up by doubling, as sums of positive parts, so
-    that the cost grows with log n. The rate is in Hz.
+    them and of the noise in them. Both contributions are computed by doubling, as sums of positive
+    terms, at a cost proportional to log n. The rate is in Hz.
     """
     interval = 1.0 / rate
     sizes = np.ravel(n).astype(np.int64)
     longest = interval * int(sizes.max(initial=1))
     times, densities = sources.realised(low_pass, interval, longest)
-    sample, start = _one_sample(sources.white, times, densities, low_pass, interval)
+    sample, start = _make_one_sample(sources.white, times, densities, low_pass, interval)
     powers = [sample]
     for _ in range(int(sizes.max(initial=1)).bit_length() - 1):
         powers.append(powers[-1].then(powers[-1]))
@@ -115,20 +116,20 @@ def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -
 
 @dataclass(frozen=True)
 class _Cluster:
-    """Consecutive samples of independent systems z = (x, e): what becomes of state and sum."""
+    """State transition and sum of consecutive samples of independent systems z = (x, e)."""
 
-    # transition, lost: shape (n, k, k); of the state over the samples, and 1 less it
+    # shape (n, k, k); transition of the state over the samples, and identity minus transition
     transition: Array
     lost: Array
-    sums: Array  # shape (n, k); what the sum of the samples has of the state before them
-    # state, both, total: shapes (n, k, k), (n, k), (n,); covariance of what noise adds to the state
-    # after them and to their sum
+    sums: Array  # shape (n, k); gain from the state before the samples to their sum
+    # state, both, total: shapes (n, k, k), (n, k), (n,); covariance of the noise contributions to
+    # the state after the samples and to their sum: state, state with sum, sum
     state: Array
     both: Array
     total: Array
 
     def then(self, later: _Cluster) -> _Cluster:
-        """Return this cluster and the one that follows it, as one."""
+        """Return the concatenation of this cluster and the next one."""
         after = later.transition
         carried = np.einsum("nij,nj->ni", self.state, later.sums)
         return _Cluster(
@@ -144,7 +145,7 @@ class _Cluster:
         )
 
     def difference(self, start: Array) -> float:
-        """Return the variance of the sum over the next such cluster less that over this one."""
+        """Return the variance of the difference between the sums of the next and this cluster."""
         change = np.einsum("nj,njk->nk", self.sums, self.lost)
         before = np.einsum("ni,nij,nj->n", change, start, change)
         inside = (
@@ -155,10 +156,10 @@ class _Cluster:
         return float((before + inside + self.total).sum())
 
 
-def _one_sample(
+def _make_one_sample(
     white: float, times: Array, densities: Array, low_pass: LowPass, interval: float
 ) -> tuple[_Cluster, Array]:
-    """Return one sample of every source, the white one last, and the stationary covariance."""
+    """Return one sample of every source, white noise last, and the stationary covariance."""
     n, m = len(times), low_pass.order
     slow = slow_sources(times, interval, low_pass)
     A = filter_transition(low_pass, interval)
@@ -187,7 +188,7 @@ def _one_sample(
     )
     start = np.zeros((n + 1, 1 + m, 1 + m))
     for i in range(n):
-        # Where a walk stands at the start does not matter: the difference does not see it.
+        # The initial value of a random walk does not matter: it cancels in the difference.
         alone = (times[i : i + 1], densities[i : i + 1])
         mean, covariance = stationary(*alone, 0.0, low_pass)
         variance = 0.0 if math.isinf(times[i]) else densities[i] * times[i] / 2.0

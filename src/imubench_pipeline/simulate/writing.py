@@ -1,8 +1,8 @@
-"""A simulated log as a file that the readers of the project read, and the notes beside it.
+"""Write a simulated log as a file that the readers of the project read, with its notes.
 
-Parquet is written as recordings are kept, in SI. CSV has the columns, units and delimiter of the
-sensor file where that names columns of one text file, and those of Parquet elsewhere. The notes,
-``<log>.yaml``, say how it is written where the sensor file says otherwise.
+Parquet files have the form of ingested recordings, in SI. CSV files have the columns, units and
+delimiter of the sensor file if it names columns of one text file, otherwise the columns and units
+of Parquet. The notes, ``<log>.yaml``, contain the log format where it differs from the sensor file.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS
 
 FORMATS = (".parquet", ".csv")
-_HEAD = f"# {SIMULATED}: "
-"""How notes begin, before the name of their log."""
+_NOTES_PREFIX = f"# {SIMULATED}: "
+"""Start of the notes, before the name of their log."""
 
 Blocks = Iterable[Mapping[str, Array]]
 
@@ -47,9 +47,9 @@ def write_log(
 ) -> None:
     """Write a simulated log as Parquet or CSV.
 
-    The columns are in SI; the format is as `layout` gives it. The metadata is that of a Parquet
-    file, the remarks are comments at the top of a CSV file. Progress is told after each block how
-    many samples there are.
+    The columns are in SI; for the format see `layout`. The metadata are for Parquet files; the
+    remarks become comments at the top of CSV files. ``progress`` is called after each block with
+    the number of samples.
     """
     names = list(columns)
     known_sources = {str(name): source for name, source in log.channels.items()}
@@ -74,16 +74,16 @@ def write_log(
 
 
 def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) -> str:
-    """Return the notes beside a log: what of its format the sensor file says otherwise.
+    """Return the notes of a log, with its format where it differs from the sensor file.
 
     ``name``: file name of the log. ``words``: description of the log.
     """
     own = log.model_dump(exclude_unset=True, exclude_none=True)
     base = {} if sensor is None else sensor.model_dump(exclude_unset=True)
-    notes = {"device": "simulated", "simulated": True, "log": _over(own, base)}
+    notes = {"device": "simulated", "simulated": True, "log": _diff_settings(own, base)}
     text = yaml.safe_dump(notes, sort_keys=False, default_flow_style=None, width=100)
     comment = "".join(f"# {line}\n" for line in words.splitlines())
-    return f"{_HEAD}{name}\n{comment}{text}"
+    return f"{_NOTES_PREFIX}{name}\n{comment}{text}"
 
 
 def check_notes(notes: Path, path: Path) -> None:
@@ -116,19 +116,19 @@ def check_notes(notes: Path, path: Path) -> None:
 
 
 def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | None) -> LogFormat:
-    """Return how a log of columns, channels and perhaps temperature, at a rate, Hz, is written.
+    """Return the format of a log of channels, and perhaps temperature, at a rate, Hz.
 
     Raises
     ------
     ConfigError
-        If the suffix is of no format that is written.
+        If the suffix is not a supported format.
     """
     if path.suffix not in FORMATS:
         raise ConfigError(f"{path}: expected a name that ends in {' or '.join(FORMATS)}")
     names = list(columns)
     text = path.suffix == ".csv"
-    channels = {name: _si_source(name) for name in names if name != TEMPERATURE}
-    temperature = _si_source(TEMPERATURE) if TEMPERATURE in names else None
+    channels = {name: _make_si_source(name) for name in names if name != TEMPERATURE}
+    temperature = _make_si_source(TEMPERATURE) if TEMPERATURE in names else None
     delimiter = ","
     if text and sensor is not None and _has_names(sensor, channels):
         channels = {name: sensor.channels[name] for name in channels}  # type: ignore[index]  # the keys are channels, as text
@@ -151,7 +151,7 @@ def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | 
 
 
 def _has_names(sensor: LogFormat, channels: Mapping[str, ColumnSource]) -> bool:
-    """Return whether a sensor's logs are one text file with a name for each of these channels."""
+    """Return whether the sensor's logs are one text file with a named column for each channel."""
     by_name = {str(name): source for name, source in sensor.channels.items()}
     sources = [by_name.get(name) for name in channels]
     if sensor.temperature is not None:
@@ -160,18 +160,18 @@ def _has_names(sensor: LogFormat, channels: Mapping[str, ColumnSource]) -> bool:
     return named and sensor.reader in (None, "csv")
 
 
-def _si_source(name: str) -> ColumnSource:
+def _make_si_source(name: str) -> ColumnSource:
     unit = SI_UNITS["temperature" if name == TEMPERATURE else QUANTITIES[quantity_of(name)]]
     return ColumnSource(column=name, unit=unit)
 
 
-def _over(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what makes ``own`` of ``base`` when it is merged over it; null takes a key out."""
+def _diff_settings(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the changes that turn ``base`` into ``own`` when merged; null removes a key."""
     changes: dict[str, Any] = {key: None for key, value in base.items() if key not in own and value}
     for key, value in own.items():
         before = base.get(key)
         if isinstance(value, Mapping) and isinstance(before, Mapping):
-            if inner := _over(value, before):
+            if inner := _diff_settings(value, before):
                 changes[key] = inner
         elif value != before:
             changes[key] = dict(value) if isinstance(value, Mapping) else value
