@@ -1,6 +1,6 @@
-"""The front door: what ``import imubench_pipeline as imu`` gives, over the rooms that compute it.
+"""The Python interface: the functions and classes of ``import imubench_pipeline as imu``.
 
-Logs, arrays and tables of users are taken in (`logs`, `given`), handed to what the workflow runs,
-and what comes of it is shown in engineers' units, drawn, and given as tables (`curves`,
-`estimates`, `comparison`). Nothing is calculated here.
+This package reads logs, arrays and tables of users (`logs`, `given`), calls the functions of the
+workflow, and shows the results in engineers' units, as plots and as tables (`curves`, `estimates`,
+`comparison`). It contains no calculations.
 """

@@ -1,4 +1,4 @@
-"""Logs or estimates beside each other: by channel and parameter, how many times, and how surely."""
+"""Comparison of logs or estimates: ratios with intervals, by channel and parameter."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-_TAU = ("1 s", "10 s", "100 s", "1000 s")
-_FUSION = FusionSettings()
+_DEFAULT_TAUS = ("1 s", "10 s", "100 s", "1000 s")
+_FUSION_DEFAULTS = FusionSettings()
 
 
 @dataclass(frozen=True)
 class Compared:
-    """One figure of one channel of two logs; values in SI."""
+    """Comparison of one figure of one channel between two logs; values in SI."""
 
     channel: str
     symbol: str
@@ -40,20 +40,21 @@ class Compared:
 
     @property
     def verdict(self) -> str:
-        """Which is lower, by its name, or that they are not told apart."""
+        """Name of the log with the lower value, or the verdict of no significant difference."""
         lower = {"lower": self.names[0], "higher": self.names[1]}.get(self.ratio.verdict)
         return f"{lower} lower" if lower else self.ratio.verdict
 
     @property
     def label(self) -> str:
-        """What is compared."""
+        """Label of the figure."""
         return symbol_text(self.symbol) if self.tau is None else f"σ({self.tau:g} s)"
 
 
 class Comparison(Shown, Sequence[Compared]):
     """Noise parameters and Allan deviations of logs, as ratios with 95 % intervals.
 
-    A verdict is that of one interval; of twenty sensors that are alike one is called lower.
+    A verdict depends on a single 95 % interval: of twenty comparisons of equal sensors, about one
+    is significant by chance.
     """
 
     def __init__(self, compared: Sequence[Compared], names: Sequence[str]) -> None:
@@ -122,7 +123,7 @@ class Comparison(Shown, Sequence[Compared]):
         for each in self:
             unit = page_unit(quantity_of(each.channel), each.symbol, "practical")
             row = [each.channel, each.label, *(unit.text(value, 3) for value in each.values)]
-            row += [unit.sign, *_ratio_texts(each.ratio), each.verdict]
+            row += [unit.sign, *_format_ratio(each.ratio), each.verdict]
             row.append(cut(each.ratio.reason or "", 50))
             rows.append([f"{each.names[0]} / {each.names[1]}", *row] if several else row)
         if several:
@@ -132,7 +133,7 @@ class Comparison(Shown, Sequence[Compared]):
         return Summary(f"Comparison of {title}", heads, rows)
 
 
-def _ratio_texts(ratio: Ratio) -> tuple[str, str]:
+def _format_ratio(ratio: Ratio) -> tuple[str, str]:
     value = "–" if ratio.value is None else number_text(ratio.value, 3)
     digits = limit_digits(ratio.lower, ratio.upper)
     if ratio.lower is None and ratio.upper is None:
@@ -145,7 +146,7 @@ def _ratio_texts(ratio: Ratio) -> tuple[str, str]:
 def compare(
     *logs: Log | Estimates,
     names: Sequence[str] | None = None,
-    tau: Sequence[float | str] = _TAU,
+    tau: Sequence[float | str] = _DEFAULT_TAUS,
     method: Method = "likelihood",
 ) -> Comparison:
     """Compare the noise of logs, channel by channel.
@@ -155,25 +156,26 @@ def compare(
     *logs : Log or Estimates
         Two or more; a log is estimated first.
     names : sequence of str, optional
-        What they are called; by default as the recordings, with their sensors where these are the
-        same.
+        Names of the logs; by default the names of the recordings, with their sensors if these are
+        equal.
     tau : sequence of float or str
-        Averaging times at which Allan deviations of the models are compared, s or with their unit;
-        those that the logs do not tell, beyond a ninth of the shorter one, are left out.
+        Averaging times at which Allan deviations of the models are compared, s or with their unit.
+        Times beyond a ninth of the shorter log are left out: the log does not determine them.
     method : str
-        Of the estimates of logs.
+        Method of the estimates, for logs.
 
     Returns
     -------
     Comparison
-        Of each pair, for each channel that both have: ratio with its 95 % interval and a verdict,
-        of N, B and lowest point of the curve, K, and the Allan deviation at each tau. Parameters
-        are held against each other by their limits, Allan deviations by the joint draws of both.
+        Ratios with 95 % intervals and verdicts, for each pair of logs and each common channel. The
+        figures are N, B, the minimum of the curve, K, and the Allan deviation at each tau. The
+        intervals follow from the limits of the parameters, and from joint draws for Allan
+        deviations.
 
     Raises
     ------
     ValueError
-        If there are fewer than two, or no channel is in both of a pair.
+        If there are fewer than two logs, or a pair has no common channel.
 
     Examples
     --------
@@ -187,8 +189,8 @@ def compare(
     """
     if len(logs) < 2:
         raise ValueError(f"{len(logs)} given; expected two or more logs, or estimates")
-    estimates = [_estimated(log, method) for log in logs]
-    called = list(names) if names is not None else _names(estimates)
+    estimates = [_require_estimates(log, method) for log in logs]
+    called = list(names) if names is not None else _choose_names(estimates)
     if len(called) != len(logs) or len(set(called)) < len(called):
         raise ValueError(
             f"names are {', '.join(called)}; expected {len(logs)} of them, all distinct"
@@ -202,7 +204,7 @@ def compare(
     return Comparison(compared, called)
 
 
-def _estimated(log: object, method: Method) -> Estimates:
+def _require_estimates(log: object, method: Method) -> Estimates:
     if isinstance(log, Estimates):
         return log
     if isinstance(log, Log):
@@ -210,7 +212,7 @@ def _estimated(log: object, method: Method) -> Estimates:
     raise ValueError(f"found {type(log).__name__}; expected what read_log or estimate returns")
 
 
-def _names(estimates: Sequence[Estimates]) -> list[str]:
+def _choose_names(estimates: Sequence[Estimates]) -> list[str]:
     for names in ([each.log.recording for each in estimates], [each.name for each in estimates]):
         if len(set(names)) == len(names):
             return names
@@ -229,27 +231,32 @@ def _pair(
     for channel in channels:
         pair = first[channel], second[channel]
         for symbol in COMPARED:
-            a, b = (_parameter(one, symbol) for one in pair)
+            a, b = (_find_parameter(one, symbol) for one in pair)
             if a is not None and b is not None:
                 ratio = ratio_of_parameters(a, b)
                 yield Compared(channel, symbol, None, names, (a.value, b.value), ratio)
-        a_log, b_log = (_as_fused(one) for one in pair)
+        a_log, b_log = (_make_fusion_channel(one) for one in pair)
         for tau in seconds:
-            if tau > _FUSION.longest * min(a_log.duration, b_log.duration):
+            if tau > _FUSION_DEFAULTS.longest * min(a_log.duration, b_log.duration):
                 continue
             ratio = ratio_of_deviations(
-                a_log, b_log, tau, longest=_FUSION.longest, draws=_FUSION.draws, seed=_FUSION.seed
+                a_log,
+                b_log,
+                tau,
+                longest=_FUSION_DEFAULTS.longest,
+                draws=_FUSION_DEFAULTS.draws,
+                seed=_FUSION_DEFAULTS.seed,
             )
             deviations = a_log.variance(tau) ** 0.5, b_log.variance(tau) ** 0.5
             yield Compared(channel, "adev", tau, names, deviations, ratio)
 
 
-def _parameter(estimate: ChannelEstimate, symbol: str) -> Parameter | None:
+def _find_parameter(estimate: ChannelEstimate, symbol: str) -> Parameter | None:
     return {**estimate.parameters, **estimate.curve}.get(symbol)
 
 
-def _as_fused(estimate: ChannelEstimate) -> FusionChannel:
-    """Return a channel as `navigation.fusion` takes it."""
+def _make_fusion_channel(estimate: ChannelEstimate) -> FusionChannel:
+    """Return a channel in the form of `navigation.fusion`."""
     curve = estimate.measured
     assert curve is not None
     sensor, _, recording = estimate.log.partition("/")

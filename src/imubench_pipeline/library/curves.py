@@ -38,25 +38,35 @@ if TYPE_CHECKING:
 
 Overlap = Literal["full", "octave"]
 
-_HEADS = ("channel", "tau", "from", "to", "at the shortest", "lowest", "at tau")
-_COLUMNS = ("tau", "adev", "lower", "upper", "edf", "cluster_size", "averaged", "exponent", "share")
+_SUMMARY_HEADS = ("channel", "tau", "from", "to", "at the shortest", "lowest", "at tau")
+_TABLE_COLUMNS = (
+    "tau",
+    "adev",
+    "lower",
+    "upper",
+    "edf",
+    "cluster_size",
+    "averaged",
+    "exponent",
+    "share",
+)
 
 
 @dataclass(frozen=True, repr=False)
 class Curve(Shown, AllanCurve):
-    """An Allan curve that can be drawn, and given as a table.
+    """An Allan curve with plots and tables.
 
     Attributes
     ----------
     channel : str or None
-        Of a channel it is in SI; without one it is in the unit of the samples.
+        With a channel the curve is in SI; without one it is in the unit of the samples.
     """
 
     channel: str | None = None
 
     @classmethod
     def of(cls, curve: AllanCurve, channel: str | None) -> Curve:
-        """Return a curve with the channel that it is of."""
+        """Return a curve with its channel."""
         values = {field.name: getattr(curve, field.name) for field in fields(AllanCurve)}
         return cls(**values, channel=channel)
 
@@ -75,11 +85,11 @@ class Curve(Shown, AllanCurve):
 
     def to_pandas(self) -> pd.DataFrame:
         """Return a row for each tau: deviation, 95 % limits, degrees of freedom; units in attrs."""
-        return _table([self])
+        return _make_table([self])
 
     def _summary(self) -> Summary:
         title = f"Allan curve{'' if self.channel is None else f' of {self.channel}'}"
-        return Summary(f"{title}, {self.samples:,} samples", _HEADS, [_row(self)])
+        return Summary(f"{title}, {self.samples:,} samples", _SUMMARY_HEADS, [_make_row(self)])
 
 
 class Curves(Shown, Mapping[str, Curve]):
@@ -88,7 +98,7 @@ class Curves(Shown, Mapping[str, Curve]):
     Attributes
     ----------
     name : str
-        What they are of.
+        Name of the log.
     """
 
     def __init__(self, curves: Iterable[Curve], name: str = "") -> None:
@@ -105,7 +115,7 @@ class Curves(Shown, Mapping[str, Curve]):
         return len(self._curves)
 
     def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Any:
-        """Draw the curves, gyros and accelerometers apart; return the axes, shape (quantities,)."""
+        """Draw the curves, one panel per quantity; return the axes, shape (quantities,)."""
         from imubench_pipeline.library.drawing import draw_curves, panels
 
         by_quantity: dict[str, dict[str, AllanCurve]] = {}
@@ -119,26 +129,26 @@ class Curves(Shown, Mapping[str, Curve]):
         return axes
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return a row for each channel and tau, as the workflow's table ``allan``, in SI."""
-        return _table(self.values())
+        """Return a row for each channel and tau, like the workflow's table ``allan``, in SI."""
+        return _make_table(self.values())
 
     def _summary(self) -> Summary:
         title = f"Allan curves{f' of {self.name}' if self.name else ''}"
-        return Summary(title, _HEADS, [_row(curve) for curve in self.values()])
+        return Summary(title, _SUMMARY_HEADS, [_make_row(curve) for curve in self.values()])
 
 
 def measured(
     log: ChannelLog, sizes: ArrayLike | None, overlap: Overlap, threads: int
 ) -> Curve | None:
-    """Return the curve of a channel of a log, at cluster sizes, shape (m,), or those by default.
+    """Return the curve of a channel of a log at cluster sizes, shape (m,), or at the default ones.
 
-    None: too many samples are missing (`imubench_pipeline.steps.allan.too_sparse`).
+    None if too many samples are missing (`imubench_pipeline.steps.allan.too_sparse`).
     """
     curve = curve_of(log, sizes, overlap, threads=threads)
     return Curve.of(curve, log.channel) if len(curve.tau) else None
 
 
-def _row(curve: Curve) -> list[str]:
+def _make_row(curve: Curve) -> list[str]:
     from imubench_pipeline.library.drawing import deviation_unit
 
     unit = deviation_unit(curve.quantity)
@@ -153,14 +163,14 @@ def _row(curve: Curve) -> list[str]:
     ]
 
 
-def _table(curves: Iterable[Curve]) -> pd.DataFrame:
+def _make_table(curves: Iterable[Curve]) -> pd.DataFrame:
     import pandas as pd
 
     rows = []
     for curve in curves:
         unit = None if curve.channel is None else SI_UNITS[dimension_of(curve.channel)]
         for row in allan_rows(Key("", "", curve.channel or ""), curve):
-            kept = {key: row[key] for key in _COLUMNS}
+            kept = {key: row[key] for key in _TABLE_COLUMNS}
             rows.append(({"channel": curve.channel, "unit": unit} if unit else {}) | kept)
     table = pd.DataFrame(rows)
     table.attrs["units"] = {"tau": "s"}
@@ -190,15 +200,15 @@ def allan_variance(
     rate : float or str, optional
         Sampling rate, Hz, or with its unit: ``"100 Hz"``. A log has its own.
     channels : str or sequence of str, optional
-        Of an array of several columns what they are, ``"gyro"`` and ``"accel"`` for three axes (six
-        are gyro_x to accel_z); of a log or table, those to take.
+        For an array of several columns, the channels of the columns; ``"gyro"`` and ``"accel"`` are
+        three axes (six columns are gyro_x to accel_z). For a log or table, the selected channels.
     units : mapping of str to str, optional
         By ``gyro`` and ``accel``, or by channel: ``{"gyro": "deg/s", "accel": "g"}``.
     cluster_sizes : array_like of int, optional
         n of each tau, log-spaced by default.
     overlap : {"full", "octave"}
-        Every cluster, or those that start 1/48 of their length apart: as sure, and many times
-        faster.
+        All clusters, or clusters that start 1/48 of their length apart: the confidence limits are
+        practically the same, and it is many times faster.
     valid : array_like of bool, shape (L,), optional
         False where a sample is missing.
     segments : sequence of (int, int), optional
@@ -209,9 +219,8 @@ def allan_variance(
     Returns
     -------
     Curve or Curves
-        Of samples of shape (L,) one `imubench_pipeline.allan.AllanCurve` in their unit, else
-        a mapping of channels to curves in SI. Of an array, knocks are not left out, as they are
-        from a log.
+        For samples of shape (L,) one `imubench_pipeline.allan.AllanCurve` in their unit, else a
+        mapping of channels to curves in SI. Knocks are left out of logs, but not of arrays.
 
     Raises
     ------

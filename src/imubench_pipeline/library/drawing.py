@@ -1,4 +1,4 @@
-"""Drawing onto the axes of a user, who may go on with them."""
+"""Draw results on axes of the user, who can continue to use them."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from imubench_pipeline.settings.extras import extra
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_OWN = PageUnit("unit of the samples", 1.0)
+_SAMPLE_UNIT = PageUnit("unit of the samples", 1.0)
 
 
 def panels(count: int, wide: int = 3) -> Any:
-    """Return new axes, shape (count,), at most so many in a row.
+    """Return new axes, shape (count,), at most ``wide`` in a row.
 
     Raises
     ------
@@ -42,13 +42,13 @@ def panels(count: int, wide: int = 3) -> Any:
 
 
 def axes_or_new(ax: Axes | None) -> Any:
-    """Return the axes that are given, or new ones."""
+    """Return the given axes, or new ones."""
     return panels(1)[0] if ax is None else ax
 
 
 def deviation_unit(quantity: str | None) -> PageUnit:
-    """Return the unit in which an Allan deviation is drawn; that of the samples, if not known."""
-    return _OWN if quantity is None else page_unit(quantity, "adev", "practical")
+    """Return the unit of an Allan deviation in plots; the unit of the samples if not known."""
+    return _SAMPLE_UNIT if quantity is None else page_unit(quantity, "adev", "practical")
 
 
 def draw_curves(axes: Axes, curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
@@ -57,7 +57,7 @@ def draw_curves(axes: Axes, curves: Mapping[str, AllanCurve], quantity: str | No
     looks = cycle(sensor_appearances([*curves]).values())
     for (name, curve), look in zip(curves.items(), looks, strict=False):
         draw_measured(axes, curve, unit, name, look.light)
-    _finish(axes, unit)
+    _format_axes(axes, unit)
     _draw_slopes(axes, next(iter(curves.values())), unit)
 
 
@@ -89,11 +89,11 @@ def draw_model(axes: Axes, curve: AllanCurve, model: NoiseModel, quantity: str) 
         axes.plot(curve.tau, total, label=f"model: {model.name}", **SUM_LOOK)
         shown = np.concatenate([total, curve.deviation * unit.per_si])
         axes.set_ylim(float(shown.min()) / 5.0, float(shown.max()) * 2.0)
-    _finish(axes, unit)
+    _format_axes(axes, unit)
 
 
 def draw_ratios(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Draw ratios with their 95 % intervals, one below the other: keys label, value and limits."""
+    """Draw ratios with 95 % intervals in rows, with the keys label, ratio, lower and upper."""
     places = range(len(rows), 0, -1)
     for place, row in zip(places, rows, strict=True):
         lower, upper = row["lower"] or None, row["upper"]
@@ -115,7 +115,7 @@ def draw_ratios(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
     axes.grid(True, axis="x", color="0.9")
 
 
-def _finish(axes: Axes, unit: PageUnit) -> None:
+def _format_axes(axes: Axes, unit: PageUnit) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("averaging time τ (s)")

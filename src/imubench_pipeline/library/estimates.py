@@ -1,4 +1,4 @@
-"""Noise parameters of logs, arrays and tables, as the workflow estimates them."""
+"""Noise parameters of logs, arrays and tables, estimated by the functions of the workflow."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Method = Literal["likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"]
 
-_HEADS = ("channel", "", "value", "95 % interval", "unit", "status")
+_SUMMARY_HEADS = ("channel", "", "value", "95 % interval", "unit", "status")
 
 
 @dataclass(frozen=True, repr=False)
@@ -46,7 +46,7 @@ class ChannelEstimate(Shown, Estimate):
     ----------
     channel : str
     measured : Curve or None
-        The Allan curve that they go with.
+        The Allan curve of the channel.
     log : str
         Sensor and recording.
     """
@@ -57,7 +57,7 @@ class ChannelEstimate(Shown, Estimate):
 
     @classmethod
     def of(cls, estimate: Estimate, channel: str, measured: Curve, log: str) -> ChannelEstimate:
-        """Return an estimate with the channel and the curve that it is of."""
+        """Return an estimate with its channel, curve and log."""
         values = {each.name: getattr(estimate, each.name) for each in fields(Estimate)}
         return cls(**values, channel=channel, measured=measured, log=log)
 
@@ -85,11 +85,11 @@ class ChannelEstimate(Shown, Estimate):
 
     def to_pandas(self, units: System = "si") -> pd.DataFrame:
         """Return a row for each parameter: see `Estimates.to_pandas`."""
-        return _table([self], units)
+        return _make_table([self], units)
 
     def _summary(self) -> Summary:
         title = f"{self.channel} of {self.log}: {self.model.name}, by {self.method}"
-        return Summary(title, _HEADS, list(_rows(self)), _reasons([self]))
+        return Summary(title, _SUMMARY_HEADS, list(_make_rows(self)), _list_reasons([self]))
 
 
 class Estimates(Shown, Mapping[str, ChannelEstimate]):
@@ -98,14 +98,14 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
     Attributes
     ----------
     log : Log
-        What they are of: files and arrays alike are judged before.
+        The log of the estimates; arrays are ingested like files.
     method : str
     findings : tuple of Finding
-        What was found of the log, and by the estimation: as in a run of the log alone.
+        Findings of ingest and estimation, as in a run with this log only.
     doubts : tuple of Doubt
-        Why values may be wrong, likewise.
+        Reasons why values may be wrong, as in such a run.
     left_out : dict of str to str
-        Channels without an estimate, and why.
+        Channels without an estimate, with the reason.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
 
     @property
     def curves(self) -> Curves:
-        """The Allan curves that the estimates go with."""
+        """The Allan curves of the channels."""
         return Curves((one.measured for one in self.values() if one.measured), self.name)
 
     @property
@@ -173,27 +173,27 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
         return axes
 
     def to_pandas(self, units: System = "si") -> pd.DataFrame:
-        """Return a row for each channel and parameter, as the workflow's table ``parameters``.
+        """Return a row for each channel and parameter, like the workflow's table ``parameters``.
 
         Parameters
         ----------
         units : {"si", "practical"}
-            Of value and limits: SI, or deg/sqrt(h), deg/h, ug and the like; column ``unit`` says
-            which.
+            Units of value and limits: SI, or deg/sqrt(h), deg/h, ug and similar. The column
+            ``unit`` names the unit.
         """
-        return _table(self.values(), units)
+        return _make_table(self.values(), units)
 
     def _summary(self) -> Summary:
         names = {estimate.model.name for estimate in self.values()}
         model = f": {names.pop()}" if len(names) == 1 else ""
         title = f"Estimates of {self.name}{model}, by {self.method}"
-        rows = [row for estimate in self.values() for row in _rows(estimate)]
-        notes = _reasons(self.values())
+        rows = [row for estimate in self.values() for row in _make_rows(estimate)]
+        notes = _list_reasons(self.values())
         notes += [f"{channel}: {reason}" for channel, reason in self.left_out.items()]
         serious = [f.finding for f in self.findings if f.severity != "note"]
         if serious:
             notes.append(f"warnings: {', '.join(dict.fromkeys(serious))} (see .findings)")
-        return Summary(title, _HEADS, rows, notes)
+        return Summary(title, _SUMMARY_HEADS, rows, notes)
 
 
 def estimate(
@@ -212,29 +212,29 @@ def estimate(
     Parameters
     ----------
     data : Log, array_like, DataFrame, or mapping of str to array_like
-        As `imubench_pipeline.allan_variance` takes it; an array of shape (L,) is gyro_x unless
-        ``channels`` says otherwise. Arrays are judged as files are: knocks are left out, and
-        findings say what is wrong.
+        See `imubench_pipeline.allan_variance`; an array of shape (L,) is gyro_x unless ``channels``
+        names another channel. Arrays are ingested like files: knocks are left out, and problems
+        are reported as findings.
     rate : float or str, optional
         Sampling rate, Hz, or with its unit: ``"100 Hz"``. A log has its own.
     method : str
         ``likelihood``, or another of the workflow: ``likelihood_gm`` (the papers' N, B, T_B, K),
         ``compensated`` (without what temperature explains), ``weighted``, ``curve``, ``paper``.
     channels : str or sequence of str, optional
-        Of an array what the columns are; of a log or table those to take.
+        For an array, the channels of the columns; for a log or table, the selected channels.
     units : mapping of str to str, optional
         By ``gyro`` and ``accel``, or by channel; arrays are in SI without them.
     name : str
-        Of an array or table: what the log is called.
+        Name of the log, for an array or table.
     threads : int, optional
-        Of the Allan variance; by default one for each core.
+        Threads of the Allan variance; by default one for each core.
     **settings
         ``longest``, ``band`` and ``seed`` as under ``estimate`` of a run's configuration.
 
     Returns
     -------
     Estimates
-        Of a log with the names that it has in a run, the numbers of that run.
+        For a log with the same names as in a run, the numbers are those of the run.
 
     Raises
     ------
@@ -264,7 +264,7 @@ def estimate(
     chosen = log.chosen(channels if log is data else None)
     if method == "compensated" and not any(kept.temperature for kept in chosen.values()):
         raise ValueError(f"{log.name} has no readings of the temperature; expected another method")
-    # What other methods find wrong of a curve is doubted by the likelihood: it is always asked.
+    # The doubts about a curve come from the likelihood: this method always runs.
     asked = tuple(dict.fromkeys(("likelihood", method)))
     how = parse(EstimateSettings, {**settings, "methods": asked}, "estimate")
     grid = AllanSettings()
@@ -283,7 +283,7 @@ def estimate(
         estimate_channel(key, kept, curve, how, log.bandwidth, into)
         found = into.estimates[channel].get(method)
         if found is None:
-            left_out[channel] = _why_not(into, channel)
+            left_out[channel] = _explain_missing_compensation(into, channel)
         else:
             estimates.append(ChannelEstimate.of(found, channel, curve, log.name))
     if not estimates:
@@ -303,8 +303,8 @@ def estimate(
     return Estimates(estimates, log, method, list(map(finding_of, rows)), doubted, left_out)
 
 
-def _why_not(into: Estimation, channel: str) -> str:
-    """Return why temperature was not taken out of a channel."""
+def _explain_missing_compensation(into: Estimation, channel: str) -> str:
+    """Return the reason why the temperature effect of a channel was not compensated."""
     reasons = [
         row.reason or "the data do not favour it"
         for row in into.temperature
@@ -313,8 +313,8 @@ def _why_not(into: Estimation, channel: str) -> str:
     return "; ".join(reasons) or "its clock has no readings of the temperature"
 
 
-def _rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
-    """Yield the rows of what is shown of an estimate, in engineers' units."""
+def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
+    """Yield the rows of the summary of an estimate, in engineers' units."""
     order = {symbol: place for place, symbol in enumerate(SHOWN)}
     components = [
         (component, symbol, parameter)
@@ -337,8 +337,8 @@ def _rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
         ]
 
 
-def _reasons(estimates: Any) -> list[str]:
-    """Return why values are in doubt, and what N is of where the curve does not show it."""
+def _list_reasons(estimates: Any) -> list[str]:
+    """Return the reasons of doubtful values, and remarks on N."""
     reasons = (
         f"{estimate.channel} {symbol_text(symbol)}: {cut(parameter.reason, 150)}"
         for estimate in estimates
@@ -349,7 +349,7 @@ def _reasons(estimates: Any) -> list[str]:
     return list(dict.fromkeys(reasons))
 
 
-def _table(estimates: Any, units: System) -> pd.DataFrame:
+def _make_table(estimates: Any, units: System) -> pd.DataFrame:
     import pandas as pd
 
     if units not in get_args(System):

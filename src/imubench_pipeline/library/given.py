@@ -1,8 +1,8 @@
-"""Samples as users have them, arrays and tables, taken as channels with units.
+"""Convert arrays and tables of users to channels with units.
 
-What stands in an array is in SI unless its units are given: so is all of this library. A table says
-its units, in the names of its columns (``gyro_x [deg/s]``), in its ``attrs`` or beside it; a unit
-is never guessed from the figures.
+Arrays are in SI unless units are given. For tables, the units must be stated: in the names of the
+columns (``gyro_x [deg/s]``), in ``attrs``, or as an argument. A unit is never guessed from the
+values.
 """
 
 from __future__ import annotations
@@ -23,15 +23,17 @@ from imubench_pipeline.units import SI_UNITS, UnitError, conversion, in_si, nami
 Channels = str | Sequence[str]
 Units = Mapping[str, str]
 
-_AXES = {quantity: [f"{quantity}_{axis}" for axis in "xyz"] for quantity in QUANTITIES}
-_NAMED = re.compile(r"^\s*(.*?)\s*[\[(]\s*(.+?)\s*[\])]\s*$")
-_TIMES = ("time", "t", "timestamp")
-_BY_NAME = "the name of the column"
+_CHANNELS_OF_QUANTITY = {
+    quantity: [f"{quantity}_{axis}" for axis in "xyz"] for quantity in QUANTITIES
+}
+_LABEL_PATTERN = re.compile(r"^\s*(.*?)\s*[\[(]\s*(.+?)\s*[\])]\s*$")
+_TIME_COLUMNS = ("time", "t", "timestamp")
+_NAME_SOURCE = "the name of the column"
 
 
 @dataclass(frozen=True)
 class Column:
-    """One channel, or the temperature, as it is given."""
+    """One channel, or the temperature, in its original unit."""
 
     values: Array  # shape (L,); NaN where a sample is missing
     unit: str
@@ -48,12 +50,12 @@ def dimension_of(name: str) -> str:
 
 
 def rate_of(rate: float | str | None, data: object) -> float:
-    """Return the sampling rate of samples, Hz; that of a table may stand in its ``attrs``.
+    """Return the sampling rate of samples, Hz; a table may state it in its ``attrs``.
 
     Raises
     ------
     ValueError
-        If none is given, or it is no frequency above 0 (`UnitError`: of another dimension).
+        If none is given, or it is not a frequency above 0 (`UnitError`: another dimension).
     """
     stated = rate if rate is not None else getattr(data, "attrs", {}).get("rate")
     if stated is None:
@@ -70,7 +72,7 @@ def numbers(values: object, name: str) -> Array:
     Raises
     ------
     ValueError
-        If they are no real numbers.
+        If they are not real numbers.
     """
     filled = values.filled(np.nan) if isinstance(values, np.ma.MaskedArray) else values
     try:
@@ -92,26 +94,26 @@ def columns_of(
     Parameters
     ----------
     data : array_like, DataFrame or mapping of str to array_like
-        Shape (L,), (L, 3) or (L, 6), rows are samples; or a column a channel.
+        Shape (L,), (L, 3) or (L, 6), rows are samples; or one column per channel.
     channels : str or sequence of str, optional
-        What the columns of an array are; ``"gyro"`` and ``"accel"`` are three axes, and the x axis
-        of shape (L,). By default six are gyro_x to accel_z, and shape (L,) is gyro_x. Of a table or
-        mapping, those to take.
+        Channels of the columns of an array; ``"gyro"`` and ``"accel"`` are three axes, or the x
+        axis for shape (L,). By default six columns are gyro_x to accel_z, and shape (L,) is gyro_x.
+        For a table or mapping, the selected channels.
     units : mapping of str to str, optional
-        By ``gyro``, ``accel``, or channel. By default SI, but that of a table must be stated.
+        By ``gyro``, ``accel``, or channel. Default: SI, but the units of a table must be stated.
 
     Raises
     ------
     ValueError
-        If the shape, or a name, is none of these, or a channel has no number
+        If the shape or a name is not one of these, or a channel has no finite number
         (`UnitError`: a unit is missing, not known or of another dimension).
     """
     _check_units(units)
     is_table = _is_table(data)
     if has_columns(data):
-        columns = dict(_named_columns(data, listed(channels), units or {}, stated=is_table))
+        columns = dict(_select_columns(data, listed(channels), units or {}, stated=is_table))
     else:
-        columns = dict(_positions(data, listed(channels), units or {}))
+        columns = dict(_name_columns(data, listed(channels), units or {}))
     for name, column in columns.items():
         with naming(f"{name}: "):
             conversion(column.unit, dimension_of(name))
@@ -121,12 +123,12 @@ def columns_of(
 
 
 def check_present(values: Array, name: str) -> None:
-    """Refuse samples, shape (L,), of which none is a finite number.
+    """Check that samples, shape (L,), contain a finite number.
 
     Raises
     ------
     ValueError
-        If so.
+        If they do not.
     """
     if not len(values):
         raise ValueError(f"{name} is empty; expected two samples or more")
@@ -138,23 +140,23 @@ def check_present(values: Array, name: str) -> None:
 
 
 def has_columns(data: object) -> bool:
-    """Return whether samples have names: those of a table, or of a mapping."""
+    """Return whether samples have column names, as in a table or a mapping."""
     return _is_table(data) or isinstance(data, Mapping)
 
 
 def _is_table(data: object) -> bool:
-    """Return whether it is a DataFrame of pandas, which is imported by whoever has one."""
+    """Return whether data are a pandas DataFrame, without importing pandas."""
     pandas = sys.modules.get("pandas")
     return pandas is not None and isinstance(data, pandas.DataFrame)
 
 
 def listed(channels: Channels | None) -> list[str] | None:
-    """Return the names of channels, where ``gyro`` or ``accel`` are three.
+    """Return the names of channels; ``gyro`` and ``accel`` are expanded to three axes.
 
     Raises
     ------
     ValueError
-        If one is none, or stands twice, or they are no names.
+        If a name is not a channel, is repeated, or is not text.
     """
     if channels is None:
         return None
@@ -163,7 +165,7 @@ def listed(channels: Channels | None) -> list[str] | None:
         asked = [channels] if isinstance(channels, str) else list(channels)
     if strange := [name for name in asked if not isinstance(name, str)]:
         raise ValueError(f"no channel {strange[0]!r}; expected names: 'gyro', ['gyro_z'] and such")
-    names = [name for each in map(str, asked) for name in _AXES.get(each, [each])]
+    names = [name for each in map(str, asked) for name in _CHANNELS_OF_QUANTITY.get(each, [each])]
     if unknown := [name for name in names if name not in (*CHANNELS, TEMPERATURE)]:
         raise ValueError(
             f"no channel {unknown[0]!r}; expected of {', '.join(CHANNELS)}, or gyro or accel for "
@@ -182,12 +184,14 @@ def _check_units(units: Units | None) -> None:
         raise ValueError(f"units name {unknown[0]!r}; expected of {', '.join(known)}")
 
 
-def _unit_beside(name: str, units: Units) -> str | None:
+def _find_unit(name: str, units: Units) -> str | None:
     return units.get(name) or units.get(quantity_of(name))
 
 
-def _positions(data: object, names: list[str] | None, units: Units) -> Iterator[tuple[str, Column]]:
-    """Yield the columns of an array."""
+def _name_columns(
+    data: object, names: list[str] | None, units: Units
+) -> Iterator[tuple[str, Column]]:
+    """Yield the columns of an array with their channel names."""
     array = numbers(data, "the array")
     if array.ndim not in (1, 2) or not array.size:
         raise ValueError(
@@ -197,7 +201,7 @@ def _positions(data: object, names: list[str] | None, units: Units) -> Iterator[
     count = table.shape[1]
     if names is None and count == len(CHANNELS):
         names = list(CHANNELS)
-    if array.ndim == 1 and (names is None or names in _AXES.values()):
+    if array.ndim == 1 and (names is None or names in _CHANNELS_OF_QUANTITY.values()):
         names = [names[0] if names else CHANNELS[0]]
     if names is None or len(names) != count:
         turned = table.shape[0] in (3, 6) and count > len(CHANNELS)
@@ -214,19 +218,19 @@ def _positions(data: object, names: list[str] | None, units: Units) -> Iterator[
     for place, name in enumerate(names):
         yield (
             name,
-            Column(table[:, place], _unit_beside(name, units) or SI_UNITS[dimension_of(name)]),
+            Column(table[:, place], _find_unit(name, units) or SI_UNITS[dimension_of(name)]),
         )
 
 
-def _named_columns(
+def _select_columns(
     data: Any, names: list[str] | None, units: Units, *, stated: bool
 ) -> Iterator[tuple[str, Column]]:
-    """Yield the columns of a table or mapping by name; of a table, the units must be ``stated``."""
-    written = {label: _split(label) for label in (data.columns if stated else data)}
+    """Yield the columns of a table or mapping by name; with ``stated``, units are required."""
+    written = {label: _split_label(label) for label in (data.columns if stated else data)}
     there = {name: label for label, (name, _) in written.items()}
     if len(there) < len(written):
         raise ValueError(f"two columns of {', '.join(map(str, written))} are one channel")
-    passed = (TEMPERATURE, *_TIMES)
+    passed = (TEMPERATURE, *_TIME_COLUMNS)
     if names is None:
         strange = [label for label, (name, _) in written.items() if name not in CHANNELS]
         strange = [label for label in strange if written[label][0] not in passed]
@@ -247,11 +251,11 @@ def _named_columns(
             raise ValueError(f"{name} has shape {values.shape}, expected one dimension")
         lengths.add(len(values))
         sources = {
-            _BY_NAME: written[there[name]][1],
-            "units=": _unit_beside(name, units),
-            "attrs['units']": attrs.get(there[name]) or _unit_beside(name, attrs),
+            _NAME_SOURCE: written[there[name]][1],
+            "units=": _find_unit(name, units),
+            "attrs['units']": attrs.get(there[name]) or _find_unit(name, attrs),
         }
-        unit = _one_unit(name, {source: unit for source, unit in sources.items() if unit})
+        unit = _require_one_unit(name, {source: unit for source, unit in sources.items() if unit})
         if unit is None and stated:
             raise UnitError(
                 f"{name}: the table does not say its unit, which is never guessed; expected such "
@@ -263,15 +267,15 @@ def _named_columns(
         raise ValueError(f"the channels have {sorted(lengths)} samples; expected as many of each")
 
 
-def _split(label: object) -> tuple[str, str | None]:
-    """Return the name in a column's label, and the unit where it says one."""
-    match = _NAMED.match(str(label))
+def _split_label(label: object) -> tuple[str, str | None]:
+    """Return the name and the unit in the label of a column; None without a unit."""
+    match = _LABEL_PATTERN.match(str(label))
     name, unit = (match[1], match[2]) if match else (str(label).strip(), None)
     return name.lower(), unit
 
 
-def _one_unit(name: str, units: Mapping[str, str]) -> str | None:
-    """Return the unit that some sources state, which must agree."""
+def _require_one_unit(name: str, units: Mapping[str, str]) -> str | None:
+    """Return the unit stated by the sources, which must agree; None if none states it."""
     factors = {}
     for source, unit in units.items():
         with naming(f"{name}: "):

@@ -1,4 +1,4 @@
-"""Logs as the workflow reads them: files and arrays on a time base, judged, and kept in SI."""
+"""Read logs like the workflow: put files and arrays on a time base, check and store them in SI."""
 
 from __future__ import annotations
 
@@ -45,32 +45,31 @@ from imubench_pipeline.units import SI_UNITS, in_si, quantity_to_si
 if TYPE_CHECKING:
     import pandas as pd
 
-_SENSORS = Path("config/sensors")
-_NOTES = (".yaml", ".yml")
-_MODEL = {"vendor": "unknown", "model": "unknown"}
+_SENSOR_FOLDER = Path("config/sensors")
+_YAML_SUFFIXES = (".yaml", ".yml")
+_UNKNOWN_MODEL = {"vendor": "unknown", "model": "unknown"}
 
 
 class Log(Shown):
-    """A recording that was read: its channels in SI on a uniform grid, and what was found of it.
+    """An ingested recording: its channels in SI on a uniform grid, and the findings.
 
-    The samples are kept in a temporary folder, which goes with the object: a log may be longer than
-    memory.
+    The samples are stored in a temporary folder, since a log may be larger than memory. The folder
+    is removed with the object.
 
     Attributes
     ----------
     sensor, recording : str
-        Names, from which the random streams of an estimate follow, as in the workflow.
+        Names. The random streams of an estimate depend on them, as in the workflow.
     channels : tuple of str
-        Those that can be analysed, of gyro_x to accel_z.
+        Channels that can be analysed, of gyro_x to accel_z.
     findings : tuple of Finding
-        What is wrong with the log, or worth knowing of it: name, severity, detail, channel and
-        span.
+        Problems and remarks: name, severity, detail, channel and span.
     bandwidth : float or None
         Stated cut-off of the sensor's own low-pass, Hz.
     quality : Quality
-        What the ingest found.
+        Result of the ingest.
     declared : Sensor or None
-        The sensor file that the log was read by; None: it was drafted.
+        Sensor file of the log; None: it was drafted.
     """
 
     def __init__(
@@ -100,7 +99,7 @@ class Log(Shown):
 
     @property
     def rates(self) -> dict[str, float]:
-        """Sampling rate of each channel, Hz: as the stamps say it, where there are any."""
+        """Sampling rate of each channel, Hz; measured from the time stamps, if there are any."""
         return {name: log.rate for name, log in self._logs.items()}
 
     @property
@@ -110,7 +109,7 @@ class Log(Shown):
         Raises
         ------
         ValueError
-            If channels have rates of their own.
+            If the channels have different rates.
         """
         if len(set(self.rates.values())) > 1:
             each = ", ".join(f"{name} {rate:.6g} Hz" for name, rate in self.rates.items())
@@ -119,7 +118,7 @@ class Log(Shown):
 
     @property
     def duration(self) -> float:
-        """Length of the longest channel, s, holes counted."""
+        """Length of the longest channel, s, including gaps."""
         return max(log.grid / log.rate for log in self._logs.values())
 
     @property
@@ -149,13 +148,12 @@ class Log(Shown):
         return any(log.temperature for log in self._logs.values())
 
     def chosen(self, channels: Channels | None = None) -> dict[str, ChannelLog]:
-        """Return channels, by default all, as the steps of the workflow take them.
+        """Return channels, by default all, in the form of the steps of the workflow.
 
         Raises
         ------
         ValueError
-            If the sensor was turned: what it senses of that is no noise; or the log has no such
-            channel.
+            If the sensor was turned, since its motion is not noise, or the log has no such channel.
         """
         if not self._at_rest:
             raise ValueError(
@@ -177,7 +175,7 @@ class Log(Shown):
         Raises
         ------
         ValueError
-            If channels have clocks of their own.
+            If the channels have different clocks.
         """
         import pandas as pd
 
@@ -210,8 +208,10 @@ class Log(Shown):
                 ]
             )
         serious = [finding for finding in self.findings if finding.severity != "note"]
-        notes = [f"{f.severity}: {f.finding}: {cut(f.detail, 100)}" for f in serious[:_SERIOUS]]
-        if len(self.findings) > len(serious[:_SERIOUS]):
+        notes = [
+            f"{f.severity}: {f.finding}: {cut(f.detail, 100)}" for f in serious[:_MAX_FINDINGS]
+        ]
+        if len(self.findings) > len(serious[:_MAX_FINDINGS]):
             notes.append(f"{len(self.findings)} findings in all: .findings")
         heads = ["channel", "rate", "samples", "unit", "some missing"]
         made = " (simulated)" * self.simulated
@@ -219,8 +219,8 @@ class Log(Shown):
         return Summary(title, heads, rows, notes)
 
 
-_SERIOUS = 6
-"""Findings that are shown."""
+_MAX_FINDINGS = 6
+"""Max. number of findings in the summary."""
 
 
 def read_log(
@@ -229,24 +229,24 @@ def read_log(
     *,
     rate: float | str | None = None,
     units: Units | None = None,
-    sensors: str | Path = _SENSORS,
+    sensors: str | Path = _SENSOR_FOLDER,
     quality: Mapping[str, Any] | None = None,
 ) -> Log:
-    """Read a log of any format as the workflow does: time base, units, knocks, findings.
+    """Read a log of any format like the workflow: time base, units, knocks, findings.
 
     Parameters
     ----------
     path : str or Path
-        The log file, or the folder or archive of a recording. ``<recording>.yaml`` beside it is
-        its notes.
+        The log file, or the folder or archive of a recording. ``<recording>.yaml`` in the same
+        folder contains its notes.
     sensor : str, Path or mapping, optional
-        How it is written: a sensor file, the name of one in ``sensors``, or what would stand in
-        it (or under its ``log``). By default this is drafted from the log, as by `imubench
-        inspect`.
+        Format of the log: a sensor file, the name of one in ``sensors``, or a mapping with the
+        content of a sensor file (or of its ``log``). By default it is drafted from the log, like
+        `imubench inspect`.
     rate : float or str, optional
-        Of a log without stamps, where it is drafted: Hz, or ``"100 Hz"``.
+        For the draft, of a log without time stamps: Hz, or ``"100 Hz"``.
     units : mapping of str to str, optional
-        Where it is drafted, what the log does not say: ``{"gyro": "deg/s", "accel": "g"}``, or by
+        For the draft, units that the log does not state: ``{"gyro": "deg/s", "accel": "g"}``, or by
         channel.
     sensors : str or Path
         Folder of the sensor files.
@@ -260,9 +260,9 @@ def read_log(
     Raises
     ------
     ValueError
-        If the log cannot be used (`RecordingError`), a setting cannot (`ConfigError`), or a draft
-        has something left to fill in: the text says what, with the draft. The unit of a gyro is
-        never guessed.
+        If the log cannot be used (`RecordingError`), a setting cannot be used (`ConfigError`), or
+        the draft is incomplete: the message names the missing parts and contains the draft. The
+        unit of a gyro is never guessed.
 
     Examples
     --------
@@ -277,7 +277,7 @@ def read_log(
     if not source.exists():
         raise ValueError(f"{source}: no such file; expected the log of an inertial sensor")
     name = source.name if source.is_dir() else name_of(source.name)
-    declared, sensor_name, own = _sensor_of(source, sensor, Path(sensors), rate, units)
+    declared, sensor_name, own = _load_sensor(source, sensor, Path(sensors), rate, units)
     notes_file = source.with_name(f"{name}.yaml")
     notes = RecordingNotes()
     if notes_file.is_file() and notes_file != own:
@@ -288,12 +288,12 @@ def read_log(
     except ValueError as error:
         raise ConfigError(f"{notes_file}: {error}") from None
     bandwidth = quantity_to_si(log.bandwidth, "frequency") if log.bandwidth else None
-    kept, found = _ingested(source, log, notes, (sensor_name, name), quality or {}, guarded=True)
+    kept, found = _ingest(source, log, notes, (sensor_name, name), quality or {}, guarded=True)
     return Log(kept, found, declared if sensor is not None else None, bandwidth)
 
 
 def log_of(columns: Mapping[str, Column], rate: float, name: str) -> Log:
-    """Return samples as a log: they are ingested as a file is, so what is wrong of it is found.
+    """Return samples as a log, ingested like a file, with the same checks.
 
     Parameters
     ----------
@@ -302,7 +302,7 @@ def log_of(columns: Mapping[str, Column], rate: float, name: str) -> Log:
     rate : float
         Hz.
     name : str
-        What the log is called.
+        Name of the log.
 
     Raises
     ------
@@ -329,11 +329,11 @@ def log_of(columns: Mapping[str, Column], rate: float, name: str) -> Log:
     with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
         file = Path(folder) / f"{name}.npy"
         np.save(file, np.column_stack([column.values for column in columns.values()]))
-        kept, found = _ingested(file, log, RecordingNotes(), ("array", name), {}, guarded=False)
+        kept, found = _ingest(file, log, RecordingNotes(), ("array", name), {}, guarded=False)
     return Log(kept, found, None, None)
 
 
-def _ingested(
+def _ingest(
     source: Path,
     log: LogFormat,
     notes: RecordingNotes,
@@ -342,7 +342,7 @@ def _ingested(
     *,
     guarded: bool,
 ) -> tuple[Path, Quality]:
-    """Return the folder where the samples of a log are kept, and what was found of it."""
+    """Ingest a log; return the folder of its samples, and its quality."""
     limits = parse(QualitySettings, quality, "quality")
     experiments = {"two_position": notes.two_position, "rate_table": notes.rate_table}
     settings = of_ingest(log, notes, kind_of(experiments)) | {
@@ -360,13 +360,13 @@ def _ingested(
     return folder, found
 
 
-def _sensor_of(
+def _load_sensor(
     source: Path, sensor: Any, folder: Path, rate: float | str | None, units: Units | None
 ) -> tuple[Sensor, str, Path | None]:
-    """Return how a log is written, the name of its sensor, and the file that says so."""
+    """Return the sensor of a log, its name, and its sensor file, if there is one."""
     of_folder = sensor_of(source.absolute().parent)
     if sensor is None:
-        return _drafted(source, rate, units), of_folder, None
+        return _draft_sensor(source, rate, units), of_folder, None
     if rate is not None or units is not None:
         raise ValueError(
             "rate= and units= fill in a draft; expected them in what sensor= states, or no sensor="
@@ -375,9 +375,9 @@ def _sensor_of(
         return sensor, of_folder, None
     if isinstance(sensor, Mapping):
         whole = sensor if "log" in sensor else {"log": sensor}
-        return parse(Sensor, {**_MODEL, **whole}, "sensor"), of_folder, None
+        return parse(Sensor, {**_UNKNOWN_MODEL, **whole}, "sensor"), of_folder, None
     file = Path(sensor)
-    if file.suffix not in _NOTES:
+    if file.suffix not in _YAML_SUFFIXES:
         file = folder / f"{sensor}.yaml"
         if not file.is_file():
             names = sorted(path.stem for path in folder.glob("*.yaml"))
@@ -391,8 +391,8 @@ def _sensor_of(
     return read_settings(Sensor, file), file.stem, file
 
 
-def _drafted(source: Path, rate: float | str | None, units: Units | None) -> Sensor:
-    """Return the sensor file that a log tells, with what a user states of it."""
+def _draft_sensor(source: Path, rate: float | str | None, units: Units | None) -> Sensor:
+    """Return a sensor file drafted from a log, completed by the rate and units of the user."""
     inspection = inspect(source)
     sensor = inspection.draft.sensor()
     log = sensor["log"]
@@ -404,7 +404,7 @@ def _drafted(source: Path, rate: float | str | None, units: Units | None) -> Sen
             column["unit"] = stated
     if unknown := [key for key in units or () if key not in (*CHANNELS, "gyro", "accel")]:
         raise ValueError(f"units name {unknown[0]!r}; expected gyro, accel, or a channel")
-    left = [key for key in inspection.draft.unfilled() if _value_of(log, key) == UNKNOWN]
+    left = [key for key in inspection.draft.unfilled() if _look_up(log, key) == UNKNOWN]
     if left:
         raise ValueError(
             f"{source.name}: the log does not say {', '.join(left)}; expected units= or rate= that "
@@ -414,7 +414,7 @@ def _drafted(source: Path, rate: float | str | None, units: Units | None) -> Sen
     return parse(Sensor, sensor, f"the sensor file drafted from {source.name}")
 
 
-def _value_of(log: Any, key: str) -> Any:
+def _look_up(log: Any, key: str) -> Any:
     for part in key.split("."):
         log = log[part]
     return log

@@ -1,4 +1,4 @@
-"""What a notebook and a terminal show of a result: a title, a small table, remarks."""
+"""Summaries of results for notebooks and terminals: a title, a small table, remarks."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-_MOST = 60
-"""Rows that are shown."""
+_MAX_ROWS = 60
+"""Max. number of rows in a summary."""
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What is shown of a result."""
+    """Summary of a result."""
 
     title: str
     heads: Sequence[str] = ()
@@ -21,10 +21,10 @@ class Summary:
     notes: Sequence[str] = ()
 
     def text(self) -> str:
-        """Return it with columns of equal width."""
+        """Return the summary as text, with aligned columns."""
         lines = [self.title]
         if self.rows:
-            shown = [self.heads, *self.rows[:_MOST]]
+            shown = [self.heads, *self.rows[:_MAX_ROWS]]
             widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
             for row in shown:
                 cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
@@ -32,13 +32,13 @@ class Summary:
         return "\n".join([*lines, *self._remarks()])
 
     def html(self) -> str:
-        """Return it as HTML."""
+        """Return the summary as HTML."""
         parts = [f"<div><strong>{escape(self.title)}</strong>"]
         if self.rows:
             parts.append("<table><thead><tr>")
             parts += [f"<th>{escape(head)}</th>" for head in self.heads]
             parts.append("</tr></thead><tbody>")
-            for row in self.rows[:_MOST]:
+            for row in self.rows[:_MAX_ROWS]:
                 cells = "".join(f"<td>{escape(cell)}</td>" for cell in row)
                 parts.append(f"<tr>{cells}</tr>")
             parts.append("</tbody></table>")
@@ -46,16 +46,16 @@ class Summary:
         return "".join([*parts, "</div>"])
 
     def _remarks(self) -> list[str]:
-        more = len(self.rows) - _MOST
+        more = len(self.rows) - _MAX_ROWS
         return [*([f"... and {more} rows more: to_pandas()"] if more > 0 else []), *self.notes]
 
 
 class Shown(ABC):
-    """A result that shows itself as its summary."""
+    """A result with a summary as its representation."""
 
     @abstractmethod
     def _summary(self) -> Summary:
-        """Return what is shown."""
+        """Return the summary."""
 
     def __repr__(self) -> str:
         return self._summary().text()
@@ -65,5 +65,5 @@ class Shown(ABC):
 
 
 def cut(text: str, most: int = 60) -> str:
-    """Return a text for a cell, shortened."""
+    """Shorten a text for a cell to at most ``most`` characters."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
