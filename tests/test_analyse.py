@@ -223,7 +223,7 @@ def failing(step: Any, name: str) -> Any:
 def test_who_is_told_of_an_error_at_once_is_told_of_no_compilation(
     expected: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(compilation, "_SLOW", 0.0)
+    monkeypatch.setattr(compilation, "_MESSAGE_DELAY", 0.0)
     monkeypatch.setattr(compilation, "compile_kernels", lambda: time.sleep(600.0))
     said: list[str] = []
     told = threading.Event()

@@ -29,7 +29,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         if recording.simulated:
             continue
         try:
-            quality = _checked(plan, sensor, name, recording)
+            quality = _check_recording(plan, sensor, name, recording)
         except Exception as error:  # the others are checked all the same
             reason = one_line(f"{recording.path.name}: {describe_error(error)}")
             failure = Failure(sensor, name, "check", "error", reason)
@@ -37,7 +37,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         yield sensor, name, quality
 
 
-def _checked(plan: Plan, sensor: str, name: str, recording: Recording) -> Quality:
+def _check_recording(plan: Plan, sensor: str, name: str, recording: Recording) -> Quality:
     """Read a recording as the run would, and look for what it would find; nothing is kept."""
     with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
         settings = plan.ingest_settings(sensor, name)

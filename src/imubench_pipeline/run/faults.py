@@ -19,39 +19,40 @@ Of = tuple[str, str, str | None]
 """Step, sensor and recording; None: a step of the whole sensor."""
 
 TOLD = "IMUBENCH_FAILURES_TOLD"
-"""The environment variable of a run whose caller looks itself for what is left out."""
+"""Environment variable of a run whose caller reports the failures itself."""
 
-_FOLDER = "faults"
+_FAULT_FOLDER = "faults"
 
 
 class Faults:
     """The records of the steps that failed, in the folder ``faults`` of the results.
 
-    What was there when this was made says how often each step was tried; a step that failed at
-    its last attempt has another one now. So has an ingest of which the samples are no longer as it
-    left them: no rule declares them, as what there will be of them is known by the log alone.
+    The records at the creation of this object contain the number of attempts of each step. A step
+    that failed at its last attempt is tried again. An ingest is also tried again if its samples
+    were changed: they are not declared outputs of a rule, since their files depend on the log.
     """
 
     def __init__(self, results: Path) -> None:
         self.results = results
-        self._folder = results / _FOLDER
+        self._folder = results / _FAULT_FOLDER
         self._before = dict(self._records())
         self._failed = {of[1:] for of, record in self._before.items() if record["failed"]}
         self._lost: dict[Of, bool] = {}
 
     def attempt(self, of: Of, *, again: bool = True) -> int:
-        """Return the number of the attempt of this run, 0 where none has ever failed.
+        """Return the number of the attempt of this run; 0 if no attempt ever failed.
 
         Without `again` a step that failed is not tried again.
         """
         record = self._before.get(of)
         tried, failed = (record["attempt"], record["failed"]) if record else (0, False)
-        return tried + (again and (failed or self._lost_samples(of)))
+        return tried + (again and (failed or self._has_lost_samples(of)))
 
-    def _lost_samples(self, of: Of) -> bool:
-        """Return whether what an ingest left was not as it left it when this was first asked.
+    def _has_lost_samples(self, of: Of) -> bool:
+        """Return whether the outputs of an ingest were changed, as checked at the first call.
 
-        All of it is read where a step has failed since, as one does that finds samples damaged.
+        All samples are read if another step of the recording failed, since damaged samples make
+        steps fail.
         """
         step, sensor, recording = of
         if step != "ingest" or recording is None:
@@ -69,7 +70,7 @@ class Faults:
         return self._lost[of]
 
     def failed(self, failure: Failure, attempt: int, log: Path) -> None:
-        """Keep that a step failed at an attempt; its log is told, too."""
+        """Record the failure of a step at an attempt, and append it to the log of the step."""
         path = self._path((failure.step, failure.sensor, failure.recording))
         record = {"attempt": attempt, "failed": True, "log": str(log), **asdict(failure)}
         write_sealed_json(record, path)
@@ -78,7 +79,7 @@ class Faults:
             file.write(f"{failure.name}, {failure.step}: {failure.reason}\n")
 
     def succeeded(self, of: Of, attempt: int) -> None:
-        """Keep that a step which had failed did not any more."""
+        """Record the success of a step that failed before."""
         path = self._path(of)
         if attempt or path.is_file():
             step, sensor, recording = of
@@ -86,14 +87,14 @@ class Faults:
             write_sealed_json({"attempt": attempt, "failed": False, **about}, path)
 
     def now(self) -> Iterator[tuple[Failure, Path]]:
-        """Yield what has failed in this run, with the log of it."""
+        """Yield the failures of this run with their logs."""
         for of, record in self._records():
             if record["failed"] and record["attempt"] >= self.attempt(of):
                 names = ("sensor", "recording", "step", "cause", "reason")
                 yield Failure(**{name: record[name] for name in names}), Path(record["log"])
 
     def left_out(self) -> str:
-        """Return what a run says that left something out; nothing where its caller looks itself."""
+        """Return the message about failures of a run; empty if its caller reports them (`TOLD`)."""
         from imubench_pipeline.report.run_summary import one_line
 
         failures = [
@@ -116,7 +117,7 @@ class Faults:
 
 
 def _is_record(record: Any) -> bool:
-    """Return whether what was read has all that is asked of a record."""
+    """Return whether data have all fields of a record."""
     if not isinstance(record, dict) or not isinstance(record.get("recording", 0), str | None):
         return False
     failed = record.get("failed")

@@ -1,4 +1,4 @@
-"""One run at a time in a folder of results, whoever starts it, whatever became of the last one."""
+"""Lock on a folder of results: one run at a time, also after a run that was killed."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from imubench_pipeline.run.nightly.recovery import restarted
 from imubench_pipeline.tables import read_json
 
 INHERITED = "IMUBENCH_LOCK"
-"""The environment variable with the descriptor of a lock that a caller holds for this process."""
+"""Environment variable with the descriptor of a lock that the caller holds for this process."""
 
-_PAUSE = 0.5  # s between two attempts
+_RETRY_INTERVAL = 0.5  # s between two attempts
 _MAX_COMMAND = 200  # characters
 
 
 class TakenError(RuntimeError):
-    """Another run works on the results; the text says which, and since when."""
+    """Raised if another run uses the results; the message names it and its start."""
 
 
 def lock_of(results: Path) -> Path:
@@ -36,11 +36,11 @@ def lock_of(results: Path) -> Path:
 
 
 class Lock:
-    """A lock on a folder of results, that the system takes back from a process that was killed.
+    """A lock on a folder of results, which the system releases if the process is killed.
 
-    It is held by whatever has ``descriptor`` open: given to Snakemake too, it stays as long as one
-    of the two lives. While it is held, the file has a note of who holds it; one that is still there
-    when the lock is free comes from a run that did not reach its end.
+    All processes with an open ``descriptor`` hold the lock. Snakemake inherits it, so the lock
+    lasts until both processes end. While the lock is held, the file contains a note about the
+    holder. A note in the file of a free lock comes from a run that did not reach its end.
 
     Attributes
     ----------
@@ -48,8 +48,8 @@ class Lock:
     since : float
         When it was taken, s since 1970.
     left_over : mapping
-        The note of a run that did not reach its end; empty where it did. Who has put right what
-        that run left makes it empty: until then, it is left to the next run again.
+        The note of a run that did not reach its end; otherwise empty. After a recovery the caller
+        sets it to empty; until then, the note stays for the next run.
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,31 +59,31 @@ class Lock:
         self.left_over: Mapping[str, Any] = {}
 
     def acquire(self, wait: float = 0.0) -> None:
-        """Take the lock; `wait`: for a run that goes on, s.
+        """Acquire the lock; `wait`: max. time to wait for another run, s.
 
         Raises
         ------
         TakenError
-            If another run still holds it then.
+            If another run still holds the lock after this time.
         """
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         until = time.monotonic() + wait
-        while not self._taken():
+        while not self._try_lock():
             if time.monotonic() >= until:
                 note = read_note(self.path)
                 self._close()
                 raise TakenError(
-                    f"another run works on {self.path.parent.parent}: {_holder(note)}; wait for "
-                    "its end, or use another folder of results"
+                    f"another run works on {self.path.parent.parent}: {_describe_holder(note)}; "
+                    "wait for its end, or use another folder of results"
                 )
-            time.sleep(min(_PAUSE, max(until - time.monotonic(), 0.0)))
+            time.sleep(min(_RETRY_INTERVAL, max(until - time.monotonic(), 0.0)))
         self.since = time.time()
         self.left_over = read_note(self.path)
         self.note()
 
     def acquire_unless_inherited(self) -> None:
-        """Take the lock, unless the caller of this process holds it for it.
+        """Acquire the lock, unless this process inherited it from its caller.
 
         A note of a run that did not reach its end stays only if the machine was restarted since:
         `imubench nightly` then checks the files that were being written.
@@ -107,20 +107,20 @@ class Lock:
             return False
 
     def note(self, **more: object) -> None:
-        """Write who holds the lock, and what else a later run should know."""
+        """Write the holder of the lock, and further data for a later run, to its file."""
         about = {
             "process": os.getpid(),
-            "command": _command(),
+            "command": _describe_command(),
             "host": platform.node(),
             "since": datetime.fromtimestamp(self.since, UTC).isoformat(timespec="seconds"),
         }
         self._write(json.dumps(about | more) + "\n")
 
     def release(self) -> None:
-        """Give the lock back; the note goes, unless that of an earlier run is still needed."""
+        """Release the lock; remove the note, unless the note of an earlier run is still needed."""
         if self.descriptor >= 0:
             self._write(json.dumps(self.left_over) + "\n" if self.left_over else "")
-            # For all that have it open: a step that outlives Snakemake must not keep it.
+            # Unlock for all processes: a step that outlives Snakemake must not hold the lock.
             fcntl.flock(self.descriptor, fcntl.LOCK_UN)
             self._close()
 
@@ -130,7 +130,7 @@ class Lock:
     def __exit__(self, *_: object) -> None:
         self.release()
 
-    def _taken(self) -> bool:
+    def _try_lock(self) -> bool:
         try:
             fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -150,7 +150,7 @@ class Lock:
 
 
 def read_note(path: Path) -> Mapping[str, Any]:
-    """Return what stands in the file of a lock; nothing where that cannot be read."""
+    """Return the note in the file of a lock; empty if it cannot be read."""
     try:
         note = read_json(path)
     except (OSError, ValueError):
@@ -158,15 +158,15 @@ def read_note(path: Path) -> Mapping[str, Any]:
     return note if isinstance(note, dict) else {}
 
 
-def _command() -> str:
+def _describe_command() -> str:
     """Return the command of this process, as a user would type it."""
     program = Path(sys.argv[0])
     name = program.parent.name if program.name == "__main__.py" else program.name
     return shlex.join([name, *sys.argv[1:]])[:_MAX_COMMAND]
 
 
-def _holder(note: Mapping[str, Any]) -> str:
-    """Return who holds a lock, in words."""
+def _describe_holder(note: Mapping[str, Any]) -> str:
+    """Describe the holder of a lock."""
     if not isinstance(process := note.get("process"), int):
         return "who holds it is not known"
     since = f"since {note.get('since')}"

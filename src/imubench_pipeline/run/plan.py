@@ -1,7 +1,7 @@
-"""What a run consists of: the recordings found and the settings of each step.
+"""Plan of a run: the recordings and the settings of each step.
 
-This is all that the rules ask of the package. Settings are handed to a rule as JSON text
-of what the rule depends on, so that an edit runs again what it touches and nothing else.
+This is the interface of the package to the rules. A rule gets the settings on which it depends as
+JSON text, so that an edit of the settings reruns only the affected rules.
 """
 
 from __future__ import annotations
@@ -46,36 +46,35 @@ from imubench_pipeline.settings.simulated_recordings import (
     profile_files,
     read_simulated,
 )
-from imubench_pipeline.settings.validation import (
-    ConfigError,
-    UnavailableSettingsError,
-    parse,
-)
+from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables.digests import digest_of
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 
-_OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
-_OF_THE_SOURCE = {"published", "figures", "read"}
-_PUBLISHED: dict[str, Any] = {"channels": {"__all__": _OF_THE_SOURCE}, "shows": True}
-"""Keys of a simulated recording that its samples do not depend on."""
+_INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
+_SOURCE_KEYS = {"published", "figures", "read"}
+_KEYS_WITHOUT_EFFECT_ON_SAMPLES: dict[str, Any] = {
+    "channels": {"__all__": _SOURCE_KEYS},
+    "shows": True,
+}
+"""Keys of a simulated recording that do not affect its samples."""
 
-_OF_RANKING = ("price_class", "must")
-"""Keys of a requirement that no error follows from."""
+_RANKING_KEYS = ("price_class", "must")
+"""Keys of a requirement that do not affect the error budget."""
 
-_SHOWN = {
+_REPORTED_SECTIONS = {
     *("allan", "estimate", "reconstruction", "quality"),
     *("datasheet", "error_budget", "fusion", "earth_rate", "navigate"),
 }
 """Sections of the settings that the report shows."""
 
-_ANY_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
-"""Stands for the layout of a sensor's logs where that does not matter."""
+_PLACEHOLDER_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
+"""Placeholder for the log format of a sensor where it does not matter."""
 
 
-_BRACE_OF_NAME = re.compile(r"\{(?=\s*\w)")
-"""In JSON a brace before a letter is part of a text; others are before quotes or braces."""
+_BRACE_BEFORE_WORD = re.compile(r"\{(?=\s*\w)")
+"""A brace inside a text of JSON; structural braces come before quotes or braces."""
 
 
 class Plan:
@@ -95,7 +94,7 @@ class Plan:
         declared = read_sensor_files(folders(self.run.sensors, "sensors"))
         self.sensors: dict[str, Sensor] = {}
         self.unusable: dict[str, ConfigError] = {}
-        """Why a sensor file cannot be used, by sensor: all logs of that sensor are rejected."""
+        """Error of each unusable sensor file, by sensor: all logs of these sensors are rejected."""
         for name, sensor in declared.items():
             if isinstance(sensor, ConfigError):
                 self.unusable[name] = sensor
@@ -123,7 +122,7 @@ class Plan:
                 self._reject_one_name(other, recording, fault)
 
     def _reject_one_name(self, first: Recording, second: Recording, fault: str) -> None:
-        """Reject two logs of one name, or only the one that cannot be used for its own reason."""
+        """Reject two logs of one name, or only the log that has another error anyway."""
         if first.error and not second.error:
             first, second = second, first
         error = first.error or (None if second.error else fault)
@@ -155,11 +154,11 @@ class Plan:
         return sorted(chain.from_iterable(by_name.values()), key=lambda log: log.path)
 
     def _as_it_is(self, key: str, logs: list[Recording]) -> list[Recording]:
-        """Return a recording that is held back, if its results are there; its log may be not."""
+        """Return a recording that is held back, if its results exist; its log may be missing."""
         sensor, _, name = key.partition("/")
         folder = self.run.results / "recordings" / sensor / name
         if (sensor, name) in self._simulated or not all(
-            (folder / file).is_file() for file in _OF_INGEST
+            (folder / file).is_file() for file in _INGEST_OUTPUTS
         ):
             return []
         path = logs[0].path if logs else self.run.logs / sensor / name
@@ -175,24 +174,24 @@ class Plan:
         ]
 
     def files(self) -> str:
-        """Return every file in the drop zone, with its recording or why it is skipped."""
+        """Return every file in the drop zone, with its recording or the reason to skip it."""
         found = [log for log in self.recordings.values() if not log.simulated]
         files = account_for(self.run.logs, found, self._still_written)
-        return _text([asdict(file) for file in files])
+        return _to_json([asdict(file) for file in files])
 
     def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
-        """Return how often a step had failed and was tried again, with this run: what failed is.
+        """Return the number of the attempt of a step, see `Faults.attempt`.
 
-        Of a recording that is held back nothing is.
+        A failed step is tried again, but not for a recording that is held back.
         """
         held_back = name is not None and self.recordings[sensor, name].held_back
         return self.faults.attempt((step, sensor, name), again=not held_back)
 
     def ingest_settings(self, sensor: str, name: str) -> str:
-        """Return what the ingest of a recording depends on, its error where it cannot be read."""
+        """Return the settings of the ingest of a recording, or its error if it cannot be read."""
         key = (sensor, name)
         if key not in self._of_ingest:
-            self._of_ingest[key] = _text(self._ingest(self.recordings[key]))
+            self._of_ingest[key] = _to_json(self._ingest(self.recordings[key]))
         return self._of_ingest[key]
 
     def _ingest(self, recording: Recording) -> dict[str, object]:
@@ -240,7 +239,7 @@ class Plan:
             return {}
 
     def _notes(self, recording: Recording) -> object:
-        """Return what the file of notes beside a log holds, which is read once a run."""
+        """Return the content of the notes of a log; each file is read once per run."""
         if recording.notes is None:
             return {}
         if recording.notes not in self._read_notes:
@@ -288,7 +287,7 @@ class Plan:
         return isinstance(notes, Mapping) and notes.get("pointing") is not None
 
     def experiment_settings(self, sensor: str, name: str) -> str:
-        """Return what is found of a turned or a stated axis depends on beside the samples."""
+        """Return the settings of the experiments with turned or stated axes of a recording."""
         recording = self.recordings[sensor, name]
         declared = self.sensors.get(sensor)
         settings: dict[str, object] = {
@@ -297,27 +296,32 @@ class Plan:
         }
         if recording.simulated:
             entry = self._simulated[sensor, name]
-            return _text(
-                settings | {"simulated": entry.model_dump(mode="json", exclude=_PUBLISHED)}
+            return _to_json(
+                settings
+                | {
+                    "simulated": entry.model_dump(
+                        mode="json", exclude=_KEYS_WITHOUT_EFFECT_ON_SAMPLES
+                    )
+                }
             )
         try:
             notes = self._written(recording)[1]
         except ConfigError:
-            return _text(settings)  # it is rejected, and says why
+            return _to_json(settings)  # it is rejected, and says why
         experiments = notes.model_dump(mode="json", include=set(EXPERIMENTS), exclude_none=True)
-        return _text(settings | experiments)
+        return _to_json(settings | experiments)
 
     def outlook_settings(self, sensor: str) -> str:
-        """Return what is predicted of a sensor at rest depends on beside its noise."""
+        """Return the settings of the predictions for a sensor at rest."""
         declared = self.sensors.get(sensor)
         biases = {key: {"bias_repeatability", "offset"} for key in ("gyro", "accel")}
         printed = declared.datasheet.model_dump(mode="json", include=biases) if declared else {}
         settings = self.run.earth_rate.model_dump(mode="json")
-        return _text({"earth_rate": settings, "datasheet": printed})
+        return _to_json({"earth_rate": settings, "datasheet": printed})
 
     @property
     def navigated(self) -> list[str]:
-        """The sensors that filters are tuned for: those with static recordings that are asked."""
+        """Sensors with static recordings that the settings select for navigation."""
         of = self.run.navigate.of
         return [
             sensor
@@ -327,9 +331,9 @@ class Plan:
         ]
 
     def navigate_settings(self, sensor: str) -> str:
-        """Return what the navigation of a sensor depends on beside its estimates."""
+        """Return the settings of the navigation of a sensor."""
         declared = self.sensors.get(sensor)
-        return _text(
+        return _to_json(
             {
                 "navigate": self.run.navigate.model_dump(mode="json", exclude={"of"}),
                 "asked": sorted(
@@ -347,7 +351,7 @@ class Plan:
         )
 
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
-        """Return how a log is written, and the notes beside it; ConfigError if it is of no use."""
+        """Return the format and the notes of a log; ConfigError if it cannot be used."""
         if recording.error:
             raise ConfigError(recording.error)
         if recording.unavailable:
@@ -367,15 +371,15 @@ class Plan:
         return merged_log(sensor, notes, str(recording.notes or recording.sensor)), notes
 
     def estimate_settings(self, sensor: str, name: str) -> str:
-        """Return what the estimates of a recording depend on."""
+        """Return the settings of the estimates of a recording."""
         settings = self.run.estimate.model_dump(mode="json")
-        return _text(
+        return _to_json(
             {"estimate": settings, "bandwidth": self.bandwidth(sensor, name)}
             | self._read_by_authors(sensor, name)
         )
 
     def _read_by_authors(self, sensor: str, name: str) -> dict[str, object]:
-        """Return what the source of a simulated recording reads from its own curve, in SI."""
+        """Return the values that the source of a simulated recording read from its curve, in SI."""
         if (sensor, name) not in self._simulated:
             return {}
         channels = self._simulated[sensor, name].channels.items()
@@ -391,12 +395,14 @@ class Plan:
         return quantity_to_si(stated, "frequency") if stated else None
 
     def simulated_settings(self, sensor: str, name: str) -> str:
-        """Return the parameters of a simulated recording and the layout that it is written in."""
+        """Return the parameters and the log format of a simulated recording."""
         recording = self._simulated[sensor, name]
         written = layout(recording, self.sensors[sensor].log)
-        return _text(
+        return _to_json(
             {
-                "recording": recording.model_dump(mode="json", exclude=_PUBLISHED),
+                "recording": recording.model_dump(
+                    mode="json", exclude=_KEYS_WITHOUT_EFFECT_ON_SAMPLES
+                ),
                 "log": written.model_dump(mode="json", exclude={"bandwidth"}),
                 "profiles": self._profiles(recording),
             }
@@ -415,12 +421,12 @@ class Plan:
     def settings(self, section: str) -> str:
         """Return one section of the run's configuration."""
         value = getattr(self.run, section)
-        return _text(value.model_dump(mode="json") if isinstance(value, BaseModel) else value)
+        return _to_json(value.model_dump(mode="json") if isinstance(value, BaseModel) else value)
 
     def datasheet_settings(self, sensor: str) -> str:
-        """Return what the comparison with the datasheet of a sensor depends on."""
+        """Return the settings of the comparison with the datasheet of a sensor."""
         declared = self.sensors.get(sensor)
-        return _text(
+        return _to_json(
             {
                 "datasheet": declared.datasheet.model_dump(mode="json") if declared else {},
                 "tolerance": self.run.datasheet.tolerance,
@@ -429,22 +435,19 @@ class Plan:
         )
 
     def error_budget_settings(self, sensor: str) -> str:
-        """Return the errors that are asked of a sensor's recordings, and what is printed of it."""
+        """Return the settings of the error budget of a sensor, with its printed figures."""
         declared = self.sensors.get(sensor)
-        return _text(
+        return _to_json(
             {
                 "error_budget": self.run.error_budget.model_dump(mode="json"),
                 "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
-                "requirements": self._requirements(*_OF_RANKING, "title", "note", "example"),
+                "requirements": self._requirements(*_RANKING_KEYS, "title", "note", "example"),
                 "datasheet": declared.datasheet.only(IN_USE) if declared else {},
             }
         )
 
     def ranking_settings(self) -> str:
-        """Return what the ranking depends on: requirements, and what the sensors have.
-
-        Of those that can be bought.
-        """
+        """Return the settings of the ranking: requirements, and sensors that are for sale."""
         sensors = {
             name: about
             for name, about in self._described("price_class").items()
@@ -453,17 +456,17 @@ class Plan:
         for name, about in sensors.items():
             about["abilities"] = abilities(self.sensors[name]).model_dump(mode="json")
         requirements = self._requirements("title", "note", "example", "environment")
-        return _text({"requirements": requirements, "sensors": sensors})
+        return _to_json({"requirements": requirements, "sensors": sensors})
 
     def _requirements(self, *unused: str) -> dict[str, object]:
-        """Return what applications need, without what a step does not use of it."""
+        """Return the requirements of applications, without keys that a step does not use."""
         return {
             name: {"title": name} | requirement.model_dump(mode="json", exclude=set(unused))
             for name, requirement in self.requirements.items()
         }
 
     def _described(self, *keys: str) -> dict[str, dict[str, object]]:
-        """Return what the files of the sensors that have recordings say."""
+        """Return keys of the sensor files of the sensors with recordings."""
         used = {sensor for sensor, _ in self.recordings}
         return {
             name: sensor.model_dump(mode="json", include=set(keys))
@@ -472,14 +475,14 @@ class Plan:
         }
 
     def report_settings(self) -> str:
-        """Return what the report shows beside the tables."""
-        return _text(
+        """Return the settings of the report."""
+        return _to_json(
             {
                 "report": self.run.report.model_dump(mode="json"),
                 "results": str(self.run.results),
                 "logs": str(self.run.logs),
                 "given": given_beside(self.run, Path("config/config.yaml")),
-                "settings": self.run.model_dump(mode="json", include=_SHOWN),
+                "settings": self.run.model_dump(mode="json", include=_REPORTED_SECTIONS),
                 "sensors": self._described("vendor", "model", "price_class", "sold"),
                 "boards": {name: self._board(board) for name, board in self.boards.items()},
                 "requirements": self._requirements(),
@@ -493,7 +496,7 @@ class Plan:
 
     @staticmethod
     def _board(board: Board) -> dict[str, object]:
-        """Return what the report says of a board beside its tables."""
+        """Return the description of a board for the report."""
         return {
             "title": board.title,
             "note": board.note,
@@ -506,8 +509,8 @@ class Plan:
         }
 
     def figures_settings(self) -> str:
-        """Return what the figures of all sensors show beside the tables."""
-        return _text({"report": {"units": self.run.report.units}})
+        """Return the settings of the figures of all sensors."""
+        return _to_json({"report": {"units": self.run.report.units}})
 
     def catalogue(self, *more: str) -> str:
         """Return the datasheets of all sensor files, with vendor and model, and more keys."""
@@ -519,25 +522,26 @@ class Plan:
 
     def _sensor_files(self, names: Iterable[str], more: Iterable[str]) -> str:
         keys = {"vendor", "model", "datasheet", *more}
-        return _text(
+        return _to_json(
             {
-                name: self.sensors[name].model_dump(mode="json", include=keys) | {"log": _ANY_LOG}
+                name: self.sensors[name].model_dump(mode="json", include=keys)
+                | {"log": _PLACEHOLDER_LOG}
                 for name in names
             }
         )
 
     @cached_property
     def usual(self) -> str:
-        """What is usual of the figures of sensors, by the catalogue that comes with the package.
+        """Usual figures of sensors, from the catalogue of the package.
 
-        Sensor files of the user have no part in it: an edit of one concerns its own logs alone.
+        Sensor files of the user are not included: an edit of one only affects its own logs.
         """
         return usual_as_text(usual_figures(shipped_sensors()))
 
     def truths(self, sensor: str) -> str:
         """Return the true parameters of the simulated recordings of a sensor."""
         entries = (entry for (of, _), entry in self._simulated.items() if of == sensor)
-        return _text([entry.model_dump(mode="json") for entry in entries])
+        return _to_json([entry.model_dump(mode="json") for entry in entries])
 
     @staticmethod
     def code(step: str) -> str:
@@ -546,7 +550,7 @@ class Plan:
 
 
 def _check_places(run: Run) -> None:
-    """Refuse results that would be taken for logs, and logs that would be taken for results."""
+    """Check that the folders of logs, results and sensor files do not overlap."""
     logs, results = run.logs.resolve(), run.results.resolve()
     declared = (run.sensors,) if isinstance(run.sensors, Path) else run.sensors
     if results in [folder.resolve() for folder in declared]:
@@ -561,7 +565,7 @@ def _check_places(run: Run) -> None:
         )
 
 
-def _text(value: object) -> str:
+def _to_json(value: object) -> str:
     """Return a value as JSON, in which Snakemake finds no wildcard: a name may have braces."""
     text = json.dumps(value, sort_keys=True, ensure_ascii=False)
-    return _BRACE_OF_NAME.sub(r"\\u007b", text)
+    return _BRACE_BEFORE_WORD.sub(r"\\u007b", text)

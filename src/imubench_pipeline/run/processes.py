@@ -1,8 +1,8 @@
-"""Runs the scripts of the workflow, each in a process of its own that has its imports already.
+"""Run the scripts of the workflow in forks of one process that already has their imports.
 
-What a step of a short log computes takes a tenth of a second, what it imports a second. So one
-process, which lives as long as the run, imports what a kind of step needs before the first of
-them, and forks for each: `imubench_pipeline.run.step_server`.
+For a short log, a step computes for a tenth of a second, but its imports take a second. One process
+therefore lives as long as the run. It imports the modules of a kind of step once, and forks for
+each step: see `imubench_pipeline.run.step_server`.
 """
 
 from __future__ import annotations
@@ -27,35 +27,35 @@ from imubench_pipeline.run.start import ONE_THREAD
 from imubench_pipeline.tables.failures import Cause
 
 BEGUN, DONE, FAILED, KILLED = b"b", b"d", b"f", b"k"
-"""What is said of a step: that it begins, and how it ended. To the latter belongs JSON, after its
-length: what the step has cost, its error, or the signal that ended it."""
+"""Messages about a step: its begin, and its outcome. An outcome is followed by the length of a JSON
+text and the text: the cost of the step, its error, or the signal that ended it."""
 
 LENGTH = 4
-"""Bytes of that length."""
+"""Bytes of the length of the JSON text."""
 
 COSTS = "IMUBENCH_COSTS"
-"""The environment variable with the file to which what each step has cost is appended, a line of
-JSON each: CPU time in s, peak of memory in MB."""
+"""Environment variable with the file for the cost of each step, one line of JSON each: CPU time in
+s, peak memory in MB."""
 
-_PATIENCE = 60.0
-"""s; for the system to end a step."""
+_MAX_KILL_TIME = 60.0
+"""Max. time for the system to end a step, s."""
 
-_TO_STOP = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGIO", None)}
+_STOP_SIGNALS = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGIO", None)}
 """Signals that end a step because the run ends."""
 
 
 class StepError(Exception):
-    """A script of the workflow did not come to its end.
+    """Raised if a script of the workflow did not finish.
 
     Attributes
     ----------
     cause : {"error", "killed", "time"} or None
-        None: the recording has nothing to do with it. The run was stopped, the disk is full, the
-        script cannot even be imported.
+        None: not caused by the recording. The run was stopped, the disk is full, or the script
+        cannot be imported.
     reason : str
         In one line.
     trace : str
-        What it has said.
+        Output of the script.
     """
 
     def __init__(
@@ -69,18 +69,18 @@ class StepError(Exception):
 
 @dataclass(frozen=True)
 class Job:
-    """A script, and what it is run for.
+    """A script with its inputs and outputs.
 
     Attributes
     ----------
     input, output, params, wildcards : object
-        What the script sees as ``snakemake.input`` and so on. They are pickled.
+        Attributes of ``snakemake`` in the script; they are pickled.
     log : Path
-        What is printed goes to the end of it.
+        Output of the script is appended to it.
     memory : int or None
-        Bytes that it may take beside what the process that forks has; None: no limit.
+        Max. memory besides the memory of the forking process, bytes; None: no limit.
     results : Path or None
-        Where what it leaves is sealed (`imubench_pipeline.run.sealing`); None: nowhere.
+        Folder for the seals of its outputs (`imubench_pipeline.run.sealing`); None: no seals.
     """
 
     script: Path
@@ -101,9 +101,9 @@ class Job:
 class Processes:
     """Runs scripts in forks of one process, which begins with the first of them.
 
-    It ends with the process that has this object, even where that is killed; so do the forks, on
-    Linux, where each also has the name of its script. A fork does not need the process that made
-    it any more.
+    The forking process ends with the process of this object, even if that is killed. On Linux the
+    forks end, too, and each has the name of its script. A fork does not depend on the forking
+    process.
     """
 
     def __init__(self) -> None:
@@ -118,7 +118,7 @@ class Processes:
         ----------
         job : Job
         seconds : float, optional
-            It is ended where it takes longer, its imports apart.
+            Max. time without imports; a longer script is ended.
 
         Raises
         ------
@@ -130,9 +130,9 @@ class Processes:
         with ours:
             with theirs:
                 self._hand_over(theirs)
-            how, details = _answer(ours, len(request).to_bytes(8, "big") + request, seconds)
+            how, details = _request_answer(ours, len(request).to_bytes(8, "big") + request, seconds)
         if how != DONE:
-            raise _error(job.name, how, details, seconds)
+            raise _make_error(job.name, how, details, seconds)
         if COSTS in os.environ:
             about = {"step": job.name, "of": "/".join(map(str, job.wildcards))} | details
             with self._lock, Path(os.environ[COSTS]).open("a", encoding="utf-8") as file:
@@ -149,9 +149,9 @@ class Processes:
 
     def _hand_over(self, connection: socket.socket) -> None:
         with self._lock:
-            # The first that does not live any more was killed; a second one is no accident.
+            # One dead process may have been killed; a second one is a fault.
             for _ in range(2):
-                process, requests = self._server = self._server or _started()
+                process, requests = self._server = self._server or _start_server()
                 try:
                     socket.send_fds(requests, [b"s"], [connection.fileno()])
                     return
@@ -162,43 +162,45 @@ class Processes:
         raise StepError("the process that starts the steps ends at once; what it says stands above")
 
 
-def _answer(
+def _request_answer(
     connection: socket.socket, request: bytes, seconds: float | None
 ) -> tuple[bytes, dict[str, Any]]:
-    """Return how a step ended, and what is told of it; nothing where nobody can tell."""
+    """Return the outcome of a step and its details; empty if they are not known."""
     try:
         connection.sendall(request)
-        if _received(connection, 1) != BEGUN:
+        if _receive_bytes(connection, 1) != BEGUN:
             return b"", {}
         try:
             connection.settimeout(seconds)
-            return _told(connection)
+            return _receive_outcome(connection)
         except TimeoutError:
-            # The system ends a step whose connection is closed.
+            # Closing the connection ends the step.
             connection.shutdown(socket.SHUT_WR)
-            connection.settimeout(_PATIENCE)
+            connection.settimeout(_MAX_KILL_TIME)
             with contextlib.suppress(TimeoutError):
-                _told(connection)
+                _receive_outcome(connection)
             return b"", {"time": True}
     except OSError:
-        return b"", {}  # so is the process that was to start it
+        return b"", {}  # the process that should start it has ended
 
 
-def _told(connection: socket.socket) -> tuple[bytes, dict[str, Any]]:
-    how = _received(connection, 1)
-    length = _received(connection, LENGTH)
-    return how, json.loads(_received(connection, int.from_bytes(length, "big")) or b"{}")
+def _receive_outcome(connection: socket.socket) -> tuple[bytes, dict[str, Any]]:
+    how = _receive_bytes(connection, 1)
+    length = _receive_bytes(connection, LENGTH)
+    return how, json.loads(_receive_bytes(connection, int.from_bytes(length, "big")) or b"{}")
 
 
-def _received(connection: socket.socket, size: int) -> bytes:
-    """Return so many bytes; fewer where the other end is closed."""
+def _receive_bytes(connection: socket.socket, size: int) -> bytes:
+    """Return ``size`` bytes; fewer if the other end is closed."""
     received = b""
     while len(received) < size and (more := connection.recv(size - len(received))):
         received += more
     return received
 
 
-def _error(name: str, how: bytes, details: Mapping[str, Any], seconds: float | None) -> StepError:
+def _make_error(
+    name: str, how: bytes, details: Mapping[str, Any], seconds: float | None
+) -> StepError:
     if "time" in details:
         reason = f"ran for longer than {seconds:.4g} s"
         return StepError(f"{name}.py {reason}", "time", reason)
@@ -206,14 +208,14 @@ def _error(name: str, how: bytes, details: Mapping[str, Any], seconds: float | N
         alone = details["imported"] and details["errno"] not in OF_RESULTS
         cause: Cause | None = "error" if alone else None
         return StepError(f"{name}.py failed", cause, details["error"], details["trace"])
-    if how == KILLED and details["signal"] not in _TO_STOP:
+    if how == KILLED and details["signal"] not in _STOP_SIGNALS:
         with_it = signal.Signals(details["signal"]).name
         reason = with_it + ", perhaps for want of memory" * (with_it == "SIGKILL")
         return StepError(f"{name}.py was killed", "killed", reason)
     return StepError(f"{name}.py was killed")
 
 
-def _started() -> tuple[subprocess.Popen[bytes], socket.socket]:
+def _start_server() -> tuple[subprocess.Popen[bytes], socket.socket]:
     ours, theirs = socket.socketpair()
     with theirs:
         process = subprocess.Popen(

@@ -29,7 +29,7 @@ from imubench_pipeline.report.run_summary import one_line
 OURS: Mapping[str, Any] = {"imubench": True}
 """Marks a record that is shown as it is: ``logger.info(text, extra=OURS)``."""
 
-_SHOWN_BY_THE_LINE = {
+_EVENTS_OF_PROGRESS_LINE = {
     LogEvent.JOB_INFO,
     LogEvent.JOB_STARTED,
     LogEvent.JOB_FINISHED,
@@ -38,12 +38,12 @@ _SHOWN_BY_THE_LINE = {
     LogEvent.SHELLCMD,
     LogEvent.RESOURCES_INFO,
 }
-_NAMED_LOG = "Complete log"
-_BAR = 16
-_ROOM_FOR_BAR = 60
-_STYLES = {logging.ERROR: "red", logging.WARNING: "yellow"}
-_LONGEST = 200
-_BETWEEN_LINES = 10.0
+_LOG_FILE_PREFIX = "Complete log"
+_BAR_WIDTH = 16
+_MIN_WIDTH_FOR_BAR = 60
+_LEVEL_STYLES = {logging.ERROR: "red", logging.WARNING: "yellow"}
+_MAX_LINE_LENGTH = 200
+_MIN_LINE_INTERVAL = 10.0
 """s, at least, between two lines of progress in a pipe."""
 
 Recording = tuple[str, str]
@@ -109,20 +109,20 @@ class LogHandler(LogHandlerBase):
         about: Mapping[str, Any] = record.__dict__
         event = about.get("event")
         if event == LogEvent.JOB_INFO:
-            self._started(about)
+            self._start_job(about)
         elif event == LogEvent.JOB_FINISHED:
-            self._ended(about.get("job_id"))
+            self._end_job(about.get("job_id"))
         elif event == LogEvent.PROGRESS:
             self._done, self._total = about["done"], about["total"]
             self._say_in_pipe()
-        if event in _SHOWN_BY_THE_LINE:
+        if event in _EVENTS_OF_PROGRESS_LINE:
             return
         text = self.format(record)
         shown = record.levelno >= logging.WARNING or "imubench" in about
-        if text and (shown or text.startswith(_NAMED_LOG)):
-            self._print(text, _STYLES.get(record.levelno, ""))
+        if text and (shown or text.startswith(_LOG_FILE_PREFIX)):
+            self._print(text, _LEVEL_STYLES.get(record.levelno, ""))
         if event == LogEvent.JOB_ERROR:
-            self._ended(about.get("jobid"))
+            self._end_job(about.get("jobid"))
 
     def close(self) -> None:
         """Take the line away."""
@@ -136,11 +136,15 @@ class LogHandler(LogHandlerBase):
     def _say_in_pipe(self) -> None:
         """Print how far the run is, where no line moves, now and then."""
         now = time.monotonic()
-        if not self._moves and now - self._last_line >= _BETWEEN_LINES and self._done < self._total:
+        if (
+            not self._moves
+            and now - self._last_line >= _MIN_LINE_INTERVAL
+            and self._done < self._total
+        ):
             self._last_line = now
-            self._print(self._far(now))
+            self._print(self._describe_progress(now))
 
-    def _started(self, about: Mapping[str, Any]) -> None:
+    def _start_job(self, about: Mapping[str, Any]) -> None:
         of = "/".join(str(value) for value in (about.get("wildcards") or {}).values())
         label = one_line(f"{about.get('rule_name')} {of}")
         self._running[about["jobid"]] = (label, time.monotonic())
@@ -151,7 +155,7 @@ class LogHandler(LogHandlerBase):
             self._of[about["jobid"]] = (str(sensor), str(recording))
         if self._live is None and self._moves:
             self._live = Live(
-                get_renderable=self._line,
+                get_renderable=self._make_line,
                 console=self._console,
                 transient=True,
                 redirect_stdout=False,
@@ -160,7 +164,7 @@ class LogHandler(LogHandlerBase):
             )
             self._live.start()
 
-    def _ended(self, job: int | None) -> None:
+    def _end_job(self, job: int | None) -> None:
         if job is not None:
             self._running.pop(job, None)
             self._tell(self._of.pop(job, None))
@@ -174,44 +178,48 @@ class LogHandler(LogHandlerBase):
         _expected[recording] -= 1
         if _expected[recording] == 0:
             for told in _told:
-                self._print(one_line(told(*recording), _LONGEST))
+                self._print(one_line(told(*recording), _MAX_LINE_LENGTH))
 
     def _hide(self) -> None:
         if self._live is not None:
             self._live.stop()
             self._live = None
 
-    def _line(self) -> Table:
+    def _make_line(self) -> Table:
         room = self._console.width
         line = Table.grid(padding=(0, 1))
         cells: list[RenderableType] = [self._spinner]
         line.add_column(width=1)
-        if room >= _ROOM_FOR_BAR:
-            line.add_column(width=_BAR)
-            cells.append(ProgressBar(self._total or 1, self._done, width=_BAR))
+        if room >= _MIN_WIDTH_FOR_BAR:
+            line.add_column(width=_BAR_WIDTH)
+            cells.append(ProgressBar(self._total or 1, self._done, width=_BAR_WIDTH))
         width = sum(column.width or 0 for column in line.columns) + len(cells)
         line.add_column(width=room - width, no_wrap=True, overflow="ellipsis")
-        line.add_row(*cells, Text(self._said()))
+        line.add_row(*cells, Text(self._describe_state()))
         return line
 
-    def _said(self) -> str:
+    def _describe_state(self) -> str:
         now = time.monotonic()
         running = ", ".join(
-            f"{label} {_clock(now - begin)}" for label, begin in list(self._running.values())
+            f"{label} {_format_clock(now - begin)}" for label, begin in list(self._running.values())
         )
-        return f"{self._far(now)}: {running}" if self._done else f"first steps: {running}"
+        return (
+            f"{self._describe_progress(now)}: {running}"
+            if self._done
+            else f"first steps: {running}"
+        )
 
-    def _far(self, now: float) -> str:
+    def _describe_progress(self, now: float) -> str:
         left = (now - self._begin) / self._done * (self._total - self._done)
-        return f"{self._done} of {self._total} steps, about {_rough(left)} left"
+        return f"{self._done} of {self._total} steps, about {_format_rough_time(left)} left"
 
 
-def _clock(seconds: float) -> str:
+def _format_clock(seconds: float) -> str:
     minutes, rest = divmod(int(seconds), 60)
     return f"{minutes}:{rest:02}"
 
 
-def _rough(seconds: float) -> str:
+def _format_rough_time(seconds: float) -> str:
     for size, name in ((3600, "h"), (60, "min")):
         if seconds >= 2 * size:
             return f"{round(seconds / size)} {name}"

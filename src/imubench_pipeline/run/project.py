@@ -7,12 +7,12 @@ from pathlib import Path
 from imubench_pipeline.settings.shipped import project
 from imubench_pipeline.settings.validation import ConfigError
 
-_OWN = ("Snakefile", "workflow/Snakefile")
+_SNAKEFILE_PATHS = ("Snakefile", "workflow/Snakefile")
 
 
 def has_snakefile(folder: Path) -> bool:
     """Return whether a folder has a workflow of its own, which `snakemake` finds there."""
-    return any((folder / own).is_file() for own in _OWN)
+    return any((folder / own).is_file() for own in _SNAKEFILE_PATHS)
 
 
 def snakefile_of(folder: Path) -> Path:
@@ -23,7 +23,7 @@ def snakefile_of(folder: Path) -> Path:
     ConfigError
         If the folder is neither.
     """
-    for own in _OWN:
+    for own in _SNAKEFILE_PATHS:
         if (folder / own).is_file():
             return (folder / own).absolute()
     shipped = project() / "Snakefile"

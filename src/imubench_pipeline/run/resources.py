@@ -1,8 +1,8 @@
-"""Memory and time that a job asks for on a cluster, from the size of the log.
+"""Memory and time that a job requests on a cluster, from the size of the log.
 
-The costs that the rules state are what steps took of logs of up to 60 million samples
-(docs/how-to/cluster.md); here a margin is added. A job has one core whatever its log: no step
-computes with more. A run on one computer is held to the limits alone, far above what steps take.
+The costs in the rules were measured with logs of up to 60 million samples (docs/how-to/cluster.md);
+this module adds a margin. A job has one core for any log: no step uses more. On a single computer
+only the limits apply, which are far above the measured costs.
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ from imubench_pipeline.recordings.drop_zone import COMPRESSED, Recording
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.units import quantity_to_si
 
-_BESIDE = 900
-"""MB that a step does not have to itself: two Snakemakes and the process that forks, 550, and two
-small steps of the same group."""
+_OVERHEAD_MEMORY = 900
+"""Memory of a job besides the step, MB: 550 for two Snakemake processes and the process that forks,
+the rest for two small steps of the same group."""
 
-_START = 60
-"""s; a cold start of Python from a shared file system, and the compilers of a first run."""
+_START_TIME = 60
+"""Start-up time of a job, s: Python from a shared file system, and compilation in a first run."""
 
-_MB = 10**6
+_BYTES_PER_MB = 10**6
 
-_MARGIN = 10
-"""A busy node and a slow file system may take that many times the time measured."""
+_TIME_MARGIN = 10
+"""Factor on measured times, for a busy node and a slow file system."""
 
-_TEXT = {".csv", ".txt", ".log", ".tsv", ".dat", ".asc", ".nmea"}
-_AS_TEXT = {"text": 1, "binary": 3, "compressed": 6}
-"""How many times the samples of text a byte of a log may hold."""
+_TEXT_SUFFIXES = {".csv", ".txt", ".log", ".tsv", ".dat", ".asc", ".nmea"}
+_TEXT_EXPANSION = {"text": 1, "binary": 3, "compressed": 6}
+"""Max. samples per byte of a log, relative to text."""
 
-_BYTES_OF_A_VALUE = 7
-"""Of text. Nine digits take eleven, small counts three: for these the margin is there."""
+_BYTES_PER_VALUE = 7
+"""Bytes per value of text. Nine digits take eleven, small counts three; the margin covers these."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """What a step may take: time in s, and memory in bytes beside what the process that forks has.
+    """Limits of a step: time in s, and memory in bytes besides the memory of the forking process.
 
-    ``words``: where that is set.
+    ``words``: the settings of the limit.
     """
 
     seconds: float
@@ -56,7 +56,7 @@ Limits = Callable[[str, str | None], Limit]
 
 
 class Resources(TypedDict):
-    """What a job asks for: memory in MB, time in minutes."""
+    """Resources of a job: memory in MB, time in minutes."""
 
     mem_mb: int
     runtime: int
@@ -68,9 +68,9 @@ Asked = Callable[[Mapping[str, str], int], int]
 
 @dataclass(frozen=True)
 class Extent:
-    """How much there is to compute, of one recording, a sensor or the run.
+    """Size of the data of a recording, a sensor or the run.
 
-    ``million_samples`` are those of one channel.
+    ``million_samples`` is the number per channel.
     """
 
     million_samples: float = 0.0
@@ -80,10 +80,10 @@ class Extent:
 
 @dataclass(frozen=True, kw_only=True)
 class OfRecording:
-    """What a step of one recording takes.
+    """Cost of a step of one recording.
 
-    Memory in MB, and MB a million samples of a channel; time in s, s a channel, and s a million
-    values of all channels.
+    Memory in MB, and MB per million samples of a channel. Time in s, s per channel, and s per
+    million values of all channels.
     """
 
     memory: float
@@ -97,15 +97,16 @@ class OfRecording:
         values = self.time_of_values * extent.million_samples
         return (
             self.memory + self.memory_of_samples * extent.million_samples,
-            _START + _MARGIN * (self.time + (self.time_of_channels + values) * extent.channels),
+            _START_TIME
+            + _TIME_MARGIN * (self.time + (self.time_of_channels + values) * extent.channels),
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class OfMany:
-    """What a step of many recordings takes, of one sensor or of all: memory in MB, and time in s.
+    """Cost of a step of many recordings, of one sensor or of all: memory in MB, and time in s.
 
-    ``many_jobs``: one group has so many of them that each cannot ask for a start of its own.
+    ``many_jobs``: a group contains many such jobs, which do not each request a start-up time.
     """
 
     memory: float
@@ -116,10 +117,10 @@ class OfMany:
 
     def of(self, extent: Extent) -> tuple[float, float]:
         """Return memory in MB and time in s."""
-        start = 0.0 if self.many_jobs else _START
+        start = 0.0 if self.many_jobs else _START_TIME
         return (
             self.memory + self.memory_of_each * extent.recordings,
-            start + _MARGIN * (self.time + self.time_of_each * extent.recordings),
+            start + _TIME_MARGIN * (self.time + self.time_of_each * extent.recordings),
         )
 
 
@@ -127,25 +128,25 @@ Cost = OfRecording | OfMany
 
 
 def resources_of(cost: Cost, extent: Extent, attempt: int = 1) -> Resources:
-    """Return what a job asks for; each attempt, counted from 1, for twice as much as the last."""
+    """Return the resources of a job; each attempt, counted from 1, requests twice the last one."""
     memory, seconds = cost.of(extent)
     times: int = 2 ** (attempt - 1)
     return {
-        "mem_mb": times * math.ceil((_BESIDE + memory) / 100) * 100,
+        "mem_mb": times * math.ceil((_OVERHEAD_MEMORY + memory) / 100) * 100,
         "runtime": times * math.ceil(seconds / 60),
     }
 
 
 def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
-    """Return what makes of the cost of a rule what it states as its resources."""
-    extent = _extents(plan)
+    """Return a function from the cost of a rule to its resource functions."""
+    extent = _make_extent_lookup(plan)
 
     def stated(cost: Cost) -> dict[str, Asked]:
         def of_job(wildcards: Mapping[str, str], attempt: int) -> Resources:
             size = extent(wildcards.get("sensor"), wildcards.get("recording"))
             return resources_of(cost, size, attempt)
 
-        # Snakemake knows by their names what its functions take.
+        # Snakemake passes arguments by their names.
         def mem_mb(wildcards: Mapping[str, str], attempt: int) -> int:
             return of_job(wildcards, attempt)["mem_mb"]
 
@@ -158,8 +159,8 @@ def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
 
 
 def limits_of_steps(plan: Plan) -> Limits:
-    """Return what each step of a recording or a sensor may take, as the plan sets it."""
-    extent = _extents(plan)
+    """Return the limits of steps of recordings and sensors, from the settings of the plan."""
+    extent = _make_extent_lookup(plan)
     limits = plan.run.limits
     seconds = {
         key: quantity_to_si(getattr(limits, key), "time")
@@ -177,13 +178,13 @@ def limits_of_steps(plan: Plan) -> Limits:
             time = seconds["recording"] + seconds["million_values"] * values
             memory = limits.memory + math.ceil(limits.memory_of_million_values * values)
             words = "limits.recording, limits.million_values"
-        return Limit(time, words, memory * _MB)
+        return Limit(time, words, memory * _BYTES_PER_MB)
 
     return limit
 
 
-def _extents(plan: Plan) -> Callable[[str | None, str | None], Extent]:
-    """Return what tells the extent of a recording, a sensor or all, and keeps it."""
+def _make_extent_lookup(plan: Plan) -> Callable[[str | None, str | None], Extent]:
+    """Return a cached function for the extent of a recording, a sensor or all."""
 
     @cache
     def extent(sensor: str | None, name: str | None) -> Extent:
@@ -191,12 +192,12 @@ def _extents(plan: Plan) -> Callable[[str | None, str | None], Extent]:
             return Extent(recordings=len(plan.recordings))
         if name is None:
             return Extent(recordings=sum(of == sensor for of, _ in plan.recordings))
-        return _extent(plan, plan.recordings[sensor, name])
+        return _estimate_extent(plan, plan.recordings[sensor, name])
 
     return extent
 
 
-def _extent(plan: Plan, recording: Recording) -> Extent:
+def _estimate_extent(plan: Plan, recording: Recording) -> Extent:
     if recording.simulated:
         text = plan.simulated_settings(recording.sensor, recording.name)
         made = json.loads(text)["recording"]
@@ -209,7 +210,7 @@ def _extent(plan: Plan, recording: Recording) -> Extent:
         size = sum(size_as_text(path) for path in recording.files)
     except OSError:
         size = 0  # the ingest says what is wrong with it
-    return Extent(size / (_BYTES_OF_A_VALUE * channels) / 1e6, channels)
+    return Extent(size / (_BYTES_PER_VALUE * channels) / 1e6, channels)
 
 
 def size_as_text(path: Path) -> int:
@@ -220,5 +221,7 @@ def size_as_text(path: Path) -> int:
     if not path.is_file():
         return 0
     suffix = path.suffix.lower()
-    kind = "compressed" if suffix in COMPRESSED else "text" if suffix in _TEXT else "binary"
-    return path.stat().st_size * _AS_TEXT[kind]
+    kind = (
+        "compressed" if suffix in COMPRESSED else "text" if suffix in _TEXT_SUFFIXES else "binary"
+    )
+    return path.stat().st_size * _TEXT_EXPANSION[kind]

@@ -19,7 +19,7 @@ from imubench_pipeline.run.resources import Limit, Limits
 from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import QUALITY, Failure, failure_of, write_empty
 
-_SIGNATURE = signature(script_of_snakemake)
+_SCRIPT_SIGNATURE = signature(script_of_snakemake)
 
 
 class Scripts:
@@ -57,8 +57,8 @@ class Scripts:
         StepError
             If the run cannot go on without the script.
         """
-        given = SimpleNamespace(**_SIGNATURE.bind(*values, **named).arguments)
-        script = _path_of(given)
+        given = SimpleNamespace(**_SCRIPT_SIGNATURE.bind(*values, **named).arguments)
+        script = _locate_script(given)
         params = given.params
         job = Job(
             script,
@@ -85,18 +85,18 @@ class Scripts:
         """Run a script; leave its outputs empty where its recording or sensor makes it fail."""
         of: Of = (job.name, job.wildcards["sensor"], job.wildcards.get("recording"))
         outputs = [Path(path) for path in job.output]
-        if before := _before(job.input, outputs[0].parent):
+        if before := _find_earlier_failure(job.input, outputs[0].parent):
             with sealed(job):
                 _leave_out(outputs, job.params, before)
             return
         limit = limits(*of[1:])
         try:
-            self._tried(job, limit)
+            self._run_with_retry(job, limit)
         except StepError as error:
             if error.cause is None:
                 raise
             words = f" ({limit.words})" * (error.cause == "time")
-            reason = f"the step {job.name} {_VERBS[error.cause]}{error.reason}{words}"
+            reason = f"the step {job.name} {_CAUSE_VERBS[error.cause]}{error.reason}{words}"
             failure = Failure(of[1], of[2], job.name, error.cause, reason)
             remove_unfinished(outputs)
             sys.stderr.write(error.trace)
@@ -107,7 +107,7 @@ class Scripts:
         else:
             self._faults.succeeded(of, attempt)
 
-    def _tried(self, job: Job, limit: Limit) -> None:
+    def _run_with_retry(self, job: Job, limit: Limit) -> None:
         job = replace(job, memory=limit.memory)
         try:
             self._processes.run(job, limit.seconds)
@@ -118,10 +118,10 @@ class Scripts:
             self._processes.run(job, limit.seconds)
 
 
-_VERBS = {"error": "failed: ", "killed": "was killed twice: ", "time": ""}
+_CAUSE_VERBS = {"error": "failed: ", "killed": "was killed twice: ", "time": ""}
 
 
-def _path_of(given: SimpleNamespace) -> Path:
+def _locate_script(given: SimpleNamespace) -> Path:
     """Return the path of a script; Snakemake caches one of a workflow from elsewhere."""
     source = infer_source_file(given.path, infer_source_file(given.basedir))
     if isinstance(source, LocalSourceFile):
@@ -130,7 +130,7 @@ def _path_of(given: SimpleNamespace) -> Path:
     return Path(cache.get_path(source))
 
 
-def _before(inputs: Any, folder: Path) -> Failure | None:
+def _find_earlier_failure(inputs: Any, folder: Path) -> Failure | None:
     """Return which earlier step of the same recording failed, by the inputs of a job."""
     own = (Path(path) for path in inputs if Path(path).parent == folder)
     return next((failure for path in own if (failure := failure_of(path))), None)

@@ -24,17 +24,17 @@ if TYPE_CHECKING:
     from imubench_pipeline.simulate.profiles import Profile
     from imubench_pipeline.simulate.sources import Origin
 
-_YAML = (".yaml", ".yml")
-_MOST = 1 << 36
-_BEYOND = 1e15
-_WORTH_SAYING = 1.02
-_COLDEST, _HOTTEST = -273.15, 1000.0
+_YAML_SUFFIXES = (".yaml", ".yml")
+_MAX_SAMPLES = 1 << 36
+_MIN_EXPONENT_FORMAT = 1e15
+_MIN_REPORTED_FOLDING = 1.02
+_MIN_TEMPERATURE, _MAX_TEMPERATURE = -273.15, 1000.0
 """degC that a sensor may have."""
-_PATIENCE = 3.0
+_PROGRESS_INTERVAL = 3.0
 """Seconds between two lines of progress where there is no terminal."""
 
 
-_DEPTH = 2
+_LOG_PATH_DEPTH = 2
 """Names from the drop zone to a log: sensor and recording."""
 
 
@@ -169,7 +169,7 @@ def _check_depth(out: OutputFile) -> None:
         logs = Path(os.path.realpath(place.path))
         if place.kind == "logs" and real.is_relative_to(logs):
             parts = real.relative_to(logs).parts
-            if len(parts) != _DEPTH:
+            if len(parts) != _LOG_PATH_DEPTH:
                 raise ConfigError(
                     f"{out}: lies at {'/'.join(parts)} in the drop zone {logs}; expected "
                     "<sensor>/<recording>, as a recording of its own: name another --out"
@@ -229,7 +229,7 @@ def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
     if asked and (twice := [name for name in asked if asked.count(name) > 1]):
         raise ConfigError(f"--channels: found {twice[0]} twice; expected each channel once")
     path = Path(options.sensor)
-    if path.suffix in _YAML:
+    if path.suffix in _YAML_SUFFIXES:
         if options.results:
             raise ConfigError("--results are for a sensor by name; the file of models has its own")
         origin = sources.from_file(path)
@@ -271,12 +271,13 @@ def _duration(text: str | None, hours: float | None, rate: float) -> float:
         assert hours is not None  # one of them is required
         duration, option = 3600.0 * hours, f"--hours {hours:g}"
     if not math.isfinite(duration):
-        raise ConfigError(f"{option}: expected a length of 1 to {_MOST} samples")
+        raise ConfigError(f"{option}: expected a length of 1 to {_MAX_SAMPLES} samples")
     samples = duration * rate
-    if not 0.5 < samples <= _MOST:
-        shown = f"{samples:.0f}" if abs(samples) < _BEYOND else f"{samples:g}"
+    if not 0.5 < samples <= _MAX_SAMPLES:
+        shown = f"{samples:.0f}" if abs(samples) < _MIN_EXPONENT_FORMAT else f"{samples:g}"
         raise ConfigError(
-            f"{option}: {duration:g} s at {rate:g} Hz are {shown} samples; expected 1 to {_MOST}"
+            f"{option}: {duration:g} s at {rate:g} Hz are {shown} samples; expected 1 to "
+            f"{_MAX_SAMPLES}"
         )
     return duration
 
@@ -291,7 +292,7 @@ def _profiles(
     forms: dict[str, Any] = {}
     folder = Path()
     if options.motion is not None:
-        if options.motion.suffix in _YAML:
+        if options.motion.suffix in _YAML_SUFFIXES:
             forms["motion"] = _section(options.motion, "motion")
             folder = options.motion.parent
         else:
@@ -305,7 +306,7 @@ def _profiles(
     if options.temperature is None:
         return motion, None
     path, folder = Path(options.temperature), Path()
-    if path.suffix in _YAML:
+    if path.suffix in _YAML_SUFFIXES:
         warm = _section(path, "temperature")
         folder = path.parent
     elif path.suffix in (".csv", ".parquet", ".txt"):
@@ -313,9 +314,10 @@ def _profiles(
     else:
         with naming("--temperature: "):
             celsius = quantity_to_si(options.temperature, "temperature")
-        if not _COLDEST <= celsius <= _HOTTEST:
+        if not _MIN_TEMPERATURE <= celsius <= _MAX_TEMPERATURE:
             raise ConfigError(
-                f"--temperature {options.temperature}: expected {_COLDEST:g} to {_HOTTEST:g} degC"
+                f"--temperature {options.temperature}: expected {_MIN_TEMPERATURE:g} "
+                f"to {_MAX_TEMPERATURE:g} degC"
             )
         warm = options.temperature
     around = parse(Surroundings, {"temperature": warm}, options.temperature)
@@ -354,7 +356,7 @@ def _folded(origin: Origin, rate: float) -> list[str]:
     statements = []
     for channel, axis in origin.imu.axes.items():
         more = folding(axis, rate)
-        if more > _WORTH_SAYING:
+        if more > _MIN_REPORTED_FOLDING:
             statements.append(
                 f"{channel}: N is the density before the low-pass; sampled at {rate:g} Hz the log "
                 f"shows {math.sqrt(more):.3g} N, for noise beyond {rate / 2:g} Hz is folded into it"
@@ -389,7 +391,7 @@ def _progress(samples: int) -> Iterator[Callable[[int], None]]:
 
     def report(done: int) -> None:
         nonlocal last
-        if time.monotonic() - last >= _PATIENCE and done < samples:
+        if time.monotonic() - last >= _PROGRESS_INTERVAL and done < samples:
             last = time.monotonic()
             print(f"{100 * done / samples:.0f} % simulated", file=sys.stderr, flush=True)
 

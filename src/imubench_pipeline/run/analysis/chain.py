@@ -24,10 +24,7 @@ from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.run.analysis.compilation import Compilation
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import limits_of_steps
-from imubench_pipeline.settings.config import (
-    AllanSettings,
-    ReconstructionSettings,
-)
+from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
 from imubench_pipeline.steps import allan as allan_step
 from imubench_pipeline.steps import datasheet as datasheet_step
 from imubench_pipeline.steps.error_budget import error_tables
@@ -44,26 +41,26 @@ T = TypeVar("T")
 K = TypeVar("K", bound=tuple[str, ...])
 Say = Callable[[str], None]
 
-_OF_INGEST = {"quality": "quality.json"} | {
+_INGEST_FILES = {"quality": "quality.json"} | {
     name: f"{name}.parquet" for name in ("envelope", "histogram")
 }
-_OF_ESTIMATE = tuple(
+_ESTIMATE_TABLES = tuple(
     field.name for field in fields(Estimation) if field.name not in ("estimates", "paths")
 )
-_OF_COMPARISON = (
+_COMPARISON_TABLES = (
     *("datasheet", "datasheet_curve", "error_budget", "backtest"),
     *("error_growth", "drawn_deviations"),
 )
-_BEFORE_RECONSTRUCTION = ("allan", "parameters", "allan_compensated")
-_OF_RECONSTRUCTION = ("reconstruction", "scores")
-_OUTPUTS: dict[str, tuple[str, ...]] = {
+_RECONSTRUCTION_INPUTS = ("allan", "parameters", "allan_compensated")
+_RECONSTRUCTION_TABLES = ("reconstruction", "scores")
+_TABLES_OF_STEP: dict[str, tuple[str, ...]] = {
     "ingest": ("envelope", "histogram"),
     "estimate": (),  # they are written together, and so are those of the reconstruction
-    "datasheet": _OF_COMPARISON,
+    "datasheet": _COMPARISON_TABLES,
     "reconstruct": (),
 }
 """The tables that a step leaves."""
-_SLOW = 3.0
+_MIN_REPORTED_TIME = 3.0
 """s; who waits for longer is told for what."""
 
 
@@ -94,28 +91,32 @@ class Analysis:
         """Read the logs and estimate; return every joined table, of what is known by then."""
         self._compiling.expected()
         with ThreadPoolExecutor(self._cores) as beside:
-            channels = _ended(self._begun(beside, "ingest", self._plan.recordings, self._read))
+            channels = _collect_results(
+                self._submit(beside, "ingest", self._plan.recordings, self._read)
+            )
             self._series = [(*key, channel) for key, own in channels.items() for channel in own]
             self._compiling.finish()
-            parts = _ended(self._begun(beside, "estimate", self._series, self._estimate))
-        self._write_parts(_OF_ESTIMATE, parts)
-        return self._joined(_OF_ESTIMATE)
+            parts = _collect_results(self._submit(beside, "estimate", self._series, self._estimate))
+        self._write_parts(_ESTIMATE_TABLES, parts)
+        return self._join_tables(_ESTIMATE_TABLES)
 
     def for_pages(self) -> dict[str, pa.Table]:
         """Compute what pages show beside the estimates, after them; return every joined table."""
         with ThreadPoolExecutor(self._cores) as beside:
-            compared = self._begun(beside, "datasheet", self._plan.recordings, self._compare)
-            parts = _ended(self._begun(beside, "reconstruct", self._series, self._reconstruct))
-            _ended(compared)
-        self._write_parts(_OF_RECONSTRUCTION, parts)
-        return self._joined((*_OF_ESTIMATE, *_OF_COMPARISON, *_OF_RECONSTRUCTION))
+            compared = self._submit(beside, "datasheet", self._plan.recordings, self._compare)
+            parts = _collect_results(
+                self._submit(beside, "reconstruct", self._series, self._reconstruct)
+            )
+            _collect_results(compared)
+        self._write_parts(_RECONSTRUCTION_TABLES, parts)
+        return self._join_tables((*_ESTIMATE_TABLES, *_COMPARISON_TABLES, *_RECONSTRUCTION_TABLES))
 
     # ------------------------------------------------------------------ the steps of a recording
 
     def _read(self, sensor: str, recording: str) -> list[str]:
         """Read a log and take its curves; return its channels."""
-        folder = self._folder(sensor, recording)
-        outputs = {name: folder / file for name, file in _OF_INGEST.items()}
+        folder = self._get_folder(sensor, recording)
+        outputs = {name: folder / file for name, file in _INGEST_FILES.items()}
         source = self._plan.recordings[sensor, recording].path
         settings = self._plan.ingest_settings(sensor, recording)
         write_recording(source, settings, sensor, recording, outputs)
@@ -124,7 +125,7 @@ class Analysis:
         return list(static_logs(folder))
 
     def _estimate(self, sensor: str, recording: str, channel: str) -> Estimation:
-        folder = self._folder(sensor, recording)
+        folder = self._get_folder(sensor, recording)
         rows = estimation(
             folder / "quality.json",
             folder / "curve.parquet",
@@ -146,7 +147,7 @@ class Analysis:
             own = [part for (*of, _), part in parts.items() if tuple(of) == key]
             failure = self._failed.get(key)
             for table in tables:
-                path = self._folder(*key) / f"{table}.parquet"
+                path = self._get_folder(*key) / f"{table}.parquet"
                 if failure is not None:
                     write_empty([path], failure)
                 else:
@@ -154,7 +155,7 @@ class Analysis:
 
     def _compare(self, sensor: str, recording: str) -> None:
         """Hold a recording against its datasheet, and say what its noise means in use."""
-        folder, plan = self._folder(sensor, recording), self._plan
+        folder, plan = self._get_folder(sensor, recording), self._plan
         stated = (folder, sensor, recording, plan.datasheet_settings(sensor))
         write("datasheet", datasheet_step.rows(*stated), folder / "datasheet.parquet")
         write(
@@ -171,7 +172,7 @@ class Analysis:
             write(table, rows, folder / f"{table}.parquet")
 
     def _reconstruct(self, sensor: str, recording: str, channel: str) -> ReconstructionRows:
-        folder = self._folder(sensor, recording)
+        folder = self._get_folder(sensor, recording)
         settings = ReconstructionSettings.model_validate_json(self._plan.settings("reconstruction"))
         inputs = (
             "quality.json",
@@ -183,15 +184,15 @@ class Analysis:
 
     # ---------------------------------------------------------------------------- all together
 
-    def _joined(self, made: Sequence[str]) -> dict[str, pa.Table]:
+    def _join_tables(self, made: Sequence[str]) -> dict[str, pa.Table]:
         """Join the tables of each sensor that were made, and those of all; the others are empty."""
         plan = self._plan
         names = [name for name in made if name not in OF_ONE_RECORDING]
         parts: dict[str, list[Path]] = {}
         for sensor in dict.fromkeys(sensor for sensor, _ in plan.recordings):
-            folders = [self._folder(*key) for key in plan.recordings if key[0] == sensor]
+            folders = [self._get_folder(*key) for key in plan.recordings if key[0] == sensor]
             own = {name: [folder / f"{name}.parquet" for folder in folders] for name in names}
-            own["quality"] = [folder / _OF_INGEST["quality"] for folder in folders]
+            own["quality"] = [folder / _INGEST_FILES["quality"] for folder in folders]
             tables = joined_tables(
                 own,
                 plan.truths(sensor),
@@ -207,10 +208,10 @@ class Analysis:
         absent = (name for name in TABLES if name not in every and name not in OF_ONE_RECORDING)
         return every | {name: build(name, ()) for name in absent}
 
-    def _folder(self, sensor: str, recording: str) -> Path:
+    def _get_folder(self, sensor: str, recording: str) -> Path:
         return self._plan.run.results / "recordings" / sensor / recording
 
-    def _begun(
+    def _submit(
         self,
         beside: ThreadPoolExecutor,
         step: str,
@@ -218,9 +219,9 @@ class Analysis:
         function: Callable[..., T],
     ) -> dict[K, Future[T | None]]:
         """Begin a step for each key, of a recording that is not left out."""
-        return {key: beside.submit(self._bounded, step, function, key) for key in keys}
+        return {key: beside.submit(self._run_bounded, step, function, key) for key in keys}
 
-    def _bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:
+    def _run_bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:
         """Call a step in a process of its own; where it fails, its recording is left out."""
         sensor, recording, *_ = key
         failure = self._failed.get((sensor, recording))
@@ -238,7 +239,7 @@ class Analysis:
             words = one_line(f"the step {step} failed: {describe_error(error)}")
             self._leave_out(step, sensor, recording, "error", words)
             return None
-        if time.monotonic() - begun > _SLOW:
+        if time.monotonic() - begun > _MIN_REPORTED_TIME:
             self._say(f"{'/'.join(key[1:])}: {step} done")
         return value
 
@@ -246,15 +247,15 @@ class Analysis:
         failure = Failure(sensor, recording, step, cause, reason)
         self._failed.setdefault((sensor, recording), failure)
         if step == "ingest":
-            quality = self._folder(sensor, recording) / "quality.json"
+            quality = self._get_folder(sensor, recording) / "quality.json"
             write_failed(self._plan.ingest_settings(sensor, recording), failure, quality)
         self._write_nothing(step, sensor, recording, failure)
 
     def _write_nothing(self, step: str, sensor: str, recording: str, failure: Failure) -> None:
-        folder = self._folder(sensor, recording)
-        write_empty((folder / f"{name}.parquet" for name in _OUTPUTS[step]), failure)
+        folder = self._get_folder(sensor, recording)
+        write_empty((folder / f"{name}.parquet" for name in _TABLES_OF_STEP[step]), failure)
 
 
-def _ended(begun: Mapping[K, Future[T | None]]) -> dict[K, T]:
+def _collect_results(begun: Mapping[K, Future[T | None]]) -> dict[K, T]:
     """Wait for a step; return what came of it, where something did."""
     return {key: value for key, done in begun.items() if (value := done.result()) is not None}

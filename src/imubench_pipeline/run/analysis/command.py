@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from imubench_pipeline.run.analysis.compilation import Compilation
     from imubench_pipeline.run.plan import Plan
 
-_LONGEST, _MEMORY = 600.0, 4 << 30
+_MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30
 """s and bytes that a process may take for its figures."""
 
 _DESCRIPTION = (
@@ -129,7 +129,7 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
     return 0 if statuses == {"ok"} else 1
 
 
-def _called(arguments: argparse.Namespace) -> str:
+def _describe_command(arguments: argparse.Namespace) -> str:
     """Return the command with its options, for a shell."""
     options = {
         "--sensor": arguments.sensor,
@@ -163,10 +163,10 @@ def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Names
     # Of one log there are no intervals to hold side by side.
     kinds = ("comparison", "forest") if len(arguments.logs) > 1 else ("comparison",)
     # The results are gone with the process: what makes them again is this command.
-    told = json.loads(plan.report_settings()) | {"at_once": _called(arguments)}
+    told = json.loads(plan.report_settings()) | {"at_once": _describe_command(arguments)}
     with output.filling() as folder:
         figures = figures_of(tables, arguments.units, folder / "figures", kinds=kinds)
-        with _drawn_beside(figures, arguments.cores):
+        with _draw_in_parallel(figures, arguments.cores):
             site = site_of(tables, json.dumps(told), plan.run.results)
             write_content(one_file(site), folder / "report.html")
             for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
@@ -175,18 +175,18 @@ def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Names
 
 
 @contextmanager
-def _drawn_beside(figures: Sequence[Callable[[], None]], cores: int) -> Iterator[None]:
+def _draw_in_parallel(figures: Sequence[Callable[[], None]], cores: int) -> Iterator[None]:
     """Draw figures in processes of their own meanwhile; wait for them in the end."""
     from imubench_pipeline.readers.bounded import Bounded
 
     shares = [figures[first::cores] for first in range(min(cores, len(figures)))]
     with ExitStack() as beside:
-        drawing = [Bounded(_MEMORY, _draw, share) for share in shares]
+        drawing = [Bounded(_MAX_DRAWING_MEMORY, _draw, share) for share in shares]
         for process in drawing:
             beside.callback(process.end)
         yield
         for process in drawing:
-            process.result(_LONGEST)
+            process.result(_MAX_DRAWING_TIME)
 
 
 def _draw(figures: Sequence[Callable[[], None]]) -> None:

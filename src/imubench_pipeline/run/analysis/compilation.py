@@ -10,8 +10,8 @@ from types import TracebackType
 from imubench_pipeline.estimators.compilation import compile_kernels
 from imubench_pipeline.readers.bounded import Bounded
 
-_LONGEST, _MEMORY = 600.0, 4 << 30
-_SLOW = 3.0
+_MAX_COMPILE_TIME, _MAX_COMPILE_MEMORY = 600.0, 4 << 30
+_MESSAGE_DELAY = 3.0
 """s; who waits for longer is told for what."""
 
 
@@ -23,8 +23,8 @@ class Compilation:
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
-        self._process = Bounded(_MEMORY, compile_kernels)
-        self._told = threading.Timer(_SLOW, self._tell)
+        self._process = Bounded(_MAX_COMPILE_MEMORY, compile_kernels)
+        self._told = threading.Timer(_MESSAGE_DELAY, self._tell)
 
     def expected(self) -> None:
         """Tell of it from now on, where it takes long: there will be somebody who waits for it."""
@@ -32,7 +32,7 @@ class Compilation:
 
     def finish(self) -> None:
         """Wait for its end, and load the kernels, so that no fork does so again."""
-        self._process.result(_LONGEST)
+        self._process.result(_MAX_COMPILE_TIME)
         self._told.cancel()
         compile_kernels()
 

@@ -80,14 +80,14 @@ def lay_out(
     missing = [log for log in logs if not log.exists()]
     if missing:
         raise ConfigError(f"{missing[0]}: no such file; expected a log, or the folder of one")
-    declared = None if sensor is None else _sensor_file(sensor, catalogue)
+    declared = None if sensor is None else _find_sensor_file(sensor, catalogue)
     if declared is not None and stated:
         raise ConfigError(
             "--rate, --gyro-unit and --accel-unit fill in what a log does not say; with --sensor "
             "they have no place: state them in the sensor file"
         )
     (folder / "sensors").mkdir()
-    for log, name in zip(logs, _names(logs), strict=True):
+    for log, name in zip(logs, _name_recordings(logs), strict=True):
         path = log.resolve()
         if declared is not None:
             of, described = sensor_of(declared.with_suffix("")), declared
@@ -97,7 +97,7 @@ def lay_out(
         else:
             of = name
             target = folder / "sensors" / f"{of}.yaml"
-            write_json(_drafted(log, stated), target)  # which is YAML, too
+            write_json(_draft_sensor(log, stated), target)  # which is YAML, too
         place = folder / "logs" / of
         place.mkdir(parents=True, exist_ok=True)
         (place / (name + path.name.removeprefix(name_of(path.name)))).symlink_to(path)
@@ -113,7 +113,7 @@ def lay_out(
     }
 
 
-def _sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
+def _find_sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
     """Return the file of a sensor that is given by its path, or by its name in the catalogue."""
     if not sensor.is_file():
         named = files_in(catalogue, "sensor").get(str(sensor))
@@ -128,7 +128,7 @@ def _sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
     return sensor
 
 
-def _names(logs: Sequence[Path]) -> list[str]:
+def _name_recordings(logs: Sequence[Path]) -> list[str]:
     """Return the names of the recordings: with that of their folder where two are alike."""
     names = [name_of(log.resolve().name) for log in logs]
     times = Counter(names)
@@ -146,7 +146,7 @@ def _names(logs: Sequence[Path]) -> list[str]:
     return longer
 
 
-def _drafted(log: Path, stated: Stated) -> Mapping[str, object]:
+def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
     """Return the sensor file that a log tells itself, filled in by what is stated."""
     try:
         inspected: Inspection = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, log)
@@ -164,15 +164,15 @@ def _drafted(log: Path, stated: Stated) -> Mapping[str, object]:
         unit = stated.unit_of(channel)
         if unit and source["unit"] == UNKNOWN:
             source["unit"] = unit
-    open_keys = _open(written)
+    open_keys = _list_open_keys(written)
     if open_keys:
-        raise UnfilledError(_what_is_missing(log, inspected, open_keys))
+        raise UnfilledError(_describe_missing_keys(log, inspected, open_keys))
     return parse(Sensor, described, f"drafted from {log}").model_dump(
         mode="json", exclude_unset=True
     )
 
 
-def _open(written: Mapping[str, object]) -> list[str]:
+def _list_open_keys(written: Mapping[str, object]) -> list[str]:
     """Return what is left open: the rate, or a unit or column of a quantity."""
     keys = ["rate"] * (written.get("rate") == UNKNOWN)
     channels = written["channels"]
@@ -184,7 +184,7 @@ def _open(written: Mapping[str, object]) -> list[str]:
     return list(dict.fromkeys(keys))
 
 
-def _what_is_missing(log: Path, inspected: Inspection, keys: Sequence[str]) -> str:
+def _describe_missing_keys(log: Path, inspected: Inspection, keys: Sequence[str]) -> str:
     """Return what a log does not say, and how to say it."""
     options = {
         "rate": "--rate '100 Hz'",

@@ -10,7 +10,7 @@ from pathlib import Path
 from imubench_pipeline.settings.command_line import LONGEST, number, seconds
 from imubench_pipeline.settings.extras import extra
 
-_WAIT = number(0.0, LONGEST, "a time, such as 10 s", seconds)
+_TIME_TYPE = number(0.0, LONGEST, "a time, such as 10 s", seconds)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,14 +29,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--settle",
-        type=_WAIT,
+        type=_TIME_TYPE,
         default="10 s",
         metavar="TIME",
         help="a log is complete when nothing of it has changed for so long; default: 10 s",
     )
     parser.add_argument(
         "--wait",
-        type=_WAIT,
+        type=_TIME_TYPE,
         default="0 s",
         metavar="TIME",
         help="how long to wait for a run that goes on; default: not at all",

@@ -29,12 +29,12 @@ from imubench_pipeline.tables.seals import night_place, seal_files
 
 __all__ = ["Night", "TakenError"]
 
-_PATHS = ("logs", "results", "held_back")
+_PATH_SETTINGS = ("logs", "results", "held_back")
 _OWN_FLAGS = {"--config", "-C", "--configfile", "--configfiles"}
-_LITTLE = 200e6  # bytes
-_MOST_ERRORS = 5
-_PAUSE = 5.0  # s between two looks at a Snakemake that somebody else runs
-_WRITTEN_TO = "it was written to while it was read: what the results say is of a part of it"
+_LOW_DISK_SPACE = 200e6  # bytes
+_MAX_ERRORS = 5
+_RETRY_INTERVAL = 5.0  # s between two looks at a Snakemake that somebody else runs
+_CHANGED_WHILE_READ = "it was written to while it was read: what the results say is of a part of it"
 
 
 class Night:
@@ -60,7 +60,7 @@ class Night:
         self._snakefile = snakefile_of(self.project)
         if own := set(flags) & _OWN_FLAGS:
             raise ConfigError(f"{', '.join(own)}: expected --config of imubench nightly instead")
-        run = _settings(self.project / "config/config.yaml", config)
+        run = _read_run_settings(self.project / "config/config.yaml", config)
         self.logs = self.project / run.logs
         self.results = self.project / run.results
         self.folder = self.results / "nightly"
@@ -81,24 +81,28 @@ class Night:
             If another run still goes on.
         """
         until = time.monotonic() + wait
-        with Lock(lock_of(self.results)) as lock, _stopped_by_signals():
+        with Lock(lock_of(self.results)) as lock, _interrupt_on_signals():
             lock.acquire(wait)
             self._began = datetime.now(UTC)
             self._wait_for_others(until)
-            before = self._before()
+            before = self._read_previous_state()
             self._recover(lock)
             seen, skips = settled(self.logs, settle, before.logs if before else {})
             try:
-                failure = self._snakemake(cores, skips, lock)
+                failure = self._run_snakemake(cores, skips, lock)
             except OSError as error:
                 failure = [str(error)]
             except KeyboardInterrupt:
                 failure = ["it was stopped by a signal; the next run goes on where it was"]
-            summary, after = self._summary(before, seen, skips, failure)
+            summary, after = self._summarise(before, seen, skips, failure)
             try:
                 self._keep(summary, after)
             except OSError as error:
-                why = [*summary.failure, f"the summary cannot be kept: {error}", *self._space()]
+                why = [
+                    *summary.failure,
+                    f"the summary cannot be kept: {error}",
+                    *self._describe_disk_space(),
+                ]
                 return summary.model_copy(update={"outcome": "failed", "failure": why})
         return summary
 
@@ -110,7 +114,7 @@ class Night:
     def _log(self) -> Path:
         return self.folder / f"{self._began:%Y%m%dT%H%M%SZ}.log"
 
-    def _before(self) -> State | None:
+    def _read_previous_state(self) -> State | None:
         try:
             return read_state(self._state)
         except StateError as error:
@@ -125,7 +129,7 @@ class Night:
                 return
             if time.monotonic() >= until:
                 raise TakenError(f"Snakemake (process {process}) works on {self.results}")
-            time.sleep(min(_PAUSE, max(until - time.monotonic(), 0.0)))
+            time.sleep(min(_RETRY_INTERVAL, max(until - time.monotonic(), 0.0)))
 
     def _recover(self, lock: Lock) -> None:
         locks = recovery.snakemake_locks(self.project, self.results)
@@ -148,14 +152,14 @@ class Night:
             self._put_right.append(f"temporary files removed: {number} ({size / 1e6:.1f} MB)")
         lock.left_over = {}
 
-    def _snakemake(self, cores: str, skips: Sequence[Skip], lock: Lock) -> list[str]:
+    def _run_snakemake(self, cores: str, skips: Sequence[Skip], lock: Lock) -> list[str]:
         """Run Snakemake; return why it failed, if it did."""
         arguments = ["--snakefile", str(self._snakefile), f"-c{cores}", "--rerun-incomplete"]
         arguments += [*self._flags, *self._held_back(skips)]
         status = run_snakemake(arguments, self.project, self._log, lock)
         if status == 0:
             return []
-        messages = [f"a step said: {error}" for error in errors(self._log)[:_MOST_ERRORS]]
+        messages = [f"a step said: {error}" for error in errors(self._log)[:_MAX_ERRORS]]
         why = f"Snakemake ended with exit status {status}; the last lines of its log:"
         return [*messages, why, *last_lines(self._log)]
 
@@ -166,7 +170,7 @@ class Night:
         write_json({"held_back": sorted(names)}, file)
         return ["--configfile", str(file), *(["--config", *self._config] if self._config else [])]
 
-    def _summary(
+    def _summarise(
         self,
         before: State | None,
         seen: Mapping[str, Found],
@@ -184,7 +188,7 @@ class Night:
             failure = [f"the tables cannot be read: {error}"]
         held_back = {skip.recording for skip in skips if skip.held_back}
         late = sorted(moved(seen, look(self.logs)) - held_back)
-        skips = [*skips, *(Skip(name, _WRITTEN_TO, held_back=False) for name in late)]
+        skips = [*skips, *(Skip(name, _CHANGED_WHILE_READ, held_back=False) for name in late)]
         was_skipped = before.skipped if before else {}
         since = {skip.recording: was_skipped.get(skip.recording, self._began) for skip in skips}
         if tables is not None:
@@ -208,16 +212,18 @@ class Night:
             finished=finished,
             seconds=(finished - self._began).total_seconds(),
             put_right=self._put_right,
-            failure=[*failure, *(self._space() if failure else [])],
+            failure=[*failure, *(self._describe_disk_space() if failure else [])],
             report=str(self.results / "report/index.html"),
             log=str(self._log),
             **fields,
         )
         return summary, after
 
-    def _space(self) -> list[str]:
+    def _describe_disk_space(self) -> list[str]:
         free = disk_usage(self.results).free
-        return [f"the disk of the results has only {free / 1e6:.0f} MB left"] * (free < _LITTLE)
+        return [f"the disk of the results has only {free / 1e6:.0f} MB left"] * (
+            free < _LOW_DISK_SPACE
+        )
 
     def _keep(self, summary: Summary, after: State | None) -> None:
         for name in (self._log.stem, "latest"):
@@ -232,7 +238,7 @@ class Night:
             seal_files(self.results, night_place("state"), [self._state], {})
 
 
-def _settings(file: Path, config: Sequence[str]) -> Run:
+def _read_run_settings(file: Path, config: Sequence[str]) -> Run:
     """Return where the logs and the results are; the rest is Snakemake's to read."""
     settings = read_config(file)
     for entry in config:
@@ -241,12 +247,12 @@ def _settings(file: Path, config: Sequence[str]) -> Run:
             raise ConfigError(f"--config: found {entry!r}; expected KEY=VALUE")
         settings |= {key: yaml.load(value, Loader=yaml.BaseLoader)}
     return read_run(
-        {key: settings[key] for key in _PATHS if key in settings}, f"{file} or --config"
+        {key: settings[key] for key in _PATH_SETTINGS if key in settings}, f"{file} or --config"
     )
 
 
 @contextmanager
-def _stopped_by_signals() -> Iterator[None]:
+def _interrupt_on_signals() -> Iterator[None]:
     """Turn the signal that ends a service into that of Ctrl-C, so that all is left in order."""
 
     def stop(number: int, frame: FrameType | None) -> None:

@@ -1,7 +1,7 @@
-"""What a run leaves that was killed, or cut off with the power, and how the next one goes on.
+"""Recover from a run that was killed, or interrupted by a power failure.
 
-Steps that were interrupted are left to Snakemake (``--rerun-incomplete``). The rest is here: its
-lock, steps that run on without it, temporary files, and files that were on their way to the disk
+Snakemake reruns interrupted steps (``--rerun-incomplete``). This module handles the lock of
+Snakemake, steps that are still running, temporary files, and files that were not yet on the disk
 when the machine stopped.
 """
 
@@ -21,25 +21,25 @@ from typing import Any
 
 import psutil
 
-_FOLDERS = (
+_WRITTEN_FOLDERS = (
     *("recordings", "sensors", "tables", "simulated", "report", "exports", "seals", "faults"),
     "nightly",
 )
-"""What a run writes to, below the results: nothing else is touched."""
+"""Folders in the results that runs write; nothing else is changed."""
 
-_TEMPORARY = re.compile(r"\..+\.[a-z0-9_]{8}\.part")
-"""Names that `tables.replacing`, `tables.making` and the ingest give to what is not complete."""
+_TEMPORARY_NAME = re.compile(r"\..+\.[a-z0-9_]{8}\.part")
+"""Names of incomplete files of `tables.replacing`, `tables.making` and the ingest."""
 
 STILL_WRITTEN = 60.0
-"""s; what has changed so shortly before a run may be a command's of someone."""
+"""s; a file that changed so shortly before a run may belong to another command."""
 
-_ON_ITS_WAY = 60.0  # s; a system keeps what is written in memory for half a minute or so
-_PATIENCE = 10.0  # s; for a process to end
+_MAX_WRITE_DELAY = 60.0  # s; systems buffer writes in memory for about half a minute
+_MAX_TERMINATION_TIME = 10.0  # s; for a process to end
 
 
 def snakemake_locks(project: Path, results: Path) -> list[Path]:
     """Return the locks of Snakemake on files of these results; `project` has the Snakefile."""
-    # The paths in a lock are as Snakemake was told them: links are not followed.
+    # The paths in a lock are as given to Snakemake: links are not resolved.
     inside = os.path.normpath(results) + os.sep
 
     def concerns(path: Path) -> bool:
@@ -50,14 +50,14 @@ def snakemake_locks(project: Path, results: Path) -> list[Path]:
 
     locks = []
     for path in sorted(project.glob(".snakemake/locks/*.lock")):
-        with contextlib.suppress(OSError):  # a run that has just ended takes its own away
+        with contextlib.suppress(OSError):  # a run that has just ended removes its lock
             if concerns(path):
                 locks.append(path)
     return locks
 
 
 def owner(locks: Iterable[Path], project: Path, results: Path) -> int | None:
-    """Return the process of a Snakemake that these locks may belong to; None: they are stale."""
+    """Return the Snakemake process that may own these locks; None: they are stale."""
     stamps = []
     for lock in locks:
         with contextlib.suppress(OSError):
@@ -82,13 +82,13 @@ def _is_snakemake(process: psutil.Process, project: Path, results: Path) -> bool
     try:
         return Path(process.cwd()) == project.resolve()
     except psutil.AccessDenied:
-        return True  # somebody else's: rather wait one night
+        return True  # of another user: rather wait one night
 
 
 def end_left_over(note: Mapping[str, Any], project: Path) -> int:
-    """End the steps that a run left running which was killed; return how many there were.
+    """End the steps of a killed run that are still running; return their number.
 
-    `note` is what that run left in the lock; the steps run in `project`.
+    `note` is the note of that run in the lock; the steps run in `project`.
     """
     group = note.get("snakemake")
     if note.get("host") != platform.node() or not isinstance(group, int) or restarted(note):
@@ -96,26 +96,26 @@ def end_left_over(note: Mapping[str, Any], project: Path) -> int:
     ended = []
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error, OSError):
-            # The number may have gone to another group of processes since.
+            # Another process group may have the same number now.
             if os.getpgid(process.pid) == group and Path(process.cwd()) == project.resolve():
                 process.terminate()
                 ended.append(process)
-    for process in psutil.wait_procs(ended, timeout=_PATIENCE)[1]:
+    for process in psutil.wait_procs(ended, timeout=_MAX_TERMINATION_TIME)[1]:
         with contextlib.suppress(psutil.Error):
             process.kill()
     return len(ended)
 
 
 def end_group(group: int) -> None:
-    """End what is left of a group of processes that this run has started, by the first of them."""
+    """Kill the remaining processes of a group that this run started, by its leader."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(group, signal.SIGKILL)
 
 
 def restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
-    """Tell whether the machine has been started anew since a run that left this note began.
+    """Return whether the machine was restarted after the begin of the run of this note.
 
-    `boot`: when the machine was started, s since 1970; default: asked of the system.
+    `boot`: start of the machine, s since 1970; default: from the system.
     """
     try:
         since = datetime.fromisoformat(str(note.get("since"))).timestamp()
@@ -127,13 +127,13 @@ def restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
 
 
 def remove_temporary(results: Path, locked: float) -> tuple[int, int]:
-    """Remove the temporary files of killed runs; return how many they were, and their bytes.
+    """Remove the temporary files of killed runs; return their number and bytes.
 
-    `locked`: when the lock was, s since 1970: what changed shortly before, or later, stays.
+    `locked`: time of the lock, s since 1970. Files that changed shortly before or later stay.
     """
     number = size = 0
-    for path in list(_below(results)):
-        if not _TEMPORARY.fullmatch(path.name) or path.is_symlink():
+    for path in list(_walk_outputs(results)):
+        if not _TEMPORARY_NAME.fullmatch(path.name) or path.is_symlink():
             continue
         inside = list(path.rglob("*")) if path.is_dir() else []
         with contextlib.suppress(OSError):
@@ -146,40 +146,40 @@ def remove_temporary(results: Path, locked: float) -> tuple[int, int]:
 
 def temporary(results: Path) -> list[Path]:
     """Return the files and folders below the results that are not complete."""
-    unfinished = [path for path in _below(results) if _TEMPORARY.fullmatch(path.name)]
+    unfinished = [path for path in _walk_outputs(results) if _TEMPORARY_NAME.fullmatch(path.name)]
     return [path for path in unfinished if not any(other in path.parents for other in unfinished)]
 
 
 def remove_unfinished(outputs: Iterable[Path]) -> None:
-    """Remove what a step that was ended had not completed of its outputs."""
+    """Remove the incomplete outputs of a step that was ended."""
     for path in outputs:
         for left in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
-            if _TEMPORARY.fullmatch(left.name):
+            if _TEMPORARY_NAME.fullmatch(left.name):
                 with contextlib.suppress(FileNotFoundError):
                     _remove(left)
 
 
 def remove_doubtful(results: Path) -> int:
-    """Remove what was written in the last minute before the power went; return how many files.
+    """Remove the files of the last minute before a power failure; return their number.
 
-    A file that has its name already may have no content then. Snakemake makes anew what is not
-    there. Of a folder that one step makes, all goes.
+    Such a file may have its final name without its content. Snakemake makes missing files again.
+    A folder that one step makes is removed as a whole.
     """
     stamps: dict[Path, float] = {}
-    for path in _below(results):
+    for path in _walk_outputs(results):
         with contextlib.suppress(OSError):
             if path.is_file() and path.relative_to(results).parts[0] != "nightly":
                 stamps[path] = path.stat().st_mtime
     last = max(stamps.values(), default=0.0)
-    doubtful = [path for path, stamp in stamps.items() if stamp > last - _ON_ITS_WAY]
-    for made in dict.fromkeys(_made_as_one(results, path) for path in doubtful):
+    doubtful = [path for path, stamp in stamps.items() if stamp > last - _MAX_WRITE_DELAY]
+    for made in dict.fromkeys(_find_common_output(results, path) for path in doubtful):
         with contextlib.suppress(OSError):
             _remove(made)
     return len(doubtful)
 
 
-def _made_as_one(results: Path, path: Path) -> Path:
-    """Return the folder that one step makes and a file is in; else the file itself."""
+def _find_common_output(results: Path, path: Path) -> Path:
+    """Return the folder of a file if one step makes the whole folder; else the file itself."""
     parts = path.relative_to(results).parts
     if parts[0] in ("report", "exports"):
         return results / parts[0]
@@ -193,9 +193,9 @@ def _remove(path: Path) -> None:
         path.unlink()
 
 
-def _below(results: Path) -> Iterator[Path]:
-    """Yield files and folders that a run wrote; links to elsewhere are not followed."""
-    for folder in _FOLDERS:
+def _walk_outputs(results: Path) -> Iterator[Path]:
+    """Yield files and folders that runs write; links are not followed."""
+    for folder in _WRITTEN_FOLDERS:
         yield from results.glob(f".{folder}.*.part")  # the folder itself, while it is made
         for place, folders, files in os.walk(results / folder):
             yield from (Path(place, name) for name in (*folders, *files))

@@ -18,12 +18,14 @@ from imubench_pipeline.run.faults import TOLD
 from imubench_pipeline.run.lock import INHERITED, Lock
 from imubench_pipeline.run.nightly.recovery import end_group
 
-_PATIENCE = 60.0  # s; for Snakemake to stop its steps
-_SHOWN = 20  # last lines
-_ERROR = re.compile(r"^Traceback \(most recent call last\):\n(?:[ \t].*\n)*(\S.*)", re.MULTILINE)
-_REDRAWN = re.compile(rb".*\x1b\[2K", re.DOTALL)
-_WIPES = b"\x1b[1A\x1b[2K"
-_SIGNS = re.compile(rb"\x1b\[[0-9;?]*[A-Za-z]|\r")
+_MAX_STOP_TIME = 60.0  # s; for Snakemake to stop its steps
+_MAX_LAST_LINES = 20  # last lines
+_TRACEBACK = re.compile(
+    r"^Traceback \(most recent call last\):\n(?:[ \t].*\n)*(\S.*)", re.MULTILINE
+)
+_ERASED_LINE = re.compile(rb".*\x1b\[2K", re.DOTALL)
+_ERASE_SEQUENCE = b"\x1b[1A\x1b[2K"
+_CONTROL_SEQUENCE = re.compile(rb"\x1b\[[0-9;?]*[A-Za-z]|\r")
 
 
 def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: Lock) -> int:
@@ -55,7 +57,7 @@ def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: L
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGINT)
             with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(_PATIENCE)
+                process.wait(_MAX_STOP_TIME)
             raise
         finally:
             end_group(process.pid)
@@ -103,24 +105,26 @@ class _Terminal:
 
     def _keep(self, line: bytes) -> None:
         """Keep a line once the next one does not wipe it out, as a display does that ends."""
-        if self._last is not None and _WIPES not in line:
+        if self._last is not None and _ERASE_SEQUENCE not in line:
             with contextlib.suppress(OSError):  # a full disk: the steps say so themselves
                 self._file.write(self._last + b"\n")
-        text = _SIGNS.sub(b"", _REDRAWN.sub(b"", line)).rstrip()
-        self._last = text if text or not _REDRAWN.match(line) else None
+        text = _CONTROL_SEQUENCE.sub(b"", _ERASED_LINE.sub(b"", line)).rstrip()
+        self._last = text if text or not _ERASED_LINE.match(line) else None
 
 
 def errors(path: Path) -> list[str]:
     """Return the errors of the steps that failed in a run, each once, of a file of what it said."""
-    return list(dict.fromkeys(_ERROR.findall(_text(path))))
+    return list(dict.fromkeys(_TRACEBACK.findall(_read_output(path))))
 
 
 def last_lines(path: Path) -> list[str]:
     """Return the last lines that a run said, without empty ones, of such a file."""
-    return [line.rstrip() for line in _text(path).splitlines() if line.strip()][-_SHOWN:]
+    return [line.rstrip() for line in _read_output(path).splitlines() if line.strip()][
+        -_MAX_LAST_LINES:
+    ]
 
 
-def _text(path: Path) -> str:
+def _read_output(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError:

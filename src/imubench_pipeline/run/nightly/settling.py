@@ -1,9 +1,9 @@
-"""Which logs are complete, and which are still being written.
+"""Find logs that are complete, and logs that are still being written.
 
-A log is taken when nothing of it has changed for a while. Three signs say that it is not complete:
-a stamp of its last change that is too young, a size or a stamp that moves between two looks (stamps
-alone may be wrong: clocks of network disks and of copied files), and a process on this machine that
-has it open for writing (a logger may write its buffer every few minutes only).
+A log is read if it has not changed for a while. Three signs show an incomplete log: a modification
+time that is too recent, a size or modification time that changes between two scans (times alone may
+be wrong: clocks of network disks and of copied files), and a process on this machine that has it
+open for writing (a logger may write its buffer only every few minutes).
 """
 
 from __future__ import annotations
@@ -30,25 +30,24 @@ from imubench_pipeline.report.run_summary import one_line
 Signature = tuple[tuple[str, int, int], ...]
 """Path, size in bytes and last change in ns of each file of a recording."""
 
-_LONGEST_PAUSE = 10.0  # s; what writes less often is known by its stamps, or as an open file
-_GIVEN_UP = 86400.0  # s without a byte; a partial file that is older is not being transferred now
-_OF_RSYNC = re.compile(r"\.(.+)\.[A-Za-z0-9]{6}")
-_GONE = -1
+_MAX_PAUSE = 10.0  # s; slower writers are found by their time stamps, or as open files
+_MAX_TRANSFER_PAUSE = 86400.0  # s without a change; an older partial file is not being transferred
+_RSYNC_NAME = re.compile(r"\.(.+)\.[A-Za-z0-9]{6}")
+_MISSING = -1
 
 
 @dataclass(frozen=True)
 class Found:
-    """What the drop zone has of one recording.
+    """Files of one recording in the drop zone.
 
     Attributes
     ----------
     files : Signature
-        Its files, and the notes beside them; those still being transferred apart.
+        Its files and notes, without files that are still being transferred.
     partial : tuple or None
-        Path below the sensor's folder, size and last change of a file of it that is still being
-        transferred.
+        Relative path, size and last change of a file that is still being transferred.
     incomplete : bool
-        The partial file is a part of it, not a later version that will replace it.
+        Whether the partial file is a part of the recording, and not a later version of it.
     """
 
     files: Signature = ()
@@ -65,8 +64,8 @@ class Skip:
     recording : str
         Sensor and name, such as ``mti_7/night``.
     held_back : bool
-        False: nothing to hold back. A complete log beside the partial one is read; where there
-        is none, the partial one was given up long ago.
+        False: the recording is not held back. Either there is a complete log besides the partial
+        one, or the transfer of the partial one was given up long ago.
     """
 
     recording: str
@@ -75,22 +74,22 @@ class Skip:
 
 
 def look(logs: Path) -> dict[str, Found]:
-    """Return what is in a drop zone, by sensor and name of the recording; it may be missing."""
+    """Scan a drop zone, which may be missing; return its files by sensor and recording."""
     recordings: dict[str, Found] = {}
     if not logs.is_dir():
         return recordings
     for log in found_logs(logs):
         key = f"{log.sensor}/{log.name}"
         before = recordings.get(key, Found())
-        partial = next(_partial_inside(log.path), before.partial)
-        recordings[key] = Found(before.files + _signature(log), partial, partial is not None)
+        partial = next(_find_partial_files(log.path), before.partial)
+        recordings[key] = Found(before.files + _stat_files(log), partial, partial is not None)
     for path in sorted(logs.glob("*/*")):
         whole = complete_name(path.name)
         if whole is not None and path.is_file():
             key = f"{sensor_of(path.parent)}/{name_of(whole)}"
             before = recordings.get(key, Found())
             if not before.incomplete:
-                recordings[key] = Found(before.files, _stamped(path, path.parent))
+                recordings[key] = Found(before.files, _stat_file(path, path.parent))
     return recordings
 
 
@@ -102,7 +101,7 @@ def complete_name(name: str) -> str | None:
     if name.startswith("._"):
         return None  # what macOS keeps beside a file
     whole = name.lstrip(".")
-    if whole != name and (of_rsync := _OF_RSYNC.fullmatch(name)):
+    if whole != name and (of_rsync := _RSYNC_NAME.fullmatch(name)):
         return of_rsync[1]
     if Path(whole).suffix.lower() in PARTIAL:
         return Path(whole).stem
@@ -113,7 +112,7 @@ def complete_name(name: str) -> str | None:
 def settled(
     logs: Path, settle: float, earlier: Mapping[str, Signature]
 ) -> tuple[dict[str, Found], list[Skip]]:
-    """Look at a drop zone, twice where logs are new, for what is still being written.
+    """Scan a drop zone for logs that are still being written, twice if logs are new.
 
     Parameters
     ----------
@@ -121,17 +120,17 @@ def settled(
     settle : float
         How long nothing of a complete log has changed, s.
     earlier : mapping of str to Signature
-        The logs as they were at an earlier run: one that is as it was then needs no second look.
+        The logs at an earlier run; unchanged logs need no second scan.
 
     Returns
     -------
     dict of str to Found, and list of Skip
-        The last look, and what is still being written.
+        The last scan, and the logs that are still being written.
     """
     first = look(logs)
     second = first
     if settle and any(earlier.get(key) != recording.files for key, recording in first.items()):
-        pause = min(settle, _LONGEST_PAUSE)
+        pause = min(settle, _MAX_PAUSE)
         time.sleep(pause)
         second = look(logs)
     return second, list(unsettled(first, second, settle, time.time(), writers(second)))
@@ -149,46 +148,46 @@ def unsettled(
     Parameters
     ----------
     first, second : mapping of str to Found
-        Two looks.
+        Two scans.
     settle : float
         How long nothing of a complete log has changed, s.
     now : float
-        When the second look was, s since 1970.
+        Time of the second scan, s since 1970.
     writing : mapping of Path to str
-        Files that are open for writing, and by what.
+        Files that are open for writing, with their process.
     """
     for key in sorted(first.keys() | second.keys()):
         was, latest = first.get(key, Found()), second.get(key, Found())
-        by = next((writing[real] for real in _real(latest) if real in writing), None)
-        age = now - max((stamp for _, _, stamp in latest.files), default=_GONE) * 1e-9
+        by = next((writing[real] for real in _resolve_paths(latest) if real in writing), None)
+        age = now - max((stamp for _, _, stamp in latest.files), default=_MISSING) * 1e-9
         if latest.partial and latest.incomplete:
-            yield Skip(key, _transferred(latest.partial, now))
+            yield Skip(key, _describe_transfer(latest.partial, now))
         elif was.files != latest.files:
             yield Skip(key, "it changed while it was looked at")
         elif by is not None:
             yield Skip(key, f"{by} has it open for writing")
-        # A stamp far in the future comes from a clock that was never set, and says nothing.
+        # A time far in the future comes from a clock that was not set, and is ignored.
         elif abs(age) < settle:
             yield Skip(key, f"last written to {max(age, 0.0):.0f} s ago")
         elif latest.partial:
-            replaces = not latest.files and now - latest.partial[2] * 1e-9 < _GIVEN_UP
-            yield Skip(key, _transferred(latest.partial, now), held_back=replaces)
+            replaces = not latest.files and now - latest.partial[2] * 1e-9 < _MAX_TRANSFER_PAUSE
+            yield Skip(key, _describe_transfer(latest.partial, now), held_back=replaces)
 
 
-def _transferred(partial: tuple[str, int, int], now: float) -> str:
+def _describe_transfer(partial: tuple[str, int, int], now: float) -> str:
     path, _, stamp = partial
-    days = (now - stamp * 1e-9) / _GIVEN_UP
+    days = (now - stamp * 1e-9) / _MAX_TRANSFER_PAUSE
     if days < 1.0:
         return one_line(f"{path} is still being transferred")
     return one_line(f"{path} is not complete, and nothing was written to it for {days:.0f} days")
 
 
 def writers(recordings: Mapping[str, Found]) -> dict[Path, str]:
-    """Return the files of recordings that processes have open for writing, and which these are.
+    """Return the files of recordings that are open for writing, with their process.
 
-    They are the processes that may be looked into: one's own, or all for an administrator.
+    Only accessible processes are checked: those of the user, or all for an administrator.
     """
-    looked_for = {real for recording in recordings.values() for real in _real(recording)}
+    looked_for = {real for recording in recordings.values() for real in _resolve_paths(recording)}
     writing: dict[Path, str] = {}
     for process in psutil.process_iter() if looked_for else ():
         with contextlib.suppress(psutil.Error, OSError):
@@ -200,34 +199,34 @@ def writers(recordings: Mapping[str, Found]) -> dict[Path, str]:
 
 
 def moved(before: Mapping[str, Found], after: Mapping[str, Found]) -> set[str]:
-    """Return the recordings whose logs changed, or appeared, between two looks."""
+    """Return the recordings whose logs changed or appeared between two scans."""
     return {key for key, log in after.items() if before.get(key, Found()).files != log.files}
 
 
-def _real(recording: Found) -> Iterable[Path]:
+def _resolve_paths(recording: Found) -> Iterable[Path]:
     return (Path(os.path.realpath(path)) for path, _, _ in recording.files)
 
 
-def _signature(log: Recording) -> Signature:
-    return tuple(_stamped(path) for path in log.files or [log.path])
+def _stat_files(log: Recording) -> Signature:
+    return tuple(_stat_file(path) for path in log.files or [log.path])
 
 
-def _stamped(path: Path, below: Path | None = None) -> tuple[str, int, int]:
+def _stat_file(path: Path, below: Path | None = None) -> tuple[str, int, int]:
     shown = str(path.relative_to(below) if below else path)
     try:
         about = path.stat()
     except OSError:
-        return shown, _GONE, _GONE
+        return shown, _MISSING, _MISSING
     return shown, about.st_size, about.st_mtime_ns
 
 
-def _partial_inside(path: Path) -> Iterator[tuple[str, int, int]]:
+def _find_partial_files(path: Path) -> Iterator[tuple[str, int, int]]:
     """Yield the partial files of a recording that is a folder; the folder itself may be one."""
     if path.is_dir():
         if path.suffix.lower() in PARTIAL:
-            yield _stamped(path, path.parent)
+            yield _stat_file(path, path.parent)
         for file in sorted(path.rglob("*")):
             # Other hidden files are no part of a recording.
-            named = file.suffix.lower() in PARTIAL or _OF_RSYNC.fullmatch(file.name)
+            named = file.suffix.lower() in PARTIAL or _RSYNC_NAME.fullmatch(file.name)
             if named and complete_name(file.name) and file.is_file():
-                yield _stamped(file, path.parent)
+                yield _stat_file(file, path.parent)

@@ -1,4 +1,4 @@
-"""What a run found, in short: the next one tells by it what is new."""
+"""Short state of a run, which the next run compares to find new results."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 
 
 class StateError(ValueError):
-    """A state that cannot be read; the text says what follows."""
+    """Raised for an unreadable state; the message names the consequence."""
 
 
 class Warned(NamedTuple):
-    """What names a finding: its size may change from run to run."""
+    """Key of a finding, without its size, which may change between runs."""
 
     recording: str
     channel: str | None
@@ -36,7 +36,7 @@ class Warned(NamedTuple):
 
 
 class Drifted(NamedTuple):
-    """What names a change of a device."""
+    """Key of a change of a device."""
 
     sensor: str
     device: str
@@ -58,14 +58,14 @@ class Leader(NamedTuple):
 
 
 class Known(NamedTuple):
-    """A recording, in short."""
+    """Digest of a recording, and the reason if it was rejected."""
 
     digest: str
     rejected: str | None = None
 
 
 class State(BaseModel):
-    """What a successful run found.
+    """State after a successful run.
 
     Attributes
     ----------
@@ -90,11 +90,11 @@ class State(BaseModel):
     skipped: dict[str, datetime] = {}
 
     def write(self, path: Path) -> None:
-        """Keep it, atomically."""
+        """Write the state atomically."""
         write_sealed_json(self.model_dump(mode="json"), path)
 
     def without(self, names: Collection[str], before: State | None) -> State:
-        """Return a state in which some recordings are as they were before, if they were."""
+        """Return a state with the previous entries of some recordings, if there were any."""
         was = before or State(finished=self.finished)
         old = {name: was.recordings[name] for name in names if name in was.recordings}
         others = {name: row for name, row in self.recordings.items() if name not in names}
@@ -111,7 +111,7 @@ class State(BaseModel):
 
 
 def read_state(path: Path) -> State | None:
-    """Return the state that a run has kept; None where there is none.
+    """Return the state that a run has written; None if there is none.
 
     Raises
     ------
@@ -182,7 +182,8 @@ def state_of(
         finished=finished,
         logs=dict(logs),
         recordings={
-            name: Known(digest, rejected.get(name)) for name, digest in _digests(tables).items()
+            name: Known(digest, rejected.get(name))
+            for name, digest in _digest_recordings(tables).items()
         },
         warned=sorted({warned(row) for row in serious(tables.findings)}, key=str),
         drifted=sorted({drifted(row) for row in changes(tables.drift)}),
@@ -197,22 +198,22 @@ def name_in(row: OfRecordingRow | RecordingRow | FailureRow | DriftRow) -> str:
 
 
 def warned(row: FindingRow) -> Warned:
-    """Return what names a finding."""
+    """Return the key of a finding."""
     return Warned(name_in(row), row.channel, row.finding)
 
 
 def changes(drift: Iterable[DriftRow]) -> list[DriftRow]:
-    """Return the rows that say that a device has changed."""
+    """Return the rows of devices that have changed."""
     return [row for row in drift if row.verdict == "changed"]
 
 
 def drifted(row: DriftRow) -> Drifted:
-    """Return what names a row of the table ``drift``."""
+    """Return the key of a row of the table ``drift``."""
     return Drifted(row.sensor, row.device, row.channel, row.parameter, row.recording)
 
 
 def leading(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
-    """Return the sensor that comes first for each requirement; None where none can be ranked."""
+    """Return the best sensor for each requirement; None if no sensor can be ranked."""
     first: dict[str, Leader | None] = {}
     margins: dict[str, float] = {}
     for row in ranking:
@@ -226,8 +227,8 @@ def leading(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
     return first
 
 
-def _digests(tables: RunRows) -> dict[str, str]:
-    """Return a digest of what the tables say of each recording: another one of another outcome."""
+def _digest_recordings(tables: RunRows) -> dict[str, str]:
+    """Return a digest of the rows of each recording; it changes with the outcome."""
     digests = {name_in(row): hashlib.sha256() for row in tables.recordings}
     rows = chain[RecordingRow | ParameterRow | FixedBiasRow](
         tables.recordings, tables.parameters, tables.fixed_bias

@@ -25,7 +25,7 @@ Outcome = Literal["fine", "flagged", "failed"]
 STATUS: Mapping[Outcome, int] = {"fine": 0, "flagged": 1, "failed": 2}
 """Exit status of each outcome."""
 
-_MOST_LINES = 20
+_MAX_LINES = 20
 
 
 class Changed(BaseModel):
@@ -154,7 +154,7 @@ def compared(
         "recordings": len(after.recordings),
         "new": [name for name in now if name not in was.recordings],
         "changed": [
-            Changed(recording=name, because=_because(name, was, after))
+            Changed(recording=name, because=_explain_change(name, was, after))
             for name in both
             if now[name].digest != was.recordings[name].digest
         ],
@@ -183,7 +183,7 @@ def compared(
             for row in changes(tables.drift)
             if name_in(row) not in written_to and drifted(row) not in known_drift
         ],
-        "first": list(_first(was, after, tables)),
+        "first": list(_list_new_leaders(was, after, tables)),
     }
     rejected = any(rejection.new for rejection in fields["rejected"])
     flagged = rejected or fields["warnings"] or fields["drift"]
@@ -191,13 +191,13 @@ def compared(
     return fields | {"outcome": outcome}
 
 
-def _because(name: str, was: State, now: State) -> str:
+def _explain_change(name: str, was: State, now: State) -> str:
     if was.logs.get(name) != now.logs.get(name):
         return "its log changed"
     return "settings, or the code of the analysis, changed"
 
 
-def _first(was: State, now: State, tables: RunRows) -> Iterator[First]:
+def _list_new_leaders(was: State, now: State, tables: RunRows) -> Iterator[First]:
     for name, leader in now.leaders.items():
         if name in was.leaders and leader == was.leaders[name]:
             continue
@@ -205,12 +205,12 @@ def _first(was: State, now: State, tables: RunRows) -> Iterator[First]:
         yield First(
             requirement=name,
             sensor=leader and leader.sensor,
-            before=_shown(was.leaders.get(name)),
+            before=_describe_leader(was.leaders.get(name)),
             said=next(leaders(of_it, tables.recordings)),
         )
 
 
-def _shown(leader: Leader | None) -> str | None:
+def _describe_leader(leader: Leader | None) -> str | None:
     return leader and (leader.sensor if leader.fulfils else f"{leader.sensor}, which failed it")
 
 
@@ -225,10 +225,10 @@ def in_words(summary: Summary) -> str:
         * bool(summary.failed)
     )
     counts += "".join(f"\n{line}" for line in summary.files)
-    since = f"since {_time(summary.since)}" if summary.since else "the first run"
+    since = f"since {_format_time(summary.since)}" if summary.since else "the first run"
     lines = [
-        f"imubench nightly: {summary.outcome}, {_time(summary.finished)}, "
-        f"took {_duration(summary.seconds)}"
+        f"imubench nightly: {summary.outcome}, {_format_time(summary.finished)}, "
+        f"took {_format_duration(summary.seconds)}"
     ]
     if summary.failure:
         lines += ["", "why it failed:", *(f"  {one_line(line, 500)}" for line in summary.failure)]
@@ -241,13 +241,15 @@ def in_words(summary: Summary) -> str:
         "new": summary.new,
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
         "removed": summary.removed,
-        "skipped, and looked at again next time": [_skip(skip) for skip in summary.skipped],
+        "skipped, and looked at again next time": [
+            _describe_skip(skip) for skip in summary.skipped
+        ],
         f"rejected ({new or 'none'} of them new)": [
             f"{rejection.recording}{' (new)' * rejection.new}: {rejection.reason}"
             for rejection in rejected
         ],
-        "new warnings": [_warning(warning) for warning in summary.warnings],
-        "devices that have changed": [_drift(drift) for drift in summary.drift],
+        "new warnings": [_describe_warning(warning) for warning in summary.warnings],
+        "devices that have changed": [_describe_drift(drift) for drift in summary.drift],
         "first for a requirement": [
             lead.said + f" (before: {lead.before})" * bool(lead.before) for lead in summary.first
         ],
@@ -255,22 +257,22 @@ def in_words(summary: Summary) -> str:
     }
     for title, entries in sections.items():
         if entries:
-            lines += ["", f"{title}:", *_bounded(entries)]
+            lines += ["", f"{title}:", *_limit_lines(entries)]
     lines += ["", f"report: {summary.report}", f"log: {summary.log}"]
     return "\n".join(lines) + "\n"
 
 
-def _skip(skip: Skipped) -> str:
+def _describe_skip(skip: Skipped) -> str:
     stays = "; its results stay" * skip.keeps_results
-    return f"{skip.recording}: {skip.reason}{stays} (since {_time(skip.since)})"
+    return f"{skip.recording}: {skip.reason}{stays} (since {_format_time(skip.since)})"
 
 
-def _warning(warning: NewWarning) -> str:
+def _describe_warning(warning: NewWarning) -> str:
     channel = f"{warning.channel}: " if warning.channel else ""
     return f"{warning.recording}: {channel}{warning.finding.replace('_', ' ')}: {warning.detail}"
 
 
-def _drift(drift: Drift) -> str:
+def _describe_drift(drift: Drift) -> str:
     value = f" {drift.value:.4g} {drift.unit}" if drift.value is not None else ""
     expected = ""
     if drift.expected_lower is not None and drift.expected_upper is not None:
@@ -281,17 +283,17 @@ def _drift(drift: Drift) -> str:
     )
 
 
-def _bounded(lines: list[str]) -> list[str]:
-    more = len(lines) - _MOST_LINES
-    shown = lines if more <= 1 else [*lines[:_MOST_LINES], f"and {more} more"]
+def _limit_lines(lines: list[str]) -> list[str]:
+    more = len(lines) - _MAX_LINES
+    shown = lines if more <= 1 else [*lines[:_MAX_LINES], f"and {more} more"]
     return [f"  {one_line(line, 300)}" for line in shown]
 
 
-def _time(stamp: datetime) -> str:
+def _format_time(stamp: datetime) -> str:
     return stamp.astimezone().strftime("%Y-%m-%d %H:%M %Z")
 
 
-def _duration(seconds: float) -> str:
+def _format_duration(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"

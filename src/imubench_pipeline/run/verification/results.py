@@ -32,10 +32,10 @@ from imubench_pipeline.tables.seals import (
     visible,
 )
 
-_SEALED = ("recordings", "sensors", "tables", "simulated", "report", "exports")
+_SEALED_FOLDERS = ("recordings", "sensors", "tables", "simulated", "report", "exports")
 """Folders in which every file has a seal, but for those that have a digest of their own."""
 
-_SAMPLES = "log*.parquet"
+_SAMPLE_FILES = "log*.parquet"
 _NO_SEAL = "expected a seal of the step that left it, found none"
 
 
@@ -77,7 +77,7 @@ class Results:
     @cached_property
     def size(self) -> int:
         """Bytes that `faults` reads."""
-        samples = self.folder.glob(f"recordings/*/*/{_SAMPLES}")
+        samples = self.folder.glob(f"recordings/*/*/{_SAMPLE_FILES}")
         return sum(file.size for file in self._left.values()) + sum(
             path.stat().st_size for path in samples if path.is_file()
         )
@@ -168,7 +168,7 @@ class Results:
             if words := expected.fault(path.with_name(file), whole=True):
                 yield Fault(f"{place}/{file}", words, self._mended(f"{place}/{file}", step))
             self.read(expected.size)
-        for other in sorted(path.parent.glob(_SAMPLES)):
+        for other in sorted(path.parent.glob(_SAMPLE_FILES)):
             if other.name not in samples:
                 yield self._stray(f"{place}/{other.name}")
         known_log = path.with_name(KNOWN)
@@ -227,10 +227,10 @@ class Results:
 
     def _unsealed(self) -> Iterator[Fault]:
         """Yield the files that no step is known to have left."""
-        for folder in _SEALED:
+        for folder in _SEALED_FOLDERS:
             for path in sorted((self.folder / folder).rglob("*")):
                 place = path.relative_to(self.folder)
-                own = any(place.match(f"recordings/*/*/{name}") for name in (KNOWN, _SAMPLES))
+                own = any(place.match(f"recordings/*/*/{name}") for name in (KNOWN, _SAMPLE_FILES))
                 declared = own or path.is_dir() or place.as_posix() in self._left
                 if not declared and visible(place):
                     yield self._stray(place.as_posix())
