@@ -16,7 +16,7 @@ from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.settings.config import NavigateSettings
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
-from imubench_pipeline.steps.navigate import _consistent, navigate
+from imubench_pipeline.steps.navigate import _is_consistent, navigate
 from imubench_pipeline.steps.tunings import scaled, tunings
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
@@ -169,7 +169,7 @@ def test_every_tuning_runs_on_the_signals_of_the_estimate_and_of_the_log(folder:
 def test_a_share_is_judged_as_far_as_the_runs_tell(
     value: float, error: float, verdict: bool | None
 ) -> None:
-    assert _consistent(Share(value, error)) is verdict
+    assert _is_consistent(Share(value, error)) is verdict
 
 
 @pytest.mark.release

@@ -30,7 +30,7 @@ from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.report.publish import _keys
 from imubench_pipeline.run.faults import Faults
-from imubench_pipeline.run.lock import _holder, read_note
+from imubench_pipeline.run.lock import _describe_holder, read_note
 from imubench_pipeline.run.nightly.recovery import restarted
 from imubench_pipeline.run.nightly.state import State, StateError, read_state
 from imubench_pipeline.settings.config import read_run
@@ -222,7 +222,7 @@ def _take_quality(path: Path) -> object:
 
 def _take_note(path: Path) -> object:
     note = read_note(path)
-    return _holder(note), restarted(note)
+    return _describe_holder(note), restarted(note)
 
 
 def _take_record(path: Path) -> object:

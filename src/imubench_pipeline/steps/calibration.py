@@ -51,7 +51,7 @@ UNITS = {
 }
 """SI unit of each quantity of the table ``calibration``."""
 
-_OF_RUN = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "present_bias")}
+_RUN_PARAMETERS = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "present_bias")}
 
 
 def calibration_tables(
@@ -169,12 +169,12 @@ class GyroLog:
         if self.source is not None:
             row |= {"model": self.source.model.name, "model_from": self.source.words}
         if pointing is not None:
-            row |= {name: getattr(pointing, name) for name in _OF_DIRECTION}
+            row |= {name: getattr(pointing, name) for name in _DIRECTION_PARAMETERS}
             row |= {"earth_rate": pointing.rate, "earth_rate_sigma": pointing.rate_sigma}
         return row
 
 
-_OF_DIRECTION = ("latitude", "heading", "elevation")
+_DIRECTION_PARAMETERS = ("latitude", "heading", "elevation")
 
 
 def _at_rest(gyro: GyroLog, declared: AtRest) -> Rows:
@@ -351,7 +351,7 @@ def _without(names: Mapping[str, Any], status: str, reason: str) -> Rows:
                 status=status,
                 reason=reason,
             )
-            for parameter in _OF_RUN[names["run"]]
+            for parameter in _RUN_PARAMETERS[names["run"]]
         ]
     )
 

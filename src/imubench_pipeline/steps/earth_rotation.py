@@ -57,19 +57,19 @@ from imubench_pipeline.units import quantity_to_si
 WHOLE = "whole"
 """Name of the part that is all of a recording."""
 
-_NEARLY_ALL = 0.9
-"""Part of the turns on the schedule alone from which nothing but the level shows any."""
+_MIN_SCHEDULED_SHARE = 0.9
+"""Min. share of turns found only by the schedule from which the turns count as not visible."""
 
-_LIMIT = 1.96
+_Z_95 = 1.96
 """Standard deviations of a 95 % limit."""
 
-_GIVEN = (
+_KNOWN_RATE_REASON = (
     "bias tracking with known rate: the filter is given the Earth's rate and returns it; whatever "
     "rate it is given, it finds"
 )
 
 
-_POSITION_ELSEWHERE = (
+_POSITION_CLOCK_REASON = (
     "the position has a clock of its own; give it as a column of the file that the gyro is in, or "
     "leave 'position' out"
 )
@@ -187,7 +187,7 @@ def _earth_rate(
     tables = EarthRate()
     names = _names(key, declared, source)
     if len(log.segments) > 1 or log.position_elsewhere:
-        reason = segments_reason(log) if len(log.segments) > 1 else _POSITION_ELSEWHERE
+        reason = segments_reason(log) if len(log.segments) > 1 else _POSITION_CLOCK_REASON
         tables.earth_rate += _without(names, WHOLE, "not_shown", reason)
         return tables
     if source is not None:
@@ -363,7 +363,7 @@ def _unsure(turning: Turning, trusted: bool) -> dict[str, Any]:
     """Return status and reason of estimates of which sign or turns are not known."""
     reasons = []
     by_schedule, turns = turning.by_schedule, len(turning.turns)
-    unseen = by_schedule >= _NEARLY_ALL * turns
+    unseen = by_schedule >= _MIN_SCHEDULED_SHARE * turns
     if unseen:
         reasons.append(
             f"{by_schedule} of {turns} turns rest on the schedule: nothing else shows that it was "
@@ -394,15 +394,15 @@ def _figure(course: Course, unsure: dict[str, Any]) -> dict[str, Any]:
         return row | {
             "value": value,
             "status": "given",
-            "reason": _GIVEN,
+            "reason": _KNOWN_RATE_REASON,
             "settled": None if course.settled in (None, math.inf) else course.settled,
         }
     sigma = float(course.sigma[-1])
     row |= {
         "status": "ok",
         "value": value,
-        "lower": value - _LIMIT * sigma,
-        "upper": value + _LIMIT * sigma,
+        "lower": value - _Z_95 * sigma,
+        "upper": value + _Z_95 * sigma,
         "sigma": sigma,
         "off_sigma": (value - EARTH_RATE) / sigma,
     }

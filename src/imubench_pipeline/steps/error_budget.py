@@ -40,7 +40,7 @@ def error_tables(
         questions += of_requirement(name, requirement)
     estimates = recommended_estimates(inputs["parameters"], inputs["draws"])
     if not estimates:
-        return {name: iter(()) for name in _TABLES}
+        return {name: iter(()) for name in _OUTPUT_TABLES}
     drawn = {"draws": how.draws, "seed": how.seed}
     logs = kept_static_logs(inputs["quality"].parent)
     apart = DeterministicRow.rows_of(read("deterministic", [inputs["deterministic"]]))
@@ -52,10 +52,10 @@ def error_tables(
         growth_rows(names, estimates, times=times, window=window, figures=figures, **drawn),
         _deviations(names, Quality.read(inputs["quality"]), estimates, sections),
     )
-    return dict(zip(_TABLES, tables, strict=True))
+    return dict(zip(_OUTPUT_TABLES, tables, strict=True))
 
 
-_TABLES = ("error_budget", "backtest", "error_growth", "drawn_deviations")
+_OUTPUT_TABLES = ("error_budget", "backtest", "error_growth", "drawn_deviations")
 
 
 def _deviations(

@@ -19,12 +19,7 @@ from imubench_pipeline.estimators.agreement import disagreements, doubt_contradi
 from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_deterministic_signals
 from imubench_pipeline.estimators.deterministic.verdict import assess_signals, deterministic_rows
-from imubench_pipeline.estimators.estimate import (
-    PARAMETERS,
-    SI_UNITS,
-    Estimate,
-    Parameter,
-)
+from imubench_pipeline.estimators.estimate import PARAMETERS, SI_UNITS, Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import describe_disagreement
 from imubench_pipeline.estimators.rows import allan_rows, draw_rows, limit_rows, parameter_rows
@@ -105,7 +100,7 @@ def estimate_channel(
     into.deterministic += deterministic_rows(asdict(key), channel.unit, channel.signals)
     into.add_findings(key, verdict.findings)
     estimates = channel.by_curve()
-    if _BY_LIKELIHOOD & set(settings.methods):
+    if _LIKELIHOOD_METHODS & set(settings.methods):
         estimates |= channel.by_likelihood(into)
     else:
         into.allan += allan_rows(key, curve)
@@ -113,10 +108,10 @@ def estimate_channel(
     if "likelihood" in estimates:
         estimates |= {
             method: doubt_contradicted(estimates[method], estimates["likelihood"])
-            for method in _BY_CURVE
+            for method in _CURVE_METHODS
             if method in estimates
         }
-    best = next(method for method in _BEST_FIRST if method in settings.methods)
+    best = next(method for method in _METHODS_BY_PREFERENCE if method in settings.methods)
     for method in settings.methods:
         if method in estimates:
             estimate = estimates[method]
@@ -269,16 +264,16 @@ def _unfiltered(band: float | None, bandwidth: float | None) -> float | None:
     return min((frequency for frequency in limits if frequency), default=None)
 
 
-_ENOUGH = 1 << 16
-"""Samples that show the step of a register."""
+_MIN_SAMPLES_FOR_STEP = 1 << 16
+"""Samples from which the step of a register is found."""
 
-_BY_LIKELIHOOD = {"likelihood", "likelihood_gm", "compensated"}
+_LIKELIHOOD_METHODS = {"likelihood", "likelihood_gm", "compensated"}
 
-_BY_CURVE = ("likelihood_gm", "weighted", "paper", "curve")
-"""Methods that know one model only, or the curve alone."""
+_CURVE_METHODS = ("likelihood_gm", "weighted", "paper", "curve")
+"""Methods with a single model, or with the Allan curve only."""
 
-_BEST_FIRST = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
-"""The method to use is the first of these that is asked for."""
+_METHODS_BY_PREFERENCE = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
+"""Methods in order of preference: the first requested one is recommended."""
 
 
 def _model_rows(key: Key, fit: Likelihood) -> Iterator[ModelRow]:
@@ -393,7 +388,7 @@ def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[LowPassRow]:
 def resolution_of(log: ChannelLog) -> float:
     """Return the step of the register that a log shows at its beginning, SI; 0 where none shows."""
     values = next((block for block in log.blocks() if np.isfinite(block).any()), np.empty(0))
-    present = values[np.isfinite(values)][:_ENOUGH]
+    present = values[np.isfinite(values)][:_MIN_SAMPLES_FOR_STEP]
     return estimate_resolution(np.unique(present), len(present))
 
 

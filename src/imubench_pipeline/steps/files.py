@@ -13,7 +13,7 @@ from imubench_pipeline.tables import build, read, write_arrow
 
 NEEDED = ("recordings", "failures")
 
-_STATUS = {"ok": "analysed"}
+_STATUS_WORDS = {"ok": "analysed"}
 
 
 def file_rows(
@@ -38,7 +38,7 @@ def file_rows(
         if file.sensor is None or file.recording is None:
             yield file
         elif row := outcome.get((file.sensor, file.recording)):
-            status = _STATUS.get(row.status, row.status)
+            status = _STATUS_WORDS.get(row.status, row.status)
             yield replace(file, status=status, reason=row.reason)
         else:
             reason = of_sensor.get(file.sensor, "it is in no table of its sensor")

@@ -30,7 +30,7 @@ from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.units import quantity_to_si
 
 NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
-"""The tables of a run that it takes."""
+"""The tables of a run that the step reads."""
 
 
 def candidates(
@@ -128,8 +128,8 @@ def fusion_rows(
     return with_doubts(rows, RecordingRow.rows_of(tables["recordings"]))
 
 
-TACTICAL = "tactical"
-"""First word of the price class whose datasheets are to be reached."""
+TACTICAL_CLASS = "tactical"
+"""First word of the price class of the target datasheets."""
 
 
 def grades_of_run(
@@ -142,7 +142,7 @@ def grades_of_run(
     grades = [
         Grade(name, f"{sensor.vendor} {sensor.model}", sensor.datasheet)
         for name, sensor in sensors.items()
-        if (sensor.price_class or "").split(" ")[0].strip(",") == TACTICAL
+        if (sensor.price_class or "").split(" ")[0].strip(",") == TACTICAL_CLASS
     ]
     not_sold = {name for name, sensor in sensors.items() if not sensor.sold}
     return grade_rows(candidates(tables, None, not_sold), grades)

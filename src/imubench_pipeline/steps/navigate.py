@@ -1,4 +1,4 @@
-"""Run filters tuned by all that is known of a sensor on simulated drives, with outages of GNSS.
+"""Run filters with different tunings for a sensor on simulated drives with GNSS outages.
 
 Their signals are simulated with the true model of a simulated recording, low-pass and register
 included, or, of a measured one, with the model that was found of it; or they are pieces of the log
@@ -57,24 +57,24 @@ from imubench_pipeline.tables import read
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
-_FEWEST_PIECES = 4
-"""Runs that a log must be long enough for."""
+_MIN_PIECES = 4
+"""Min. number of runs for which a log must be long enough."""
 
-_TOLERANCE = 0.02
-"""How far from 0.95 the share of a consistent filter may be, beside twice its standard error; one
-that is off by three times that is not consistent."""
+_SHARE_TOLERANCE = 0.02
+"""Tolerance on the share 0.95 of a consistent filter. A filter is inconsistent if its share differs
+by more than the tolerance plus three standard errors."""
 
 
-_WIDEST = 0.05
-"""How far from 0.95 a share of a consistent filter is at most, twice its standard error beside."""
+_MAX_SHARE_ERROR = 0.05
+"""Max. difference from 0.95, including two standard errors, of the share of a consistent filter."""
 
-_SLOWEST = 10.0
-"""Hz; samples that come slower are no log to navigate by."""
+_MIN_RATE = 10.0
+"""Min. sampling rate of a log for navigation, Hz."""
 
 
 @dataclass(frozen=True)
 class _Source:
-    """What the sensors of a run give, and how they came to it."""
+    """Source of the sensor signals of a run."""
 
     words: str  # truth, estimate or log
     sampling: float  # Hz
@@ -90,7 +90,9 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
     `imubench_pipeline.run.plan.Plan.navigate_settings`.
     """
     sections = json.loads(settings)
-    how = _with(NavigateSettings.model_validate(sections["navigate"]), sections["asked"])
+    how = _add_requirements(
+        NavigateSettings.model_validate(sections["navigate"]), sections["asked"]
+    )
     declared = Sensor.model_validate(sections["sensor"]) if sections["sensor"] else None
     truths = {
         entry.recording: entry
@@ -105,12 +107,12 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
         names = {"sensor": sensor, "recording": about.recording}
         untold = NavigationRow(sensor=sensor, recording=about.recording, tuning=TRUE)
         rate = about.rate or 0.0
-        if rate < _SLOWEST:
-            slow = f"samples of {rate:.3g} Hz; expected {_SLOWEST:g} Hz or more"
+        if rate < _MIN_RATE:
+            slow = f"samples of {rate:.3g} Hz; expected {_MIN_RATE:g} Hz or more"
             for course in how.trajectories:
                 yield replace(untold, trajectory=course, reason=slow)
             return
-        stand_in = _stand_in(fitted, how)
+        stand_in = _substitute_accelerometers(fitted, how)
         fitted |= stand_in
         if all_axes(fitted) is None:
             lacking = "the recording tells no white noise of a gyro"
@@ -122,8 +124,8 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
         truth = truths.get(about.recording)
         methods = [each.method for each in best.values()]
         chosen = max(sorted(set(methods)), key=methods.count)
-        for source in _sources(folder, about, rate, fitted, stand_in, truth, how):
-            for row in _rows(names, how, source, tuned, lacking_of):
+        for source in _list_sources(folder, about, rate, fitted, stand_in, truth, how):
+            for row in _make_rows(names, how, source, tuned, lacking_of):
                 yield replace(
                     row,
                     recommended=row.tuning == chosen,
@@ -132,8 +134,10 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
         return
 
 
-def _with(how: NavigateSettings, asked: Sequence[tuple[Trajectory, str]]) -> NavigateSettings:
-    """Return settings with what requirements ask for, and runs that are long enough for it."""
+def _add_requirements(
+    how: NavigateSettings, asked: Sequence[tuple[Trajectory, str]]
+) -> NavigateSettings:
+    """Return settings with the outages of the requirements, and sufficiently long runs."""
     lengths = {quantity_to_si(length, "time"): length for length in how.outages}
     for _, length in asked:
         lengths.setdefault(quantity_to_si(length, "time"), length)
@@ -149,14 +153,14 @@ def _with(how: NavigateSettings, asked: Sequence[tuple[Trajectory, str]]) -> Nav
     )
 
 
-def _stand_in(fitted: Models, how: NavigateSettings) -> Models:
-    """Return the accelerometers that stand in where a log has none that tells its noise."""
+def _substitute_accelerometers(fitted: Models, how: NavigateSettings) -> Models:
+    """Return substitute accelerometer models for a log without accelerometer noise."""
     if any(quantity_of(name) == "accel" and model.N > 0.0 for name, model in fitted.items()):
         return {}
     return {"accel_x": NoiseModel(N=quantity_to_si(how.accel_noise, "accel_density"))}
 
 
-def _sources(
+def _list_sources(
     folder: Path,
     about: RecordingRow,
     logged: float,
@@ -165,19 +169,20 @@ def _sources(
     truth: SimulatedRecording | None,
     how: NavigateSettings,
 ) -> Iterator[_Source]:
-    """Yield where signals may come from: the simulator, and a log that is no simulation."""
-    block = _block(logged, how)
-    spreads = _spreads(how)
+    """Yield the sources of signals: the simulator, and a measured log."""
+    block = _choose_block(logged, how)
+    spreads = _make_spreads(how)
     known = truth is not None and truth.specimens is None
     if known and truth is not None:
         axes = {str(name): model for name, model in imu_model(truth.channels, truth).axes.items()}
     else:
         axes = {
-            channel: _in_front(folder, channel, noise, logged) for channel, noise in fitted.items()
+            channel: _model_before_filter(folder, channel, noise, logged)
+            for channel, noise in fitted.items()
         }
     axes |= {channel: SensorModel(noise=noise) for channel, noise in stand_in.items()}
     axes = {channel: replace(model, bias=0.0, scale_error=0.0) for channel, model in axes.items()}
-    whole = _all_models(axes)
+    whole = _complete_models(axes)
     true = {
         channel: replace(model.noise, N=in_the_log(model, logged))
         for channel, model in whole.items()
@@ -187,7 +192,7 @@ def _sources(
     )
 
     def simulated(drive: Drive, course: str, number: int) -> Signals:
-        samples, reference = len(drive.trajectory.rate) * block, _reference(whole)
+        samples, reference = len(drive.trajectory.rate) * block, _find_reference(whole)
         return signals(
             drive.trajectory,
             whole,
@@ -206,8 +211,8 @@ def _sources(
     sampling = logged / block
     yield _Source("truth" if known else "estimate", sampling, how.runs, simulated, true)
     if not about.simulated:
-        pieces = _pieces(folder, block, round(quantity_to_si(how.duration, "time") * sampling))
-        if len(pieces) >= _FEWEST_PIECES:
+        pieces = _cut_pieces(folder, block, round(quantity_to_si(how.duration, "time") * sampling))
+        if len(pieces) >= _MIN_PIECES:
 
             def of_log(drive: Drive, course: str, number: int) -> Signals:
                 return signals(
@@ -223,7 +228,7 @@ def _sources(
             yield _Source("log", sampling, min(len(pieces), how.runs), of_log, None)
 
 
-def _spreads(how: NavigateSettings) -> Spreads:
+def _make_spreads(how: NavigateSettings) -> Spreads:
     return Spreads(
         quantity_to_si(how.gyro_bias, "angular_rate"),
         quantity_to_si(how.accel_bias, "acceleration"),
@@ -232,7 +237,7 @@ def _spreads(how: NavigateSettings) -> Spreads:
     )
 
 
-def _all_models(axes: Mapping[str, SensorModel]) -> dict[str, SensorModel]:
+def _complete_models(axes: Mapping[str, SensorModel]) -> dict[str, SensorModel]:
     """Return models of all six channels, as `all_axes`."""
     whole = {}
     for channel in CHANNELS:
@@ -243,12 +248,12 @@ def _all_models(axes: Mapping[str, SensorModel]) -> dict[str, SensorModel]:
     return whole
 
 
-def _reference(axes: Mapping[str, SensorModel]) -> float:
+def _find_reference(axes: Mapping[str, SensorModel]) -> float:
     return next((m.drift.reference for m in axes.values() if m.drift is not None), 25.0)
 
 
-def _in_front(folder: Path, channel: str, noise: NoiseModel, rate: float) -> SensorModel:
-    """Return the model of an axis that was found of a log at a rate in Hz, with its low-pass."""
+def _model_before_filter(folder: Path, channel: str, noise: NoiseModel, rate: float) -> SensorModel:
+    """Return the model of an axis from the estimates of a log, with its low-pass; rate in Hz."""
     rows = LowPassRow.rows_of(read("low_pass", [folder / "low_pass.parquet"]))
     filters = [
         LowPass(row.value, row.order)
@@ -260,12 +265,12 @@ def _in_front(folder: Path, channel: str, noise: NoiseModel, rate: float) -> Sen
     return replace(plain, noise=before_the_filter(plain, noise, rate))
 
 
-def _block(logged: float, how: NavigateSettings) -> int:
-    """Return how many samples of a log at a rate in Hz make one of a filter."""
+def _choose_block(logged: float, how: NavigateSettings) -> int:
+    """Return the number of samples of a log, at a rate in Hz, per sample of the filter."""
     return max(math.ceil(logged / quantity_to_si(how.rate, "frequency") - 1e-6), 1)
 
 
-def _pieces(folder: Path, block: int, size: int) -> list[dict[str, Array]]:
+def _cut_pieces(folder: Path, block: int, size: int) -> list[dict[str, Array]]:
     """Return pieces of a log of ``size`` means over ``block`` samples, less the mean of the log.
 
     Those with a hole in a channel lack it.
@@ -284,7 +289,7 @@ def _pieces(folder: Path, block: int, size: int) -> list[dict[str, Array]]:
     return [piece for piece in pieces if {*map(quantity_of, piece)} == {"gyro", "accel"}]
 
 
-def _rows(
+def _make_rows(
     names: Mapping[str, str],
     how: NavigateSettings,
     source: _Source,
@@ -293,13 +298,13 @@ def _rows(
 ) -> Iterator[NavigationRow]:
     lengths = [quantity_to_si(length, "time") for length in how.outages]
     duration = quantity_to_si(how.duration, "time")
-    spreads = _spreads(how)
+    spreads = _make_spreads(how)
     models = dict(tuned) | ({TRUE: source.true} if source.true is not None else {})
     for course in how.trajectories:
         drive = Drive(trajectory(course, duration, source.sampling), schedule(duration, lengths))
         outcomes = drive.repeat(
             {
-                name: _states(model, source.sampling, spreads, duration)
+                name: _make_states(model, source.sampling, spreads, duration)
                 for name, model in models.items()
             },
             partial(source.of_run, drive, course),
@@ -312,20 +317,26 @@ def _rows(
         }
         told = [
             NavigationRow(
-                **(about | _of_tuning(drive, outcomes, name, length) | _banks(models[name])),
-                model=_named(models[name]),
+                **(
+                    about
+                    | _describe_tuning(drive, outcomes, name, length)
+                    | _list_bank_shares(models[name])
+                ),
+                model=_describe_terms(models[name]),
             )
             for name in models
             for length in (None, *lengths)
         ]
-        smallest = _smallest(told)
+        smallest = _choose_smallest(told)
         for row in told:
             yield replace(row, smallest=row.tuning == smallest)
         for name, reason in lacking.items():
             yield NavigationRow(**about, tuning=name, reason=reason)
 
 
-def _states(models: Models, sampling: float, spreads: Spreads, duration: float) -> list[AxisStates]:
+def _make_states(
+    models: Models, sampling: float, spreads: Spreads, duration: float
+) -> list[AxisStates]:
     return [
         axis_states(
             models[channel],
@@ -339,8 +350,8 @@ def _states(models: Models, sampling: float, spreads: Spreads, duration: float) 
     ]
 
 
-def _named(models: Models) -> str:
-    """Return the terms of the models, of gyros and accelerometers."""
+def _describe_terms(models: Models) -> str:
+    """Describe the terms of the models of gyros and accelerometers."""
     return "; ".join(
         f"{quantity} {', '.join(dict.fromkeys(models[c].name for c in own))}"
         for quantity in ("gyro", "accel")
@@ -348,10 +359,10 @@ def _named(models: Models) -> str:
     )
 
 
-def _of_tuning(
+def _describe_tuning(
     drive: Drive, outcomes: Mapping[str, Outcome], name: str, length: float | None
 ) -> dict[str, Any]:
-    """Return what a row says of a tuning, at the end of outages of a length, s, or with fixes."""
+    """Return the fields of a row about a tuning, at the end of outages, s, or with fixes."""
     outcome = outcomes[name]
     row: dict[str, Any] = {
         "tuning": name,
@@ -379,12 +390,12 @@ def _of_tuning(
             row |= {
                 "nees_inside": share.value,
                 "nees_error": share.error,
-                "consistent": _consistent(share),
+                "consistent": _is_consistent(share),
             }
     return row
 
 
-def _banks(models: Models) -> dict[str, None]:
+def _list_bank_shares(models: Models) -> dict[str, None]:
     """Return the shares that are null: those of biases that a bank of processes only stands for.
 
     It has no process shorter than an epoch, so that its states are no truth to hold a filter to.
@@ -393,16 +404,16 @@ def _banks(models: Models) -> dict[str, None]:
     return {f"nees_{quantity_of(name)}": None for name in flickering}
 
 
-def _consistent(share: Share) -> bool | None:
-    """Tell whether a share is that of a filter as sure as it may be; None: the runs do not tell."""
+def _is_consistent(share: Share) -> bool | None:
+    """Return whether the share of a filter is consistent with 0.95; None: not enough runs."""
     off = abs(share.value - 0.95)
-    if off > _TOLERANCE + 3.0 * share.error:
+    if off > _SHARE_TOLERANCE + 3.0 * share.error:
         return False
-    return True if off + 2.0 * share.error <= _WIDEST + 1e-9 else None
+    return True if off + 2.0 * share.error <= _MAX_SHARE_ERROR + 1e-9 else None
 
 
-def _smallest(rows: Sequence[NavigationRow]) -> str | None:
-    """Return the tuning of the fewest states of those that are consistent in all their rows.
+def _choose_smallest(rows: Sequence[NavigationRow]) -> str | None:
+    """Return the consistent tuning (in all its rows) with the fewest states.
 
     Of several that one whose position is best after the longest outage. The true model is none.
     """

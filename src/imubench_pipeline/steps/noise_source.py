@@ -1,4 +1,4 @@
-"""Which noise model an Earth-rate experiment is weighed by: that of the same sensor at rest.
+"""Choose the noise model for the weights of an Earth-rate experiment: the sensor at rest.
 
 The log of a gyro that is turned does not tell its noise: the turns are in it. The model is that of
 a static recording of the same sensor, of the same device where there is one, and the longest of
@@ -28,18 +28,18 @@ NO_MODEL = (
     "the noise of this sensor is not known: no static recording of it could be used, and its "
     "datasheet prints no noise; add a static log of this sensor"
 )
-"""Why nothing is found without a `NoiseSource`."""
+"""Reason of missing results without a `NoiseSource`."""
 
 Kept = tuple[RecordingRow, Path]
 """A recording, and its folder."""
 
-_SEED = 20260101
-"""Of the drawn models: each recording and channel has a stream of its own."""
+_DRAW_SEED = 20260101
+"""Seed of the drawn models; each recording and channel has an independent stream."""
 
 
 @dataclass(frozen=True)
 class NoiseSource:
-    """A noise model, and where it is from.
+    """A noise model and its source.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ def from_static(
             every = {estimate.method: estimate for estimate in estimates(parameters)[name]}
             papers = every.get("likelihood_gm", best[name]).model
             words = f"{_words(row, own, name, channel)}; method {best[name].method}"
-            rng = channel_rng(_SEED, repr(best[name].model), name)
+            rng = channel_rng(_DRAW_SEED, repr(best[name].model), name)
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, words, drawn)
     return None
@@ -146,7 +146,7 @@ def from_printed(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
 
 
 def segments_reason(log: ChannelLog) -> str:
-    """Return why a log of several segments cannot be used as one."""
+    """Return the reason why a log of several segments cannot be used as one."""
     return (
         f"the log is in {len(log.segments)} segments, with gaps of unknown length between "
         "them; use one of them ('use:' beside the log)"

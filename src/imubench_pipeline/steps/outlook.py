@@ -1,4 +1,4 @@
-"""What a sensor at rest could find of attitude, north and the Earth's rate, before it tries.
+"""Predict the accuracy of attitude, north and Earth rate from a sensor at rest.
 
 Its noise is that of a static recording: a measured one before a simulated one, the longest of
 several. A log may have fewer than three axes: those that are there stand for the others.
@@ -32,19 +32,19 @@ from imubench_pipeline.steps.noise_source import static_recordings
 from imubench_pipeline.units import quantity_to_si
 
 TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)
-"""Of rest, s."""
+"""Durations of rest, s."""
 
 DWELL = 28.0
-"""Data in each dwell of the predicted turns, s; with the turn half a minute."""
+"""Length of each dwell of the predicted turns, s; with the turn half a minute."""
 
-TURNING = 2.0
-"""Time that such a turn takes, s."""
+TURN_TIME = 2.0
+"""Duration of a turn, s."""
 
-_RUNS = 400
-"""Triads of the check: their rms is sure to 3.5 %."""
+_SIMULATED_TRIADS = 400
+"""Number of simulated triads of the check; their rms is accurate to 3.5 %."""
 
-_SEED = 20260101
-_TYPICAL = ("1sigma", "typ")
+_CHECK_SEED = 20260101
+_TYPICAL_KINDS = ("1sigma", "typ")
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Noise:
 
     @property
     def middle_gyro(self) -> str | None:
-        """The gyro whose Allan deviation over a dwell is the middle one; None: there is none."""
+        """The gyro with the median Allan deviation over a dwell; None: there is none."""
         gyros = [name for name in self.models if name.startswith("gyro_")]
         if not gyros:
             return None
@@ -83,7 +83,7 @@ class Noise:
 
 
 def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
-    """Return the noise of a sensor from its static recordings; None where none tells it."""
+    """Return the noise of a sensor from its static recordings; None if none has an estimate."""
     for row, folder in static_recordings(folders, lambda row: (row.simulated,)):
         best = recommended_estimates(folder / "parameters.parquet")
         models = {name: estimate.model for name, estimate in best.items() if estimate.model.N}
@@ -107,32 +107,32 @@ def outlook_tables(
     noise = noise_at_rest(folders)
     if noise is None:
         return rows
-    rows["earth_rate_prediction"] = list(_predicted(sensor, noise, how))
+    rows["earth_rate_prediction"] = list(_predict_earth_rate(sensor, noise, how))
     if any(name.startswith("accel_") for name in noise.models):
         printed = Datasheet.model_validate(sections["datasheet"])
-        rows["alignment"] = list(_aligned(sensor, noise, printed, how))
+        rows["alignment"] = list(_predict_alignment(sensor, noise, printed, how))
     return rows
 
 
-def _predicted(
+def _predict_earth_rate(
     sensor: str, noise: Noise, how: EarthRateSettings
 ) -> Iterator[EarthRatePredictionRow]:
     gyro = noise.middle_gyro
     assert gyro is not None  # noise_at_rest has seen to it
     latitude = quantity_to_si(how.latitude, "angle")
-    outlook = Outlook(noise.models[gyro], latitude, TURNING, noise.rate)
+    outlook = Outlook(noise.models[gyro], latitude, TURN_TIME, noise.rate)
     run_time = max(quantity_to_si(how.run_time, "time"), 3.0 * DWELL)
     row = partial(EarthRatePredictionRow, sensor=sensor, recording=noise.recording, channel=gyro)
     for predicted in prediction_rows(outlook, DWELL, how.goals, run_time):
         yield row(**predicted)
 
 
-def _aligned(
+def _predict_alignment(
     sensor: str, noise: Noise, printed: Datasheet, how: EarthRateSettings
 ) -> Iterator[AlignmentRow]:
     gyros, accelerometers = noise.three("gyro"), noise.three("accel")
-    gyro_bias, gyro_words = _bias(printed, "gyro", how)
-    accelerometer_bias, accelerometer_words = _bias(printed, "accel", how)
+    gyro_bias, gyro_words = _find_bias(printed, "gyro", how)
+    accelerometer_bias, accelerometer_words = _find_bias(printed, "accel", how)
     triad = Triad(
         gyros=tuple(gyros.values()),
         accelerometers=tuple(accelerometers.values()),
@@ -140,8 +140,8 @@ def _aligned(
         accelerometer_bias=accelerometer_bias,
     )
     site = Site(latitude=quantity_to_si(how.latitude, "angle"))
-    rng = channel_rng(_SEED, repr(triad), "alignment")
-    for accuracy in accuracies(triad, site, noise.rate, TIMES, runs=_RUNS, rng=rng):
+    rng = channel_rng(_CHECK_SEED, repr(triad), "alignment")
+    for accuracy in accuracies(triad, site, noise.rate, TIMES, runs=_SIMULATED_TRIADS, rng=rng):
         roll, pitch, heading = (float(value) for value in accuracy.sigma)
         errors = [None] * 3 if accuracy.errors is None else accuracy.errors.tolist()
         of_roll, of_pitch, of_heading = (
@@ -171,11 +171,11 @@ def _aligned(
         )
 
 
-def _bias(printed: Datasheet, quantity: str, how: EarthRateSettings) -> tuple[float, str]:
-    """Return the standard deviation of the fixed bias in SI, and what it is from."""
+def _find_bias(printed: Datasheet, quantity: str, how: EarthRateSettings) -> tuple[float, str]:
+    """Return the standard deviation of the fixed bias in SI, and its source."""
     dimension = QUANTITIES[quantity]
     sheet: QuantityDatasheet | None = getattr(printed, quantity)
-    for name, kind in product(("bias_repeatability", "offset"), _TYPICAL):
+    for name, kind in product(("bias_repeatability", "offset"), _TYPICAL_KINDS):
         for figure in sheet.printed(name) if sheet else ():
             value = figure.on_axis("x")
             if figure.kind == kind and isinstance(value, float):

@@ -26,9 +26,9 @@ from imubench_pipeline.steps.outlook import noise_at_rest
 from imubench_pipeline.units import quantity_to_si
 
 ANGLES = ("roll", "pitch", "heading")
-"""What is found, of the first position."""
+"""Estimated angles, of the first position."""
 
-_LIMIT = 1.96
+_Z_95 = 1.96
 """Standard deviations of a 95 % limit."""
 
 
@@ -105,8 +105,8 @@ def attitude_rows(
         yield about(
             parameter=name,
             value=value,
-            lower=value - _LIMIT * sigma,
-            upper=value + _LIMIT * sigma,
+            lower=value - _Z_95 * sigma,
+            upper=value + _Z_95 * sigma,
             status="ok",
             sigma=sigma,
             sigma_noise=sigma,

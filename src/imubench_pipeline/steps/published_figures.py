@@ -1,4 +1,4 @@
-"""What a paper prints of a sensor beside what is found of the log that is simulated from it."""
+"""Compare printed figures of a sensor with estimates of the log simulated from them."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from imubench_pipeline.units import quantity_to_si
 
 _Place = tuple[str, str, str, str]
 
-_DATASHEET = {
+_DATASHEET_PARAMETERS = {
     "N": ("N", 1.0),
     "adev_minimum": ("B", 1.0 / FLOOR),
     "offset": ("bias", 1.0),
     SENSITIVITY: (SENSITIVITY, 1.0),
 }
-"""Parameter and factor of what is printed in a datasheet, by statistic or quantity."""
+"""Parameter and factor of datasheet figures, by statistic or quantity."""
 
 
 def published_rows(
@@ -99,7 +99,7 @@ def _place(row: ChannelRow, parameter: str) -> _Place:
 def _estimates(
     tables: Mapping[str, pa.Table],
 ) -> tuple[dict[_Place, float], dict[_Place, ParameterRow | TemperatureRow]]:
-    """Return what the curve says, and the rows of the recommended method."""
+    """Return the values from the curve, and the rows of the recommended method."""
     curve: dict[_Place, float] = {}
     parameters = ParameterRow.rows_of(tables["parameters"])
     for row in parameters:
@@ -115,12 +115,12 @@ def _estimates(
     return curve, best
 
 
-_LONGEST = 1.0 / 9.0
-"""Part of a log up to which its curve is read."""
+_MAX_TAU_OVER_LENGTH = 1.0 / 9.0
+"""Longest tau at which a curve is read, over the length of the log."""
 
 
 def _lowest_points(tables: Mapping[str, pa.Table]) -> dict[_Place, float]:
-    """Return B by the lowest point of each curve, as a source reads it that shows no minimum."""
+    """Return B from the lowest point of each curve, for sources without a visible minimum."""
     durations = {
         (row.sensor, row.recording): row.duration
         for row in RecordingRow.rows_of(tables["recordings"])
@@ -128,7 +128,7 @@ def _lowest_points(tables: Mapping[str, pa.Table]) -> dict[_Place, float]:
     lowest: dict[_Place, float] = {}
     for row in AllanRow.rows_of(tables["allan"]):
         duration = durations.get((row.sensor, row.recording))
-        if duration is not None and row.tau <= _LONGEST * duration:
+        if duration is not None and row.tau <= _MAX_TAU_OVER_LENGTH * duration:
             place = _place(row, "B")
             lowest[place] = min(lowest.get(place, math.inf), row.adev / FLOOR)
     return lowest
@@ -158,7 +158,9 @@ def _printed(rows: Iterable[DatasheetRow]) -> dict[_Place, list[tuple[str | None
     """Return kind and value of the figures of the datasheet, in the parameters' conventions."""
     figures: dict[_Place, list[tuple[str | None, float]]] = {}
     for row in rows:
-        convention = _DATASHEET.get(row.statistic) or _DATASHEET.get(row.quantity)
+        convention = _DATASHEET_PARAMETERS.get(row.statistic) or _DATASHEET_PARAMETERS.get(
+            row.quantity
+        )
         if convention is not None and row.comparable is not None:
             parameter, factor = convention
             figures.setdefault(_place(row, parameter), []).append(
@@ -190,7 +192,7 @@ def truth_rows(truths: str) -> Iterator[SimulatedTruthRow]:
 
 
 def _of_fused(recording: SimulatedRecording, channel: str) -> dict[str, float]:
-    """Return by what the noise of a specimen is multiplied where several are fused."""
+    """Return the factors on the noise of one specimen if several are fused."""
     if recording.specimens is None:
         return {}
     models = [model.axes[channel].noise for model in specimens_of(recording)]

@@ -36,15 +36,15 @@ from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 
 STRETCH = 1.0
-"""Length of the stretch of which every sample is shown, s."""
+"""Length of the section in which every sample is shown, s."""
 
-MOST = 1_500_000
-"""Samples of each that are compared: those of three sensors take 8 s."""
+MAX_SAMPLES = 1_500_000
+"""Max. number of compared samples of each; three sensors take 8 s."""
 
-_SPAN = ("start", "end", "low", "high", "mean")
+_ENVELOPE_COLUMNS = ("start", "end", "low", "high", "mean")
 
-_SMOOTHED = 100.0
-"""Time over which readings of the temperature are averaged, s."""
+_TEMPERATURE_AVERAGING_TIME = 100.0
+"""Averaging time of temperature readings, s."""
 
 
 def samples_of_models(
@@ -73,7 +73,7 @@ def samples_of_models(
         key = Key(sensor, recording, channel)
         low_pass = _low_pass(row for row in filters if row.channel == channel)
         followed = {row.parameter: row for row in thermal if row.channel == channel}
-        samples = min(log.grid, MOST)
+        samples = min(log.grid, MAX_SAMPLES)
         yield from _rows(key, "log", log.rate, samples, log.blocks())
         plain = SensorModel(low_pass=low_pass, bias=log.mean())
         models = by_method.get(channel, {})
@@ -115,7 +115,7 @@ def _warmed(
     bias = model.bias if bias is None else bias
     warmed = SensorModel(noise=model.noise, low_pass=model.low_pass, bias=bias, drift=drift)
     readings = np.concatenate([*log.temperatures()])
-    size = max(round(_SMOOTHED * log.rate), 1)
+    size = max(round(_TEMPERATURE_AVERAGING_TIME * log.rate), 1)
     at, means = [], []
     for start in range(0, len(readings), size):
         part = readings[start : start + size]
@@ -129,7 +129,7 @@ def _warmed(
 def _rows(
     key: Key, of: str, rate: float, samples: int, blocks: Iterable[Array]
 ) -> Iterator[ModelSampleRow]:
-    """Yield the deviation of the samples, those of a stretch, and the envelope."""
+    """Yield the deviation of the samples, the samples of a section, and the envelope."""
     row = partial(
         ModelSampleRow,
         sensor=key.sensor,
@@ -161,4 +161,4 @@ def _rows(
         mean = None if math.isnan(value) else value
         yield row(what="stretch", start=k / rate, end=(k + 1) / rate, mean=mean)
     for seen in envelope_rows(edges / rate, figures):
-        yield row(what="envelope", **{name: seen[name] for name in _SPAN})
+        yield row(what="envelope", **{name: seen[name] for name in _ENVELOPE_COLUMNS})

@@ -1,4 +1,4 @@
-"""The tables of a sensor: what its recordings have left, joined, judged and compared."""
+"""Tables of a sensor: the tables of its recordings, joined, assessed and compared."""
 
 from __future__ import annotations
 
@@ -103,11 +103,11 @@ def joined_tables(
     return with_failures(joined, failures)
 
 
-_OF_LOGS = {"step": "bias_step", "warm_up": "warm_up_drift"}
-"""What is found of a log as it is read, and found again, with its size, beside its noise."""
+_KIND_OF_FINDING = {"step": "bias_step", "warm_up": "warm_up_drift"}
+"""Kind in ``deterministic``, with a size, of findings that the ingest also reports."""
 
-_NEAR = 1 / 100
-"""Part of a recording within which two steps are one."""
+_MAX_STEP_DISTANCE = 1 / 100
+"""Max. distance of two steps that are treated as one, over the length of the recording."""
 
 
 def findings_of(
@@ -151,7 +151,7 @@ def without_doubles(
     deterministic: Iterable[DeterministicRow],
     durations: Mapping[tuple[str, str], float],
 ) -> Iterator[FindingRow]:
-    """Yield the findings of the ingest that the table ``deterministic`` does not tell better.
+    """Yield the findings of the ingest that are not also in the table ``deterministic``.
 
     `durations`: of each sensor and recording, s.
     """
@@ -159,12 +159,12 @@ def without_doubles(
     for row in deterministic:
         by_place.setdefault((row.sensor, row.recording, row.channel), []).append(row)
     for finding in findings:
-        kind = _OF_LOGS.get(finding.finding)
+        kind = _KIND_OF_FINDING.get(finding.finding)
         if kind is None or finding.channel is None:
             yield finding
             continue
         place = (finding.sensor, finding.recording, finding.channel)
         same = (row for row in by_place.get(place, ()) if row.kind == kind)
-        near = _NEAR * durations.get((finding.sensor, finding.recording), 0.0)
+        near = _MAX_STEP_DISTANCE * durations.get((finding.sensor, finding.recording), 0.0)
         if not any(abs(row.start - (finding.start or 0.0)) <= near for row in same):
             yield finding

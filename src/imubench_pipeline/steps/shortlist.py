@@ -19,7 +19,7 @@ from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import build, read, write_arrow
 
 NEEDED = ("recordings", "parameters", "ranking")
-"""The tables of a run that it reads."""
+"""The tables of a run that the step reads."""
 
 
 def rows_of_run(

@@ -26,8 +26,8 @@ from imubench_pipeline.simulate.profiles import Profile
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 
-_SPREAD = ("N", "B", "K")
-"""What differs from specimen to specimen."""
+_SPREAD_PARAMETERS = ("N", "B", "K")
+"""Parameters that differ between specimens."""
 
 
 def specimens_of(recording: SimulatedRecording) -> list[ImuModel]:
@@ -42,8 +42,8 @@ def specimens_of(recording: SimulatedRecording) -> list[ImuModel]:
         for channel, model in whole.axes.items():
             names = (recording.sensor, recording.recording, channel, f"specimen {number}")
             rng = channel_rng(recording.seed, *names)
-            factors = np.exp(stated.spread * rng.standard_normal(len(_SPREAD)))
-            axes[channel] = replace(model, noise=_multiplied(model.noise, factors))
+            factors = np.exp(stated.spread * rng.standard_normal(len(_SPREAD_PARAMETERS)))
+            axes[channel] = replace(model, noise=_scale_model(model.noise, factors))
         made.append(replace(whole, axes=axes))
     return made
 
@@ -62,13 +62,13 @@ def fused_model(models: Sequence[NoiseModel], weights: Constant) -> NoiseModel:
     ratios = [
         np.linalg.norm(weights.values * [getattr(model, name) for model in models])
         / (getattr(models[0], name) or 1.0)
-        for name in _SPREAD
+        for name in _SPREAD_PARAMETERS
     ]
-    return _multiplied(models[0], np.array(ratios))
+    return _scale_model(models[0], np.array(ratios))
 
 
-def _multiplied(model: NoiseModel, factors: Array) -> NoiseModel:
-    """Return a model with N, B and K so many times as large."""
+def _scale_model(model: NoiseModel, factors: Array) -> NoiseModel:
+    """Return a model with N, B and K multiplied by factors."""
     n, b, k = map(float, factors)
     return replace(model, N=n * model.N, B=b * model.B, K=k * model.K)
 

@@ -19,10 +19,10 @@ def tables_of_all(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
     for name, paths in parts.items():
         joined[name], failed = read_with_failures(name, paths)
         failures |= dict.fromkeys(failed)
-    return _without_simulated(with_failures(joined, list(failures)))
+    return _remove_simulated(with_failures(joined, list(failures)))
 
 
-def _without_simulated(tables: dict[str, pa.Table]) -> dict[str, pa.Table]:
+def _remove_simulated(tables: dict[str, pa.Table]) -> dict[str, pa.Table]:
     """Return tables in which no simulated recording decides beside measured ones of any sensor."""
     recordings, new = without_simulated(RecordingRow.rows_of(tables["recordings"]))
     if not new:

@@ -1,4 +1,4 @@
-"""Noise models that a filter may be tuned with, each from what a run knows of a sensor."""
+"""Noise models for the tuning of a filter, from the results of a run for a sensor."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ DATASHEET, MISREAD, TENFOLD, TABLE_1, OVERBOUND, TRUE = (
     "overbound",
     "true",
 )
-"""Tunings beside those that have the name of a method."""
+"""Tunings other than those named after a method."""
 
-_METHODS = ("curve", "paper", "weighted", "likelihood", "likelihood_gm", "compensated")
-_TEN = 10.0
+_ESTIMATION_METHODS = ("curve", "paper", "weighted", "likelihood", "likelihood_gm", "compensated")
+_TENFOLD_FACTOR = 10.0
 
 
 def all_axes(models: Mapping[str, NoiseModel]) -> Models | None:
@@ -70,14 +70,14 @@ def tunings(
     every = estimates(folder / "parameters.parquet", folder / "draws.parquet")
     named: dict[str, Models] = {}
     lacking: dict[str, str] = {}
-    for name, models in _printed(sensor, declared).items():
+    for name, models in _make_printed_models(sensor, declared).items():
         named[name] = models
-    best = _recommended(folder, every)
-    ten = {channel: scaled(estimate.model, _TEN) for channel, estimate in best.items()}
-    candidates = {TENFOLD: ten, TABLE_1: _by_method(every, "authors")}
-    candidates |= {method: _by_method(every, method) for method in _METHODS}
+    best = _select_recommended(folder, every)
+    ten = {channel: scaled(estimate.model, _TENFOLD_FACTOR) for channel, estimate in best.items()}
+    candidates = {TENFOLD: ten, TABLE_1: _select_method(every, "authors")}
+    candidates |= {method: _select_method(every, method) for method in _ESTIMATION_METHODS}
     try:
-        candidates[OVERBOUND] = _bounded(folder, best, horizon)
+        candidates[OVERBOUND] = _make_overbounds(folder, best, horizon)
     except ValueError as error:
         lacking[OVERBOUND] = str(error)
     for name, models in candidates.items():
@@ -106,7 +106,9 @@ def scaled(model: NoiseModel, factor: float) -> NoiseModel:
     )
 
 
-def _recommended(folder: Path, every: Mapping[str, Sequence[Estimate]]) -> dict[str, Estimate]:
+def _select_recommended(
+    folder: Path, every: Mapping[str, Sequence[Estimate]]
+) -> dict[str, Estimate]:
     table = read("parameters", [folder / "parameters.parquet"])
     rows = table.filter(pc.field("recommended")).select(["channel", "method"]).to_pylist()
     method = {row["channel"]: row["method"] for row in rows}
@@ -117,8 +119,8 @@ def _recommended(folder: Path, every: Mapping[str, Sequence[Estimate]]) -> dict[
     }
 
 
-def _by_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Models:
-    """Return what a method tells, without a ramp and lines: no filter expects them to go on."""
+def _select_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Models:
+    """Return the models of a method without a ramp and lines: no filter expects them to go on."""
     return {
         channel: scaled(estimate.model, 1.0)
         for channel, own in every.items()
@@ -127,7 +129,7 @@ def _by_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Models:
     }
 
 
-def _bounded(folder: Path, best: Mapping[str, Estimate], horizon: float) -> Models:
+def _make_overbounds(folder: Path, best: Mapping[str, Estimate], horizon: float) -> Models:
     """Return the smallest models of white noise and a walk above the curves.
 
     Raises
@@ -143,13 +145,13 @@ def _bounded(folder: Path, best: Mapping[str, Estimate], horizon: float) -> Mode
         drawn = estimate.draws
         many = [drawn.model(number) for number in range(len(drawn))] if drawn is not None else []
         bound = overbound(
-            curve, estimate.model, rate, horizon=horizon, drawn=many, most_excess=_TEN
+            curve, estimate.model, rate, horizon=horizon, drawn=many, most_excess=_TENFOLD_FACTOR
         )
         models[channel] = bound.model
     return models
 
 
-def _printed(sensor: str, declared: Sensor | None) -> dict[str, Models]:
+def _make_printed_models(sensor: str, declared: Sensor | None) -> dict[str, Models]:
     """Return what the datasheet says, read right, and as 000 reads it."""
     if declared is None:
         return {}
