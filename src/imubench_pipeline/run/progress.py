@@ -1,4 +1,4 @@
-"""While a run goes on: how far it is, a line for each recording that ends, and what is wrong.
+"""Show the progress of a run, a line for each finished recording, and errors.
 
 This is a logger plugin of Snakemake (`snakemake_logger_plugin_imubench`), which a profile asks for
 by ``logger: imubench``. In a terminal one line moves; in a pipe there is one now and then. All that
@@ -27,7 +27,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from imubench_pipeline.report.run_summary import one_line
 
 OURS: Mapping[str, Any] = {"imubench": True}
-"""Marks a record that is shown as it is: ``logger.info(text, extra=OURS)``."""
+"""Marks a record that is shown unchanged: ``logger.info(text, extra=OURS)``."""
 
 _EVENTS_OF_PROGRESS_LINE = {
     LogEvent.JOB_INFO,
@@ -44,7 +44,7 @@ _MIN_WIDTH_FOR_BAR = 60
 _LEVEL_STYLES = {logging.ERROR: "red", logging.WARNING: "yellow"}
 _MAX_LINE_LENGTH = 200
 _MIN_LINE_INTERVAL = 10.0
-"""s, at least, between two lines of progress in a pipe."""
+"""Min. time between two lines of progress in a pipe, s."""
 
 Recording = tuple[str, str]
 """Sensor and name."""
@@ -54,14 +54,14 @@ _told: list[Callable[[str, str], str]] = []
 
 
 def follow(jobs: Iterable[Recording], told: Callable[[str, str], str]) -> None:
-    """Have a line shown for each recording that ends.
+    """Register the jobs of recordings, to show a line for each finished recording.
 
     Parameters
     ----------
     jobs : iterable of (str, str)
         The recording of each job of this run that is of one.
     told : callable
-        Returns what became of a recording.
+        Returns the line about a recording.
     """
     _expected.clear()
     _expected.update(jobs)
@@ -172,7 +172,7 @@ class LogHandler(LogHandlerBase):
             self._hide()
 
     def _tell(self, recording: Recording | None) -> None:
-        """Say what became of a recording of which the last job has ended."""
+        """Print the line about a recording when its last job has ended."""
         if recording is None or recording not in _expected:
             return
         _expected[recording] -= 1

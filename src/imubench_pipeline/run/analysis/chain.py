@@ -1,8 +1,8 @@
-"""The steps of the workflow, one after the other, for a few logs that somebody waits for.
+"""Run the steps of the workflow for a few logs while the user waits.
 
-The same functions as the rules call, with the same settings, so that the numbers are the same. The
-work is shared among forks of one process, as in a run, but of one recording the channels are
-estimated and reconstructed side by side.
+It calls the same functions as the rules, with the same settings, so that the numbers are the same.
+Forks of one process share the work, as in a run. The channels of a recording are estimated and
+reconstructed in parallel.
 """
 
 from __future__ import annotations
@@ -59,26 +59,26 @@ _TABLES_OF_STEP: dict[str, tuple[str, ...]] = {
     "datasheet": _COMPARISON_TABLES,
     "reconstruct": (),
 }
-"""The tables that a step leaves."""
+"""Output tables of each step."""
 _MIN_REPORTED_TIME = 3.0
-"""s; who waits for longer is told for what."""
+"""Steps that take longer, s, are reported."""
 
 
 class Analysis:
-    """The steps of all recordings of a plan: what the numbers need, and then what pages need.
+    """The steps of all recordings of a plan: first for the numbers, then for the pages.
 
-    A step that fails for a recording leaves that out, and the table ``failures`` says so.
+    A recording with a failed step is left out, and is listed in the table ``failures``.
 
     Parameters
     ----------
     plan : Plan
-        Whose results are in a folder of their own.
+        Its results are in a separate folder.
     compiling : Compilation
-        Estimates wait for it.
+        Estimates wait for its end.
     cores : int
-        Processes that compute at a time.
+        Number of parallel processes.
     say : callable
-        Is told what goes on.
+        Called with progress messages.
     """
 
     def __init__(self, plan: Plan, compiling: Compilation, cores: int, say: Say) -> None:
@@ -88,7 +88,7 @@ class Analysis:
         self._series: list[tuple[str, str, str]] = []
 
     def estimates(self) -> dict[str, pa.Table]:
-        """Read the logs and estimate; return every joined table, of what is known by then."""
+        """Read the logs and estimate; return all joined tables so far."""
         self._compiling.expected()
         with ThreadPoolExecutor(self._cores) as beside:
             channels = _collect_results(
@@ -101,7 +101,7 @@ class Analysis:
         return self._join_tables(_ESTIMATE_TABLES)
 
     def for_pages(self) -> dict[str, pa.Table]:
-        """Compute what pages show beside the estimates, after them; return every joined table."""
+        """Compute the further results for pages, after the estimates; return all joined tables."""
         with ThreadPoolExecutor(self._cores) as beside:
             compared = self._submit(beside, "datasheet", self._plan.recordings, self._compare)
             parts = _collect_results(
@@ -142,7 +142,7 @@ class Analysis:
         tables: Sequence[str],
         parts: Mapping[tuple[str, str, str], Estimation | ReconstructionRows],
     ) -> None:
-        """Write the tables of each recording, of what its channels have."""
+        """Write the tables of each recording from the rows of its channels."""
         for key in self._plan.recordings:
             own = [part for (*of, _), part in parts.items() if tuple(of) == key]
             failure = self._failed.get(key)
@@ -154,7 +154,7 @@ class Analysis:
                     write(table, chain.from_iterable(getattr(part, table) for part in own), path)
 
     def _compare(self, sensor: str, recording: str) -> None:
-        """Hold a recording against its datasheet, and say what its noise means in use."""
+        """Compare a recording with its datasheet, and compute its error budget."""
         folder, plan = self._get_folder(sensor, recording), self._plan
         stated = (folder, sensor, recording, plan.datasheet_settings(sensor))
         write("datasheet", datasheet_step.rows(*stated), folder / "datasheet.parquet")
@@ -185,7 +185,7 @@ class Analysis:
     # ---------------------------------------------------------------------------- all together
 
     def _join_tables(self, made: Sequence[str]) -> dict[str, pa.Table]:
-        """Join the tables of each sensor that were made, and those of all; the others are empty."""
+        """Join the tables that were made, by sensor and of all sensors; the others are empty."""
         plan = self._plan
         names = [name for name in made if name not in OF_ONE_RECORDING]
         parts: dict[str, list[Path]] = {}
@@ -222,7 +222,7 @@ class Analysis:
         return {key: beside.submit(self._run_bounded, step, function, key) for key in keys}
 
     def _run_bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:
-        """Call a step in a process of its own; where it fails, its recording is left out."""
+        """Call a step in a separate process; if it fails, its recording is left out."""
         sensor, recording, *_ = key
         failure = self._failed.get((sensor, recording))
         if failure is not None:
@@ -257,5 +257,5 @@ class Analysis:
 
 
 def _collect_results(begun: Mapping[K, Future[T | None]]) -> dict[K, T]:
-    """Wait for a step; return what came of it, where something did."""
+    """Wait for a step; return its results without None."""
     return {key: value for key, done in begun.items() if (value := done.result()) is not None}

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from imubench_pipeline.run.plan import Plan
 
 _MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30
-"""s and bytes that a process may take for its figures."""
+"""Max. time, s, and memory, bytes, of a process that draws figures."""
 
 _DESCRIPTION = (
     "Read static logs, say what is wrong with them, and estimate the noise parameters of each "
@@ -85,8 +85,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Analyse logs, print the parameters and write what is asked for; return the exit status."""
     from imubench_pipeline.run.analysis.compilation import Compilation
 
-    # Compiling and importing make many objects that stay: to look for what can go as often as
-    # Python does takes a tenth of the time at the first use.
+    # Compiling and importing create many permanent objects: the default frequency of garbage
+    # collection takes a tenth of the time at the first use.
     gc.set_threshold(100_000, 50, 50)
     with Compilation(_say) as compiling:  # while this process imports all else
         if arguments.output is not None:
@@ -154,15 +154,15 @@ def _print(tables: Mapping[str, pa.Table], system: System) -> None:
 
 
 def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Namespace) -> None:
-    """Write the page, and beside it the figures and the tables."""
+    """Write the page, the figures and the tables."""
     from imubench_pipeline.report.publish import one_file, site_of
     from imubench_pipeline.report.static_figures.of_run import figures_of
     from imubench_pipeline.tables import write_arrow, write_content
 
     output: OutputFolder = arguments.output
-    # Of one log there are no intervals to hold side by side.
+    # For a single log there are no intervals to compare.
     kinds = ("comparison", "forest") if len(arguments.logs) > 1 else ("comparison",)
-    # The results are gone with the process: what makes them again is this command.
+    # The results are temporary: this command makes them again.
     told = json.loads(plan.report_settings()) | {"at_once": _describe_command(arguments)}
     with output.filling() as folder:
         figures = figures_of(tables, arguments.units, folder / "figures", kinds=kinds)
@@ -176,7 +176,7 @@ def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Names
 
 @contextmanager
 def _draw_in_parallel(figures: Sequence[Callable[[], None]], cores: int) -> Iterator[None]:
-    """Draw figures in processes of their own meanwhile; wait for them in the end."""
+    """Draw figures in parallel processes; wait for them at the end."""
     from imubench_pipeline.readers.bounded import Bounded
 
     shares = [figures[first::cores] for first in range(min(cores, len(figures)))]

@@ -1,4 +1,4 @@
-"""What the first use compiles, in a process of its own beside the imports and the reading."""
+"""Compile kernels at the first use in a separate process, in parallel with imports and reading."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from imubench_pipeline.readers.bounded import Bounded
 
 _MAX_COMPILE_TIME, _MAX_COMPILE_MEMORY = 600.0, 4 << 30
 _MESSAGE_DELAY = 3.0
-"""s; who waits for longer is told for what."""
+"""Delay of the message about the compilation, s."""
 
 
 class Compilation:
-    """Compiles the kernels of estimates where that was not done before; begins at once.
+    """Compiles the kernels of estimates unless they are cached; begins at once.
 
-    As a context it ends its process where nobody waited for it.
+    As a context manager it ends its process if nobody waited for it.
     """
 
     def __init__(self, say: Callable[[str], None]) -> None:
@@ -27,11 +27,11 @@ class Compilation:
         self._told = threading.Timer(_MESSAGE_DELAY, self._tell)
 
     def expected(self) -> None:
-        """Tell of it from now on, where it takes long: there will be somebody who waits for it."""
+        """Start the timer of the message: the caller will wait for the compilation."""
         self._told.start()
 
     def finish(self) -> None:
-        """Wait for its end, and load the kernels, so that no fork does so again."""
+        """Wait for the end, and load the kernels, so that forks need not load them."""
         self._process.result(_MAX_COMPILE_TIME)
         self._told.cancel()
         compile_kernels()

@@ -20,12 +20,12 @@ from imubench_pipeline.tables import write_json
 from imubench_pipeline.tables.findings import RecordingError
 
 INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
-"""Time and memory in which a log is looked into, or rejected."""
+"""Max. time, s, and memory, bytes, for the inspection of a log; beyond them it is rejected."""
 
 
 @dataclass(frozen=True)
 class Stated:
-    """What the command line says of logs that do not say it themselves; None: nothing."""
+    """Properties of logs from the command line, where the logs do not state them."""
 
     rate: str | None = None
     gyro_unit: str | None = None
@@ -40,7 +40,7 @@ class Stated:
 
 
 class UnfilledError(ConfigError):
-    """A log does not say all that is needed of it, and nobody else does."""
+    """Raised if neither the log nor the user states a required property."""
 
 
 def lay_out(
@@ -57,14 +57,14 @@ def lay_out(
     logs : sequence of Path
         Files of logs, or folders of recordings.
     sensor : Path or None
-        The sensor file of all of them, or its name in the catalogue. None: each log has what it
-        says itself, as `imubench inspect` drafts it.
+        The sensor file of all logs, or its name in the catalogue. None: a draft for each log, as by
+        `imubench inspect`.
     stated : Stated
-        Fills in what a draft leaves open.
+        Completes the drafts.
     catalogue : sequence of Path
         Folders of sensor files, for names.
     folder : Path
-        Where the project is made; it is there.
+        Existing folder for the project.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def _name_recordings(logs: Sequence[Path]) -> list[str]:
 
 
 def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
-    """Return the sensor file that a log tells itself, filled in by what is stated."""
+    """Return the sensor file drafted from a log, completed by the stated properties."""
     try:
         inspected: Inspection = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, log)
     except BoundError as error:
@@ -173,7 +173,7 @@ def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
 
 
 def _list_open_keys(written: Mapping[str, object]) -> list[str]:
-    """Return what is left open: the rate, or a unit or column of a quantity."""
+    """Return the missing keys: the rate, or a unit or column of a quantity."""
     keys = ["rate"] * (written.get("rate") == UNKNOWN)
     channels = written["channels"]
     assert isinstance(channels, Mapping)
@@ -185,7 +185,7 @@ def _list_open_keys(written: Mapping[str, object]) -> list[str]:
 
 
 def _describe_missing_keys(log: Path, inspected: Inspection, keys: Sequence[str]) -> str:
-    """Return what a log does not say, and how to say it."""
+    """Describe the missing properties of a log, and how to state them."""
     options = {
         "rate": "--rate '100 Hz'",
         "gyro unit": "--gyro-unit deg/s (or rad/s, dps, ...: see the logger's manual)",

@@ -1,4 +1,4 @@
-"""One nightly run: lock, put right, hold back, run, compare, say."""
+"""One nightly run: lock, recover, hold back incomplete logs, run, compare, report."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Night:
     Raises
     ------
     ConfigError
-        If the folder is none of the two, or the settings cannot be read.
+        If the folder is neither of the two, or the settings cannot be read.
     """
 
     def __init__(self, project: Path, config: Sequence[str], flags: Sequence[str] = ()) -> None:
@@ -71,14 +71,15 @@ class Night:
         self._put_right: list[str] = []
 
     def run(self, cores: str, settle: float, wait: float) -> Summary:
-        """Run the workflow once; keep the summary in the folder ``nightly`` of the results, too.
+        """Run the workflow once; also write the summary to the folder ``nightly`` of the results.
 
-        `settle`: how long nothing of a complete log has changed, s; `wait`: for another run, s.
+        `settle`: min. time without change of a complete log, s; `wait`: max. time to wait for
+        another run, s.
 
         Raises
         ------
         TakenError
-            If another run still goes on.
+            If another run is still active.
         """
         until = time.monotonic() + wait
         with Lock(lock_of(self.results)) as lock, _interrupt_on_signals():
@@ -122,7 +123,7 @@ class Night:
             return None
 
     def _wait_for_others(self, until: float) -> None:
-        """Wait for a Snakemake that somebody runs on these results by hand."""
+        """Wait for a Snakemake that a user runs on these results."""
         while locks := recovery.snakemake_locks(self.project, self.results):
             process = recovery.owner(locks, self.project, self.results)
             if process is None:
@@ -232,7 +233,7 @@ class Night:
             write_content(in_words(summary), files[1])
             log = [self._log] if name != "latest" and self._log.is_file() else []
             seal_files(self.results, night_place(name), [*files, *log], {})
-        # Last: what could not be said is said by the next run.
+        # Last: if the summary was not written, the next run reports the same news.
         if after is not None:
             after.write(self._state)
             seal_files(self.results, night_place("state"), [self._state], {})
@@ -253,7 +254,7 @@ def _read_run_settings(file: Path, config: Sequence[str]) -> Run:
 
 @contextmanager
 def _interrupt_on_signals() -> Iterator[None]:
-    """Turn the signal that ends a service into that of Ctrl-C, so that all is left in order."""
+    """Handle the signals that end a service like Ctrl-C, for an orderly end."""
 
     def stop(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt

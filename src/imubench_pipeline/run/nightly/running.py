@@ -1,4 +1,4 @@
-"""Snakemake as a process of its own: what it says goes to a file, and to the terminal if any."""
+"""Run Snakemake in a separate process; its output goes to a file, and to a terminal if any."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _CONTROL_SEQUENCE = re.compile(rb"\x1b\[[0-9;?]*[A-Za-z]|\r")
 def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: Lock) -> int:
     """Run Snakemake; return its exit status, negative where a signal ended it.
 
-    All that it says goes to the file `output`. Snakemake holds the lock, too: it may outlive this
+    All output goes to the file `output`. Snakemake also holds the lock, since it may outlive this
     process.
     """
     command = [sys.executable, "-m", "snakemake", *arguments]
@@ -53,7 +53,7 @@ def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: L
                 terminal.follow(process)
             return process.wait()
         except BaseException:
-            # As Ctrl-C in a terminal does: Snakemake and its steps take away what is half-done.
+            # Like Ctrl-C in a terminal: Snakemake and its steps remove incomplete outputs.
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGINT)
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -67,9 +67,9 @@ def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: L
 
 
 class _Terminal:
-    """A terminal for Snakemake, which shows its progress there as it does when called by hand.
+    """A pseudo-terminal for Snakemake, so that it shows its progress as in a terminal.
 
-    What it writes goes on to the real one as it is, and to a file without what is drawn over.
+    The output is passed to the real terminal unchanged, and to a file without erased lines.
     """
 
     def __init__(self, file: IO[bytes]) -> None:
@@ -81,7 +81,7 @@ class _Terminal:
             termios.tcsetwinsize(self.end, termios.tcgetwinsize(sys.stderr.fileno()))
 
     def follow(self, process: subprocess.Popen[bytes]) -> None:
-        """Pass on what a process writes, until it ends."""
+        """Pass on the output of a process until it ends."""
         while True:
             ended = process.poll() is not None
             while select.select([self._begin], [], [], 0.0 if ended else 0.2)[0]:
@@ -104,7 +104,7 @@ class _Terminal:
             self._keep(line)
 
     def _keep(self, line: bytes) -> None:
-        """Keep a line once the next one does not wipe it out, as a display does that ends."""
+        """Write a line to the file once the next line does not erase it."""
         if self._last is not None and _ERASE_SEQUENCE not in line:
             with contextlib.suppress(OSError):  # a full disk: the steps say so themselves
                 self._file.write(self._last + b"\n")
@@ -113,12 +113,12 @@ class _Terminal:
 
 
 def errors(path: Path) -> list[str]:
-    """Return the errors of the steps that failed in a run, each once, of a file of what it said."""
+    """Return the errors of failed steps from the output of a run, each once."""
     return list(dict.fromkeys(_TRACEBACK.findall(_read_output(path))))
 
 
 def last_lines(path: Path) -> list[str]:
-    """Return the last lines that a run said, without empty ones, of such a file."""
+    """Return the last lines of the output of a run, without empty ones."""
     return [line.rstrip() for line in _read_output(path).splitlines() if line.strip()][
         -_MAX_LAST_LINES:
     ]

@@ -1,4 +1,4 @@
-"""What a nightly run says: what is new since the last one, as data and in words."""
+"""Summary of a nightly run: changes since the last run, as data and as text."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _MAX_LINES = 20
 
 
 class Changed(BaseModel):
-    """A recording whose outcome is another one than at the last run."""
+    """A recording with another outcome than at the last run."""
 
     recording: str
     because: str
 
 
 class Skipped(BaseModel):
-    """A log that was not read, being written."""
+    """A log that was not read, since it is being written."""
 
     recording: str
     reason: str
@@ -45,7 +45,7 @@ class Skipped(BaseModel):
 
 
 class Rejected(BaseModel):
-    """A recording that cannot be used; ``new``: it was not so at the last run."""
+    """A rejected recording; ``new``: it was not rejected for this reason at the last run."""
 
     recording: str
     reason: str
@@ -72,7 +72,7 @@ class NewWarning(BaseModel):
 
 
 class Drift(BaseModel):
-    """A parameter of a device that has left the interval that its earlier recordings give."""
+    """A parameter of a device outside the interval from its earlier recordings."""
 
     sensor: str
     device: str
@@ -87,7 +87,7 @@ class Drift(BaseModel):
 
 
 class First(BaseModel):
-    """The sensor that comes first for a requirement, where that has changed."""
+    """The best sensor for a requirement, if it has changed."""
 
     requirement: str
     sensor: str | None
@@ -96,22 +96,22 @@ class First(BaseModel):
 
 
 class Summary(BaseModel):
-    """What a nightly run found since the last one that succeeded.
+    """Changes since the last successful nightly run.
 
     Attributes
     ----------
     seconds : float
-        How long it took.
+        Duration of the run.
     since : datetime or None
         The end of the run that this one is compared with; None: there is none.
     recordings : int
-        How many there are in the tables.
+        Number of recordings in the tables.
     files : list of str
-        What became of the files in the drop zone, as lines.
+        Status of the files in the drop zone, as lines.
     put_right : list of str
-        What an earlier run left behind.
+        Repairs after an earlier run.
     failure : list of str
-        Why it failed: the last lines of its log.
+        Reason of a failure: the last lines of the log.
     """
 
     outcome: Outcome
@@ -139,10 +139,10 @@ class Summary(BaseModel):
 def compared(
     before: State | None, after: State, tables: RunRows, without: Iterable[str]
 ) -> dict[str, Any]:
-    """Return what is new in a state since the last successful run, as fields of the summary.
+    """Return the changes of a state since the last successful run, as fields of the summary.
 
-    `tables` are those that `after` is of; nothing is said of the recordings `without`, whose logs
-    were written to while they were read.
+    `tables` are the rows of the state `after`. The recordings `without` are left out: their logs
+    changed while they were read.
     """
     was = before or State(finished=after.finished)
     written_to = set(without)

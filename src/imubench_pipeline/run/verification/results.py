@@ -1,4 +1,4 @@
-"""Whether the results of runs are as they were left: each file, and all of them together."""
+"""Verify that the results of runs are unchanged and consistent with each other."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from imubench_pipeline.tables.seals import (
 )
 
 _SEALED_FOLDERS = ("recordings", "sensors", "tables", "simulated", "report", "exports")
-"""Folders in which every file has a seal, but for those that have a digest of their own."""
+"""Folders in which every file has a seal, except files with their own digest."""
 
 _SAMPLE_FILES = "log*.parquet"
 _NO_SEAL = "expected a seal of the step that left it, found none"
@@ -41,16 +41,16 @@ _NO_SEAL = "expected a seal of the step that left it, found none"
 
 @dataclass(frozen=True)
 class Fault:
-    """A file that is not as it was left.
+    """A file that was changed, or is missing or unexpected.
 
     Attributes
     ----------
     path : str
         Below the results.
     found : str
-        What was expected, and what is found.
+        The expected and the found state.
     mend : str
-        The command that has it made again, or what else is to be done.
+        The command that makes the file again, or another action.
     """
 
     path: str
@@ -60,7 +60,7 @@ class Fault:
 
 @dataclass
 class Results:
-    """What lies in a folder of results; `read` is told how many bytes were read."""
+    """The files in a folder of results; `read` is called with the number of bytes read."""
 
     folder: Path
     read: Callable[[int], None] = lambda _: None
@@ -84,7 +84,7 @@ class Results:
 
     @property
     def files(self) -> int:
-        """How many files have a seal."""
+        """Number of files with a seal."""
         return len(self._left)
 
     @cached_property
@@ -95,14 +95,14 @@ class Results:
             settings = json.loads((self.folder / "report/settings.json").read_text("utf-8"))
             config = [str(entry) for entry in settings["given"]]
         except (OSError, ValueError, KeyError, TypeError):
-            pass  # it is told that this file is damaged
+            pass  # `faults` reports that this file is damaged
         flags = ["--config", *config] if config else []
         own = has_snakefile(Path()) or not Path("config/config.yaml").is_file()
         called = ["snakemake", "-c2"] if own else ["imubench", "run", *(["--"] if flags else [])]
         return shlex.join([*called, *flags])
 
     def faults(self) -> Iterator[Fault]:
-        """Yield what is not as it was left, each file once."""
+        """Yield the changed files, each once."""
         named = set()
         for fault in self._every():
             if fault.path not in named:
@@ -110,7 +110,7 @@ class Results:
                 yield fault
 
     def waiting(self) -> list[str]:
-        """Return the steps that the next run does by itself: what they read was made anew since."""
+        """Return the steps that the next run repeats anyway, because their inputs are newer."""
         return [
             place
             for place in self._current
@@ -138,7 +138,7 @@ class Results:
             yield Fault(place, words, f"where no run goes on: rm -r {self._quoted(place)}")
 
     def _changed(self, place: str, seal: Seal) -> Iterator[Fault]:
-        """Yield the files of a step that are not those that it left."""
+        """Yield the changed outputs of a step."""
         left = any(os.path.lexists(self.folder / name) for name in seal.outputs)
         last = place in (f"{NIGHTS}/latest", f"{NIGHTS}/state")
         if not (left or last or place in self._current):
@@ -149,7 +149,7 @@ class Results:
             self.read(file.size)
 
     def _samples(self, path: Path) -> Iterator[Fault]:
-        """Yield the samples of a recording that are not those that the ingest left."""
+        """Yield the changed samples of a recording."""
         place = path.parent.relative_to(self.folder).as_posix()
         step, name = f"{place}/ingest", f"{place}/{path.name}"
         try:
@@ -177,7 +177,7 @@ class Results:
             yield Fault(f"{place}/{KNOWN}", words, self.run_again)
 
     def _own_digests(self) -> Iterator[Fault]:
-        """Yield the files with a digest of their own that are not as they were written."""
+        """Yield the changed files with their own digest."""
         own = [*self.folder.glob(f"recordings/*/*/{KNOWN}"), *self.folder.glob("faults/**/*.json")]
         for path in sorted(own):
             place = path.relative_to(self.folder).as_posix()
@@ -187,7 +187,7 @@ class Results:
                 yield Fault(place, f"expected what a run wrote, {_of(error)}", self._removed(place))
 
     def _of_others(self) -> Iterator[Fault]:
-        """Yield what was made of other files than those that are there, which are not newer."""
+        """Yield outputs made from inputs that differ from the present ones, and are not newer."""
         for place in self._current:
             others = [name for name, newer in self._others_now(self.seals[place]) if not newer]
             if others:
@@ -198,7 +198,7 @@ class Results:
                 yield Fault(first, words, self._mended(first, place))
 
     def _others_now(self, seal: Seal) -> list[tuple[str, bool]]:
-        """Return the inputs of a step that are others by now, and whether they are newer."""
+        """Return the changed inputs of a step, and whether they are newer."""
         made = min((file.changed for file in seal.outputs.values()), default=0)
         now = ((name, digest, self._left.get(name)) for name, digest in seal.inputs.items())
         return [
@@ -209,12 +209,12 @@ class Results:
 
     @cached_property
     def _left(self) -> dict[str, SealedFile]:
-        """What every step left, by its place."""
+        """Outputs of all steps, by path."""
         return {name: file for seal in self.seals.values() for name, file in seal.outputs.items()}
 
     @cached_property
     def _current(self) -> list[str]:
-        """The steps that the comparison stands on: not those of logs that were removed."""
+        """The steps that contribute to the comparison, without steps of removed logs."""
         by = {name: place for place, seal in self.seals.items() for name in seal.outputs}
         current: set[str] = set()
         todo = [place for place in self.seals if "/" not in place]
