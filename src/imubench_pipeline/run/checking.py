@@ -38,7 +38,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
 
 
 def _check_recording(plan: Plan, sensor: str, name: str, recording: Recording) -> Quality:
-    """Read a recording as the run would, and look for what it would find; nothing is kept."""
+    """Check a recording like a run, without storing results."""
     with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
         settings = plan.ingest_settings(sensor, name)
         quality = ingest_as_planned(
@@ -60,7 +60,7 @@ def findings_of_channel(
     `bandwidth`: cut-off of the sensor's own filter, where it is known, Hz.
     """
     if log.holes:
-        # Filling holes takes a model: that is the estimation's.
+        # Filling gaps needs a model, which only the estimation has.
         return [] if len(curve_of_channel(log, settings).tau) else [too_sparse(channel, log)]
     spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
     frame = select_for_fit(spectrum, line_spectra, bandwidth=bandwidth)

@@ -1,4 +1,4 @@
-"""Which workflow runs in a folder."""
+"""Find the workflow of a folder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def has_snakefile(folder: Path) -> bool:
 
 
 def snakefile_of(folder: Path) -> Path:
-    """Return the Snakefile of a folder: its own, or, of a folder of logs, that of this package.
+    """Return the Snakefile of a folder; for a folder of logs, the Snakefile of this package.
 
     Raises
     ------

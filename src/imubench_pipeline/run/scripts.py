@@ -1,4 +1,4 @@
-"""Runs the scripts of the rules; what one of them does to one recording ends nothing else."""
+"""Run the scripts of the rules; the failure of one recording does not end the run."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ _SCRIPT_SIGNATURE = signature(script_of_snakemake)
 
 
 class Scripts:
-    """Stands for Snakemake's own `script`, which a rule with a script calls.
+    """Replacement for the function `script` of Snakemake, which rules with a script call.
 
-    A rule with the parameter ``attempt`` is one of a recording or a sensor, which is left out
-    where its script fails. One that is killed, as the system does where memory is short, is run
-    once more. What the run as a whole must have fails as any script does, and so does a step that
-    is stopped with the run, meets a full disk, or cannot be imported.
+    A rule with the parameter ``attempt`` belongs to a recording or a sensor, which is left out if
+    its script fails. A killed script, for example for lack of memory, is run once more. Other
+    scripts fail as usual. A step also fails as usual if it is stopped with the run, the disk is
+    full, or it cannot be imported.
 
     Parameters
     ----------
     faults : Faults
-        Where it is recorded what failed.
+        Records of failures.
     limits : callable, optional
-        What a step of one recording or sensor may take; without, each failure ends the job.
+        Limits of a step of one recording or sensor; without them, each failure ends the job.
     """
 
     def __init__(self, faults: Faults, limits: Limits | None) -> None:
@@ -50,7 +50,7 @@ class Scripts:
         Parameters
         ----------
         *values, **named
-            What Snakemake gives its own function `script`, by whose signature they have names.
+            Arguments of the function `script` of Snakemake, named by its signature.
 
         Raises
         ------
@@ -82,7 +82,7 @@ class Scripts:
             raise
 
     def _bounded(self, job: Job, attempt: int, limits: Limits) -> None:
-        """Run a script; leave its outputs empty where its recording or sensor makes it fail."""
+        """Run a script; write empty outputs if its recording or sensor makes it fail."""
         of: Of = (job.name, job.wildcards["sensor"], job.wildcards.get("recording"))
         outputs = [Path(path) for path in job.output]
         if before := _find_earlier_failure(job.input, outputs[0].parent):
@@ -131,7 +131,7 @@ def _locate_script(given: SimpleNamespace) -> Path:
 
 
 def _find_earlier_failure(inputs: Any, folder: Path) -> Failure | None:
-    """Return which earlier step of the same recording failed, by the inputs of a job."""
+    """Return the failure of an earlier step of the same recording, from the inputs of a job."""
     own = (Path(path) for path in inputs if Path(path).parent == folder)
     return next((failure for path in own if (failure := failure_of(path))), None)
 

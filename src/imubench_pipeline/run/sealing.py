@@ -1,4 +1,4 @@
-"""Seals of what the steps of a run left, and which of it is to be made again."""
+"""Seal the outputs of steps, and find outputs that must be made again."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from imubench_pipeline.tables.seals import (
 
 @contextlib.contextmanager
 def sealed(job: Job) -> Iterator[None]:
-    """Seal what a job leaves when the block ends without error, with what it read.
+    """Seal the outputs and inputs of a job when the block ends without error.
 
     A job without ``results`` is not sealed.
     """
@@ -38,13 +38,13 @@ def sealed(job: Job) -> Iterator[None]:
 
 
 def settings_digest(params: Mapping[str, object]) -> str:
-    """Return a digest of the parameters of a job, how often it was tried apart."""
+    """Return a digest of the parameters of a job, without the number of its attempt."""
     settings = {name: value for name, value in params.items() if name != "attempt"}
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
 
 def left_by(step: str, outputs: Sequence[Path]) -> list[Path]:
-    """Return the files and folders that a step leaves, those among them that no rule can name."""
+    """Return the outputs of a step, including outputs that no rule can declare."""
     folder = outputs[0].parent
     if step == "report":  # as many pages as there are recordings
         return files_of_report(folder)

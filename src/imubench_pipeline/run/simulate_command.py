@@ -29,13 +29,13 @@ _MAX_SAMPLES = 1 << 36
 _MIN_EXPONENT_FORMAT = 1e15
 _MIN_REPORTED_FOLDING = 1.02
 _MIN_TEMPERATURE, _MAX_TEMPERATURE = -273.15, 1000.0
-"""degC that a sensor may have."""
+"""Range of sensor temperatures, degC."""
 _PROGRESS_INTERVAL = 3.0
 """Seconds between two lines of progress where there is no terminal."""
 
 
 _LOG_PATH_DEPTH = 2
-"""Names from the drop zone to a log: sensor and recording."""
+"""Path components from the drop zone to a log: sensor and recording."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -117,7 +117,10 @@ def _run(options: argparse.Namespace) -> None:
     _check_depth(out)
     if temperature is None and any(axis.drift for axis in origin.imu.axes.values()):
         origin.assume("drift", "no drift with temperature: none is given (--temperature)")
-    for text in (*_ended(duration, motion, temperature), *_folded(origin, rate)):
+    for text in (
+        *_list_short_files(duration, motion, temperature),
+        *_describe_aliasing(origin, rate),
+    ):
         origin.assume("log", text)
     if not motion:
         origin.assume("log", "at rest, and no gravity (--motion)")
@@ -127,9 +130,9 @@ def _run(options: argparse.Namespace) -> None:
     }
     assumed = [assumption.text for assumption in origin.assumed]
     remarks += [f"{name}: {line}" for name, lines in figures.items() for line in lines]
-    remarks += [f"assumed: {line}" for line in _short(assumed)]
+    remarks += [f"assumed: {line}" for line in _merge_lines(assumed)]
     print(f"{SIMULATED}: {samples:,} samples of {', '.join(columns)} at {rate:g} Hz")
-    print("\n".join(_short(remarks)), flush=True)
+    print("\n".join(_merge_lines(remarks)), flush=True)
     sensor_name = origin.sensor or Path(options.sensor).stem
     about = {
         "from": origin.source,
@@ -141,7 +144,9 @@ def _run(options: argparse.Namespace) -> None:
         "motion": None if options.motion is None else str(options.motion),
     }
     kind = "static" if not motion else "in_motion"
-    metadata = _metadata(sensor_name, out.path.stem, kind, rate, columns) | {"simulation": about}
+    metadata = _make_metadata(sensor_name, out.path.stem, kind, rate, columns) | {
+        "simulation": about
+    }
     # A name of its own in the stream: the same seed gives every sensor its own noise.
     blocks = simulate_imu(
         origin.imu,
@@ -155,7 +160,7 @@ def _run(options: argparse.Namespace) -> None:
     )
     # The notes are there before the log, which cannot be read without them.
     with out.replacing() as temporary:
-        with _progress(samples) as report:
+        with _show_progress(samples) as report:
             write_log(temporary, blocks, columns, form, metadata, remarks, report)
         notes.write(notes_text(out.path.name, form, log, f"from {origin.source}"))
     size = out.path.stat().st_size / 1e6
@@ -163,7 +168,7 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _check_depth(out: OutputFile) -> None:
-    """Raise `ConfigError` where a log among others would become a part of a recording."""
+    """Raise `ConfigError` if the log would become a part of another recording."""
     real = out.check()
     for place in out.places(real):
         logs = Path(os.path.realpath(place.path))
@@ -176,10 +181,10 @@ def _check_depth(out: OutputFile) -> None:
                 )
 
 
-def _metadata(
+def _make_metadata(
     sensor: str, recording: str, kind: str, rate: float, columns: list[str]
 ) -> dict[str, Any]:
-    """Return what a log says of itself, as one that was ingested does."""
+    """Return the metadata of a log, in the form of ingested logs."""
     return {
         "sensor": sensor,
         "device": "simulated",
@@ -331,10 +336,10 @@ def _section(path: Path, key: str) -> Any:
     return content.get(key, content) if isinstance(content, dict) else content
 
 
-def _ended(
+def _list_short_files(
     duration: float, motion: Mapping[str, Profile], temperature: Profile | None
 ) -> list[str]:
-    """Say which files end before the log."""
+    """List the files that do not cover the log."""
     from imubench_pipeline.simulate.profiles import FileColumn
 
     profiles = [*motion.values(), *([] if temperature is None else [temperature])]
@@ -349,8 +354,8 @@ def _ended(
     ]
 
 
-def _folded(origin: Origin, rate: float) -> list[str]:
-    """Say how much of the white noise beyond Nyquist sampling folds into the log."""
+def _describe_aliasing(origin: Origin, rate: float) -> list[str]:
+    """Describe the aliasing of white noise above the Nyquist frequency."""
     from imubench_pipeline.simulate.model import folding
 
     statements = []
@@ -364,8 +369,8 @@ def _folded(origin: Origin, rate: float) -> list[str]:
     return statements
 
 
-def _short(lines: list[str]) -> list[str]:
-    """Say once what holds for several channels."""
+def _merge_lines(lines: list[str]) -> list[str]:
+    """Merge equal lines of several channels."""
     channels: dict[str, list[str]] = {}
     for line in lines:
         name, colon, rest = line.partition(": ")
@@ -377,8 +382,8 @@ def _short(lines: list[str]) -> list[str]:
 
 
 @contextmanager
-def _progress(samples: int) -> Iterator[Callable[[int], None]]:
-    """Give what is told how many samples there are, and shows it."""
+def _show_progress(samples: int) -> Iterator[Callable[[int], None]]:
+    """Yield a function that shows the number of simulated samples."""
     if sys.stderr.isatty():
         from rich.console import Console
         from rich.progress import Progress

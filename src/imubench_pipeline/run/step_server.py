@@ -32,14 +32,14 @@ from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.findings import UnavailableError
 
-_LONGEST = 300
-"""Letters of an error in one line."""
+_MAX_ERROR_LENGTH = 300
+"""Max. length of an error in one line, characters."""
 
 
 def serve(requests: socket.socket) -> None:
     """Fork for each connection that comes through a socket, until the other end is closed.
 
-    A connection brings the job of a step, and is told how that ended.
+    A connection transfers the job of a step, and returns its outcome.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
     signal.signal(signal.SIGCHLD, _reap)
@@ -53,18 +53,18 @@ def serve(requests: socket.socket) -> None:
                 size = int.from_bytes(stream.read(8), "big")
                 job: Job = pickle.loads(stream.read(size))
             if job.script not in ready:
-                ready[job.script] = _import_what_it_needs(job.script)
+                ready[job.script] = _import_modules_of(job.script)
             # Until a fork is known, that it has ended must not be heard of.
-            signal.pthread_sigmask(signal.SIG_BLOCK, _ENDED)
+            signal.pthread_sigmask(signal.SIG_BLOCK, _CHILD_SIGNALS)
             fork = os.fork()
             if fork == 0:
                 requests.close()
                 _run(connection, job, imported=ready[job.script])
             _running[fork] = connection.dup()
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDED)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _CHILD_SIGNALS)
 
 
-_ENDED = {signal.SIGCHLD}
+_CHILD_SIGNALS = {signal.SIGCHLD}
 
 _running: dict[int, socket.socket] = {}
 """The connection of each fork, by its process."""
@@ -90,7 +90,7 @@ def _message(how: bytes, details: Mapping[str, Any]) -> bytes:
     return how + len(text).to_bytes(LENGTH, "big") + text
 
 
-def _import_what_it_needs(script: Path) -> bool:
+def _import_modules_of(script: Path) -> bool:
     """Import what a script does; return whether that was possible."""
     try:
         runpy.run_path(str(script), run_name="imports")
@@ -118,7 +118,7 @@ def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
             other.close()
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDED)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _CHILD_SIGNALS)
         if sys.platform == "linux":
             _end_with_who_asked(connection)
             Path("/proc/self/comm").write_text(job.name)  # for ps and top
@@ -134,7 +134,7 @@ def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
     except BaseException as error:
         if not isinstance(error, UnavailableError):  # of the surroundings: its text says it all
             details["trace"] = _trace(error, str(job.script))
-        details["error"] = one_line(describe_error(error), _LONGEST)
+        details["error"] = one_line(describe_error(error), _MAX_ERROR_LENGTH)
         if isinstance(error, MemoryError):
             details["error"] += f"; limits.memory allows {(job.memory or 0) // 10**6} MB"
         details["errno"] = error.errno if isinstance(error, OSError) else None
