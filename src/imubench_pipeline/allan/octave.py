@@ -77,7 +77,7 @@ def _find_level(sizes: Integers) -> Integers:
 class OctaveSums:
     """Sums of squared differences of cluster means of one segment of a log.
 
-    The sizes, shape (m,), are those of `octave_sizes`; the sums have the same bits for any number
+    The sizes, shape (m,), equal `octave_sizes`; the sums have the same bits for any number
     of threads. With ``holes`` samples may be missing (NaN); ``gaps`` are the lengths of the gaps.
 
     Attributes

@@ -1,4 +1,4 @@
-"""List the figures that vendors publish, and those that users must measure."""
+"""List the figures that vendors publish, and the figures that users must measure."""
 
 from __future__ import annotations
 

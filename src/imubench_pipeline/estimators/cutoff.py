@@ -128,7 +128,7 @@ class Cutoff:
 
     @property
     def beside(self) -> float:
-        """Power of the white noise added after the filter, less rounding, over that of N."""
+        """Ratio of the white noise added after the filter, without rounding, to N, in power."""
         N = self.N.in_model
         if self.behind is None or not N:
             return 0.0

@@ -4,7 +4,7 @@ An apparent random walk may be a drift with temperature or time (`describe_drift
 drift with a few turning points in the log has its power in the lowest cosines of the transform, and
 so has a weak random walk. Above them the spectrum of the drift falls as f^-4, and the spectrum of
 the walk as f^-2. A walk is therefore accepted if the model still needs it without the lowest
-cosines, and if the spectrum is not steeper than that of a walk.
+cosines, and if the spectrum is not steeper than a random walk.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 
 _DELTA_BIC_AGAINST_PAPERS = 6.0
-"""BIC of the papers' model over that of the best model above which its values are doubtful."""
+"""BIC difference to the best model above which values of the papers' model are doubtful."""
 
 _DELTA_AIC_WITHOUT_WALK = 2.5
 """Advantage in AIC of a model without a random walk at which K is doubtful.

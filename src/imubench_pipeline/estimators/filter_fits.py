@@ -52,7 +52,7 @@ _CORRELATION_RANGE = (1e2, 1e5)
 """Shortest and longest correlation time of slow noise, sampling intervals."""
 
 _MIN_CORRELATION_RATIO = 4.0
-"""Minimum correlation time of slow noise over that of the filter, 1 / (2 pi f_c)."""
+"""Minimum ratio of the correlation time of slow noise to the filter's, 1 / (2 pi f_c)."""
 
 _MAX_FILTER_SAMPLES, MIN_PROCESS_SAMPLES = 2.0, 10.0
 """Limits of the correlation in sampling intervals, 1 / (2 pi f_c T).

@@ -72,7 +72,7 @@ class FitSelection:
         return self._whittle(spectrum, self.used, SHAPES)
 
     def likelihood_of_all_bins(self, spectrum: Spectrum) -> Whittle:
-        """Return the likelihood over all bins, including those that are not fitted."""
+        """Return the likelihood over all bins, including bins that are not fitted."""
         return self._whittle(spectrum, np.ones(len(self.used), dtype=np.bool_), COARSE)
 
     def _whittle(self, spectrum: Spectrum, bins: Mask, shapes: int) -> Whittle:

@@ -1,6 +1,6 @@
 """Cramér-Rao bounds of a noise model's parameters, and the log duration that they require.
 
-The information matrix is that of the Whittle likelihood: I_ij = 1/2 sum_k nu_k d_i log S_k
+The information matrix of the Whittle likelihood is I_ij = 1/2 sum_k nu_k d_i log S_k
 d_j log S_k, with nu_k ordinates in bin k and S_k the density (P. Whittle, Ark. Mat. 2, 1953).
 """
 

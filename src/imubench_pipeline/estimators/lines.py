@@ -90,7 +90,7 @@ class Line:
     amplitude, amplitude_lower, amplitude_upper : float
         Omega_0, rad/s or m/s², with 95 % limits.
     ratio : float
-        Its highest density over that of the noise there.
+        Its ratio of the highest density to the noise there.
     false_alarm : float
         Probability of such a ratio anywhere in the spectrum of a channel without lines.
     width : float

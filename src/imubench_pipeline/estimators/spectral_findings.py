@@ -16,7 +16,7 @@ from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
 _MIN_SINUSOID_RATIO = 0.5
-"""Integral of a sinusoid over that of white noise after 1 s, above which it is reported."""
+"""Ratio of the integrals of a sinusoid and of white noise after 1 s, above which it is reported."""
 
 _MAX_SLOW_FREQUENCY = 0.05
 """Frequency over sampling rate up to which the test for missing slow noise extends."""

@@ -234,7 +234,7 @@ def estimate(
     Returns
     -------
     Estimates
-        For a log with the same names as in a run, the numbers are those of the run.
+        For a log with the same names as in a run, the numbers equal the run's.
 
     Raises
     ------

@@ -7,9 +7,12 @@ from typing import Annotated
 from imubench_pipeline.model.table import (
     ChannelRow,
     Column,
+    LowerLimit,
     OfRecordingRow,
     SensorRow,
     TableRow,
+    Unit,
+    UpperLimit,
     table,
 )
 
@@ -18,7 +21,7 @@ from imubench_pipeline.model.table import (
 class DriftRow(SensorRow):
     """A row of the table ``drift``."""
 
-    device: Annotated[str, Column("of which the recordings are compared")]
+    device: Annotated[str, Column("whose recordings are compared")]
     channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
     parameter: Annotated[
         str,
@@ -28,9 +31,9 @@ class DriftRow(SensorRow):
     position: Annotated[int, Column("place in the order of the device's recordings, from 1")]
     started: Annotated[str | None, Column("date and time of the first sample, where known")] = None
     value: Annotated[float | None, Column("estimate of this recording", "as in unit")] = None
-    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
-    unit: Annotated[str, Column("SI unit")]
+    lower: LowerLimit = None
+    upper: UpperLimit = None
+    unit: Unit
     expected: Annotated[
         float | None,
         Column("what the earlier recordings let one expect", "as in unit"),
@@ -69,8 +72,8 @@ class PooledRow(SensorRow):
         float | None,
         Column("lower 95 % limit, the spread between recordings included", "as in unit"),
     ] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
-    unit: Annotated[str, Column("SI unit")]
+    upper: UpperLimit = None
+    unit: Unit
     spread: Annotated[
         float | None,
         Column("standard deviation between recordings", "as in unit"),
@@ -212,7 +215,7 @@ class ErrorBudgetRow(OfRecordingRow):
         float | None,
         Column("largest standard deviation that is allowed", "as in unit"),
     ] = None
-    unit: Annotated[str, Column("SI unit")]
+    unit: Unit
     reached_after: Annotated[
         float | None,
         Column("time after which the limit is reached; null: never", "s"),
@@ -263,9 +266,9 @@ class RankingRow(TableRow):
         float | None,
         Column("standard deviation of the error, of the next specimen", "as in unit"),
     ] = None
-    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
-    unit: Annotated[str, Column("SI unit")]
+    lower: LowerLimit = None
+    upper: UpperLimit = None
+    unit: Unit
     margin: Annotated[float | None, Column("limit over sigma")] = None
     chance: Annotated[
         float | None,
@@ -378,7 +381,7 @@ class ShortlistRow(TableRow):
         Column("limit over error by its logs: see the table ranking"),
     ] = None
     measured_verdict: Annotated[str | None, Column("as of the table ranking")] = None
-    assumed: Annotated[str | None, Column("what is not printed, and what stands for it")] = None
+    assumed: Annotated[str | None, Column("unprinted figures, and the values assumed")] = None
     reason: Annotated[str | None, Column("what it lacks, or why it is not judged")] = None
 
 
@@ -388,7 +391,7 @@ class FusionRow(TableRow):
 
     quantity: Annotated[str, Column("gyro or accel")]
     tau: Annotated[float, Column("averaging time at which they are compared", "s")]
-    sensor: Annotated[str, Column("of which several are averaged")]
+    sensor: Annotated[str, Column("several of these are averaged")]
     recording: Annotated[str | None, Column("that answers for it: of its median channel")] = None
     channel: Annotated[str | None, Column("that answers")] = None
     simulated: Annotated[bool | None, Column("that recording is simulated")] = None
@@ -405,7 +408,7 @@ class FusionRow(TableRow):
         float | None,
         Column("part of the variance that temperature adds: common"),
     ] = None
-    other: Annotated[str, Column("sensor of which one is to be equalled")]
+    other: Annotated[str, Column("sensor to be matched")]
     other_recording: Annotated[str | None, Column("that answers for it")] = None
     other_channel: Annotated[str | None, Column("that answers")] = None
     other_simulated: Annotated[bool | None, Column("that one is simulated")] = None
@@ -432,7 +435,7 @@ class GradeRow(TableRow):
     """A row of the table ``grades``."""
 
     quantity: Annotated[str, Column("gyro or accel")]
-    sensor: Annotated[str, Column("of which several are averaged")]
+    sensor: Annotated[str, Column("several of these are averaged")]
     recording: Annotated[str, Column("that answers for it: of its middle channel")]
     channel: Annotated[str, Column("that answers")]
     simulated: Annotated[bool, Column("that recording is simulated")]
@@ -504,7 +507,7 @@ class NavigationRow(SensorRow):
     position_predicted: Annotated[float | None, Column("rms that the filter expects", "m")] = None
     position_ratio: Annotated[
         float | None,
-        Column("rms over that of the true model on the same signals"),
+        Column("rms relative to the true model on the same signals"),
     ] = None
     position_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     position_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
@@ -520,7 +523,7 @@ class NavigationRow(SensorRow):
     velocity_predicted: Annotated[float | None, Column("rms that the filter expects", "m/s")] = None
     velocity_ratio: Annotated[
         float | None,
-        Column("rms over that of the true model on the same signals"),
+        Column("rms relative to the true model on the same signals"),
     ] = None
     velocity_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     velocity_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
@@ -536,7 +539,7 @@ class NavigationRow(SensorRow):
     heading_predicted: Annotated[float | None, Column("rms that the filter expects", "rad")] = None
     heading_ratio: Annotated[
         float | None,
-        Column("rms over that of the true model on the same signals"),
+        Column("rms relative to the true model on the same signals"),
     ] = None
     heading_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     heading_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None

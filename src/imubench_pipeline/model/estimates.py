@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from imubench_pipeline.model.table import ChannelRow, Column, OfRecordingRow, table
+from imubench_pipeline.model.table import (
+    ChannelRow,
+    Column,
+    Estimate,
+    EstimateReason,
+    EstimateStatus,
+    EstimateUnit,
+    FittedValue,
+    LowerLimit,
+    OfRecordingRow,
+    Unit,
+    UpperLimit,
+    table,
+)
 
 
 @table("allan")
@@ -22,7 +35,7 @@ class AllanRow(ChannelRow):
     ] = None
     edf_upper: Annotated[
         float | None,
-        Column("those of the upper 95 % limit: more where few clusters remain"),
+        Column("degrees of freedom of the upper 95 % limit: more where few clusters remain"),
     ] = None
     edf_source: Annotated[
         str,
@@ -61,23 +74,17 @@ class ParameterRow(ChannelRow):
             "0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)",
         ),
     ]
-    value: Annotated[
-        float | None,
-        Column("estimate; null where status says why", "as in unit"),
-    ] = None
-    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
-    unit: Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
-    status: Annotated[str, Column("ok, doubtful, not_shown, at_bound, not_identified or absent")]
-    reason: Annotated[str | None, Column("why there is no plain value")] = None
+    value: Estimate = None
+    lower: LowerLimit = None
+    upper: UpperLimit = None
+    unit: EstimateUnit
+    status: EstimateStatus
+    reason: EstimateReason = None
     duration_needed: Annotated[
         float | None,
         Column("length of a log that gives the value to 10 %", "s"),
     ] = None
-    fitted: Annotated[
-        float | None,
-        Column("what the model has where there is no value; no estimate", "as in unit"),
-    ] = None
+    fitted: FittedValue = None
 
 
 @table("models")
@@ -117,7 +124,7 @@ class LineRow(ChannelRow):
     amplitude: Annotated[float, Column("of the sinusoid", "rad/s or m/s^2")]
     amplitude_lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
     amplitude_upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
-    ratio: Annotated[float | None, Column("highest density over that of the noise")] = None
+    ratio: Annotated[float | None, Column("ratio of the highest density to the noise")] = None
     false_alarm: Annotated[
         float | None,
         Column("chance of one like it in a channel without lines"),
@@ -201,19 +208,13 @@ class TemperatureRow(ChannelRow):
         str,
         Column("T_0 (mean temperature), sensitivity, quadratic, lag, bias (at T_0)"),
     ]
-    value: Annotated[
-        float | None,
-        Column("estimate; null where status says why", "as in unit"),
-    ] = None
-    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
-    unit: Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
-    status: Annotated[str, Column("ok, doubtful, not_shown, at_bound, not_identified or absent")]
-    reason: Annotated[str | None, Column("why there is no plain value")] = None
-    fitted: Annotated[
-        float | None,
-        Column("what the model has where there is no value; no estimate", "as in unit"),
-    ] = None
+    value: Estimate = None
+    lower: LowerLimit = None
+    upper: UpperLimit = None
+    unit: EstimateUnit
+    status: EstimateStatus
+    reason: EstimateReason = None
+    fitted: FittedValue = None
 
 
 @table("allan_compensated")
@@ -233,7 +234,7 @@ class CompensatedAllanRow(ChannelRow):
     ] = None
     edf_upper: Annotated[
         float | None,
-        Column("those of the upper 95 % limit: more where few clusters remain"),
+        Column("degrees of freedom of the upper 95 % limit: more where few clusters remain"),
     ] = None
     edf_source: Annotated[
         str,
@@ -252,25 +253,19 @@ class LowPassRow(ChannelRow):
     kind: Annotated[str | None, Column("analogue, bilinear or boxcar; null: none shows")] = None
     order: Annotated[
         int | None,
-        Column("of the filter: 1, or that of Butterworth; null: none shows"),
+        Column("order of the filter: 1, or of a Butterworth; null: no filter found"),
     ] = None
     parameter: Annotated[
         str,
         Column("cutoff (-3 dB), floor (white noise that does not pass the filter)"),
     ]
-    value: Annotated[
-        float | None,
-        Column("estimate; null where status says why", "as in unit"),
-    ] = None
-    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
-    unit: Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
-    status: Annotated[str, Column("ok, doubtful, not_shown, at_bound, not_identified or absent")]
-    reason: Annotated[str | None, Column("why there is no plain value")] = None
-    fitted: Annotated[
-        float | None,
-        Column("what the model has where there is no value; no estimate", "as in unit"),
-    ] = None
+    value: Estimate = None
+    lower: LowerLimit = None
+    upper: UpperLimit = None
+    unit: EstimateUnit
+    status: EstimateStatus
+    reason: EstimateReason = None
+    fitted: FittedValue = None
 
 
 @table("reconstruction")
@@ -392,7 +387,7 @@ class BacktestRow(ChannelRow):
         float | None,
         Column("lower 95 % limit, by the models drawn", "as in unit"),
     ] = None
-    predicted_upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    predicted_upper: UpperLimit = None
     ratio: Annotated[float | None, Column("measured over predicted")] = None
     ratio_lower: Annotated[
         float | None,
@@ -408,7 +403,7 @@ class BacktestRow(ChannelRow):
         bool | None,
         Column("1.1 times the prediction or more, sure at 1 % for all rows of the recording"),
     ] = None
-    unit: Annotated[str, Column("SI unit")]
+    unit: Unit
     taken_out: Annotated[
         str | None,
         Column("in the log, not in the model: kinds of deterministic"),
@@ -447,8 +442,8 @@ class DeterministicRow(ChannelRow):
     start: Annotated[float, Column("of the part that has it, from the first sample", "s")]
     end: Annotated[float, Column("its end; of a step both are its place", "s")]
     size: Annotated[float, Column("of a step; of a warm-up at its start; amplitude", "as in unit")]
-    size_lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
-    size_upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    size_lower: LowerLimit = None
+    size_upper: UpperLimit = None
     unit: Annotated[str, Column("SI unit of the sizes")]
     time: Annotated[
         float | None,
@@ -513,4 +508,4 @@ class ErrorGrowthRow(OfRecordingRow):
     sigma: Annotated[float, Column("standard deviation", "as in unit")]
     lower: Annotated[float | None, Column("lower 95 % limit of a total", "as in unit")] = None
     upper: Annotated[float | None, Column("upper 95 % limit of a total", "as in unit")] = None
-    unit: Annotated[str, Column("SI unit")]
+    unit: Unit

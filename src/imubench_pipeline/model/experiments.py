@@ -4,14 +4,25 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from imubench_pipeline.model.table import Column, OfRecordingRow, SensorRow, table
+from imubench_pipeline.model.table import (
+    Column,
+    Estimate,
+    EstimateReason,
+    EstimateUnit,
+    LowerLimit,
+    OfRecordingRow,
+    SensorRow,
+    TurnedGyro,
+    UpperLimit,
+    table,
+)
 
 
 @table("earth_rate")
 class EarthRateRow(OfRecordingRow):
     """A row of the table ``earth_rate``."""
 
-    channel: Annotated[str, Column("the gyro that was turned")]
+    channel: TurnedGyro
     part: Annotated[str, Column("whole, or the last minutes of the recording")]
     method: Annotated[
         str,
@@ -21,13 +32,10 @@ class EarthRateRow(OfRecordingRow):
         ),
     ]
     parameter: Annotated[str, Column("earth_rate")]
-    value: Annotated[
-        float | None,
-        Column("estimate; null where status says why", "as in unit"),
-    ] = None
-    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
-    unit: Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
+    value: Estimate = None
+    lower: LowerLimit = None
+    upper: UpperLimit = None
+    unit: EstimateUnit
     status: Annotated[
         str,
         Column(
@@ -35,7 +43,7 @@ class EarthRateRow(OfRecordingRow):
             "no_model, too_short or not_shown",
         ),
     ]
-    reason: Annotated[str | None, Column("why there is no plain value")] = None
+    reason: EstimateReason = None
     sigma: Annotated[
         float | None,
         Column("standard deviation of value, by the noise model", "rad/s"),
@@ -79,7 +87,7 @@ class EarthRateRow(OfRecordingRow):
 class EarthRateSeriesRow(OfRecordingRow):
     """A row of the table ``earth_rate_series``."""
 
-    channel: Annotated[str, Column("the gyro that was turned")]
+    channel: TurnedGyro
     part: Annotated[str, Column("whole, or the last minutes of the recording")]
     method: Annotated[
         str,
@@ -104,7 +112,7 @@ class EarthRateSeriesRow(OfRecordingRow):
 class TurningRow(OfRecordingRow):
     """A row of the table ``turning``."""
 
-    channel: Annotated[str, Column("the gyro that was turned")]
+    channel: TurnedGyro
     what: Annotated[str, Column("dwell, turn, knock, or a doubt about the whole")]
     number: Annotated[int | None, Column("in order, from 1")] = None
     start: Annotated[float | None, Column("from the first sample of the recording", "s")] = None
@@ -124,7 +132,7 @@ class TurningRow(OfRecordingRow):
 class EarthRatePredictionRow(OfRecordingRow):
     """A row of the table ``earth_rate_prediction``."""
 
-    channel: Annotated[str, Column("the gyro that was turned")]
+    channel: TurnedGyro
     of: Annotated[
         str,
         Column("goal: what it takes; time: as a run grows; dwell: a run divided in dwells"),
@@ -151,7 +159,7 @@ class EarthRatePredictionRow(OfRecordingRow):
 class EarthRatePublishedRow(OfRecordingRow):
     """A row of the table ``earth_rate_published``."""
 
-    channel: Annotated[str, Column("the gyro that was turned")]
+    channel: TurnedGyro
     part: Annotated[str, Column("whole, or the last minutes of the recording")]
     place: Annotated[str, Column("of the source")]
     printed: Annotated[str, Column("as printed, with its unit")]
@@ -195,18 +203,15 @@ class CalibrationRow(OfRecordingRow):
             "earth_rate, heading",
         ),
     ]
-    value: Annotated[
-        float | None,
-        Column("estimate; null where status says why", "as in unit"),
-    ] = None
-    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
-    unit: Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
+    value: Estimate = None
+    lower: LowerLimit = None
+    upper: UpperLimit = None
+    unit: EstimateUnit
     status: Annotated[
         str,
         Column("ok; not_observable: the run cannot tell it; no_model, too_short or not_shown"),
     ]
-    reason: Annotated[str | None, Column("why there is no plain value")] = None
+    reason: EstimateReason = None
     sigma: Annotated[
         float | None,
         Column("standard deviation of value: noise and direction", "as in unit"),

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from imubench_pipeline.model.table import ChannelRow, Column, SensorRow, TableRow, table
+from imubench_pipeline.model.table import (
+    ChannelRow,
+    Column,
+    LowerLimit,
+    SensorRow,
+    TableRow,
+    UpperLimit,
+    table,
+)
 
 
 @table("coverage")
@@ -101,9 +109,9 @@ class PublishedFigureRow(ChannelRow):
     place: Annotated[str, Column("table of the source")]
     figure: Annotated[str, Column("its name there")]
     printed: Annotated[str, Column("as printed, with its unit")]
-    of: Annotated[str, Column("log or datasheet: what it says something of")]
+    of: Annotated[str, Column("log or datasheet: the subject of the figure")]
     parameter: Annotated[str, Column("N, B, bias or sensitivity")]
-    means: Annotated[float, Column("what it stands for as that parameter", "as in unit")]
+    means: Annotated[float, Column("value as that parameter", "as in unit")]
     unit: Annotated[str, Column("SI unit of the numbers")]
     truth: Annotated[float | None, Column("of the simulation", "as in unit")] = None
     curve: Annotated[
@@ -114,8 +122,8 @@ class PublishedFigureRow(ChannelRow):
         float | None,
         Column("as the recommended method estimates it of that log", "as in unit"),
     ] = None
-    lower: Annotated[float | None, Column("lower 95 % limit", "as in unit")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "as in unit")] = None
+    lower: LowerLimit = None
+    upper: UpperLimit = None
     datasheet: Annotated[
         float | None,
         Column("of the sensor file, in the convention of N and B", "as in unit"),

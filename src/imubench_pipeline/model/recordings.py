@@ -67,7 +67,7 @@ class DoubtRow(OfRecordingRow):
     parameters: Annotated[str | None, Column("on which it bears; null: on all")] = None
     factor: Annotated[
         float | None,
-        Column("by which it may change a value, where that is known"),
+        Column("possible change of a value, where known"),
     ] = None
     start: Annotated[
         float | None,

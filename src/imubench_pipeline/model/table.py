@@ -6,7 +6,7 @@ A class is declared with `table`; each field is a column, with its meaning and u
     class RecordingRow(TableRow):
         rate: Annotated[float | None, Column("sampling rate used", "Hz")] = None
 
-The type of a field is that of its column; a column that may be null has a type with ``None``.
+The type of a field sets the type of its column; a column that may be null has a type with ``None``.
 """
 
 from __future__ import annotations
@@ -50,6 +50,22 @@ class Column:
     meaning: str
     unit: str = "-"
     single: bool = False
+
+
+# Columns that several tables have.
+LowerLimit = Annotated[float | None, Column("lower 95 % limit", "as in unit")]
+UpperLimit = Annotated[float | None, Column("upper 95 % limit", "as in unit")]
+Estimate = Annotated[float | None, Column("estimate; null where status says why", "as in unit")]
+Unit = Annotated[str, Column("SI unit")]
+EstimateUnit = Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
+EstimateReason = Annotated[str | None, Column("why there is no plain value")]
+FittedValue = Annotated[
+    float | None, Column("what the model has where there is no value; no estimate", "as in unit")
+]
+EstimateStatus = Annotated[
+    str, Column("ok, doubtful, not_shown, at_bound, not_identified or absent")
+]
+TurnedGyro = Annotated[str, Column("the gyro that was turned")]
 
 
 @dataclass(frozen=True, slots=True)

@@ -201,7 +201,7 @@ class NoiseModel:
     def state_space(self, rate: float, longest: float = _MAX_FLICKER_TAU) -> StateSpace:
         """Return the discrete state space with exact noise covariances.
 
-        The states are those of the terms in their order; N is the measurement noise (Maia et
+        The states follow the order of the terms; N is the measurement noise (Maia et
         al., eq. 18-23; the printed first entry of Q_d, S_B T, is an approximation).
 
         Parameters

@@ -86,7 +86,7 @@ def sigma_range(
 def drawn_from_covariance(
     model: NoiseModel, names: Sequence[str], covariance: Array, draws: int, rng: np.random.Generator
 ) -> list[NoiseModel]:
-    """Return noise models with jointly log-normal parameters about those of a model.
+    """Return noise models with jointly log-normal parameters around a model.
 
     Parameters
     ----------

@@ -163,7 +163,7 @@ def draw_block_sums(
 def _propagate_block(
     p: float, drive: float, width: int
 ) -> tuple[float, float, float, float, float]:
-    """Return the coefficients by which a block changes the state and its sum.
+    """Return the coefficients of a block for the state and its sum.
 
     Factors of the state before the block in the state after it and in the sum; then the noise of
     the state, the noise of the sum that is common with it, and the independent noise of the sum.

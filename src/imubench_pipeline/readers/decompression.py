@@ -84,7 +84,7 @@ def _count_part(parts: int, size: int) -> int:
 
 
 class _GzipDecompressor:
-    """Decompressor of one member of gzip, with the interface of those of bz2 and lzma."""
+    """Decompressor of one member of gzip, with the interface of bz2 and lzma."""
 
     def __init__(self) -> None:
         self._inflate = zlib.decompressobj(zlib.MAX_WBITS | 16)

@@ -31,7 +31,7 @@ NOTHING_STATED = LogFormat.model_validate(
 
 @dataclass(frozen=True, kw_only=True)
 class Signature:
-    """Features by which a format is recognised: contents only, never the name of a file."""
+    """Features that identify a format: contents only, never the name of a file."""
 
     begins: tuple[bytes, ...] = ()
     """A file that begins with one of these byte strings has the format."""

@@ -1,4 +1,4 @@
-"""Find the units that logs state, and compare them with those of the sensor file."""
+"""Find the units that logs state, and compare them with the sensor file."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class Recording:
         alone = self.simulated or _holds_itself(self.path)
         try:
             logs = [self.path] if alone else log_files(self.path)
-        except OSError:  # the ingest meets it again, and says so
+        except OSError:  # the ingest meets the same error, and reports it
             logs = [self.path]
         return logs + ([self.notes] if self.notes else [])
 
@@ -295,7 +295,7 @@ def _fault(path: Path, name: str) -> str | None:
         if is_endless(path):
             return f"{shown} is neither a file nor a folder; expected a log"
         files = log_files(path)
-    except OSError:  # the ingest meets it again, and says so
+    except OSError:  # the ingest meets the same error, and reports it
         return None
     if not files:
         return f"the folder {shown} has no files"

@@ -17,7 +17,7 @@ _MAX_GRID_DISTANCE = 0.48
 is ambiguous."""
 
 _TRACKING_GAIN = 0.02
-"""Gain of the loop by which the grid follows the stamps. The gain for its interval is a quarter of
+"""Gain of the loop that makes the grid follow the stamps. The gain for its interval is a quarter of
 the square (critical damping)."""
 
 _MIN_DOUBLE_STEP, _MAX_DOUBLE_STEP = 1.75, 2.2

@@ -60,8 +60,9 @@ Progress = Callable[[str], None]
 def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[str]:
     """Write the pages of the report whose data changed, and remove those that are no more.
 
-    A page that cannot be made says so in its place, is named in `Site.failed`, and is made again
-    by the next call. ``say`` is told what is being written; returned is what was, below the folder.
+    A page that fails is replaced by one with the reason, is named in `Site.failed`, and is made
+    again by the next call. ``say`` gets each path before it is written; the function returns the
+    written paths, below the folder.
     """
     written = []
     for path, content in (_assets() | _search(site)).items():

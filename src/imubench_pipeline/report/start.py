@@ -226,7 +226,7 @@ def _basis(site: Site, row: RankingRow) -> str:
     if row.spread is not None:
         text += f" Spread: {spread_words(row)}."
     doubts = list(dict.fromkeys(finding.finding for finding in chosen.warnings))
-    if row.recordings > 1:  # those of all of them
+    if row.recordings > 1:  # of all recordings
         text += f" Doubts: {row.doubts}." if row.doubts else ""
     elif doubts:
         text += f" Doubts: {', '.join(term(name).name for name in doubts)}."

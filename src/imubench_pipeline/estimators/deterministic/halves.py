@@ -19,7 +19,7 @@ _MIN_BLOCKS = 256
 """Blocks that a part needs to be halved."""
 
 _POWER_RATIOS = np.concatenate(([0.0], np.geomspace(1e-4, 1e4, 241)))
-"""Grid of the slow power of a half, relative to that of the whole log."""
+"""Grid of the ratio of slow power in a half of the log to the whole log."""
 
 _WHITE_ROUNDS = 4
 _MIN_WHITE_RATIO = 0.1
@@ -38,7 +38,7 @@ class Halves:
     of: Literal["K", "slow noise"]  # the random walk, or all terms but the white noise together
     first: float
     second: float
-    """Amplitude of the slow noise of each half over that of the whole log."""
+    """Ratio of the slow-noise amplitude in each half to the whole log."""
     ratio: float  # twice the log likelihood ratio of two values against one
     begin: float
     middle: float

@@ -35,7 +35,7 @@ _MIN_WEIGHT = 0.05
 """Weight of an ordinate that the regressors explain almost completely."""
 
 _WALK_GRID = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
-"""Grid of K: square root of the density at the lowest frequency over that of the other noise."""
+"""Grid of K: root of the density ratio of random walk to other noise at the lowest frequency."""
 
 _FITTED_WALK_FACTORS = np.geomspace(0.6, 1.6, 9)
 """Grid of K, relative to the fitted K."""

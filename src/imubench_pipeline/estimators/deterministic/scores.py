@@ -65,9 +65,9 @@ class Score:
 def find_best_scores(
     ordinates: Ordinates, fit: Fit, density: Array, *, smooth: bool = False
 ) -> Iterator[Score]:
-    """Yield the best additional regressor of each kind in each part, given those of a fit.
+    """Yield the best additional regressor of each kind in each part, given a fit.
 
-    ``density``, shape (k,), is that of the noise, SI²/Hz; ``smooth`` excludes steps and pulses.
+    ``density``, shape (k,): of the noise, SI²/Hz; ``smooth`` excludes steps and pulses.
     """
     weight = ordinates.weights(density)
     residual = ordinates.coefficient
@@ -91,7 +91,7 @@ def find_best_scores(
 class Gain:
     """Gain of log likelihood by additional regressors of one part, for given noise.
 
-    ``regressors`` are in the fit already; ``density``, shape (k,), is that of the noise, SI²/Hz.
+    ``regressors`` are in the fit already; ``density``, shape (k,): of the noise, SI²/Hz.
     """
 
     def __init__(

@@ -154,7 +154,7 @@ def polish(
 ) -> tuple[Regressor, ...]:
     """Optimise the place, time constant or frequency of one regressor.
 
-    ``density``, shape (k,), is that of the noise, SI²/Hz.
+    ``density``, shape (k,), is the density of the noise, SI²/Hz.
     """
     best = regressors[which]
     if best.kind in ("ramp", "pulse", "restart"):
@@ -303,7 +303,7 @@ def search(ordinates: Ordinates) -> SearchResult:
 def move_regressors(
     ordinates: Ordinates, searched: SearchResult, regressors: Sequence[Regressor]
 ) -> SearchResult:
-    """Return a result with moved regressors, without those that are then unnecessary."""
+    """Return a result with moved regressors, without unnecessary ones."""
     fit, gains = _eliminate(ordinates, ordinates.fit(regressors, searched.fit.density))
     return replace(searched, fit=fit, gains=gains)
 

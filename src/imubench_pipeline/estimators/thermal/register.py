@@ -10,7 +10,7 @@ everywhere, and the errors of the levels between jumps too small.
 
 Long stays in one cell of the register have larger errors (`find_cell_stays`). A path that varies as
 elsewhere would have left the cell. During such a stay it varies less, and may be near an edge
-throughout. This error does not average out, unlike that of a varying path.
+throughout. This error does not average out, unlike the error of a varying path.
 """
 
 from __future__ import annotations

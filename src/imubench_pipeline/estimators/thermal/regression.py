@@ -226,7 +226,7 @@ class Regressors:
         """Return the spectrum (of the bins used) less the effect of temperature.
 
         The degrees of freedom of the fit are subtracted from the ordinates of each bin, so that the
-        density stays unbiased. ``weights``: as for `at`, those of the fit.
+        density stays unbiased. ``weights``: of the fit, as for `at`.
         """
         products = self.products(regression.lag)
         p = self.thermal

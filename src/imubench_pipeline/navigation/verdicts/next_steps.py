@@ -1,4 +1,4 @@
-"""Recommend the next steps: those that would change or strengthen the most verdicts."""
+"""Recommend the next steps that would change or strengthen the most verdicts."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class _Step:
 
 
 def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
-    """Return the rows of the table ``next_steps``, those that change most verdicts first."""
+    """Return the rows of the table ``next_steps``, sorted by the number of changed verdicts."""
     groups: dict[tuple[Any, ...], list[_Step]] = {}
     for judgement in judged:
         if judgement.outside is None and not judgement.rests.lacking:

@@ -49,7 +49,7 @@ _MIN_SHARE_LOG_TWICE = 0.1
 
 
 _FINGERPRINT_FORMAT = ".8e"
-"""Nine digits, by which copies of a log are found."""
+"""Nine digits, to find copies of a log."""
 
 
 def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
@@ -232,7 +232,7 @@ _MIN_SHARED_CORRELATION = 0.45
 z, other sensors at rest below 0.03."""
 
 _CORRELATION_SIGMAS = 4.0
-"""Standard errors by which the correlation must exceed `_MIN_SHARED_CORRELATION`."""
+"""The correlation must exceed `_MIN_SHARED_CORRELATION` by this number of standard errors."""
 
 
 def shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:

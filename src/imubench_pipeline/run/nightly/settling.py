@@ -185,7 +185,7 @@ def _describe_transfer(partial: tuple[str, int, int], now: float) -> str:
 def writers(recordings: Mapping[str, Found]) -> dict[Path, str]:
     """Return the files of recordings that are open for writing, with their process.
 
-    Only accessible processes are checked: those of the user, or all for an administrator.
+    Only accessible processes are checked: the user's own, or all for an administrator.
     """
     looked_for = {real for recording in recordings.values() for real in _resolve_paths(recording)}
     writing: dict[Path, str] = {}
