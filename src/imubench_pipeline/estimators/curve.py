@@ -1,4 +1,4 @@
-"""Reading of N, K, B and T_B from the slopes of an Allan deviation (000 section 2.2, 003 eq. 2-5).
+"""Reading of N, K, B and T_B from the slopes of an Allan deviation (Maia et al., section 2.2).
 
 A parameter whose slope is not visible has no value, but a reason.
 """

@@ -1,4 +1,4 @@
-"""The papers' optimisation: weighted least squares of the Allan variance (000 section 3.2).
+"""Weighted least squares of the Allan variance (optimisation of Maia et al., section 3.2).
 
 For a given T_B the model is linear in S_N, S_B and S_K, which are found by non-negative least
 squares; the search is over T_B alone (variable projection).
@@ -61,7 +61,7 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
     C = sum_i w_i (variance_i - model(tau_i))^2 with
 
     - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, the variance of the Allan variance;
-    - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 as 000 eq. 25 prints it, whose dimension is
+    - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 (Maia et al., eq. 25), whose dimension is
       not that of the cost: the bottom of the curve counts less, which on these tau hardly hurts
       (`tests/papers/test_panel.py`). For the papers' figures.
 

@@ -1,9 +1,8 @@
-"""How well a model repeats the measured curve: its own curve, and logs simulated from it.
+"""Agreement of a model with the measured curve: of its own curve, and of simulated logs.
 
-One simulated log is one draw. Where few clusters are averaged its curve may be anywhere, so that
-the difference of one draw ranks no method (000 Table 3 does that). Scored are the curve of the
-model, and the distribution over many draws, each tau with a weight by how sure the measured curve
-is there.
+One simulated log is one draw. At long tau its curve scatters widely, so the difference of one draw
+ranks no method (Maia et al., Table 3, use one). The scores use the curve of the model, and the
+distribution over many draws. Each tau is weighted by the precision of the measured curve.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ class Scores:
     drawn_log10, drawn_log10_lower, drawn_log10_upper : float
         ``rms_log10`` of single draws.
     whole, whole_lower, whole_upper : float
-        RMS of single draws with equal weights up to the longest tau, as in 000 Table 3.
+        RMS of single draws with equal weights up to the longest tau, as in Maia et al., Table 3.
     inside_band : float
         Share of the measured curve inside the 95 % band of the draws.
     """

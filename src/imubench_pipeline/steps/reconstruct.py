@@ -38,7 +38,7 @@ class Reconstruction:
     curve_rows: list[ReconstructionRow]
     score_row: ScoreRow
     differences: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    """RMS of each member with equal weights, as 000 Table 3 has it of one."""
+    """RMS of each member with equal weights, as Maia et al., Table 3, for one."""
 
 
 def reconstruct(

@@ -1,8 +1,8 @@
-"""Samples of a log beside samples of the models that were found of it, before and after the fit.
+"""Samples of a log and of its estimated models, before and after the fit.
 
-001 figures 34, 35, 38, 39, 44 and 50 compare them by eye. Before the fit is what the curve reads,
-after it the estimate, with what temperature does where that is taken out of the log; both are
-behind the low-pass that was found. The first samples of each are compared, an hour or so.
+Engers (2021, figures 34, 35, 38, 39, 44 and 50) compares them by eye. The model before the fit is
+read from the curve. The model after it is the estimate, with the temperature effect if that is
+removed from the log. Both pass the estimated low-pass. About the first hour is compared.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Specimens of one sensor on a board, fused to one log: the aim of Engers (001 section 1).
+"""Specimens of one sensor on a board, fused to one log: the aim of Engers (2021, section 1).
 
 Each specimen has noise of its own, and parameters of its own about those of its kind; their
 weights are those of least white noise, N^-2 (`navigation.fusion.weights.best_constant`). What all

@@ -152,7 +152,7 @@ def _make_overbounds(folder: Path, best: Mapping[str, Estimate], horizon: float)
 
 
 def _make_printed_models(sensor: str, declared: Sensor | None) -> dict[str, Models]:
-    """Return what the datasheet says, read right, and as 000 reads it."""
+    """Return what the datasheet says, read right, and as Maia et al. read it."""
     if declared is None:
         return {}
     try:

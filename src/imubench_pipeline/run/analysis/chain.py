@@ -51,7 +51,6 @@ _COMPARISON_TABLES = (
     *("datasheet", "datasheet_curve", "error_budget", "backtest"),
     *("error_growth", "drawn_deviations"),
 )
-_RECONSTRUCTION_INPUTS = ("allan", "parameters", "allan_compensated")
 _RECONSTRUCTION_TABLES = ("reconstruction", "scores")
 _TABLES_OF_STEP: dict[str, tuple[str, ...]] = {
     "ingest": ("envelope", "histogram"),
