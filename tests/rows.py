@@ -12,5 +12,13 @@ _PLAIN = {pa.string(): "-", pa.float64(): 1.0, pa.float32(): 1.0, pa.int64(): 1,
 
 def typed(of: type[R], rows: Iterable[Mapping[str, Any]]) -> list[R]:
     """Return rows of a table; a required column that is not said has a plain value."""
-    plain = {column.name: _PLAIN[column.type] for column in columns_of(of) if column.required}
+    plain = {
+        column.name: column.values[0]
+        if column.values
+        else ()
+        if column.is_list
+        else _PLAIN[column.type]
+        for column in columns_of(of)
+        if column.required
+    }
     return [row if isinstance(row, of) else of(**(plain | dict(row))) for row in rows]

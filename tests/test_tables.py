@@ -41,7 +41,14 @@ NOT_FINITE = (math.nan, math.inf, -math.inf)
 def a_row(table: str) -> dict[str, Any]:
     """A row of a table that has a value in every column."""
     values = {"string": "gyro_x", "double": 1.5, "float": 1.5, "int64": 1, "bool": True}
-    return {column.name: values[str(column.type)] for column in TABLES[table]}
+    return {
+        column.name: column.values[0]
+        if column.values
+        else ()
+        if column.is_list
+        else values[str(column.type)]
+        for column in TABLES[table]
+    }
 
 
 @pytest.mark.parametrize("table", TABLES)

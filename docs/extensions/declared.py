@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from extensions.markdown import cell, code, table
+from imubench_pipeline.model.table import TypedColumn
 from imubench_pipeline.noise.terms import TERMS
 from imubench_pipeline.report.glossary import Term, glossary
 from imubench_pipeline.run.formats_command import Line, export_targets, log_formats
@@ -20,7 +21,7 @@ def tables() -> str:
             (
                 (
                     code(column.name),
-                    f"{column.type}{'' if column.required else ' or null'}",
+                    _describe_type(column),
                     cell(column.unit),
                     cell(column.meaning),
                 )
@@ -29,6 +30,11 @@ def tables() -> str:
         )
         for name, columns in TABLES.items()
     )
+
+
+def _describe_type(column: TypedColumn) -> str:
+    kind = f"one of {', '.join(column.values)}" if column.values else str(column.type)
+    return cell(f"{kind}{'' if column.required else ' or null'}")
 
 
 def findings() -> str:

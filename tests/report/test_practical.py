@@ -7,17 +7,21 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from imubench_pipeline.model.comparisons import DatasheetRow
-from imubench_pipeline.report import practical
 from imubench_pipeline.report.practical import (
     PageUnit,
-    duration_text,
     first_choices,
     interval_text,
-    limit_digits,
-    number_text,
     page_unit,
+    printed_text,
     unit_of,
     units_of_pages,
+)
+from imubench_pipeline.words.numbers import (
+    degrees_text,
+    duration_text,
+    limit_digits,
+    number_text,
+    percent_text,
 )
 
 ASCII = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
@@ -244,10 +248,10 @@ def test_limits_have_as_many_digits_as_tell_them_apart(
 
 def test_what_is_not_there_is_a_dash() -> None:
     assert number_text(None) == number_text(float("nan")) == "–"
-    assert practical.duration_text(None) == practical.percent_text(None) == "–"
-    assert practical.degrees_text(None) == "–"
-    assert practical.printed_text(figure(printed=None, unit="deg/h")) == "–"
-    assert practical.printed_text(figure(printed=4.0, unit=None)) == "4"
+    assert duration_text(None) == percent_text(None) == "–"
+    assert degrees_text(None) == "–"
+    assert printed_text(figure(printed=None, unit="deg/h")) == "–"
+    assert printed_text(figure(printed=4.0, unit=None)) == "4"
 
 
 def figure(*, printed: float | None, unit: str | None) -> DatasheetRow:

@@ -10,12 +10,12 @@ from statistics import median
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import from_si
+from imubench_pipeline.words.numbers import digits_by
 
 _SUSPICIOUS_FACTOR = 20.0
 _MIN_SENSORS = 5

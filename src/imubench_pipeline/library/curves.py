@@ -26,11 +26,11 @@ from imubench_pipeline.library.given import (
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary
 from imubench_pipeline.recordings.recording import ChannelLog
-from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
 from imubench_pipeline.steps.allan import curve_of, too_sparse
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.units import SI_UNITS
+from imubench_pipeline.words.numbers import number_text
 
 if TYPE_CHECKING:
     import pandas as pd

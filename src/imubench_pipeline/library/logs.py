@@ -23,7 +23,6 @@ from imubench_pipeline.recordings.drop_zone import name_of, sensor_of
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import ChannelLog, channel_logs, on_grid, was_at_rest
-from imubench_pipeline.report.practical import duration_text, number_text
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
     CHANNELS,
@@ -41,6 +40,7 @@ from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
 from imubench_pipeline.tables.findings import RecordingError, finding_of
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS, in_si, quantity_to_si
+from imubench_pipeline.words.numbers import duration_text, number_text
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from imubench_pipeline.model.states import (
+    FailureCause,
+    FileStatus,
+    Fitness,
+    RecordingStatus,
+    Severity,
+)
 from imubench_pipeline.model.table import Column, OfRecordingRow, SensorRow, TableRow, table
 
 
@@ -17,7 +24,7 @@ class RecordingRow(SensorRow):
     started: Annotated[str | None, Column("date and time of the first sample, where known")] = None
     power_cycled: Annotated[bool | None, Column("without power before it; null: not known")] = None
     simulated: Annotated[bool, Column("made from known parameters, not measured")]
-    status: Annotated[str, Column("ok, rejected, or failed: a step of its analysis did")]
+    status: Annotated[RecordingStatus, Column("failed: a step of its analysis failed")]
     reason: Annotated[str | None, Column("why a recording is rejected or failed")] = None
     rate: Annotated[float | None, Column("sampling rate used", "Hz")] = None
     rate_from: Annotated[str | None, Column("where it is from: stamps, or stated")] = None
@@ -29,10 +36,7 @@ class RecordingRow(SensorRow):
     duration: Annotated[float | None, Column("from the first to the last sample", "s")] = None
     temperature_min: Annotated[float | None, Column("lowest temperature", "degC")] = None
     temperature_max: Annotated[float | None, Column("highest temperature", "degC")] = None
-    fitness: Annotated[
-        str | None,
-        Column("fit, fit with doubts or unfit; null: not analysed"),
-    ] = None
+    fitness: Annotated[Fitness | None, Column("null: not analysed")] = None
     decides: Annotated[bool | None, Column("enters rankings, pools and exports")] = None
     doubts: Annotated[str | None, Column("what puts its figures in doubt; empty: nothing")] = None
 
@@ -44,7 +48,7 @@ class FileRow(TableRow):
     file: Annotated[str, Column("its place in the drop zone")]
     sensor: Annotated[str | None, Column("null: the file is skipped")] = None
     recording: Annotated[str | None, Column("that it belongs to; null: it is skipped")] = None
-    status: Annotated[str, Column("analysed, rejected, failed or skipped")]
+    status: Annotated[FileStatus, Column("what became of it")]
     reason: Annotated[str | None, Column("why it is not analysed")] = None
 
 
@@ -61,8 +65,8 @@ class DoubtRow(OfRecordingRow):
         Column("a finding; not_explained: the spectrum; doubtful: a parameter's status"),
     ]
     fitness: Annotated[
-        str,
-        Column("unfit: the figures may be of something else; else fit with doubts"),
+        Fitness,
+        Column("unfit: the figures may not be those of a sensor at rest"),
     ]
     parameters: Annotated[str | None, Column("on which it bears; null: on all")] = None
     factor: Annotated[
@@ -86,7 +90,7 @@ class FindingRow(OfRecordingRow):
         Column("the channel concerned; null: the whole recording"),
     ] = None
     finding: Annotated[str, Column("what was found")]
-    severity: Annotated[str, Column("note, warning or fatal")]
+    severity: Annotated[Severity, Column("fatal: not analysed")]
     detail: Annotated[str, Column("in words, with what to do")]
     value: Annotated[float | None, Column("its size", "as the finding says")] = None
     start: Annotated[
@@ -105,5 +109,5 @@ class FailureRow(SensorRow):
         Column("that is left out; null: a step of the whole sensor"),
     ] = None
     step: Annotated[str, Column("of the workflow, which failed")]
-    cause: Annotated[str, Column("error, killed, or time: it ran past its time")]
+    cause: Annotated[FailureCause, Column("time: it ran past its time limit")]
     reason: Annotated[str, Column("in one line; the log of the step has the rest")]

@@ -7,19 +7,22 @@ A class is declared with `table`; each field is a column, with its meaning and u
         rate: Annotated[float | None, Column("sampling rate used", "Hz")] = None
 
 The type of a field sets the type of its column; a column that may be null has a type with ``None``.
+A ``Literal`` is a category (dictionary-encoded, other values are refused), a tuple a list, and a
+frozen dataclass a struct.
 """
 
 from __future__ import annotations
 
 import types
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from types import ModuleType
 from typing import (
     Annotated,
     Any,
     ClassVar,
+    Literal,
     Self,
     TypeVar,
     Union,
@@ -31,13 +34,18 @@ from typing import (
 
 import pyarrow as pa
 
+from imubench_pipeline.model.states import Status
+
 TYPES: Mapping[type, pa.DataType] = {
     str: pa.string(),
     float: pa.float64(),
     int: pa.int64(),
     bool: pa.bool_(),
 }
-"""Arrow type of each type of a field."""
+"""Arrow type of each plain type of a field."""
+
+CATEGORY = pa.dictionary(pa.int32(), pa.string())
+"""Arrow type of a column with one of a few values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +70,7 @@ EstimateReason = Annotated[str | None, Column("why there is no plain value")]
 FittedValue = Annotated[
     float | None, Column("what the model has where there is no value; no estimate", "as in unit")
 ]
-EstimateStatus = Annotated[
-    str, Column("ok, doubtful, not_shown, at_bound, not_identified or absent")
-]
+EstimateStatus = Annotated[Status, Column("whether there is a value, and its quality")]
 TurnedGyro = Annotated[str, Column("the gyro that was turned")]
 
 
@@ -77,6 +83,23 @@ class TypedColumn:
     unit: str
     meaning: str
     required: bool = True
+    values: tuple[str, ...] = ()
+    """All values of a category; empty for other columns."""
+    parts: type | None = None
+    """The dataclass of the elements of a list of structs."""
+
+    @property
+    def is_list(self) -> bool:
+        """Whether a value is a list."""
+        return bool(pa.types.is_list(self.type))
+
+    def from_arrow(self, values: list[Any]) -> list[Any]:
+        """Return values of the column in Python, as a row has them."""
+        if not self.is_list:
+            return values
+        if self.parts is None:
+            return [tuple(value or ()) for value in values]
+        return [tuple(_make_struct(self.parts, part) for part in value or ()) for value in values]
 
 
 class TableRow(Mapping[str, Any]):
@@ -104,7 +127,9 @@ class TableRow(Mapping[str, Any]):
     def rows_of(cls, content: pa.Table) -> list[Self]:
         """Return the rows of an Arrow table that has the columns of this class."""
         names = names_of(cls)
-        columns = [content.column(name).to_pylist() for name in names]
+        columns = [
+            column.from_arrow(content.column(column.name).to_pylist()) for column in columns_of(cls)
+        ]
         return [
             cls(**dict(zip(names, values, strict=True))) for values in zip(*columns, strict=True)
         ]
@@ -156,8 +181,34 @@ def _typed(name: str, hint: Any) -> TypedColumn:
     kind, column = get_args(hint)
     options = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
     (plain,) = (option for option in options if option is not types.NoneType)
-    arrow = pa.float32() if column.single else TYPES[plain]
-    return TypedColumn(name, arrow, column.unit, column.meaning, len(options) == 1)
+    values = get_args(plain) if get_origin(plain) is Literal else ()
+    element = get_args(plain)[0] if get_origin(plain) is tuple else None
+    arrow = pa.float32() if column.single else arrow_type(plain)
+    parts = element if is_dataclass(element) else None
+    return TypedColumn(name, arrow, column.unit, column.meaning, len(options) == 1, values, parts)
+
+
+def arrow_type(kind: Any) -> pa.DataType:
+    """Return the Arrow type of a type of a field: plain, a category, a list or a struct."""
+    if get_origin(kind) is Literal:
+        return CATEGORY
+    if get_origin(kind) is tuple:
+        element = arrow_type(get_args(kind)[0])
+        return pa.list_(pa.string() if element == CATEGORY else element)
+    if is_dataclass(kind):
+        hints = get_type_hints(kind)
+        return pa.struct([(name, arrow_type(_without_none(hint))) for name, hint in hints.items()])
+    return TYPES[kind]
+
+
+def _without_none(hint: Any) -> Any:
+    options = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+    return next(option for option in options if option is not types.NoneType)
+
+
+def _make_struct(kind: type, values: Mapping[str, Any]) -> Any:
+    lists = {name: tuple(value) for name, value in values.items() if isinstance(value, list)}
+    return kind(**{**values, **lists})
 
 
 @row

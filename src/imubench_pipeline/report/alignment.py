@@ -9,9 +9,10 @@ import numpy as np
 
 from imubench_pipeline.model.experiments import AlignmentRow
 from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.practical import degrees_text, duration_text, number_text, page_unit
+from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.words import sentence
+from imubench_pipeline.words.numbers import degrees_text, duration_text, number_text
 
 _SHOWN = (60.0, 600.0, 3600.0)
 """Times of the table, s; the figure has more."""

@@ -7,8 +7,9 @@ from typing import Any
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import BacktestRow
-from imubench_pipeline.report.practical import System, duration_text, number_text, unit_of
+from imubench_pipeline.report.practical import System, unit_of
 from imubench_pipeline.settings.requirements import DIMENSIONS
+from imubench_pipeline.words.numbers import duration_text, number_text
 
 
 def backtest_lines(

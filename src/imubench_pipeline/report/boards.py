@@ -8,9 +8,9 @@ from typing import Any
 from imubench_pipeline.model.published import PublishedFigureRow
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
-from imubench_pipeline.report.practical import limit_digits, number_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
+from imubench_pipeline.words.numbers import limit_digits, number_text
 
 _ALIKE = 0.05
 """Relative difference up to which found and printed are one figure."""

@@ -7,17 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.model.experiments import CalibrationRow
-from imubench_pipeline.report.practical import (
-    System,
-    degrees_text,
-    limit_digits,
-    number_text,
-    page_unit,
-    percent_text,
-)
+from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import noise_words, sentence
+from imubench_pipeline.words.numbers import degrees_text, limit_digits, number_text, percent_text
 
 WORDS = {
     "bias": "bias at the start",

@@ -15,17 +15,13 @@ import numpy as np
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.payload import Arrays, looks
-from imubench_pipeline.report.practical import (
-    duration_text,
-    number_text,
-    unit_of,
-    units_by_size,
-)
+from imubench_pipeline.report.practical import unit_of, units_by_size
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.tables import read
 from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.words.numbers import duration_text, number_text
 
 KEPT = ("error_growth", "drawn_deviations")
 """The tables of each recording that the page is made of, beside the joined ones."""

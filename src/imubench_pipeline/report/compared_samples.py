@@ -7,7 +7,7 @@ from typing import Any
 
 from imubench_pipeline.model.estimates import ModelSampleRow
 from imubench_pipeline.report.payload import Arrays, numbers
-from imubench_pipeline.report.practical import duration_text, number_text
+from imubench_pipeline.words.numbers import duration_text, number_text
 
 NAMES = {
     "log": "the log",

@@ -9,15 +9,10 @@ from typing import Any
 
 from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
 from imubench_pipeline.model.published import CoverageRow
-from imubench_pipeline.report.practical import (
-    NO_VALUE,
-    PageUnit,
-    System,
-    page_unit,
-    printed_text,
-)
+from imubench_pipeline.report.practical import PageUnit, System, page_unit, printed_text
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.words.numbers import NO_VALUE
 
 _STATISTIC_NAMES = {
     "N": "N",

@@ -12,13 +12,12 @@ from typing import Any
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import duration_text, number_text
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.told import Told, margin, margin_limits, of_ranking
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.words.numbers import counted, duration_text, number_text
 
 WORDS: Mapping[str, str] = {
     "passes": "chance of 97.5 % or more",

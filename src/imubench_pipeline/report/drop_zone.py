@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import get_args
 
 from imubench_pipeline.model.recordings import FileRow
+from imubench_pipeline.model.states import FileStatus
 from imubench_pipeline.recordings.drop_zone import account_for, found_logs
 from imubench_pipeline.recordings.known_logs import is_changed
 from imubench_pipeline.report.folder import drop_zone_of
-from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.texts import printable
+from imubench_pipeline.words.numbers import counted
 
-_OUTCOMES = ("analysed", "rejected", "failed", "skipped")
 _MAX_LINES = 10
 _MAX_NAMES = 5
 
@@ -51,7 +52,7 @@ def balance(files: Sequence[FileRow]) -> Iterator[str]:
     if not files:
         return
     counts = Counter(row.status for row in files)
-    parts = [f"{counts[name]} {name}" for name in _OUTCOMES if counts[name]]
+    parts = [f"{counts[name]} {name}" for name in get_args(FileStatus) if counts[name]]
     yield f"{counted(len(files), 'file')} in the drop zone = {' + '.join(parts)}"
     skipped = [row for row in files if row.status == "skipped"]
     for row in skipped[:_MAX_LINES]:

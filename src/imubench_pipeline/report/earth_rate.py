@@ -14,8 +14,6 @@ from imubench_pipeline.model.experiments import (
 from imubench_pipeline.report.alignment import alignments
 from imubench_pipeline.report.calibration import of_all
 from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.turned import (
     ESTIMATES,
@@ -29,6 +27,7 @@ from imubench_pipeline.report.turned import (
     published_lines,
 )
 from imubench_pipeline.report.view import RecordingView
+from imubench_pipeline.words.numbers import counted, number_text
 
 
 def _context(site: Site) -> dict[str, Any]:

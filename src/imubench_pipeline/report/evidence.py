@@ -8,13 +8,12 @@ from typing import Any
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.report.decisions import unranked, word_of
 from imubench_pipeline.report.meaning import error_of_recording, limit_words, rankings
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import duration_text, number_text
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.told import of_ranking
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import requirement_words, spread_words
 from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.words.numbers import counted, duration_text, number_text
 
 
 def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from imubench_pipeline.model.comparisons import FusionRow, GradeRow
-from imubench_pipeline.report.practical import number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES
+from imubench_pipeline.words.numbers import number_text, percent_text
 
 _PARAMETERS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
 

@@ -17,16 +17,9 @@ from jinja2.runtime import Context
 from markupsafe import Markup, escape
 
 from imubench_pipeline.report.glossary import term
-from imubench_pipeline.report.practical import (
-    NO_VALUE,
-    PageUnit,
-    System,
-    duration_text,
-    number_text,
-    page_unit,
-    symbol_text,
-)
+from imubench_pipeline.report.practical import PageUnit, System, page_unit, symbol_text
 from imubench_pipeline.report.words import started_text
+from imubench_pipeline.words.numbers import NO_VALUE, duration_text, number_text
 
 
 @cache  # compiling the templates takes longer than writing pages of a small report

@@ -9,17 +9,11 @@ from typing import Any
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.navigation.suitability.conditions import parts_of
 from imubench_pipeline.report.backtest import standing_text
-from imubench_pipeline.report.practical import (
-    NO_VALUE,
-    PageUnit,
-    System,
-    duration_text,
-    interval_text,
-    unit_of,
-)
+from imubench_pipeline.report.practical import PageUnit, System, interval_text, unit_of
 from imubench_pipeline.report.told import Between, Told, margin, of_budget, of_ranking
 from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
+from imubench_pipeline.words.numbers import NO_VALUE, duration_text
 
 Simulated = Mapping[tuple[str, str], bool]
 

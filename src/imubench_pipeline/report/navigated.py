@@ -8,9 +8,8 @@ from typing import Any, TypeVar
 
 from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.recordings.fitness import left_out
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import NO_VALUE, number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.words.numbers import NO_VALUE, counted, number_text, percent_text
 
 TUNINGS = {
     "true": "true model",

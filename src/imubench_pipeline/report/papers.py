@@ -16,9 +16,9 @@ from imubench_pipeline.experiments.papers.about import (
 )
 from imubench_pipeline.model.published import AccuracyRow, PublishedRow
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
-from imubench_pipeline.report.practical import limit_digits, number_text, percent_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
+from imubench_pipeline.words.numbers import limit_digits, number_text, percent_text
 
 
 def _context(site: Site) -> dict[str, Any]:

@@ -11,15 +11,10 @@ import numpy as np
 from imubench_pipeline.estimators.estimate import PARAMETERS, SENSOR, SHOWN
 from imubench_pipeline.estimators.model_choice import MIN_AKAIKE_WEIGHT, information_weights
 from imubench_pipeline.model.estimates import ParameterRow, SimulatedTruthRow
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import (
-    PageUnit,
-    System,
-    limit_digits,
-    page_unit,
-)
+from imubench_pipeline.report.practical import PageUnit, System, page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import model_text, untold
+from imubench_pipeline.words.numbers import counted, limit_digits
 
 
 def shown_symbols(rows: Iterable[ParameterRow]) -> list[str]:

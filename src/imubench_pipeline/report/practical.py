@@ -6,57 +6,17 @@ it needs for that. The first choice is the practical one, the last is SI.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import ROUND_HALF_UP, Context, Decimal
 from functools import cache
 from typing import Literal, Protocol
 
-from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import conversion
+from imubench_pipeline.words.numbers import NO_VALUE, digits_by, limit_digits, number_text
 
 System = Literal["practical", "si"]
-
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LEAST_PLAIN, _MOST_PLAIN = Decimal("0.0001"), 1_000_000
-_MOST_DIGITS = 7
-
-
-NO_VALUE = "–"
-"""How every page shows a number that is not there."""
-
-
-def number_text(value: float | None, digits: int = 4) -> str:
-    """Return a number rounded to some digits, with a power of ten where it is small or large.
-
-    None and NaN are `NO_VALUE`. A number in the middle of two is rounded away from zero, as the
-    scripts of the pages do.
-    """
-    if value is None or math.isnan(value):
-        return NO_VALUE
-    if math.isinf(value):
-        return "∞" if value > 0 else "−∞"
-    exact = Decimal(value)
-    rounded = _rounding(digits).create_decimal(exact)
-    if rounded == 0 or _LEAST_PLAIN <= abs(rounded) < _MOST_PLAIN:
-        text = _without_zeros(format(abs(rounded), "f"))
-    else:
-        mantissa, exponent = f"{abs(rounded):.{digits - 1}e}".split("e")
-        power = str(int(exponent)).translate(_SUPERSCRIPTS)
-        text = f"{_without_zeros(mantissa)}×10{power}"
-    return "−" + text if rounded < 0 else text
-
-
-@cache
-def _rounding(digits: int) -> Context:
-    return Context(prec=digits, rounding=ROUND_HALF_UP)
-
-
-def _without_zeros(text: str) -> str:
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 @dataclass(frozen=True)
@@ -201,26 +161,6 @@ def _page_unit(sign: str, dimension: str) -> PageUnit:
     return PageUnit(sign, 1.0 / factor)
 
 
-def rates_text(rate: float | None, of_channels: Iterable[float]) -> str:
-    """Return the rates of the channels of a recording, Hz, the highest first.
-
-    ``rate``: of the recording, Hz, used where no channel has an Allan variance.
-    """
-    rates = sorted({float(f"{each:.6g}") for each in of_channels}, reverse=True)
-    texts = list(dict.fromkeys(map(number_text, rates))) or [number_text(rate)]
-    return f"{' and '.join(filter(None, (', '.join(texts[:-1]), texts[-1])))} Hz"
-
-
-def percent_text(share: float | None, digits: int = 3) -> str:
-    """Return a share of 1 in per cent; `NO_VALUE` where there is none."""
-    return NO_VALUE if share is None else f"{number_text(100.0 * share, digits)} %"
-
-
-def degrees_text(angle: float | None, digits: int = 4) -> str:
-    """Return an angle in rad in degrees; `NO_VALUE` where there is none."""
-    return NO_VALUE if angle is None else f"{number_text(math.degrees(angle), digits)}°"
-
-
 def printed_text(row: Printed) -> str:
     """Return the figure of a datasheet as it is printed; `NO_VALUE` where there is none."""
     if row.printed is None:
@@ -238,24 +178,6 @@ class Printed(Protocol):
     @property
     def unit(self) -> str | None:
         """Its unit."""
-
-
-def duration_text(seconds: float | None) -> str:
-    """Return a time in the unit in which it is easily read; `NO_VALUE` where there is none."""
-    if seconds is None:
-        return NO_VALUE
-    for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
-        if seconds >= 2.0 * size:
-            return f"{number_text(seconds / size, 3)} {name}"
-    return f"{number_text(seconds, 3)} s"
-
-
-def limit_digits(lower: float | None, upper: float | None, least: int = 3) -> int:
-    """Return with how many digits limits are printed, so that they are seen to differ."""
-    if lower is None or upper is None or not upper > lower:
-        return least
-    ratio = max(abs(lower), abs(upper)) / (upper - lower)
-    return min(max(least, math.ceil(math.log10(ratio)) + 1), _MOST_DIGITS)
 
 
 def interval_text(lower: float | None, upper: float | None, unit: PageUnit, least: int = 3) -> str:

@@ -16,12 +16,11 @@ from imubench_pipeline.report.calibration import (
     scatter_words,
 )
 from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.recording import about_of, summary_words
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import noise_words
+from imubench_pipeline.words.numbers import counted, number_text
 
 
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:

@@ -25,22 +25,20 @@ from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.parameters import digits_of, methods_table
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks, samples_payload
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import (
-    NO_VALUE,
-    System,
-    duration_text,
-    number_text,
-    page_unit,
-    rates_text,
-    symbol_text,
-)
+from imubench_pipeline.report.practical import System, page_unit, symbol_text
 from imubench_pipeline.report.shell import imubench
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.report.words import model_text, precision, sentence, started_text
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.words.numbers import (
+    NO_VALUE,
+    counted,
+    duration_text,
+    number_text,
+    rates_text,
+)
 
 _EXACT = 1e-9
 """Relative error of a rate that is not worth a word."""

@@ -13,9 +13,9 @@ from imubench_pipeline.model.recordings import FailureRow, FindingRow, Recording
 from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.report.folder import failed_pages
-from imubench_pipeline.report.plurals import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.words.numbers import counted
 
 _NEEDED = ("recordings", "findings", "ranking", "failures")
 _MOST_LINES = 10

@@ -16,11 +16,11 @@ from imubench_pipeline.report.evidence import evidence
 from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.palette import places
 from imubench_pipeline.report.payload import FOREST, looks
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import limit_digits, symbol_text
+from imubench_pipeline.report.practical import symbol_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
+from imubench_pipeline.words.numbers import counted, limit_digits
 
 _MANY = 12
 """Recordings of a sensor beyond which its page leaves budgets and deltas to those of recordings."""

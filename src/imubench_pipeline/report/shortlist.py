@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.model.comparisons import ShortlistRow
-from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.words.numbers import number_text
 
 
 def _context(site: Site) -> dict[str, Any]:

@@ -15,8 +15,6 @@ from imubench_pipeline.report.decisions import matrix, strip
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.payload import FOREST, looks
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import duration_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import (
@@ -26,6 +24,7 @@ from imubench_pipeline.report.words import (
     sentence,
     spread_words,
 )
+from imubench_pipeline.words.numbers import counted, duration_text
 
 _STEPS = 3
 """What is to do next that the start page names; the table has all."""

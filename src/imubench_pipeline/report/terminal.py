@@ -17,20 +17,12 @@ from imubench_pipeline.model.table import OfRecordingRow
 from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.parameters import shown_symbols
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import (
-    PageUnit,
-    System,
-    duration_text,
-    number_text,
-    page_unit,
-    rates_text,
-    symbol_text,
-)
+from imubench_pipeline.report.practical import PageUnit, System, page_unit, symbol_text
 from imubench_pipeline.report.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.report.terminal_table import fitting
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.words.numbers import counted, duration_text, number_text, rates_text
 
 R = TypeVar("R", bound=OfRecordingRow)
 

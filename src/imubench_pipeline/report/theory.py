@@ -7,10 +7,10 @@ from typing import Any
 
 from imubench_pipeline.model.published import AccuracyRow
 from imubench_pipeline.report.glossary import glossary
-from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
+from imubench_pipeline.words.numbers import number_text
 
 
 def _context(site: Site) -> dict[str, Any]:

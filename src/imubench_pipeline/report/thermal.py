@@ -9,9 +9,10 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import SENSOR
 from imubench_pipeline.model.estimates import LowPassRow, ParameterRow, TemperatureRow
-from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
+from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import sentence
+from imubench_pipeline.words.numbers import limit_digits, number_text
 
 _TEMPERATURE = (
     ("sensitivity", "temperature_sensitivity", "sensitivity"),

@@ -7,9 +7,8 @@ from collections.abc import Iterable
 
 from markupsafe import Markup
 
-from imubench_pipeline.estimators.digits import digits_by
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
-from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.words.numbers import digits_by, number_text
 
 
 class Told(str):

@@ -16,20 +16,19 @@ from imubench_pipeline.model.experiments import (
     TurningRow,
 )
 from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import (
-    System,
-    degrees_text,
-    duration_text,
-    limit_digits,
-    number_text,
-    page_unit,
-    percent_text,
-)
+from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import noise_words, sentence
+from imubench_pipeline.words.numbers import (
+    counted,
+    degrees_text,
+    duration_text,
+    limit_digits,
+    number_text,
+    percent_text,
+)
 
 METHOD_TERMS = {
     "pairs": "by_pairs",

@@ -309,6 +309,10 @@ def _rows(table: pa.Table) -> NDArray[np.uint64]:
     rows = np.zeros(table.num_rows, dtype=np.uint64)
     for column in table.columns:
         rows *= _FACTOR
+        if pa.types.is_dictionary(column.type):
+            column = column.cast(pa.string())
+        elif pa.types.is_list(column.type):
+            column = pa.chunked_array([[str(value) for value in column.to_pylist()]], pa.string())
         if pa.types.is_string(column.type):
             encoded = column.combine_chunks().dictionary_encode()
             texts = np.array([*encoded.dictionary.to_pylist(), None], dtype=object)

@@ -12,16 +12,10 @@ from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED, in_words
-from imubench_pipeline.report.plurals import counted
-from imubench_pipeline.report.practical import (
-    PageUnit,
-    duration_text,
-    interval_text,
-    percent_text,
-    symbol_text,
-)
+from imubench_pipeline.report.practical import PageUnit, interval_text, symbol_text
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.validation import Strict
+from imubench_pipeline.words.numbers import counted, duration_text, percent_text
 
 _ROUGH = 0.3
 """Half of an interval over its value from which a percentage would hide its asymmetry."""

@@ -9,11 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.model.recordings import FailureRow, FileRow, RecordingRow
+from imubench_pipeline.model.states import FileStatus, RecordingStatus
 from imubench_pipeline.tables import build, read, write_arrow
 
 NEEDED = ("recordings", "failures")
 
-_STATUS_WORDS = {"ok": "analysed"}
+_STATUS: Mapping[RecordingStatus, FileStatus] = {
+    "ok": "analysed",
+    "rejected": "rejected",
+    "failed": "failed",
+}
 
 
 def file_rows(
@@ -38,8 +43,7 @@ def file_rows(
         if file.sensor is None or file.recording is None:
             yield file
         elif row := outcome.get((file.sensor, file.recording)):
-            status = _STATUS_WORDS.get(row.status, row.status)
-            yield replace(file, status=status, reason=row.reason)
+            yield replace(file, status=_STATUS[row.status], reason=row.reason)
         else:
             reason = of_sensor.get(file.sensor, "it is in no table of its sensor")
             yield replace(file, status="failed", reason=reason)

@@ -8,6 +8,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -72,14 +73,28 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
         raise TableError(f"table {table}: unknown columns {sorted(unknown)}")
     arrays = []
     for column in columns:
-        values = [row.get(column.name) for row in listed]
-        if pa.types.is_string(column.type):
-            values = [None if text is None else _shown(text) for text in values]
+        values = [_plain(row.get(column.name)) for row in listed]
+        if column.is_list:
+            values = [value or [] for value in values]
+        elif column.values and (other := set(values) - {None, *column.values}):
+            raise TableError(
+                f"table {table}: column {column.name} is {min(map(str, other))!r}; expected one of "
+                f"{', '.join(column.values)}"
+            )
         array = _finite(pa.array(values, type=column.type, from_pandas=True))
         if column.required and array.null_count:
             raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
         arrays.append(array)
     return pa.Table.from_arrays(arrays, schema=schema(table))
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as Arrow takes it: each character of a text shows, structs are mappings."""
+    if isinstance(value, str):
+        return _shown(value)
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
 
 
 def _finite(column: pa.Array) -> pa.Array:
@@ -154,7 +169,7 @@ def write_arrow(table: pa.Table, path: Path) -> None:
     """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically.
 
     Texts in CSV are such as no spreadsheet takes for formulas (`imubench_pipeline.tables.texts`);
-    Parquet has them without that.
+    Parquet has them without that. Lists in CSV are joined by semicolons, structs are JSON.
 
     Raises
     ------

@@ -9,6 +9,7 @@ cell.
 
 from __future__ import annotations
 
+import json
 import re
 
 import pyarrow as pa
@@ -43,10 +44,16 @@ def as_cell(text: str) -> str:
 
 
 def with_safe_cells(table: pa.Table) -> pa.Table:
-    """Return a table with its texts as `as_cell` gives them; numbers are as they were."""
+    """Return a table with its texts as `as_cell` gives them, and lists as texts."""
     for place, field in enumerate(table.schema):
-        if not pa.types.is_string(field.type):
+        if pa.types.is_list(field.type):
+            texts = ["; ".join(map(_text_of, value or ())) for value in table[place].to_pylist()]
+            table = table.set_column(place, field.name, pa.array(texts, pa.string()))
+        elif pa.types.is_dictionary(field.type):
+            table = table.set_column(place, field.name, table[place].cast(pa.string()))
+        elif not pa.types.is_string(field.type):
             continue
+        field = table.schema[place]
         column = table.column(place).combine_chunks().dictionary_encode()
         texts = column.dictionary.to_pylist()
         safe = [as_cell(text) for text in texts]
@@ -54,3 +61,7 @@ def with_safe_cells(table: pa.Table) -> pa.Table:
             column = pa.DictionaryArray.from_arrays(column.indices, pa.array(safe, pa.string()))
             table = table.set_column(place, field, column.cast(pa.string()))
     return table
+
+
+def _text_of(part: object) -> str:
+    return part if isinstance(part, str) else json.dumps(part, ensure_ascii=False)

@@ -1,7 +1,11 @@
 """Numbers in the text: those of the tables, in the units that the reader chooses."""
 
+from importlib import resources
+
+import numpy as np
 import pytest
 
+from imubench_pipeline.words.numbers import digits_by, limit_digits, number_text
 from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.factors import FACTORS
@@ -174,3 +178,37 @@ def test_a_choice_that_is_no_more_does_no_harm(
     assert {tuple(one) for one in shown(reader)[1]} >= {("gyro.N", "°/√h"), ("accel.B", "m/s²")}
     if drawn:
         assert axis_title(reader.figure("overlay"), "y") == "Allan deviation (°/h)"
+
+
+def test_the_browser_rounds_10_000_numbers_as_the_tables_are_printed(
+    read: Open, bench: Report
+) -> None:
+    rng = np.random.default_rng(7)
+    values = rng.choice([-1.0, 1.0], 10_000) * 10.0 ** rng.uniform(-12, 12, 10_000)
+    values[:2_000] = np.round(values[:2_000], 3) + 0.5  # halves, and numbers near a power of ten
+    values[2_000:2_010] = [0.0, 1e-4, 9.99995e-5, 1e6, 999_999.5, 0.1, 1.0, 10.0, 1e-12, -1e6]
+    widths = np.abs(values) * 10.0 ** rng.uniform(-7, 1, 10_000)
+    cases = [
+        (value, value - width, value + width, digits)
+        for value, width, digits in zip(
+            values.tolist(), widths.tolist(), rng.integers(1, 8, 10_000).tolist(), strict=True
+        )
+    ]
+    reader = read(bench.folder, PAGES[0])
+    script = resources.files("imubench_pipeline") / "report/static/numbers.js"
+    reader.page.add_script_tag(content=script.read_text(encoding="utf-8"))
+    printed = reader.page.evaluate(
+        "cases => cases.map(([v, low, high, d]) =>"
+        " [numberText(v, d), digitsBy(v, low, high), limitDigits(low, high)])",
+        cases,
+    )
+    expected = [
+        [number_text(v, d), digits_by(v, low, high), limit_digits(low, high)]
+        for v, low, high, d in cases
+    ]
+    different = [
+        (case, *pair)
+        for case, *pair in zip(cases, printed, expected, strict=True)
+        if pair[0] != pair[1]
+    ]
+    assert different == []

@@ -4,7 +4,8 @@
 const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 
 function numberText(value, digits) {
-  if (!Number.isFinite(value)) return "–";
+  if (Number.isNaN(value)) return "–";
+  if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   const rounded = Number(value.toPrecision(digits));
   let text;
   if (rounded === 0 || (Math.abs(rounded) >= 1e-4 && Math.abs(rounded) < 1e6)) {
@@ -15,6 +16,22 @@ function numberText(value, digits) {
     text = `${mantissa}×10${power}`;
   }
   return text.replaceAll("-", "−");
+}
+
+// Digits of limits that differ in print; as `limit_digits` of imubench_pipeline.words.numbers.
+function limitDigits(lower, upper, least = 3) {
+  if (lower === null || upper === null || !(upper > lower)) return least;
+  return Math.min(Math.max(least, Math.ceil(Math.log10(Math.max(Math.abs(lower), Math.abs(upper)) / (upper - lower))) + 1), 7);
+}
+
+// Digits of a value and its limits by the width of its interval; as `digits_by` there.
+function digitsBy(value, lower, upper, otherwise = 3) {
+  if (lower === null || upper === null || !(upper > lower) || !value) return otherwise;
+  const firstDigit = (number) => Math.floor(Math.log10(number) + 1e-9);
+  const half = (upper - lower) / 2;
+  if (!Number.isFinite(half)) return 2;
+  const digit = firstDigit(half) - (half < 2 * 10 ** firstDigit(half) ? 1 : 0);
+  return Math.min(Math.max(firstDigit(Math.abs(value)) - digit + 1, 2), 7);
 }
 
 const chosenUnits = {};

@@ -71,24 +71,9 @@ function drawnAt(channel, place) {
 }
 
 // Enough digits that the two limits are seen to differ.
-function limitDigits(lower, upper, least = 2) {
-  if (lower === null || upper === null || !(upper > lower)) return least;
-  return Math.min(Math.max(least, Math.ceil(Math.log10(Math.max(Math.abs(lower), Math.abs(upper)) / (upper - lower))) + 1), 7);
-}
-
-// As many digits as the interval leaves: `imubench_pipeline.estimators.digits` has the same.
-function digitsBy(value, lower, upper, otherwise = 3) {
-  if (lower === null || upper === null || !(upper > lower) || !value) return otherwise;
-  const half = (upper - lower) / 2;
-  if (!Number.isFinite(half)) return 2;
-  let digit = Math.floor(Math.log10(half));
-  if (half < 2 * 10 ** digit) digit -= 1;
-  return Math.min(Math.max(Math.floor(Math.log10(Math.abs(value))) - digit + 1, 2), 7);
-}
-
 function digitsOf(value, lower, upper) {
-  if (value === null || lower === null || upper === null) return limitDigits(lower, upper, 3);
-  return Math.max(digitsBy(value, lower, upper), limitDigits(lower, upper));
+  if (value === null || lower === null || upper === null) return limitDigits(lower, upper);
+  return Math.max(digitsBy(value, lower, upper), limitDigits(lower, upper, 2));
 }
 
 function ratioText({ value, lower, upper }) {

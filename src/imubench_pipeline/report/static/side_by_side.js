@@ -82,7 +82,7 @@ kinds.pair = (figure) => {
     traces.push({
       group: "ratio", yaxis: "y2", type: "scatter", mode: "lines+markers", x, y, name: label, meta: { low, high, of: "ratio" },
       line: lineOf(other.look), marker: { color: colourOf(other.look), size: 6, symbol: ratios.map((ratio) => (ratio.verdict === "not told apart" || ratio.verdict === "not known" ? `${(other.look.plain ?? other.look.marker)}-open` : other.look.plain ?? other.look.marker)) },
-      text: ratios.map((ratio, i) => `σ<sub>${chosen[0].letter}</sub>/σ<sub>${other.one.letter}</sub> at ${numberText(x[i], 3)} s: <b>${numberText(y[i], limitDigits(low[i], high[i]))}</b><br>95 %: ${ratioText(ratio)}<br>${verdictOf(ratio, chosen[0], other.one).text}`),
+      text: ratios.map((ratio, i) => `σ<sub>${chosen[0].letter}</sub>/σ<sub>${other.one.letter}</sub> at ${numberText(x[i], 3)} s: <b>${numberText(y[i], limitDigits(low[i], high[i], 2))}</b><br>95 %: ${ratioText(ratio)}<br>${verdictOf(ratio, chosen[0], other.one).text}`),
       hovertemplate: "%{text}<extra></extra>",
     });
   });
@@ -324,7 +324,7 @@ kinds.growth = () => {
     traces.push({
       type: "scatter", mode: "lines+markers", x: times, y, name: shortName(one), meta: { low, high }, line: lineOf(look),
       marker: { color: colourOf(look), symbol: look.marker, size: 7 },
-      text: times.map((t, i) => `${shortName(one)} after ${timeText(t)}: <b>${numberText(y[i], limitDigits(low[i], high[i]))} ${sign}</b><br>95 %: ${interval(low[i], high[i])}<br>${axes.map((name) => CHANNEL_NAMES[name]).join(", ")}, ${timeText(windows[window])} at rest`),
+      text: times.map((t, i) => `${shortName(one)} after ${timeText(t)}: <b>${numberText(y[i], limitDigits(low[i], high[i], 2))} ${sign}</b><br>95 %: ${interval(low[i], high[i])}<br>${axes.map((name) => CHANNEL_NAMES[name]).join(", ")}, ${timeText(windows[window])} at rest`),
       hovertemplate: "%{text}<extra></extra>",
     });
     ends.push({ y: Math.log10(y.at(-1)), text: one.letter, colour: colourOf(look) });

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.model.comparisons import DatasheetRow
 from imubench_pipeline.report.palette import method_appearance
-from imubench_pipeline.report.practical import NO_VALUE, System
+from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.static_figures.curves import channel_axes, draw_measured, finish
 from imubench_pipeline.report.static_figures.style import line_look, style
 from imubench_pipeline.report.static_figures.terms import TERM_LOOKS
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
+from imubench_pipeline.words.numbers import NO_VALUE
 
 _NAMES = {"N": "$N$", "adev_minimum": "bias instability", "K": "$K$"}
 _KINDS: Mapping[str | None, str | None] = {"typ": None, "1sigma": "1σ"}

@@ -1,0 +1,58 @@
+"""Codes of states and verdicts: each is one of a few values, which mypy checks.
+
+Tables keep the codes; `imubench_pipeline.words` has the words that people read.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Severity = Literal["note", "warning", "fatal"]
+"""Severity of a finding; after a fatal one, the channel or recording is not analysed."""
+
+RecordingStatus = Literal["ok", "rejected", "failed"]
+FileStatus = Literal["analysed", "rejected", "failed", "skipped"]
+FailureCause = Literal["error", "killed", "time"]
+
+Fitness = Literal["fit", "fit with doubts", "unfit"]
+"""Whether a recording is used in comparisons: ``unfit`` is left out."""
+
+Status = Literal[
+    "ok", "doubtful", "not_shown", "at_bound", "not_identified", "absent", "does_not_decide"
+]
+"""Status of an estimate; ``does_not_decide``: masked for comparisons, in no table."""
+
+Goodness = Literal["explained", "not explained"]
+"""Whether a model explains the spectrum."""
+
+Verdict = Literal[
+    "meets", "likely_meets", "not_enough_data", "likely_fails", "fails", "excluded", "not_admitted"
+]
+"""Verdict on a sensor and a requirement, or on one limit of it.
+
+It holds on the conditions beside it, if there are any. ``excluded``: it lacks a property that the
+requirement demands; ``not_admitted``: its price class is another, or not known.
+"""
+
+SURE_PROBABILITY = 0.975
+"""Minimum probability of ``meets``; that of ``fails`` is at most 1 minus this."""
+
+Evidence = Literal["strong", "weak"]
+
+SpreadOf = Literal["specimens", "recordings", "other sensors"]
+
+Action = Literal[
+    "check_unit", "find_figures", "add_channels", "record_again", "log_longer", "add_specimens"
+]
+"""Next steps, the cheapest first."""
+
+Origin = Literal["measured", "datasheet", "requirement", "not known"]
+"""Origin of a figure in an error budget."""
+
+BacktestVerdict = Literal["as predicted", "more than predicted", "less than predicted"]
+PoolVerdict = Literal["agree", "differ"]
+DriftVerdict = Literal["changed", "as before"]
+RatioVerdict = Literal["lower", "higher", "not significant", "not known"]
+
+ShortlistVerdict = Literal["cannot_meet", "worth_logging", "meets_at_worst", "not_judged"]
+"""Verdict on a sensor by its data sheet alone."""
