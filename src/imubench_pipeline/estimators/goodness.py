@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import erfc, polygamma, psi
 
+from imubench_pipeline.model.states import GoodnessVerdict
 from imubench_pipeline.typing import Array
 
 MIN_FIT_CHANCE = 1e-3
@@ -21,7 +22,7 @@ class Goodness:
     deviance: float  # mean deviance of a bin; about 1.0 where the model is right
     chance: float
     """Chance of so large a deviance, or so long runs of bins on one side, if the model is right."""
-    verdict: str  # ``explained`` or ``not explained``
+    verdict: GoodnessVerdict
     where: str  # the frequencies at which the spectrum is furthest from the model
 
 

@@ -26,6 +26,7 @@ from imubench_pipeline.model.table import R
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
+from imubench_pipeline.words.verdicts import doubts_text
 
 Tables = Mapping[str, pa.Table]
 
@@ -139,7 +140,7 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> I
         )
         about = by_name[choice.recording]
         if about.doubts:
-            cautions.append(f"{choice.recording} is in doubt: {about.doubts}")
+            cautions.append(f"{choice.recording} is in doubt: {doubts_text(about.doubts)}")
         simulated = simulated or about.simulated
         if about.rate is None:
             raise ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
@@ -182,7 +183,10 @@ def _select_deciding(
     ]
     if not apart:
         return rows, without
-    reasons = "; ".join(apart.values())
+    reasons = "; ".join(
+        f"{recording} is not used: {doubts_text(doubts)}"
+        for (_, recording), doubts in apart.items()
+    )
     if (request.because or "").strip():
         return rows, [f"{reasons}; used all the same, because: {request.because}", *without]
     deciding = [row for row in rows if (row.sensor, row.recording) not in apart]

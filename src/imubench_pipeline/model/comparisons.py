@@ -4,6 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from imubench_pipeline.model.states import (
+    Action,
+    DriftVerdict,
+    Evidence,
+    Origin,
+    PoolVerdict,
+    ShortlistVerdict,
+    SpreadOf,
+    Verdict,
+)
 from imubench_pipeline.model.table import (
     ChannelRow,
     Column,
@@ -15,6 +25,9 @@ from imubench_pipeline.model.table import (
     UpperLimit,
     table,
 )
+from imubench_pipeline.model.verdicts import Condition, DoubtMark, Share, Shortfall, UnitFactor
+
+DoubtCodes = Annotated[tuple[str, ...], Column("codes of doubts about the recording: table doubts")]
 
 
 @table("drift")
@@ -51,7 +64,7 @@ class DriftRow(SensorRow):
         float | None,
         Column("chance of such a difference, if the device has not changed"),
     ] = None
-    verdict: Annotated[str | None, Column("changed or as before; null: cannot be judged")] = None
+    verdict: Annotated[DriftVerdict | None, Column("null: cannot be judged")] = None
     reason: Annotated[str | None, Column("in words")] = None
 
 
@@ -90,9 +103,9 @@ class PooledRow(SensorRow):
         float | None,
         Column("chance of such differences, if the recordings agree"),
     ] = None
-    verdict: Annotated[str | None, Column("agree or differ, at 1 %")] = None
+    verdict: Annotated[PoolVerdict | None, Column("at a level of 1 %")] = None
     reason: Annotated[str | None, Column("in words")] = None
-    doubts: Annotated[str | None, Column("of the recordings pooled; empty: none")] = None
+    doubts: Annotated[tuple[DoubtMark, ...], Column("of the pooled recordings")] = ()
 
 
 @table("datasheet")
@@ -136,7 +149,7 @@ class DatasheetRow(ChannelRow):
     delta_upper: Annotated[float | None, Column("largest that both intervals allow")] = None
     verdict: Annotated[str, Column("better than typ, as printed, worse than typ, not sure, ...")]
     reason: Annotated[str | None, Column("in words")] = None
-    doubts: Annotated[str | None, Column("of the recording; empty: none")] = None
+    doubts: DoubtCodes = ()
 
 
 @table("repeatability")
@@ -224,10 +237,7 @@ class ErrorBudgetRow(OfRecordingRow):
         str | None,
         Column("of a source: noise, start, turn_on_bias, temperature, ..."),
     ] = None
-    origin: Annotated[
-        str | None,
-        Column("of a source: measured, datasheet, requirement or not known"),
-    ] = None
+    origin: Annotated[Origin | None, Column("of the figure of a source")] = None
     kind: Annotated[str | None, Column("of a printed figure: typ, max, 1sigma, ...")] = None
     convention: Annotated[str | None, Column("how a figure became a standard deviation")] = None
     largest: Annotated[
@@ -236,7 +246,7 @@ class ErrorBudgetRow(OfRecordingRow):
     ] = None
     largest_unit: Annotated[str | None, Column("SI unit of the figure")] = None
     reason: Annotated[str | None, Column("what is not known")] = None
-    doubts: Annotated[str | None, Column("of the recording; empty: none")] = None
+    doubts: DoubtCodes = ()
 
 
 @table("ranking")
@@ -246,8 +256,8 @@ class RankingRow(TableRow):
     requirement: Annotated[str, Column("file under config/requirements, without .yaml")]
     sensor: Annotated[str, Column("name of the sensor file")]
     rank: Annotated[int | None, Column("1 is the best; null: not ranked")] = None
-    tied_with: Annotated[str | None, Column("sensors whose intervals overlap")] = None
-    verdict: Annotated[str, Column("passes, probably passes, probably fails, surely fails, ...")]
+    tied_with: Annotated[tuple[str, ...], Column("sensors whose intervals overlap")] = ()
+    verdict: Annotated[Verdict, Column("on the conditions in the column conditions")]
     decides: Annotated[bool, Column("the limit with the least margin")]
     recording: Annotated[str | None, Column("that answers: of several, nearest to sigma")] = None
     error: Annotated[str, Column("as in error_budget")]
@@ -274,7 +284,7 @@ class RankingRow(TableRow):
         float | None,
         Column("that sigma is within limit, as far as logs and specimens tell"),
     ] = None
-    limit_verdict: Annotated[str, Column("of this limit alone")]
+    limit_verdict: Annotated[Verdict, Column("of this limit alone")]
     source: Annotated[str | None, Column("the largest contribution")] = None
     share: Annotated[float | None, Column("its part of the variance")] = None
     reached_after: Annotated[
@@ -282,13 +292,17 @@ class RankingRow(TableRow):
         Column("time after which the limit is reached", "s"),
     ] = None
     conditions: Annotated[
-        str | None,
-        Column("on which the verdict holds; why a sensor is excluded"),
-    ] = None
-    parts: Annotated[str | None, Column("every source of 1 % of the variance or more")] = None
+        tuple[Condition, ...], Column("unknown figures and properties; largest: 1 sigma, SI")
+    ] = ()
+    shortfalls: Annotated[
+        tuple[Shortfall, ...], Column("demanded properties that it lacks; has: its own, SI")
+    ] = ()
+    parts: Annotated[tuple[Share, ...], Column("every source of 1 % of the variance or more")] = ()
     reason: Annotated[str | None, Column("what is not known")] = None
-    doubts: Annotated[str | None, Column("of the recording; empty: none")] = None
-    left_out: Annotated[str | None, Column("recordings that do not decide, and why")] = None
+    doubts: Annotated[tuple[DoubtMark, ...], Column("of the recordings that are used")] = ()
+    left_out: Annotated[
+        tuple[DoubtMark, ...], Column("recordings of the sensor that are not used, and why")
+    ] = ()
     specimens: Annotated[int | None, Column("devices that the figures stand on")] = None
     recordings: Annotated[int | None, Column("recordings that they stand on")] = None
     longest_log: Annotated[float | None, Column("duration of the longest of them", "s")] = None
@@ -296,29 +310,19 @@ class RankingRow(TableRow):
         float | None,
         Column("standard deviation of ln sigma between specimens; null: unknown"),
     ] = None
-    spread_of: Annotated[
-        str | None,
-        Column("specimens; recordings (of one specimen); other sensors (of one specimen)"),
-    ] = None
-    evidence: Annotated[
-        str | None,
-        Column("of this limit: strong or weak; null: nothing is known"),
-    ] = None
+    spread_of: Annotated[SpreadOf | None, Column("compared units or recordings")] = None
+    evidence: Annotated[Evidence | None, Column("for this limit; null: there is no figure")] = None
     evidence_reasons: Annotated[
-        str | None,
+        tuple[str, ...],
         Column("one_specimen, short_log, wide_interval, few_axes, or codes of the table doubts"),
-    ] = None
-    unless: Annotated[
-        str | None,
-        Column("what the verdict would be, if what is doubted were mended"),
-    ] = None
-    unless_verdict: Annotated[
-        str | None,
-        Column("of the sensor, with the unit that is in doubt mended"),
-    ] = None
-    unless_margin: Annotated[float | None, Column("its margin")] = None
-    logged_verdict: Annotated[str | None, Column("of what was left out, as it was logged")] = None
-    logged_margin: Annotated[float | None, Column("its margin")] = None
+    ] = ()
+    corrected_units: Annotated[
+        tuple[UnitFactor, ...], Column("factors that correct units in doubt")
+    ] = ()
+    corrected_verdict: Annotated[Verdict | None, Column("with these factors")] = None
+    corrected_margin: Annotated[float | None, Column("with these factors")] = None
+    logged_verdict: Annotated[Verdict | None, Column("with unused recordings, as logged")] = None
+    logged_margin: Annotated[float | None, Column("with unused recordings, as logged")] = None
     backtest_channel: Annotated[
         str | None,
         Column("that the error mostly comes of; null: not tested"),
@@ -340,16 +344,17 @@ class NextStepRow(SensorRow):
     """A row of the table ``next_steps``."""
 
     recording: Annotated[str | None, Column("name of the recording; null: a new one")] = None
-    requirements: Annotated[str, Column("whose verdicts it is about")]
-    action: Annotated[
-        str,
-        Column("check_unit, find_figures, add_channels, record_again, log_longer or add_specimens"),
-    ]
-    verdicts_turned: Annotated[int, Column("verdicts that it may change, or settle")]
+    requirements: Annotated[tuple[str, ...], Column("whose verdicts it can change")]
+    action: Annotated[Action, Column("what to do")]
+    quantities: Annotated[tuple[str, ...], Column("whose unit or axes it is about")] = ()
+    figures: Annotated[tuple[Condition, ...], Column("to find in data sheets")] = ()
+    doubts: Annotated[tuple[str, ...], Column("codes of doubts that it removes")] = ()
+    verdicts_turned: Annotated[int, Column("verdicts that it can change, or settle")]
     verdicts_strengthened: Annotated[int, Column("verdicts whose evidence it makes stronger")]
     duration: Annotated[float | None, Column("length of the log that it takes", "s")] = None
-    specimens: Annotated[int | None, Column("how many more specimens it takes")] = None
-    text: Annotated[str, Column("in words")]
+    logged: Annotated[float | None, Column("length of the present log", "s")] = None
+    specimens: Annotated[int | None, Column("number of further units that it takes")] = None
+    text: Annotated[str, Column("in words")] = ""
 
 
 @table("shortlist")
@@ -368,10 +373,7 @@ class ShortlistRow(TableRow):
         Column("of the worst that it allows; null: not known"),
     ] = None
     decides: Annotated[str | None, Column("the limit with the least margin at the best")] = None
-    verdict: Annotated[
-        str,
-        Column("cannot pass, worth logging, passes at its worst, or not judged"),
-    ]
+    verdict: Annotated[ShortlistVerdict, Column("by the data sheet alone")]
     measured_margin_of: Annotated[
         str | None,
         Column("logs or simulated logs; null: not measured"),
@@ -380,9 +382,12 @@ class ShortlistRow(TableRow):
         float | None,
         Column("limit over error by its logs: see the table ranking"),
     ] = None
-    measured_verdict: Annotated[str | None, Column("as of the table ranking")] = None
-    assumed: Annotated[str | None, Column("unprinted figures, and the values assumed")] = None
-    reason: Annotated[str | None, Column("what it lacks, or why it is not judged")] = None
+    measured_verdict: Annotated[Verdict | None, Column("as in the table ranking")] = None
+    assumed: Annotated[tuple[str, ...], Column("unprinted figures, and the values assumed")] = ()
+    shortfalls: Annotated[
+        tuple[Shortfall, ...], Column("demanded properties that it lacks; has: its own, SI")
+    ] = ()
+    reason: Annotated[str | None, Column("why it is not judged")] = None
 
 
 @table("fusion")
@@ -427,7 +432,7 @@ class FusionRow(TableRow):
     ] = None
     reachable: Annotated[bool | None, Column("some number is enough")] = None
     reason: Annotated[str | None, Column("why there is no n or no limit")] = None
-    doubts: Annotated[str | None, Column("of both recordings; empty: none")] = None
+    doubts: DoubtCodes = ()
 
 
 @table("grades")

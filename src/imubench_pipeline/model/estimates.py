@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from imubench_pipeline.model.states import BacktestVerdict, GoodnessVerdict
 from imubench_pipeline.model.table import (
     ChannelRow,
     Column,
@@ -103,7 +104,7 @@ class ModelRow(ChannelRow):
         Column("mean of a bin; about 1 where the model is right"),
     ] = None
     chance: Annotated[float | None, Column("of so poor a fit, if the model is right")] = None
-    verdict: Annotated[str, Column("explained or not explained")]
+    verdict: Annotated[GoodnessVerdict, Column("whether the model explains the spectrum")]
     note: Annotated[
         str | None,
         Column("where it is furthest from the spectrum; what AIC says"),
@@ -398,7 +399,7 @@ class BacktestRow(ChannelRow):
         float | None,
         Column("of such a ratio or a larger one, if the model is right"),
     ] = None
-    verdict: Annotated[str | None, Column("as predicted, more or less than predicted")] = None
+    verdict: Annotated[BacktestVerdict | None, Column("null: it cannot be done")] = None
     contradicted: Annotated[
         bool | None,
         Column("1.1 times the prediction or more, sure at 1 % for all rows of the recording"),

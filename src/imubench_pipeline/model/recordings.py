@@ -12,6 +12,7 @@ from imubench_pipeline.model.states import (
     Severity,
 )
 from imubench_pipeline.model.table import Column, OfRecordingRow, SensorRow, TableRow, table
+from imubench_pipeline.model.verdicts import DoubtMark
 
 
 @table("recordings")
@@ -38,7 +39,7 @@ class RecordingRow(SensorRow):
     temperature_max: Annotated[float | None, Column("highest temperature", "degC")] = None
     fitness: Annotated[Fitness | None, Column("null: not analysed")] = None
     decides: Annotated[bool | None, Column("enters rankings, pools and exports")] = None
-    doubts: Annotated[str | None, Column("what puts its figures in doubt; empty: nothing")] = None
+    doubts: Annotated[tuple[DoubtMark, ...], Column("codes and channels of doubts")] = ()
 
 
 @table("files")
@@ -68,7 +69,7 @@ class DoubtRow(OfRecordingRow):
         Fitness,
         Column("unfit: the figures may not be those of a sensor at rest"),
     ]
-    parameters: Annotated[str | None, Column("on which it bears; null: on all")] = None
+    parameters: Annotated[tuple[str, ...], Column("affected; empty: all")] = ()
     factor: Annotated[
         float | None,
         Column("possible change of a value, where known"),

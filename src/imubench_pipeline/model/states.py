@@ -22,16 +22,14 @@ Status = Literal[
 ]
 """Status of an estimate; ``does_not_decide``: masked for comparisons, in no table."""
 
-Goodness = Literal["explained", "not explained"]
+GoodnessVerdict = Literal["explained", "not explained"]
 """Whether a model explains the spectrum."""
 
-Verdict = Literal[
-    "meets", "likely_meets", "not_enough_data", "likely_fails", "fails", "excluded", "not_admitted"
-]
+Verdict = Literal["meets", "likely_meets", "not_enough_data", "likely_fails", "fails", "excluded"]
 """Verdict on a sensor and a requirement, or on one limit of it.
 
-It holds on the conditions beside it, if there are any. ``excluded``: it lacks a property that the
-requirement demands; ``not_admitted``: its price class is another, or not known.
+It holds on the conditions beside it, if there are any. ``excluded``: the sensor lacks a property
+that the requirement demands.
 """
 
 SURE_PROBABILITY = 0.975

@@ -43,6 +43,7 @@ from scipy.special import stdtr, stdtrit
 from imubench_pipeline.model.comparisons import DriftRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.model.states import DriftVerdict
 from imubench_pipeline.navigation.pooled import (
     POOLED_PARAMETERS,
     bounded_exp,
@@ -188,9 +189,10 @@ def _make_rows(
                 reasons.append(f"{side} what the {count:.0f} before it lead one to expect")
                 if not noise and key[0].startswith("accel"):
                     reasons.append("gravity is in it: the sensor may lie differently")
-            p_value, verdict = (
-                (None, None) if math.isnan(p) else (p, "changed" if changed else "as before")
-            )
+            p_value: float | None = None
+            verdict: DriftVerdict | None = None
+            if not math.isnan(p):
+                p_value, verdict = p, "changed" if changed else "as before"
             yield DriftRow(
                 sensor=series.sensor,
                 device=series.device,

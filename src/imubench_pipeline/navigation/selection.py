@@ -6,14 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import BacktestRow
+from imubench_pipeline.model.verdicts import UnitFactor
 from imubench_pipeline.navigation.in_outages import trajectory_of
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.standing import Standing
-from imubench_pipeline.navigation.verdicts.unless import unless_words
-
-_MAX_NAMED_RECORDINGS = 3
-"""Maximum number of recordings whose doubts are listed; the others are counted."""
 
 
 def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
@@ -44,15 +41,15 @@ def _make_row(
 ) -> RankingRow:
     sensor, requirement, known = judgement.sensor, judgement.requirement, standing.known
     total, expected = standing.total, standing.expected
-    apart = [reason for (of, _), reason in basis.apart.items() if of == sensor]
-    unless = None if judgement.outside else judgement.unless
-    logged, mended = (unless.logged, unless.mended) if unless else (None, None)
+    unless = None if judgement.price else judgement.unless
+    logged, corrected = (unless.logged, unless.corrected) if unless else (None, None)
+    factors = unless.factors if unless and corrected else {}
     tested = _find_backtest(judgement.name, standing, basis)
     return RankingRow(
         requirement=judgement.name,
         sensor=sensor,
         rank=rank,
-        tied_with=", ".join(tied) or None,
+        tied_with=tuple(tied),
         verdict=judgement.verdict,
         decides=standing is judgement.decides,
         recording=total.recording,
@@ -73,20 +70,30 @@ def _make_row(
         share=standing.share,
         reached_after=total.reached_after,
         conditions=judgement.conditions,
+        shortfalls=judgement.shortfalls,
         parts=standing.parts,
         reason=total.reason,
-        doubts=_describe_doubts(sensor, standing, basis),
-        left_out="; ".join(apart) or None,
+        doubts=tuple(
+            doubt
+            for row in standing.totals or [total]
+            for doubt in basis.doubted((sensor, row.recording))
+        ),
+        left_out=tuple(
+            doubt for (of, _), doubts in basis.apart.items() if of == sensor for doubt in doubts
+        ),
         specimens=expected.specimens,
         recordings=expected.recordings,
         longest_log=basis.longest(standing.totals),
         spread=expected.spread.variance**0.5 if expected.spread else None,
         spread_of=expected.spread_of,
         evidence=("weak" if weak else "strong") if known else None,
-        evidence_reasons=", ".join(weak) or None,
-        unless=unless_words(unless) if unless else None,
-        unless_verdict=mended.verdict if mended else None,
-        unless_margin=_get_margin(mended),
+        evidence_reasons=tuple(weak),
+        corrected_units=tuple(
+            UnitFactor(quantity, factor)
+            for quantity, factor in sorted(factors.items(), reverse=True)
+        ),
+        corrected_verdict=corrected.verdict if corrected else None,
+        corrected_margin=_get_margin(corrected),
         logged_verdict=logged.verdict if logged else None,
         logged_margin=_get_margin(logged),
         backtest_channel=tested.channel if tested else None,
@@ -95,16 +102,6 @@ def _make_row(
         backtest_ratio_upper=tested.ratio_upper if tested else None,
         backtest_windows=tested.windows if tested else None,
     )
-
-
-def _describe_doubts(sensor: str, standing: Standing, basis: Basis) -> str:
-    """Return the doubts about the recordings of a standing, in words."""
-    recordings = [row.recording for row in standing.totals]
-    if len(recordings) < 2:
-        return basis.doubted((sensor, standing.total.recording))
-    doubts = [f"{name}: {words}" for name in recordings if (words := basis.doubted((sensor, name)))]
-    more = len(doubts) - _MAX_NAMED_RECORDINGS
-    return "; ".join(doubts[:_MAX_NAMED_RECORDINGS]) + (f"; and {more} more" if more > 0 else "")
 
 
 def _find_backtest(requirement: str, standing: Standing, basis: Basis) -> BacktestRow | None:
@@ -126,7 +123,7 @@ def _compute_rank(sensor: str, compared: Mapping[str, Judgement]) -> tuple[int, 
 
     def better(first: str, second: str) -> bool:
         this, that = compared[first], compared[second]
-        no_less_known = this.rests.figures.keys() <= that.rests.figures.keys()
+        no_less_known = this.open.figures.keys() <= that.open.figures.keys()
         return no_less_known and this.decides.margins[0] > that.decides.margins[1]
 
     above = [other for other in compared if better(other, sensor)]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 from imubench_pipeline.model.comparisons import (
     DatasheetRow,
@@ -22,11 +22,12 @@ from imubench_pipeline.model.comparisons import (
 )
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, FindingRow, RecordingRow
+from imubench_pipeline.model.states import Fitness
 from imubench_pipeline.model.table import ChannelRow, OfRecordingRow
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.tables.findings import LEFT_OUT
 
 Key = tuple[str, str]  # sensor, recording
-Fitness = Literal["fit", "fit with doubts", "unfit"]
 
 UNFIT = frozenset(
     {
@@ -67,7 +68,7 @@ WITH_DOUBTS: Mapping[str, type[ErrorBudgetRow] | type[DatasheetRow]] = {
 }
 """Tables of one recording whose rows repeat the doubts about it."""
 
-BEARS_ON: Mapping[str, frozenset[str]] = {
+AFFECTED_PARAMETERS: Mapping[str, frozenset[str]] = {
     "knocks": _WHITE,
     "rate_changes": _WHITE,
     "held_samples": _WHITE,
@@ -86,10 +87,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "strong_line": frozenset({"S"}),
     **{name: frozenset(powers) for name, powers in SCALES.items()},
 }
-"""The parameters on which a finding casts doubt; a warning that is not here, on all."""
-
-_SHOWN = 3
-"""Doubts of a recording that are named; of more the number."""
+"""Parameters that a finding affects; a warning that is not listed affects all."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ class Doubt:
     parameter."""
     reason: str
     parameters: tuple[str, ...] = ()
-    """On which it bears; none: on all."""
+    """Affected parameters; none: all."""
     unfit: bool = False
     """The figures may be of something else."""
     factor: float | None = None
@@ -127,7 +125,7 @@ class Doubt:
             channel=self.channel,
             code=self.code,
             fitness="unfit" if self.unfit else "fit with doubts",
-            parameters=", ".join(self.parameters) or None,
+            parameters=self.parameters,
             factor=self.factor,
             start=self.start,
             end=self.end,
@@ -227,19 +225,19 @@ def without_simulated(
     recordings : sequence of RecordingRow
         With whether they decide.
     """
-    known = {_key(row) for row in recordings if _names(row.doubts, BESIDE_MEASURED)}
+    known = {_key(row) for row in recordings if any(d.code == BESIDE_MEASURED for d in row.doubts)}
     new = [
         doubt
         for doubt in simulated_beside_measured(recordings)
         if (doubt.sensor, doubt.recording) not in known
     ]
-    apart = {(doubt.sensor, doubt.recording): words([doubt]) for doubt in new}
+    apart = {(doubt.sensor, doubt.recording): mark_doubts([doubt]) for doubt in new}
     judged_anew = [
         replace(
             row,
             fitness=row.fitness and "unfit",
             decides=False,
-            doubts="; ".join(filter(None, [apart[_key(row)], row.doubts])),
+            doubts=(*apart[_key(row)], *row.doubts),
         )
         if _key(row) in apart
         else row
@@ -281,28 +279,23 @@ def judged(
     return [_judged(row, by_recording.get(_key(row), []), included) for row in recordings]
 
 
-def words(of_recording: Iterable[Doubt]) -> str:
-    """Return the doubts of a recording in a line, the unfit first; empty where there are none."""
-    channels: dict[str, dict[str, None]] = {}
+def mark_doubts(of_recording: Iterable[Doubt]) -> tuple[DoubtMark, ...]:
+    """Return the codes of the doubts of a recording, each with its channels, the unfit first."""
+    channels: dict[tuple[str, str], dict[str, None]] = {}
     for doubt in of_recording:
         if doubt.of_recording:
-            channels.setdefault(doubt.code, {})
+            own = channels.setdefault((doubt.recording, doubt.code), {})
             if doubt.channel:
-                channels[doubt.code][doubt.channel] = None
-    return _shortened(
-        [
-            code.replace("_", " ") + (f" ({', '.join(where)})" if where else "")
-            for code, where in channels.items()
-        ]
+                own[doubt.channel] = None
+    return tuple(
+        DoubtMark(recording, code, tuple(own)) for (recording, code), own in channels.items()
     )
 
 
-def left_out(recordings: Iterable[RecordingRow]) -> dict[Key, str]:
-    """Return the recordings that were analysed and do not decide, each with the reason."""
+def left_out(recordings: Iterable[RecordingRow]) -> dict[Key, tuple[DoubtMark, ...]]:
+    """Return the analysed recordings that are not used in comparisons, each with its doubts."""
     return {
-        _key(row): f"{row.recording} does not decide: {row.doubts}"
-        for row in recordings
-        if row.status == "ok" and row.decides is False
+        _key(row): row.doubts for row in recordings if row.status == "ok" and row.decides is False
     }
 
 
@@ -327,19 +320,19 @@ def undecided(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Itera
 
 
 def with_doubts(rows: Iterable[Doubted], recordings: Iterable[RecordingRow]) -> Iterator[Doubted]:
-    """Yield rows with the doubts of the recordings that they stand on."""
-    by_recording: dict[tuple[str, str | None], str] = {
-        _key(row): row.doubts or "" for row in recordings
+    """Yield rows with the codes of the doubts about their recordings."""
+    by_recording: dict[tuple[str, str | None], list[str]] = {
+        _key(row): [doubt.code for doubt in row.doubts] for row in recordings
     }
     for row in rows:
-        texts = [by_recording.get(key, "") for key in _stands_on(row)]
-        yield replace(row, doubts="; ".join(filter(None, dict.fromkeys(texts))))
+        codes = [code for key in _stands_on(row) for code in by_recording.get(key, ())]
+        yield replace(row, doubts=tuple(dict.fromkeys(codes)))
 
 
 def _stands_on(
     row: ErrorBudgetRow | DatasheetRow | FusionRow,
 ) -> Sequence[tuple[str, str | None]]:
-    """Return sensor and recording of what a row stands on; of a comparison of two, both."""
+    """Return sensor and recording that a row is computed from; both of a comparison."""
     own = row.sensor, row.recording
     return (own, (row.other, row.other_recording)) if isinstance(row, FusionRow) else (own,)
 
@@ -350,17 +343,13 @@ def with_doubts_of_all(
     """Yield pools with the doubts of the recordings of sensor or device."""
     listed = [row for row in recordings if row.decides and row.doubts]
     for row in pools:
-        texts = [
-            f"{recording.recording}: {recording.doubts}"
+        own = (
+            doubt
             for recording in listed
             if recording.sensor == row.sensor and row.device in (None, recording.device)
-        ]
-        yield replace(row, doubts=_shortened(texts))
-
-
-def _shortened(texts: Sequence[str]) -> str:
-    more = len(texts) - _SHOWN
-    return "; ".join(texts[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+            for doubt in recording.doubts
+        )
+        yield replace(row, doubts=tuple(own))
 
 
 def _judged(row: RecordingRow, doubts: Sequence[Doubt], included: Collection[str]) -> RecordingRow:
@@ -371,12 +360,8 @@ def _judged(row: RecordingRow, doubts: Sequence[Doubt], included: Collection[str
         row,
         fitness=verdict,
         decides=verdict is not None and (verdict != "unfit" or named),
-        doubts=words(doubts),
+        doubts=mark_doubts(doubts),
     )
-
-
-def _names(words_of_doubts: str | None, code: str) -> bool:
-    return (words_of_doubts or "").startswith(code.replace("_", " "))
 
 
 def _casts_doubt(row: FindingRow) -> bool:
@@ -392,7 +377,7 @@ def _of_finding(row: FindingRow) -> Iterator[Doubt]:
     if row.value is not None:
         for name, power in SCALES.get(code, {}).items():
             by_factor.setdefault(row.value**power, []).append(name)
-    for factor, names in (by_factor or {None: [*BEARS_ON.get(code, ())]}).items():
+    for factor, names in (by_factor or {None: [*AFFECTED_PARAMETERS.get(code, ())]}).items():
         yield Doubt(
             *_place(row),
             code,

@@ -1,6 +1,6 @@
-"""The decision matrix: every sensor and requirement, in a word, a margin and a bar.
+"""The decision matrix: verdict and margin of each sensor for each requirement.
 
-All of it is of the rows of the table ``ranking`` that decide.
+It shows the deciding rows of the table ``ranking``.
 """
 
 from __future__ import annotations
@@ -8,40 +8,31 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 from imubench_pipeline.model.comparisons import RankingRow
-from imubench_pipeline.navigation.suitability.conditions import EXCLUDED
+from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.told import Told, margin, margin_limits, of_ranking
+from imubench_pipeline.report.sourced import SourcedNumber, margin, margin_limits, of_ranking
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.numbers import counted, duration_text, number_text
+from imubench_pipeline.words.verdicts import (
+    SHORT_VERDICTS,
+    VERDICT_MEANINGS,
+    answer_text,
+    doubts_text,
+    evidence_text,
+    shortfall_text,
+)
 
-WORDS: Mapping[str, str] = {
-    "passes": "chance of 97.5 % or more",
-    "likely": "50 to 97.5 %",
-    "open": "2.5 to 50 %, or known too badly",
-    "fails": "below 2.5 %",
-    "not judged": "no figure, or not admitted",
-}
-"""The words of the matrix, the best first, and what they mean."""
+_VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
-_WORD_OF = {
-    "passes": "passes",
-    "passes if": "passes",
-    "probably passes": "likely",
-    "probably passes if": "likely",
-    "probably fails": "open",
-    "surely fails": "fails",
-}
+_MAX_ORDER_DECADES = 4.0
+"""Maximum decades from 1 by which margins are sorted."""
 
-_LOGS = 4.0
-"""Decades to either side of 1 beyond which margins are sorted alike."""
-
-_DECADES = 2.0
-"""Decades to either side of 1 that a bar shows at most."""
+_MAX_BAR_DECADES = 2.0
+"""Maximum decades from 1 that a bar shows."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +47,7 @@ class Scale:
         """Return the scale that shows margins, half and twice the limit at least."""
         logs = [math.log10(value) for value in margins if 0.0 < value < math.inf]
         low, high = min([*logs, math.log10(0.5)]), max([*logs, math.log10(2.0)])
-        return cls(max(low, -_DECADES) - 0.08, min(high, _DECADES) + 0.08)
+        return cls(max(low, -_MAX_BAR_DECADES) - 0.08, min(high, _MAX_BAR_DECADES) + 0.08)
 
     def place(self, value: float) -> float:
         """Return where a margin is drawn, % of the width; at an end what lies beyond it."""
@@ -77,19 +68,25 @@ class Cell:
 
     requirement: str
     sensor: str
-    word: str
-    conditions: int  # figures that are not known, on which the word rests
-    margin: tuple[Told, Told, Told] | None  # with its 95 % limits
+    verdict: Verdict
+    word: str  # verdict in words
+    conditions: int  # unknown figures on which the verdict depends
+    margin: tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None  # with its 95 % limits
     bar: tuple[float, float, float] | None  # of these, the places
-    weak: str  # what makes the evidence weak, in words
-    doubts: str  # what is doubted of the recordings
+    weak: str  # reasons for weak evidence
+    doubts: str  # doubts about the recordings
     reason: str  # why it is not judged
-    otherwise: Sequence[tuple[str, Told, float]]  # as logged, and mended: margins and places
+    alternatives: Sequence[tuple[str, SourcedNumber, float]]  # margins as logged and corrected
     order: float  # larger is better
 
     @property
+    def judged(self) -> bool:
+        """Whether it has a margin."""
+        return self.margin is not None
+
+    @property
     def hatched(self) -> bool:
-        """Whether the evidence is weak or in doubt."""
+        """Whether the evidence is weak, or the recordings are in doubt."""
         return bool(self.weak or self.doubts)
 
 
@@ -104,69 +101,56 @@ class Column:
     answer: str
 
 
-def matrix(site: Site) -> dict[str, Any] | None:
+@dataclass(frozen=True)
+class Matrix:
+    """All sensors and requirements."""
+
+    columns: Sequence[Column]
+    lines: Sequence[tuple[str, Sequence[Cell]]]  # by sensor, the best first
+    apart: Mapping[str, str]  # sensors that are not compared, and why
+    scale: Scale
+    legend: Sequence[tuple[Verdict, str, str]]  # verdict, its word and meaning
+
+
+def matrix(site: Site) -> Matrix | None:
     """Return the matrix of a report; None where nothing is asked of its sensors."""
     requirements = site.settings["requirements"]
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
     if not rows:
         return None
     scale = Scale.of(value for row in rows.values() for value in _drawn(row))
+    # A sensor that cannot be bought is not compared with others.
+    apart = {sensor: "not sold" for sensor in site.sensors if not site.is_sold(sensor)}
     lines = {
         sensor: [
             _cell(row, scale) if (row := rows.get((name, sensor))) else _empty(site, name, sensor)
             for name in requirements
         ]
         for sensor in site.sensors
+        if sensor not in apart
     }
-    # What nobody can buy is no row among what can be bought.
-    apart = {sensor: "not sold" for sensor in site.sensors if not site.is_sold(sensor)}
-    lines = {sensor: cells for sensor, cells in lines.items() if sensor not in apart}
     order = sorted(lines, key=lambda sensor: (_merit(lines[sensor]), site.names[sensor]))
-    return {
-        "columns": [
-            _column(name, declared, answer([cells[place] for cells in lines.values()], site.names))
-            for place, (name, declared) in enumerate(requirements.items())
-        ],
-        "lines": [(sensor, lines[sensor]) for sensor in order],
-        "apart": apart,
-        "scale": scale,
-        "words": WORDS,
-    }
+    columns = []
+    for place, (name, declared) in enumerate(requirements.items()):
+        cells = [cells[place] for cells in lines.values()]
+        judged = sorted((cell for cell in cells if cell.judged), key=lambda cell: -cell.order)
+        best = [rows[name, cell.sensor] for cell in judged]
+        columns.append(_column(name, declared, answer_text(best, site.names, len(cells))))
+    return Matrix(
+        columns,
+        [(sensor, lines[sensor]) for sensor in order],
+        apart,
+        scale,
+        [(verdict, SHORT_VERDICTS[verdict], VERDICT_MEANINGS[verdict]) for verdict in _VERDICTS],
+    )
 
 
 def _merit(cells: Sequence[Cell]) -> tuple[float, ...]:
-    """Return a key that puts first what passes most, then what is likely to, and so on."""
-    words = list(WORDS)
-    counts = [-sum(cell.word == word for cell in cells) for word in words]
+    """Return a key that puts first the sensor with the most met limits, and so on."""
+    counts = [
+        -sum(cell.judged and cell.verdict == verdict for cell in cells) for verdict in _VERDICTS
+    ]
     return (*counts, -sum(cell.order for cell in cells))
-
-
-def answer(cells: Sequence[Cell], names: Mapping[str, str]) -> str:
-    """Return in a line which sensor to choose, of the cells of a requirement."""
-    judged = [cell for cell in cells if cell.word != "not judged"]
-    if not judged:
-        return "no sensor could be judged."
-    best = max(judged, key=lambda cell: cell.order)
-    name = names[best.sensor]
-    if best.word in ("passes", "likely"):
-        verb = "passes" if best.word == "passes" else "is likely to pass"
-        text = f"{name} {verb}"
-        if best.conditions:
-            text += f" if {counted(best.conditions, 'condition')} {_hold(best.conditions)}"
-        text += f", the best of {len(judged)} judged" if len(judged) > 1 else ", alone judged"
-    else:
-        of = (
-            f"none of {len(judged)} judged"
-            if len(judged) > 1
-            else "the one that is judged does not"
-        )
-        verb = "passes" if len(judged) > 1 else "pass"
-        text = f"{of} {verb}; {name} is nearest"
-    return f"{text}{', on weak evidence' * bool(best.weak)}."
-
-
-def _hold(number: int) -> str:
-    return "holds" if number == 1 else "hold"
 
 
 def _column(name: str, declared: Mapping[str, Any], answer: str) -> Column:
@@ -181,89 +165,71 @@ def _column(name: str, declared: Mapping[str, Any], answer: str) -> Column:
 
 def _drawn(row: RankingRow) -> list[float]:
     """Return the margins of a row that are drawn."""
-    known = [size for size in (row.logged_margin, row.unless_margin) if size is not None]
+    known = [size for size in (row.logged_margin, row.corrected_margin) if size is not None]
     if row.margin is None:
         return known
     return [row.margin, *(limit for limit in margin_limits(row) if limit is not None)]
 
 
-def word_of(row: RankingRow) -> str:
-    """Return the word of a row of the table ``ranking`` that decides."""
-    if row.verdict == "not enough data" and row.margin is not None:
-        return "open"
-    return _WORD_OF.get(row.verdict, "not judged")
-
-
 def unranked(own: Iterable[RecordingView]) -> str:
-    """Return in a few words why a sensor is in no ranking, of its recordings."""
+    """Return why a sensor is in no ranking, from its recordings."""
     at_rest = [view for view in own if view.static]
     if not at_rest:
         return "no recording at rest"
-    return "; ".join(dict.fromkeys(view.row.doubts for view in at_rest if view.row.doubts))
-
-
-def _why(site: Site, sensor: str) -> str:
-    """Return in a few words why a sensor would be in no ranking."""
-    return unranked(view for view in site.views if view.sensor == sensor)
+    return doubts_text(doubt for view in at_rest for doubt in view.row.doubts)
 
 
 def _empty(site: Site, requirement: str, sensor: str) -> Cell:
     """Return the cell of a sensor that is in no ranking."""
-    reason = _why(site, sensor)
-    word = "not judged"
-    return Cell(requirement, sensor, word, 0, None, None, "", "", reason, (), -math.inf)
+    reason = unranked(view for view in site.views if view.sensor == sensor)
+    word = SHORT_VERDICTS["not_enough_data"]
+    return Cell(
+        requirement, sensor, "not_enough_data", word, 0, None, None, "", "", reason, (), -math.inf
+    )
 
 
 def _cell(row: RankingRow, scale: Scale) -> Cell:
-    word = word_of(row)
-    judged = word != "not judged"
-    shown = margin(row) if judged else None
-    low, high = margin_limits(row) if shown else (None, None)
+    judged = row.margin is not None and row.verdict != "excluded"
+    low, high = margin_limits(row) if judged else (None, None)
     bar = None
     if row.margin is not None and low is not None and high is not None:
         bar = (scale.place(row.margin), scale.place(low), scale.place(high))
-    ranked = list(WORDS)
+    place = len(_VERDICTS) - _VERDICTS.index(row.verdict)
     return Cell(
         row.requirement,
         row.sensor,
-        word,
-        _conditions(row) if judged else 0,
-        shown,
+        row.verdict,
+        SHORT_VERDICTS[row.verdict],
+        len(row.conditions) if judged else 0,
+        margin(row) if judged else None,
         bar,
-        evidence_words(row) if judged else "",
-        row.doubts or "",
-        "" if judged else _reason(row),
-        [] if judged else _otherwise(row, scale),
-        _order(len(WORDS) - ranked.index(word), row.margin) if judged else -math.inf,
+        evidence_text(row) if judged else "",
+        doubts_text(row.doubts),
+        "" if judged else _explain(row),
+        [] if judged else _alternatives(row, scale),
+        _order(place, row.margin) if judged else -math.inf,
     )
 
 
 def _order(place: int, size: float | None) -> float:
-    log = math.log10(size) if size else -_LOGS
-    return round(10.0 * place + min(max(log, -_LOGS), _LOGS), 4)
+    log = math.log10(size) if size else -_MAX_ORDER_DECADES
+    return round(10.0 * place + min(max(log, -_MAX_ORDER_DECADES), _MAX_ORDER_DECADES), 4)
 
 
-def _conditions(row: RankingRow) -> int:
-    """Return on how many conditions a verdict rests."""
-    return len((row.conditions or "").split("; ")) if row.verdict.endswith(" if") else 0
-
-
-def _reason(row: RankingRow) -> str:
-    """Return in a few words why a sensor is not judged."""
-    if row.verdict == EXCLUDED:
-        return str(row.conditions)
-    if row.verdict != "not enough data":
-        return str(row.verdict)
+def _explain(row: RankingRow) -> str:
+    """Return why a sensor is not judged."""
+    if row.verdict == "excluded":
+        return "; ".join(map(shortfall_text, row.shortfalls))
     if row.left_out:
-        return "in doubt" if row.doubts else str(row.left_out)
-    return str(row.reason or "too little is known")
+        return f"not used: {doubts_text(row.left_out)}"
+    return row.reason or "too little is known"
 
 
-def _otherwise(row: RankingRow, scale: Scale) -> list[tuple[str, Told, float]]:
-    """Return the margins that a recording in doubt would have."""
+def _alternatives(row: RankingRow, scale: Scale) -> list[tuple[str, SourcedNumber, float]]:
+    """Return the margins with the recordings that are not used, and with corrected units."""
     named = (
         ("as logged", "logged_margin", row.logged_margin),
-        ("mended", "unless_margin", row.unless_margin),
+        ("if corrected", "corrected_margin", row.corrected_margin),
     )
     return [
         (words, of_ranking(row, name, number_text(size, 3)), scale.place(size))

@@ -1,4 +1,4 @@
-"""What the verdicts on a sensor stand on: every number of the decision matrix, and where from."""
+"""Trace each verdict on a sensor to its numbers and recordings."""
 
 from __future__ import annotations
 
@@ -6,20 +6,28 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
-from imubench_pipeline.report.decisions import unranked, word_of
+from imubench_pipeline.report.decisions import unranked
 from imubench_pipeline.report.meaning import error_of_recording, limit_words, rankings
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.told import of_ranking
+from imubench_pipeline.report.sourced import of_ranking
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import requirement_words, spread_words
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.numbers import counted, duration_text, number_text
+from imubench_pipeline.words.requirements import requirement_text
+from imubench_pipeline.words.verdicts import (
+    SHORT_VERDICTS,
+    condition_text,
+    doubts_text,
+    spread_text,
+    stated_verdict,
+    verdict_text,
+)
 
 
 def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
-    """Yield each requirement with how a sensor stands to it, and all that this rests on.
+    """Yield each requirement with the verdict on a sensor, its numbers and its recordings.
 
-    A requirement by which the sensor is not judged is there, too. ``own``: its recordings.
+    ``own`` are the recordings of the sensor. Requirements without a verdict are included.
     """
     rows = site.rows(RankingRow)
     own_rows = [row for row in rows if row.sensor == sensor]
@@ -27,26 +35,32 @@ def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[
     simulated = {view.full_name: view.simulated for view in own}
     requirements = site.settings["requirements"] if rows else {}
     for ranking in rankings(own_rows, requirements, simulated, site.system):
-        name, requirement = ranking["name"], ranking["requirement"]
-        about = {"name": name, "title": requirement.title, "asked": requirement_words(requirement)}
+        name, requirement = ranking.name, ranking.requirement
+        about = {"name": name, "title": requirement.title, "asked": requirement_text(requirement)}
         stands = next((r for r in own_rows if r.requirement == name and r.decides), None)
         if stands is None:
-            yield about | {"row": None, "word": "not judged", "why": unranked(own)}
+            yield about | {
+                "row": None,
+                "verdict": "not_enough_data",
+                "word": SHORT_VERDICTS["not_enough_data"],
+                "why": unranked(own),
+            }
             continue
-        (group,) = ranking["groups"]
+        (group,) = ranking.groups
         judged = sum(
             row.rank is not None and row.decides and row.requirement == name for row in rows
         )
         yield about | {
             "row": stands,
-            "word": word_of(stands),
+            "verdict": stands.verdict,
+            "word": SHORT_VERDICTS[stands.verdict],
+            "stated": verdict_text(stands.verdict) if stands.conditions else stated_verdict(stands),
             "group": group,
-            "place": f"rank {stands.rank} of {judged} that could be judged" if stands.rank else "",
-            "conditions": (stands.conditions or "").split("; ")
-            if stands.verdict.endswith(" if")
-            else [],
-            "spread": spread_words(stands) if stands.spread is not None else "",
-            "otherwise": list(_otherwise(stands)),
+            "place": f"rank {stands.rank} of {judged}" if stands.rank else "",
+            "conditions": [condition_text(each) for each in stands.conditions],
+            "spread": spread_text(stands),
+            "left_out": doubts_text(stands.left_out, named=True),
+            "alternatives": list(_alternatives(stands)),
             "window": _window(requirement),
             "limits": [
                 limit_words(row)
@@ -61,21 +75,30 @@ def evidence(site: Site, sensor: str, own: Sequence[RecordingView]) -> Iterator[
         }
 
 
-def _otherwise(row: RankingRow) -> Iterator[tuple[str, str, str]]:
-    """Yield what the verdict would be: in which case, the verdict and its margin."""
+def _alternatives(row: RankingRow) -> Iterator[tuple[str, str, str]]:
+    """Yield alternative verdicts: the case, the verdict and its margin."""
     for words, name, size, verdict in (
         ("As logged", "logged_margin", row.logged_margin, row.logged_verdict),
-        ("With the unit mended", "unless_margin", row.unless_margin, row.unless_verdict),
+        (
+            "With the unit corrected",
+            "corrected_margin",
+            row.corrected_margin,
+            row.corrected_verdict,
+        ),
     ):
         if size is not None:
-            yield words, verdict or "", of_ranking(row, name, number_text(size, 3))
+            yield (
+                words,
+                verdict_text(verdict) if verdict else "",
+                of_ranking(row, name, number_text(size, 3)),
+            )
 
 
 def _window(requirement: Requirement) -> str:
-    """Return from what biases are taken, which all errors of the requirement have in common."""
+    """Return the origin of the biases of all errors of the requirement."""
     if requirement.static_window:
         return f"{requirement.static_window} at rest right before"
-    return "turn-on biases that nothing has taken off" if requirement.turn_on else ""
+    return "turn-on biases, not calibrated" if requirement.turn_on else ""
 
 
 def _totals(view: RecordingView) -> Iterator[ErrorBudgetRow]:
@@ -97,6 +120,6 @@ def _recording(site: Site, view: RecordingView, totals: Sequence[ErrorBudgetRow]
         "length": f"{duration_text(view.row.duration)}, {axes}",
         "temperature": temperature,
         "decides": view.row.decides is not False,
-        "doubts": view.row.doubts or "",
+        "doubts": doubts_text(view.row.doubts),
         "errors": [error_of_recording(total, site.system) for total in totals],
     }

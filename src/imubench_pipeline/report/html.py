@@ -20,6 +20,7 @@ from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.practical import PageUnit, System, page_unit, symbol_text
 from imubench_pipeline.report.words import started_text
 from imubench_pipeline.words.numbers import NO_VALUE, duration_text, number_text
+from imubench_pipeline.words.verdicts import doubts_text
 
 
 @cache  # compiling the templates takes longer than writing pages of a small report
@@ -86,6 +87,7 @@ def environment(system: System) -> jinja2.Environment:
     templates.filters |= {"duration": duration_text, "number": number_text, "json": _json}
     templates.filters |= {"started": started_text, "symbol_text": symbol_text}
     templates.filters["attribute"] = _compact
+    templates.filters["doubts"] = doubts_text
     templates.filters["packed"] = packed
     templates.tests["hidden_row"] = _is_hidden
     return templates

@@ -1,19 +1,33 @@
-"""What the page says of use: which sensor fulfils which requirement, and what errors come of."""
+"""Rankings and error budgets as the pages and the terminal show them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
-from imubench_pipeline.navigation.suitability.conditions import parts_of
+from imubench_pipeline.navigation.suitability.conditions import shares_of
 from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.practical import PageUnit, System, interval_text, unit_of
-from imubench_pipeline.report.told import Between, Told, margin, of_budget, of_ranking
-from imubench_pipeline.report.words import evidence_words
+from imubench_pipeline.report.sourced import (
+    SourcedInterval,
+    SourcedNumber,
+    margin,
+    of_budget,
+    of_ranking,
+)
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.words.numbers import NO_VALUE, duration_text
+from imubench_pipeline.words.verdicts import (
+    VERDICT_WORDS,
+    corrected_text,
+    doubts_text,
+    evidence_text,
+    share_text,
+    stated_verdict,
+)
 
 Simulated = Mapping[tuple[str, str], bool]
 
@@ -28,85 +42,136 @@ _ERRORS = tuple(_NAMES)
 _QUARTER_TURN = math.pi / 2.0
 
 
+@dataclass(frozen=True)
+class LimitLine:
+    """A limit of a requirement, and the error of a sensor, as texts."""
+
+    limit: str
+    allowed: SourcedNumber
+    sigma: str
+    interval: str
+    margin: str
+    margins: str
+    chance: str
+    source: str
+    parts: Sequence[str]
+    reached: str
+    decides: bool
+    reason: str
+    backtest: str
+
+
+@dataclass(frozen=True)
+class Group:
+    """The lines of a sensor in the ranking for a requirement."""
+
+    row: RankingRow  # of the deciding limit
+    simulated: bool
+    rank: str
+    verdict: str
+    stated: str  # verdict with its conditions, or shortfalls
+    weak: str  # reasons for weak evidence
+    doubts: str
+    corrected: str  # verdict with a corrected unit, or with recordings that are not used
+    limits: Sequence[LimitLine]
+
+    @property
+    def sensor(self) -> str:
+        """Name of its file."""
+        return self.row.sensor
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """The sensors in their order for a requirement."""
+
+    name: str
+    requirement: Requirement
+    groups: Sequence[Group]
+
+
 def rankings(
     rows: Sequence[RankingRow],
     requirements: Mapping[str, Any],
     simulated: Simulated,
     system: System,
-) -> Iterator[dict[str, Any]]:
-    """Yield each requirement with the sensors in their order, and how they stand to its limits.
+) -> Iterator[Ranking]:
+    """Yield the ranking for each requirement.
 
-    Of the table ``ranking``, the requirements as the plan wrote them, and which recordings are
-    simulated.
+    Parameters
+    ----------
+    rows : sequence of RankingRow
+    requirements : mapping of str to mapping
+        As the plan wrote them.
+    simulated : mapping of (str, str) to bool
+        Whether a recording is simulated.
+    system : {'practical', 'si'}
     """
     for name, declared in requirements.items():
-        requirement = Requirement.model_validate(declared)
         own = [row for row in rows if row.requirement == name]
-        groups = []
-        for sensor in sorted(dict.fromkeys(row.sensor for row in own), key=_order(own)):
-            limits = [row for row in own if row.sensor == sensor]
-            recordings = {row.recording for row in limits}
-            stands = next(row for row in limits if row.decides)
-            groups.append(
-                {
-                    "sensor": sensor,
-                    "simulated": all(
-                        recording is not None and simulated.get((sensor, recording), False)
-                        for recording in recordings
-                    ),
-                    "rank": limits[0].rank or "–",
-                    "tied_with": limits[0].tied_with,
-                    "verdict": stands.verdict,
-                    "conditions": stands.conditions,
-                    "weak": evidence_words(stands) if stands.rank else "",
-                    "doubts": (stands.doubts or "") if stands.rank else "",
-                    "unless": stands.unless,
-                    "limits": [_limit(row, system) for row in limits],
-                }
-            )
-        yield {"name": name, "requirement": requirement, "groups": groups}
+        sensors = sorted(dict.fromkeys(row.sensor for row in own), key=_order(own))
+        groups = [
+            _group([row for row in own if row.sensor == sensor], simulated, system)
+            for sensor in sensors
+        ]
+        yield Ranking(name, Requirement.model_validate(declared), groups)
+
+
+def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -> Group:
+    row = next(row for row in limits if row.decides)
+    used = {limit.recording for limit in limits}
+    return Group(
+        row,
+        simulated=all(
+            recording is not None and simulated.get((row.sensor, recording), False)
+            for recording in used
+        ),
+        rank=str(row.rank or NO_VALUE),
+        verdict=VERDICT_WORDS[row.verdict],
+        stated=stated_verdict(row),
+        weak=evidence_text(row) if row.rank else "",
+        doubts=doubts_text(row.doubts, named=len(used) > 1) if row.rank else "",
+        corrected=corrected_text(row),
+        limits=[_limit(limit, system) for limit in limits],
+    )
 
 
 def _order(rows: Sequence[RankingRow]) -> Any:
-    """Return a key that puts the ranked sensors first, of one rank those that pass as they are.
+    """Return a key that sorts by rank, and equal ranks by conditions and margin.
 
-    A sensor of which little is known has a large margin and conditions.
+    A sensor with unknown figures has a large margin, and conditions.
     """
     places: dict[str, tuple[int, int, float]] = {}
     for row in rows:
         if row.decides:
             rank, margin = row.rank or 10**6, row.margin or 0.0
-            place = _MERIT.index(row.verdict) if row.verdict in _MERIT else len(_MERIT)
-            places[row.sensor] = (rank, place // 2, -margin)
+            meets = row.verdict in ("meets", "likely_meets")
+            place = (1 if row.conditions else 0) if meets else 2
+            places[row.sensor] = (rank, place, -margin)
     return places.__getitem__
 
 
-_MERIT = ("passes", "probably passes", "passes if", "probably passes if")
-
-
-def _limit(row: RankingRow, system: System) -> dict[str, Any]:
-    reached = row.reached_after
+def _limit(row: RankingRow, system: System) -> LimitLine:
     size = margin(row)
-    return {
-        "limit": limit_words(row),
-        "allowed": _allowed(row, system),
-        "sigma": _expected(row, system),
-        "interval": _interval(row, system),
-        "margin": size[0] if size else "–",
-        "margins": Between(size[1], size[2]) if size else "",
-        "chance": "–"
-        if row.sigma is None
-        else of_ranking(row, "chance", _percent(row.chance), "%"),
-        "source": f"{row.source} ({_percent(row.share)})" if row.source else "–",
-        "parts": (row.parts or "–").split("; "),
-        "reached": duration_text(reached) if reached is not None else "–",
-        "decides": row.decides,
-        "reason": row.reason or "",
-        "backtest": standing_text(row),
-    }
+    chance = "–" if row.sigma is None else of_ranking(row, "chance", _percent(row.chance), "%")
+    return LimitLine(
+        limit=limit_words(row),
+        allowed=_allowed(row, system),
+        sigma=_expected(row, system),
+        interval=_interval(row, system),
+        margin=size[0] if size else NO_VALUE,
+        margins=SourcedInterval(size[1], size[2]) if size else "",
+        chance=chance,
+        source=f"{row.source} ({_percent(row.share)})" if row.source else NO_VALUE,
+        parts=[share_text(share) for share in row.parts] or [NO_VALUE],
+        reached=duration_text(row.reached_after),
+        decides=row.decides,
+        reason=row.reason or "",
+        backtest=standing_text(row),
+    )
 
 
-def _allowed(row: RankingRow, system: System) -> Told:
+def _allowed(row: RankingRow, system: System) -> SourcedNumber:
     unit = unit_of(DIMENSIONS[row.error], system, row.limit)
     return of_ranking(row, "limit", f"{unit.text(row.limit, 3)} {unit.sign}", unit.sign)
 
@@ -115,7 +180,7 @@ ErrorRow = RankingRow | ErrorBudgetRow
 """A row of an error after a time."""
 
 
-def _place(row: ErrorRow, column: str, text: str, unit: str) -> Told:
+def _place(row: ErrorRow, column: str, text: str, unit: str) -> SourcedNumber:
     """Return a number of a row with its place in the tables."""
     if isinstance(row, RankingRow):
         return of_ranking(row, column, text, unit)
@@ -143,7 +208,7 @@ def _interval(row: ErrorRow, system: System) -> str:
         _place(row, name, unit.text(value, digits), unit.sign)
         for name, value in (("lower", row.lower), ("upper", row.upper))
     )
-    return Between(lower, upper)
+    return SourcedInterval(lower, upper)
 
 
 def error_of_recording(total: ErrorBudgetRow, system: System) -> tuple[str, str]:
@@ -256,7 +321,7 @@ def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> dict[str, Any]:
         lines.append(interval_text(total.lower, total.upper, unit, digits))
     sources = [row for row in rows if row.source != "total"]
     if total.sigma > 0.0:
-        lines += (parts_of(total.sigma, sources) or "").split("; ")
+        lines += [share_text(share) for share in shares_of(total.sigma, sources)] or [""]
     return {"lines": lines, "note": total.reason or "", "class": "number"}
 
 

@@ -10,6 +10,7 @@ from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.words.numbers import NO_VALUE, counted, number_text, percent_text
+from imubench_pipeline.words.verdicts import doubts_text
 
 TUNINGS = {
     "true": "true model",
@@ -45,7 +46,7 @@ def _context(site: Site) -> dict[str, Any]:
     shown = [row for row in rows if row.position is not None]
     recordings = [view.row for view in site.views]
     apart = left_out(recordings)
-    doubts = {(row.sensor, row.recording): row.doubts for row in recordings}
+    doubts = {(row.sensor, row.recording): doubts_text(row.doubts) for row in recordings}
     deciding = [row for row in shown if (row.sensor, row.recording) not in apart]
     return {
         "answers": [
@@ -54,7 +55,9 @@ def _context(site: Site) -> dict[str, Any]:
         ],
         "ranking": list(ranking(deciding)),
         "apart": {
-            row.sensor: apart[key] for row in shown if (key := (row.sensor, row.recording)) in apart
+            row.sensor: f"{row.recording} is not used: {doubts_text(apart[key])}"
+            for row in shown
+            if (key := (row.sensor, row.recording)) in apart
         },
         "lines": [line_of(row) for row in shown],
         "lacking": [dict(row) | {"tuning": TUNINGS[row.tuning]} for row in rows if row.reason],

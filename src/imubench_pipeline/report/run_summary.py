@@ -10,12 +10,12 @@ from typing import Protocol
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
-from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.report.folder import failed_pages
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.words.numbers import counted
+from imubench_pipeline.words.verdicts import stated_verdict
 
 _NEEDED = ("recordings", "findings", "ranking", "failures")
 _MOST_LINES = 10
@@ -181,11 +181,11 @@ def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -
             continue
         best = max(first, key=lambda row: row.margin or 0.0)
         shown = best.sensor + " (simulated)" * ((best.sensor, best.recording) in simulated)
-        if best.verdict.endswith("fails"):
-            shown = f"no sensor fulfils it; nearest is {shown}"
-        tied = f", tied with {best.tied_with}" if best.tied_with else ""
-        weak = ", on weak evidence" * (best.evidence == "weak")
-        yield one_line(f"{name}: {shown}: {in_words(best.verdict, best.conditions)}{weak}{tied}")
+        if best.verdict in ("likely_fails", "fails"):
+            shown = f"no sensor meets the limits; closest is {shown}"
+        tied = f"; not significantly better than {', '.join(best.tied_with)}" * bool(best.tied_with)
+        weak = "; weak evidence" * (best.evidence == "weak")
+        yield one_line(f"{name}: {shown}: {stated_verdict(best)}{weak}{tied}")
 
 
 def one_line(text: str, longest: int = _MOST_LETTERS) -> str:

@@ -1,4 +1,4 @@
-"""The page of what datasheets alone say for each requirement, before anything is bought."""
+"""The page that judges sensors by their data sheets alone."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 from imubench_pipeline.model.comparisons import ShortlistRow
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.words.numbers import number_text
+from imubench_pipeline.words.verdicts import SHORT_VERDICTS, SHORTLIST_WORDS, shortfall_text
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -35,6 +36,9 @@ def _line(site: Site, row: ShortlistRow) -> dict[str, Any]:
     sensor, verdict, best, worst, measured, _ = cells(row)
     return {
         **row,
+        "code": row.verdict,
+        "shortfalls": list(map(shortfall_text, row.shortfalls)),
+        "measured_verdict": SHORT_VERDICTS[row.measured_verdict] if row.measured_verdict else "",
         "name": site.names.get(row.sensor, sensor),
         "logged": row.sensor in site.sensors,
         "verdict": verdict,
@@ -51,18 +55,18 @@ def cells(row: ShortlistRow) -> list[str]:
         measured += " (simulated)"
     return [
         row.sensor,
-        row.verdict,
+        SHORTLIST_WORDS[row.verdict],
         _margin(row.best_margin),
         _margin(row.worst_margin) if row.best_margin is not None else "–",
         measured,
-        row.decides or row.reason or "",
+        row.decides or row.reason or "; ".join(map(shortfall_text, row.shortfalls)),
     ]
 
 
 def notes(rows: Sequence[ShortlistRow]) -> Iterator[str]:
     """Yield what is assumed of each sensor, or why it is not judged, in a line each."""
     for row in rows:
-        remarks = [row.reason, row.assumed]
+        remarks = [*map(shortfall_text, row.shortfalls), row.reason, *row.assumed]
         if any(remarks):
             yield f"{row.sensor}: {'; '.join(filter(None, remarks))}"
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
+
+from markupsafe import Markup
 
 from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
 from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
@@ -12,19 +15,21 @@ from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
 from imubench_pipeline.report.decisions import matrix, strip
-from imubench_pipeline.report.glossary import term
-from imubench_pipeline.report.meaning import rankings
+from imubench_pipeline.report.meaning import Group, rankings
 from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import (
-    listed_names,
-    requirement_verdict,
-    requirement_words,
-    sentence,
-    spread_words,
+from imubench_pipeline.report.words import sentence
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.words.numbers import counted, duration_text, join_names
+from imubench_pipeline.words.requirements import requirement_text
+from imubench_pipeline.words.verdicts import (
+    answer_text,
+    condition_text,
+    doubts_text,
+    list_others,
+    spread_text,
 )
-from imubench_pipeline.words.numbers import counted, duration_text
 
 _STEPS = 3
 """What is to do next that the start page names; the table has all."""
@@ -162,37 +167,65 @@ def _grouped(rows: Sequence[FindingRow]) -> list[tuple[str, str]]:
     return [(name, ", ".join(channels)) for name, channels in grouped.items()]
 
 
-def _rankings(site: Site) -> Iterator[dict[str, Any]]:
+@dataclass(frozen=True)
+class _Answer:
+    """The ranking for a requirement, with the answer in sentences."""
+
+    name: str
+    requirement: Requirement
+    groups: Sequence[Group]
+    asked: str
+    answer: str
+    details: Sequence[str]
+    tied: Mapping[str, Sequence[str]]  # by sensor, the names of those that are not worse
+
+
+def _rankings(site: Site) -> Iterator[_Answer]:
     simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows(RankingRow)
     for ranking in rankings(rows, site.settings["requirements"], simulated, site.system):
-        decisive = {
-            row.sensor: row for row in rows if row.requirement == ranking["name"] and row.decides
-        }
-        basis = {
-            group["sensor"]: _basis(site, decisive[group["sensor"]]) for group in ranking["groups"]
-        }
-        yield ranking | {
-            "asked": requirement_words(ranking["requirement"]),
-            "verdict": requirement_verdict(ranking["groups"], site.names, basis),
-            "tied": {
-                group["sensor"]: [
-                    site.names.get(name, name)
-                    for name in listed_names(group["tied_with"], site.names)
-                ]
-                for group in ranking["groups"]
-                if group["tied_with"]
+        groups = ranking.groups
+        ranked = [group for group in groups if group.row.rank]
+        yield _Answer(
+            ranking.name,
+            ranking.requirement,
+            groups,
+            requirement_text(ranking.requirement),
+            answer_text([group.row for group in ranked], site.names, len(groups)),
+            list(_details(site, groups, ranked)),
+            {
+                group.sensor: [site.names.get(name, name) for name in group.row.tied_with]
+                for group in groups
             },
-        }
+        )
+
+
+def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> Iterator[str]:
+    """Yield the deciding limit of the best sensor, its data, and the verdicts on the others."""
+    for group in ranked[:1]:
+        decides = next(limit for limit in group.limits if limit.decides)
+        text = Markup("Deciding limit, {}: {} expected ({}), {} allowed (1σ).").format(
+            decides.limit, decides.sigma, decides.interval, decides.allowed
+        )
+        if decides.reason:
+            text += f" Not counted: {decides.reason}."
+        yield f"{text} {_describe_data(site, group.row)}"
+        if conditions := group.row.conditions:
+            yield f"Conditions: {'; '.join(map(condition_text, conditions))}."
+        if tied := [site.names.get(name, name) for name in group.row.tied_with]:
+            yield f"The difference from {join_names(tied)} is not statistically significant."
+    yield from list_others((group.row for group in groups if group not in ranked[:1]), site.names)
+    for group in groups:
+        if group.corrected:
+            yield f"{site.names[group.sensor]}: {group.corrected}."
 
 
 def _next_steps(site: Site) -> Iterator[dict[str, Any]]:
-    """Yield what would turn or strengthen most verdicts."""
+    """Yield the steps that can change most verdicts."""
     titles = {
         name: requirement["title"] for name, requirement in site.settings["requirements"].items()
     }
     for row in site.rows(NextStepRow)[:_STEPS]:
-        about = "; ".join(titles[name] for name in listed_names(row.requirements, titles))
         own = [
             view.simulated
             for view in site.views
@@ -202,33 +235,28 @@ def _next_steps(site: Site) -> Iterator[dict[str, Any]]:
             "sensor": row.sensor,
             "simulated": all(own),
             "text": sentence(row.text),
-            "about": about,
+            "about": "; ".join(titles[name] for name in row.requirements),
         }
 
 
-def _basis(site: Site, row: RankingRow) -> str:
-    """Return on which data a sensor is judged, and what puts them in doubt."""
-    own = [v for v in site.views if v.sensor == row.sensor and v.static]
+def _describe_data(site: Site, row: RankingRow) -> str:
+    """Return the recordings of a verdict, and the doubts about them."""
+    own = [view for view in site.views if view.sensor == row.sensor and view.static]
     chosen = next((view for view in own if view.name == row.recording), None)
-    left_out = f" Left out: {row.left_out}." if row.left_out else ""
+    left_out = f" Not used: {doubts_text(row.left_out, named=True)}." if row.left_out else ""
     if chosen is None or not row.recordings:
         return left_out.strip()
     axes = counted(len(chosen.recommended()), "axis", "axes")
-    log = f"recording {chosen.name} ({duration_text(chosen.row.duration)}, {axes})"
+    log = f"{chosen.name} ({duration_text(chosen.row.duration)}, {axes})"
     if row.recordings == 1:
-        text = f"Judged by {log}; other specimens may differ."
+        text = f"Data: one recording, {log}; other units may differ."
     else:
-        of = counted(row.recordings, "recording")
-        if row.specimens is not None:
-            of += f" of {counted(row.specimens, 'specimen')}"
-        text = f"Judged by {of}, of which {log} is nearest to what is expected of the next one."
-    if row.spread is not None:
-        text += f" Spread: {spread_words(row)}."
-    doubts = list(dict.fromkeys(finding.finding for finding in chosen.warnings))
-    if row.recordings > 1:  # of all recordings
-        text += f" Doubts: {row.doubts}." if row.doubts else ""
-    elif doubts:
-        text += f" Doubts: {', '.join(term(name).name for name in doubts)}."
+        units = f" of {counted(row.specimens, 'unit')}" if row.specimens is not None else ""
+        text = f"Data: {row.recordings} recordings{units}; {log} is nearest to the prediction."
+    if spread := spread_text(row):
+        text += f" Spread: {spread}."
+    if row.doubts:
+        text += f" Doubts: {doubts_text(row.doubts, named=row.recordings > 1)}."
     return text + left_out
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import pyarrow as pa
 from rich.console import RenderableType
@@ -13,16 +13,22 @@ from rich.text import Text
 from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
 from imubench_pipeline.model.estimates import AllanRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, FailureRow, FindingRow, RecordingRow
+from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.table import OfRecordingRow
-from imubench_pipeline.navigation.suitability.conditions import in_words
-from imubench_pipeline.report.meaning import rankings
+from imubench_pipeline.report.meaning import Group, rankings
 from imubench_pipeline.report.parameters import shown_symbols
 from imubench_pipeline.report.practical import PageUnit, System, page_unit, symbol_text
 from imubench_pipeline.report.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.report.terminal_table import fitting
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.words.numbers import counted, duration_text, number_text, rates_text
+from imubench_pipeline.words.numbers import (
+    NO_VALUE,
+    counted,
+    duration_text,
+    number_text,
+    rates_text,
+)
 
 R = TypeVar("R", bound=OfRecordingRow)
 
@@ -30,13 +36,13 @@ About = Mapping[tuple[str, str], RecordingRow]
 """The row of the table ``recordings`` of each sensor and recording."""
 
 _TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
-_STYLES = {
-    "passes": "green",
-    "probably passes": "green",
-    "passes if": "yellow",
-    "probably passes if": "yellow",
-    "probably fails": "yellow",
-    "surely fails": "red",
+_STYLES: Mapping[Verdict, str] = {
+    "meets": "green",
+    "likely_meets": "green",
+    "not_enough_data": "dim",
+    "likely_fails": "yellow",
+    "fails": "red",
+    "excluded": "dim",
 }
 _LONGEST_FINDING = 400
 _STEPS = 3
@@ -142,7 +148,7 @@ def _of_log(row: FindingRow) -> str:
 
 
 def _doubt(row: DoubtRow) -> str:
-    about = " ".join(filter(None, (row.channel, row.parameters))) or "all"
+    about = " ".join(filter(None, (row.channel, ", ".join(row.parameters)))) or "all"
     return one_line(f"{about}: {row.reason}", _LONGEST_FINDING)
 
 
@@ -201,7 +207,7 @@ def _finding(row: FindingRow) -> str:
 
 
 def _next_step(row: NextStepRow) -> str:
-    return one_line(f"{row.sensor}: {row.text} ({row.requirements})", _LONGEST_FINDING)
+    return one_line(f"{row.sensor}: {row.text} ({', '.join(row.requirements)})", _LONGEST_FINDING)
 
 
 def _ranking_tables(
@@ -218,45 +224,45 @@ def _ranking_tables(
         if requirement in (None, name)
     }
     simulated = {key: row.simulated for key, row in about.items()}
-    limit = "limit" if requirement else "limit that decides"
+    limit = "limit" if requirement else "deciding limit"
     heads = ["", "sensor", "verdict", "error of allowed (1σ)", limit, "margin"]
     for ranking in rankings(rows, asked, simulated, system):
         lines = [
             line
-            for group in ranking["groups"]
+            for group in ranking.groups
             for line in _ranking_lines(group, every=requirement is not None)
         ]
-        yield fitting(f"Ranking for {ranking['name']}", heads, lines, width, names=1)
+        yield fitting(f"Ranking for {ranking.name}", heads, lines, width, names=1)
         yield Text()
 
 
-def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[str | Text]]:
-    """Yield the lines of a sensor: of every limit, or of the one that decides."""
-    sensor = one_line(group["sensor"] + " (simulated)" * group["simulated"])
-    if group["tied_with"]:
-        sensor += "\n" + one_line(f"tied with {group['tied_with']}")
-    words = in_words(group["verdict"], group["conditions"])
-    verdict = Text(one_line(words), style=_STYLES.get(group["verdict"], "dim"))
-    if group["weak"]:
+def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
+    """Yield the lines of a sensor: of every limit, or of the deciding one."""
+    row = group.row
+    sensor = one_line(group.sensor + " (simulated)" * group.simulated)
+    if row.tied_with:
+        sensor += "\n" + one_line(f"like {', '.join(row.tied_with)}")
+    style = "yellow" if row.conditions else _STYLES[row.verdict]
+    verdict = Text(one_line(group.stated), style=style)
+    if group.weak:
         verdict.stylize("dim")
-    weak = f"on weak evidence: {group['weak']}" if group["weak"] else ""
-    doubts = f"in doubt: {group['doubts']}" if group["doubts"] else ""
     for line in (
-        weak,
-        one_line(doubts, _LONGEST_FINDING),
-        one_line(group["unless"] or "", _LONGEST_FINDING),
+        f"weak evidence: {group.weak}" * bool(group.weak),
+        f"doubts: {group.doubts}" * bool(group.doubts),
+        group.corrected,
     ):
         # The names have what the other columns leave.
-        verdict.append("".join(f"\n{part}" for part in wrap(line, _BESIDE)), style="yellow")
-    first: list[str | Text] = [str(group["rank"]), sensor, verdict]
-    for limit in group["limits"]:
-        if every or limit["decides"]:
-            shown = limit["reason"]
-            if limit["sigma"] != "–":
-                shown = f"{limit['sigma']} of {limit['allowed']}"
-                shown += f"\n{limit['interval']}"
-            error, _, after = limit["limit"].rpartition(", ")
-            yield [*first, shown, f"{error}\nafter {after}", limit["margin"]]
+        wrapped = wrap(one_line(line, _LONGEST_FINDING), _BESIDE)
+        verdict.append("".join(f"\n{part}" for part in wrapped), style="yellow")
+    first: list[str | Text] = [group.rank, sensor, verdict]
+    for limit in group.limits:
+        if every or limit.decides:
+            shown = limit.reason
+            if limit.sigma != NO_VALUE:
+                shown = f"{limit.sigma} of {limit.allowed}"
+                shown += f"\n{limit.interval}"
+            error, _, after = limit.limit.rpartition(", ")
+            yield [*first, shown, f"{error}\nafter {after}", limit.margin]
             first = ["", "", ""]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from decimal import ROUND_HALF_UP, Context, Decimal
 from functools import cache
 
@@ -49,6 +49,11 @@ def _without_zeros(text: str) -> str:
 def counted(number: int, singular: str, plural: str | None = None) -> str:
     """Return a number with its noun: ``1 recording``, ``3 recordings``."""
     return f"{number} {singular if number == 1 else plural or singular + 's'}"
+
+
+def join_names(names: Sequence[str]) -> str:
+    """Return names as a list in a sentence: ``x, y and z``."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def digits_by(
@@ -99,7 +104,7 @@ def rates_text(rate: float | None, of_channels: Iterable[float]) -> str:
     """
     rates = sorted({float(f"{each:.6g}") for each in of_channels}, reverse=True)
     texts = list(dict.fromkeys(map(number_text, rates))) or [number_text(rate)]
-    return f"{' and '.join(filter(None, (', '.join(texts[:-1]), texts[-1])))} Hz"
+    return f"{join_names(texts)} Hz"
 
 
 def percent_text(share: float | None, digits: int = 3) -> str:

@@ -13,6 +13,8 @@ from dataclasses import replace
 
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.model.states import ShortlistVerdict
+from imubench_pipeline.model.verdicts import Shortfall
 from imubench_pipeline.navigation.error_budget.in_use import BIAS_CAUSES, Figure
 from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
 from imubench_pipeline.navigation.error_budget.parts import Budget
@@ -23,14 +25,7 @@ from imubench_pipeline.navigation.shortlist.figures import End, Figures, figures
 from imubench_pipeline.navigation.suitability.abilities import Abilities, abilities, judge
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
-
-VERDICTS: Mapping[str, str] = {
-    "cannot pass": "lacks what it must have, or fails even with the best that its datasheet allows",
-    "worth logging": "passes at its best and not, or nobody knows, at its worst: a log decides",
-    "passes at its worst": "passes with the worst that its datasheet allows",
-    "not judged": "too little is published, or it is outside the price class",
-}
-"""Meaning of each verdict."""
+from imubench_pipeline.words.verdicts import subject_text
 
 _NO_AXIS_ERRORS = AxisErrors()
 _QUANTITIES = ("gyro", "accel")
@@ -87,11 +82,11 @@ def _judge(
     """Return the row of a requirement and a sensor, by these names."""
     price_class = sensor.price_class
     row = ShortlistRow(
-        requirement=names[0], sensor=names[1], price_class=price_class, verdict="not judged"
+        requirement=names[0], sensor=names[1], price_class=price_class, verdict="not_judged"
     )
     lacking, unknown = judge(requirement.must, _assume_all_axes(sensor))
     if lacking:
-        return replace(row, verdict="cannot pass", reason="; ".join(lacking))
+        return replace(row, verdict="cannot_meet", shortfalls=tuple(lacking))
     needed = dict.fromkeys(quantity for question in questions for quantity in question.needs)
     published = {q: entry for q in needed if isinstance(entry := figures[q], Figures)}
     if len(published) < len(needed):
@@ -110,11 +105,11 @@ def _judge(
         best_margin=best[least],
         worst_margin=worst,
         decides=requirement.by_dead_reckoning[least].text,
-        assumed="; ".join([*assumed, *(f"{name}: not known" for name in unknown)]) or None,
+        assumed=(*assumed, *(f"{subject_text(each)}: not known" for each in unknown)),
     )
     if not requirement.admits(price_class):
-        why = "outside the price class" if price_class else "price class not stated"
-        return replace(row, reason=why)
+        asked = " or ".join(requirement.price_class or ())
+        return replace(row, shortfalls=(Shortfall("price_class", price_class or "", asked),))
     return replace(row, verdict=_choose_verdict(best[least], worst))
 
 
@@ -126,10 +121,10 @@ def _assume_all_axes(sensor: Sensor) -> Abilities:
     return has.model_copy(update={"channels": channels, "logged_rate": None})
 
 
-def _choose_verdict(best: float, worst: float | None) -> str:
+def _choose_verdict(best: float, worst: float | None) -> ShortlistVerdict:
     if best < 1.0:
-        return "cannot pass"
-    return "passes at its worst" if worst is not None and worst >= 1.0 else "worth logging"
+        return "cannot_meet"
+    return "meets_at_worst" if worst is not None and worst >= 1.0 else "worth_logging"
 
 
 def _compute_margins(

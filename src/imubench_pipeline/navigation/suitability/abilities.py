@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import get_args
+from typing import Literal, get_args
 
 from pydantic import Field
 
+from imubench_pipeline.model.verdicts import Condition, Property, Shortfall
 from imubench_pipeline.settings.printed import (
     FIGURE_DIMENSIONS,
     SENSORS,
@@ -18,9 +19,7 @@ from imubench_pipeline.settings.printed import (
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import Strict
-from imubench_pipeline.units import from_si, quantity_to_si, to_si
-
-_FULL_SCALE_UNITS: dict[Measured, str] = {"gyro": "deg/s", "accel": "g"}
+from imubench_pipeline.units import quantity_to_si, to_si
 
 _ROUNDING_MARGIN = 1.0 + 1e-9
 """Tolerance for figures that are equal to the required ones in another unit."""
@@ -45,12 +44,13 @@ class Abilities(Strict):
 
 @dataclass(frozen=True)
 class _Point:
-    """One requirement; ``fulfilled`` is None if not known."""
+    """One demanded property; ``fulfilled`` is None if not known."""
 
-    name: str
+    property: Property
+    subject: str
     fulfilled: bool | None
     asked: str
-    shown: str = ""
+    has: tuple[float, ...] = ()
 
 
 def abilities(sensor: Sensor) -> Abilities:
@@ -110,44 +110,52 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
     return min(by_axis, default=None)
 
 
-def judge(must: Must, has: Abilities) -> tuple[list[str], list[str]]:
+def judge(must: Must, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
     """Compare the properties of a sensor with the hard requirements.
 
     Returns
     -------
-    (list of str, list of str)
-        Requirements that it does not meet, such as ``full scale of the gyro 250 deg/s, 300 deg/s
-        asked``, and properties that are not known, such as ``mass``.
+    (list of Shortfall, list of Condition)
+        Demanded properties that it does not have, and those that are not known.
     """
-    lacking: list[str] = []
-    unknown: list[str] = []
-    for point in _compare(must, has):
-        if point.fulfilled is None:
-            unknown.append(point.name)
-        elif not point.fulfilled:
-            lacking.append(
-                f"{point.name} {point.shown}, {point.asked} asked"
-                if point.shown
-                else f"no {point.name}"
-            )
+    points = list(_compare(must, has))
+    lacking = [
+        Shortfall(point.property, point.subject, point.asked, point.has)
+        for point in points
+        if point.fulfilled is False
+    ]
+    unknown = [
+        Condition(None, point.property, point.subject)
+        for point in points
+        if point.fulfilled is None
+    ]
     return list(dict.fromkeys(lacking)), list(dict.fromkeys(unknown))
 
 
 def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
     yield from _compare_axes(must, has)
     yield from _compare_full_scales(must, has)
-    yield from _compare_bandwidths(must, has)
+    if must.bandwidth is not None:
+        yield from _compare_bandwidths(must.bandwidth, must, has)
     if must.rate is not None:
         yield _compare_rate(must.rate, has)
     if must.temperature is not None:
-        yield _compare_temperature(must.temperature, has)
-    for name, text, size, unit in (
-        ("mass", must.mass, has.mass, "g"),
-        ("power", must.power, has.power, "W"),
-    ):
+        low, high = (quantity_to_si(end, "temperature") for end in must.temperature)
+        own = has.temperature
+        within = None if own is None else own[0] <= low and high <= own[1]
+        yield _Point("temperature", "", within, " to ".join(must.temperature), own or ())
+    sizes: tuple[tuple[Literal["mass", "power"], str | None, float | None], ...] = (
+        ("mass", must.mass, has.mass),
+        ("power", must.power, has.power),
+    )
+    for name, text, size in sizes:
         if text is not None:
             small = None if size is None else size <= quantity_to_si(text, name) * _ROUNDING_MARGIN
-            yield _Point(name, small, text, _format_value(size, unit, name))
+            yield _Point(name, "", small, text, _list_known(size))
+
+
+def _list_known(value: float | None) -> tuple[float, ...]:
+    return () if value is None else (value,)
 
 
 def _compare_full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
@@ -158,62 +166,41 @@ def _compare_full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
     for measured, text in asked.items():
         if text is None:
             continue
-        name = f"full scale of the {SENSORS[measured]}"
-        dimension, largest = QUANTITIES[measured], has.full_scale.get(measured)
-        shown = _format_value(largest, _FULL_SCALE_UNITS[measured], dimension)
         if measured in has.without:
-            yield _Point(SENSORS[measured], False, text)
-        elif largest is None:
-            yield _Point(name, None, text)
-        else:
-            yield _Point(
-                name, largest * _ROUNDING_MARGIN >= quantity_to_si(text, dimension), text, shown
-            )
+            yield _Point("quantity", measured, False, text)
+            continue
+        largest = has.full_scale.get(measured)
+        least = quantity_to_si(text, QUANTITIES[measured])
+        enough = None if largest is None else largest * _ROUNDING_MARGIN >= least
+        yield _Point("full_scale", measured, enough, text, _list_known(largest))
 
 
-def _compare_bandwidths(must: Must, has: Abilities) -> Iterator[_Point]:
+def _compare_bandwidths(text: str, must: Must, has: Abilities) -> Iterator[_Point]:
     """Yield the bandwidth of the quantities with required axes, or else of all."""
-    if must.bandwidth is None:
-        return
-    asked = {text.split("_")[0] for text in must.axes} or set(SENSORS)
+    asked = {axes.split("_")[0] for axes in must.axes} or set(SENSORS)
     for measured in get_args(Measured):
         if measured in asked and measured not in has.without:
             width = has.bandwidth.get(measured)
-            wide = None if width is None else width >= quantity_to_si(must.bandwidth, "frequency")
-            shown = _format_value(width, "Hz", "frequency")
-            yield _Point(f"bandwidth of the {SENSORS[measured]}", wide, must.bandwidth, shown)
+            wide = None if width is None else width >= quantity_to_si(text, "frequency")
+            yield _Point("bandwidth", measured, wide, text, _list_known(width))
 
 
 def _compare_rate(text: str, has: Abilities) -> _Point:
     least = quantity_to_si(text, "frequency")
     if has.logged_rate is not None and has.logged_rate >= least:
-        return _Point("rate", True, text)
+        return _Point("rate", "", True, text)
     # The rate of a log may be lower than the highest rate of the sensor.
     fast = None if has.rate is None else has.rate >= least
-    return _Point("rate", fast, text, _format_value(has.rate, "Hz", "frequency"))
-
-
-def _compare_temperature(ends: tuple[str, str], has: Abilities) -> _Point:
-    name, text = "temperature range", " to ".join(ends)
-    if has.temperature is None:
-        return _Point(name, None, text)
-    low, high = (quantity_to_si(end, "temperature") for end in ends)
-    covered = has.temperature
-    within = covered[0] <= low and high <= covered[1]
-    return _Point(name, within, text, f"{covered[0]:.4g} to {covered[1]:.4g} degC")
+    return _Point("rate", "", fast, text, _list_known(has.rate))
 
 
 def _compare_axes(must: Must, has: Abilities) -> Iterator[_Point]:
     for text in must.axes:
         quantity, axes = text.split("_")
         if quantity in has.without:
-            yield _Point(SENSORS[quantity], False, text)
+            yield _Point("quantity", quantity, False, text)
             continue
         for axis in axes:
             # The sensor may have axes that are not in its logs.
             logged = f"{quantity}_{axis}" in has.channels or None
-            yield _Point(f"axis {quantity}_{axis}", logged, text)
-
-
-def _format_value(value: float | None, unit: str, dimension: str) -> str:
-    return "" if value is None else f"{from_si(value, unit, dimension):.4g} {unit}"
+            yield _Point("axis", f"{quantity}_{axis}", logged, text)

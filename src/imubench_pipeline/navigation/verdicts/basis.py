@@ -10,6 +10,7 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.model.table import OfRecordingRow
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.settings.sensor import quantity_of
 
@@ -24,8 +25,8 @@ class Basis:
     doubts: Mapping[Key, Sequence[DoubtRow]] = field(default_factory=dict)
     # analysed channels, and whether any noise parameter has a value
     channels: Mapping[Key, Mapping[str, bool]] = field(default_factory=dict)
-    # reasons why recordings do not decide
-    apart: Mapping[Key, str] = field(default_factory=dict)
+    # recordings that are not used in comparisons, with their doubts
+    apart: Mapping[Key, tuple[DoubtMark, ...]] = field(default_factory=dict)
     # back-tests by requirement, sensor, recording, channel, error and time
     backtests: Mapping[tuple[Any, ...], BacktestRow] = field(default_factory=dict)
 
@@ -78,10 +79,10 @@ class Basis:
         row = self.recordings.get(key)
         return bool(row and row.simulated)
 
-    def doubted(self, key: Key) -> str:
-        """Return the doubts about a recording in words; empty if there are none."""
+    def doubted(self, key: Key) -> tuple[DoubtMark, ...]:
+        """Return the doubts about a recording."""
         row = self.recordings.get(key)
-        return (row.doubts or "") if row else ""
+        return row.doubts if row else ()
 
     def axes(self, key: Key, quantity: str) -> int | None:
         """Return the number of axes of a quantity with known noise; None without an analysis."""

@@ -105,8 +105,8 @@ def _list_log_weaknesses(
     behind = parameters_behind(standing.source)
     channel = answering[quantity_behind(standing.source) or "gyro"]
     for doubt in basis.doubts.get(key, ()):
-        named = set((doubt.parameters or "").split(", ")) - {""}
-        if doubt.channel in (None, channel) and behind and (not named or named & behind):
+        affected = behind.intersection(doubt.parameters) if doubt.parameters else behind
+        if doubt.channel in (None, channel) and affected:
             yield doubt.code
 
 

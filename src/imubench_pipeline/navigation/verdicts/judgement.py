@@ -7,21 +7,24 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.model.states import Verdict
+from imubench_pipeline.model.verdicts import Condition, DoubtMark, Shortfall
 from imubench_pipeline.navigation.suitability.abilities import Abilities
-from imubench_pipeline.navigation.suitability.conditions import Rests, once_calibrated
+from imubench_pipeline.navigation.suitability.conditions import Conditions, once_calibrated
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.evidence import weaknesses
 from imubench_pipeline.navigation.verdicts.specimens import Spread, usual_spread
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
 from imubench_pipeline.navigation.verdicts.unless import Unless, unless
 from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.words.verdicts import doubts_text
 
-_WORST_FIRST = (
-    "surely fails",
-    "probably fails",
-    "not enough data",
-    "probably passes",
-    "passes",
+_WORST_FIRST: tuple[Verdict, ...] = (
+    "fails",
+    "likely_fails",
+    "not_enough_data",
+    "likely_meets",
+    "meets",
 )
 
 
@@ -36,22 +39,27 @@ class Judgement:
     decides: Standing  # the limit that decides the verdict
     # reasons for weak evidence, by limit; also empty if nothing is known
     weak: Sequence[Sequence[str]]
-    outside: str | None  # why the requirement excludes the sensor
-    rests: Rests  # conditions other than the known errors
+    price: Shortfall | None  # if the price class is another, or not known
+    open: Conditions  # conditions other than the known errors
     unless: Unless | None  # verdict with doubtful units corrected
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         """Verdict on the sensor."""
-        return self.outside or self.rests.verdict(self._verdict_on_errors)[0]
+        return "excluded" if self.price else self.open.judge(self._verdict_on_errors)[0]
 
     @property
-    def conditions(self) -> str | None:
-        """Conditions of the verdict, or why the sensor is excluded, in words."""
-        return None if self.outside else self.rests.verdict(self._verdict_on_errors)[1]
+    def conditions(self) -> tuple[Condition, ...]:
+        """Conditions on which the verdict holds."""
+        return () if self.price else self.open.judge(self._verdict_on_errors)[1]
 
     @property
-    def _verdict_on_errors(self) -> str:
+    def shortfalls(self) -> tuple[Shortfall, ...]:
+        """Demanded properties that the sensor does not have."""
+        return (self.price,) if self.price else self.open.shortfalls
+
+    @property
+    def _verdict_on_errors(self) -> Verdict:
         """Verdict on the known errors: by the deciding limit, or by all after calibration."""
         once = [_judge_once_calibrated(standing) for standing in self.standings]
         if self.decides.known and once != [standing.verdict for standing in self.standings]:
@@ -61,7 +69,7 @@ class Judgement:
     @property
     def compared(self) -> bool:
         """Whether the sensor is ranked among the others."""
-        return self.decides.known and not self.outside and not self.rests.lacking
+        return self.decides.known and not self.shortfalls
 
     @property
     def reasons(self) -> Sequence[str]:
@@ -99,8 +107,8 @@ def judgements(
                 by_limit,
                 decides,
                 [weaknesses(each, requirement, basis) if each.known else [] for each in by_limit],
-                _explain_exclusion(requirement, sensors[sensor]["price_class"]),
-                Rests.of(
+                _check_price(requirement, sensors[sensor]["price_class"]),
+                Conditions.of(
                     requirement.must,
                     Abilities.model_validate(sensors[sensor].get("abilities", {})),
                     [row for each in by_limit for row in each.conditions],
@@ -120,14 +128,14 @@ def _map_specimens(
 
 def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[ErrorBudgetRow]:
     """Return rows, with figures removed for recordings that do not decide."""
-    apart = [basis.apart.get((row.sensor, row.recording)) for row in rows]
     return [
-        row if reason is None else _remove_figure(row, reason)
-        for row, reason in zip(rows, apart, strict=True)
+        row if doubts is None else _remove_figure(row, doubts)
+        for row, doubts in ((row, basis.apart.get((row.sensor, row.recording))) for row in rows)
     ]
 
 
-def _remove_figure(row: ErrorBudgetRow, reason: str) -> ErrorBudgetRow:
+def _remove_figure(row: ErrorBudgetRow, doubts: Iterable[DoubtMark]) -> ErrorBudgetRow:
+    reason = f"{row.recording} is not used: {doubts_text(doubts)}"
     return replace(
         row, sigma=None, lower=None, upper=None, within=None, reached_after=None, reason=reason
     )
@@ -149,14 +157,14 @@ def _pool_spreads(
     return {key: spread for key, spread in usual.items() if spread is not None}
 
 
-def _judge_once_calibrated(standing: Standing) -> str:
+def _judge_once_calibrated(standing: Standing) -> Verdict:
     error = standing.expected
     return once_calibrated(
         standing.verdict, standing.total.limit, error.sigma, error.upper, standing.conditions
     )
 
 
-def _explain_exclusion(requirement: Requirement, price_class: str | None) -> str | None:
+def _check_price(requirement: Requirement, price_class: str | None) -> Shortfall | None:
     if requirement.admits(price_class):
         return None
-    return "outside the price class" if price_class else "price class not stated"
+    return Shortfall("price_class", price_class or "", " or ".join(requirement.price_class or ()))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar, get_args
 
 from scipy.special import stdtrit
 
 from imubench_pipeline.model.comparisons import NextStepRow
+from imubench_pipeline.model.states import Action
+from imubench_pipeline.model.verdicts import Condition
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
 from imubench_pipeline.navigation.verdicts.evidence import (
     MAX_TIME_SHARE,
@@ -19,12 +21,9 @@ from imubench_pipeline.navigation.verdicts.evidence import (
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.specimens import Expected
 from imubench_pipeline.navigation.verdicts.standing import Standing
-from imubench_pipeline.settings.printed import SENSORS
+from imubench_pipeline.words.next_steps import next_step_text
 
-Action = Literal[
-    "check_unit", "find_figures", "add_channels", "record_again", "log_longer", "add_specimens"
-]
-"""Possible steps, the cheapest first."""
+T = TypeVar("T")
 
 _ACTION_ORDER = get_args(Action)
 
@@ -49,14 +48,16 @@ class _Step:
     turns: bool
     duration: float | None = None
     specimens: int | None = None
-    what: str = ""
+    quantities: tuple[str, ...] = ()
+    figures: tuple[Condition, ...] = ()
+    doubts: tuple[str, ...] = ()
 
 
 def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
     """Return the rows of the table ``next_steps``, sorted by the number of changed verdicts."""
     groups: dict[tuple[Any, ...], list[_Step]] = {}
     for judgement in judged:
-        if judgement.outside is None and not judgement.rests.lacking:
+        if not judgement.shortfalls:
             for step in _list_steps(judgement, basis):
                 groups.setdefault((step.key, step.action), []).append(step)
     rows = [_make_row(steps, basis) for steps in groups.values()]
@@ -77,19 +78,21 @@ def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     unless, name = judgement.unless, judgement.name
     if unless is not None:
         action: Action = "check_unit" if unless.factors else "record_again"
-        either = unless.logged, unless.mended
+        either = unless.logged, unless.corrected
         same = None not in either and len({each.verdict for each in either if each}) == 1
         for key, doubts in unless.doubts.items():
-            what = _join_quantities(basis.factors(key)) or doubts
-            yield _Step(action, key, name, turns=not same, what=what)
+            quantities = tuple(basis.factors(key))
+            codes = () if quantities else tuple(doubt.code for doubt in doubts)
+            yield _Step(action, key, name, not same, quantities=quantities, doubts=codes)
     if not judgement.decides.known:
         yield from _find_missing_data(judgement, basis)
         return
-    if judgement.decides.verdict not in ("passes", "surely fails"):
+    if judgement.decides.verdict not in ("meets", "fails"):
         yield from _find_settling_steps(judgement, basis)
-    if judgement.compared and (unknown := judgement.rests.unknown_figures()):
-        what = ", ".join(unknown)
-        yield _Step("find_figures", (judgement.sensor, None), name, turns=False, what=what)
+    unknown = [each for each in judgement.open.conditions if each.figure != "turn_on_bias"]
+    if judgement.compared and unknown:
+        figures = tuple(replace(each, largest=None) for each in unknown)
+        yield _Step("find_figures", (judgement.sensor, None), name, False, figures=figures)
     for reason in judgement.reasons:
         yield from _find_strengthening_steps(judgement, reason, basis)
 
@@ -101,9 +104,9 @@ def _find_missing_data(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     if key in basis.apart:
         return
     needs = ("gyro",) if total.error in ("heading", "north") else ("gyro", "accel")
-    missing = [name for name in needs if basis.lacks(key, name)]
+    missing = tuple(name for name in needs if basis.lacks(key, name))
     if missing:
-        yield _Step("add_channels", key, judgement.name, turns=True, what=_join_quantities(missing))
+        yield _Step("add_channels", key, judgement.name, turns=True, quantities=missing)
     elif (needed := _compute_duration_needed(judgement)) > (basis.duration(key) or math.inf):
         yield _Step("log_longer", key, judgement.name, turns=True, duration=needed)
 
@@ -156,21 +159,16 @@ def _find_strengthening_steps(judgement: Judgement, reason: str, basis: Basis) -
     elif reason == "short_log" and duration is not None:
         yield _Step("log_longer", key, name, False, duration=_compute_duration_needed(judgement))
     elif reason == "few_axes":
-        yield _Step("add_channels", key, name, False, what="all three axes")
+        yield _Step("add_channels", key, name, False)
     elif reason not in WEAKNESS_REASONS:
         for total in decides.totals:
             own = sensor, total.recording
             doubts = [row for row in basis.doubts.get(own, ()) if row.code == reason]
             if any(row.factor is not None for row in doubts):
-                what = _join_quantities(basis.factors(own))
-                yield _Step("check_unit", own, name, False, what=what)
+                quantities = tuple(basis.factors(own))
+                yield _Step("check_unit", own, name, False, quantities=quantities)
             elif doubts:
-                what = reason.replace("_", " ")
-                yield _Step("record_again", own, name, False, what=what)
-
-
-def _join_quantities(names: Iterable[str]) -> str:
-    return " and ".join(f"the {SENSORS[name]}" for name in names)
+                yield _Step("record_again", own, name, False, doubts=(reason,))
 
 
 def _find_longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:
@@ -191,73 +189,23 @@ def _make_row(steps: Sequence[_Step], basis: Basis) -> NextStepRow:
     strengthened = {step.requirement for step in steps} - turned
     duration = max((step.duration for step in steps if step.duration), default=None)
     specimens = max((step.specimens for step in steps if step.specimens), default=None)
-    whats = ", ".join(
-        dict.fromkeys(part for step in steps if step.what for part in step.what.split(", "))
-    )
     sensor, recording = first.key
-    effect = _describe_effect(first.action, len(turned), len(strengthened))
-    logged = basis.duration((sensor, recording)) if recording else None
-    what = _describe_action(first.action, recording, whats, duration, logged, specimens)
-    return NextStepRow(
+    row = NextStepRow(
         sensor=sensor,
         recording=recording,
-        requirements=", ".join(dict.fromkeys(step.requirement for step in steps)),
+        requirements=_unite(step.requirement for step in steps),
         action=first.action,
+        quantities=_unite(name for step in steps for name in step.quantities),
+        figures=_unite(figure for step in steps for figure in step.figures),
+        doubts=_unite(code for step in steps for code in step.doubts),
         verdicts_turned=len(turned),
         verdicts_strengthened=len(strengthened),
         duration=duration,
+        logged=basis.duration((sensor, recording)) if recording else None,
         specimens=specimens,
-        text=f"{what}: {effect}",
     )
+    return replace(row, text=next_step_text(row))
 
 
-def _describe_action(
-    action: Action,
-    recording: str | None,
-    what: str,
-    duration: float | None,
-    logged: float | None,
-    specimens: int | None,
-) -> str:
-    match action:
-        case "check_unit":
-            return f"check the unit of {what} in {recording}"
-        case "find_figures":
-            return f"find out what its file does not say: {what}"
-        case "record_again":
-            return f"record {recording} again ({what})"
-        case "add_channels":
-            return f"log {what}, which {recording} does not have"
-        case "log_longer":
-            assert duration is not None  # of every such step
-            more = duration - (logged or 0.0)
-            return f"log {recording} for {_format_time(more)} more, {_format_time(duration)} in all"
-    return f"log {specimens} more {'specimen' if specimens == 1 else 'specimens'}"
-
-
-_EFFECT_VERBS = {"check_unit": "turn", "record_again": "allow", "add_channels": "allow"}
-"""Effect of a step on verdicts. Other steps settle them, if the figures remain the same."""
-
-
-def _describe_effect(action: Action, turned: int, strengthened: int) -> str:
-    if action == "find_figures":
-        return f"it would free {_count_verdicts(strengthened)} of a condition"
-    parts = []
-    if turned:
-        parts.append(f"would {_EFFECT_VERBS.get(action, 'settle')} {_count_verdicts(turned)}")
-    if strengthened:
-        parts.append(f"would give {_count_verdicts(strengthened)} stronger evidence")
-    return "it " + " and ".join(parts)
-
-
-def _count_verdicts(number: int) -> str:
-    return f"{number} {'verdict' if number == 1 else 'verdicts'}"
-
-
-def _format_time(seconds: float) -> str:
-    """Return a duration in a suitable unit, to two digits, rounded up."""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= size:
-            number = seconds / size
-            return f"{math.ceil(number) if number >= 10 else math.ceil(10 * number) / 10:g} {unit}"
-    return f"{math.ceil(seconds)} s"
+def _unite(values: Iterable[T]) -> tuple[T, ...]:
+    return tuple(dict.fromkeys(values))

@@ -31,6 +31,7 @@ from statistics import variance
 from scipy.special import stdtr, stdtrit
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.model.states import SpreadOf
 from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE, Pool, bounded_exp, pool
 
 Limits = tuple[float, float, float]  # value, lower, upper
@@ -67,8 +68,7 @@ class Expected:
     recordings: int
     # between specimens, or between the recordings of one; None: unknown
     spread: Spread | None = None
-    # ``specimens``, ``recordings`` (of one specimen), or ``other sensors``
-    spread_of: str | None = None
+    spread_of: SpreadOf | None = None
 
 
 def expected(
@@ -107,7 +107,7 @@ def expected(
     assert together.value is not None and together.error is not None  # several, all usable
     scale = math.sqrt(spread.variance + together.error**2)
     prediction = _predict(math.log(together.value), scale, spread.freedom, limit)
-    of = "specimens" if len(groups) > 1 else "recordings"
+    of: SpreadOf = "specimens" if len(groups) > 1 else "recordings"
     return Expected(*prediction, *counts, spread, of)
 
 

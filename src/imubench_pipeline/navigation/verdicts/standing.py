@@ -8,17 +8,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.model.states import SURE_PROBABILITY, Verdict
+from imubench_pipeline.model.verdicts import Share
 from imubench_pipeline.navigation.in_outages import trajectory_of
 from imubench_pipeline.navigation.suitability.conditions import (
     is_condition,
-    named,
-    parts_of,
+    shares_of,
     with_sigma,
 )
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, expected
-
-_SURE_PROBABILITY = 0.975
-"""Minimum probability of a sure verdict."""
 
 MAX_LIMIT_RATIO = 4.0
 """Maximum ratio of upper to lower limit of an error; beyond it, the log is not conclusive."""
@@ -35,7 +33,7 @@ class Standing:
     expected: Expected  # the error, of the next specimen where there are several
     source: str | None = None  # the largest contribution
     share: float | None = None  # its part of the variance
-    parts: str | None = None  # all relevant sources
+    parts: tuple[Share, ...] = ()  # all relevant sources
     # rows of sources with an unknown figure, or with one above the limit before calibration
     conditions: tuple[ErrorBudgetRow, ...] = ()
 
@@ -74,16 +72,17 @@ class Standing:
         return lower is None or upper is None or lower <= 0.0 or upper / lower > MAX_LIMIT_RATIO
 
     @property
-    def verdict(self) -> str:
-        """The probability in words."""
+    def verdict(self) -> Verdict:
+        """Verdict by the probability to be within the limit."""
         if not self.known:
-            return "not enough data"
-        if self._is_vague and 1.0 - _SURE_PROBABILITY < self.chance < _SURE_PROBABILITY:
-            return "not enough data"
-        for least, words in ((_SURE_PROBABILITY, "passes"), (0.5, "probably passes")):
-            if self.chance >= least:
-                return words
-        return "probably fails" if self.chance > 1.0 - _SURE_PROBABILITY else "surely fails"
+            return "not_enough_data"
+        if self.chance >= SURE_PROBABILITY:
+            return "meets"
+        if self.chance <= 1.0 - SURE_PROBABILITY:
+            return "fails"
+        if self._is_vague:
+            return "not_enough_data"
+        return "likely_meets" if self.chance >= 0.5 else "likely_fails"
 
 
 def standings(
@@ -144,18 +143,17 @@ def _make_standing(
         return Standing(answer, with_figure, prediction, conditions=conditions)
     largest, size = max(sources, key=lambda source: source[1])
     share = (size / sigma) ** 2
-    parts_in_words = parts_of(sigma, own)
     return Standing(
-        answer, with_figure, prediction, named(largest), share, parts_in_words, conditions
+        answer, with_figure, prediction, largest.source, share, shares_of(sigma, own), conditions
     )
 
 
 def deciding(by_limit: Sequence[Standing]) -> Standing:
-    """Return the deciding limit: the worst known one; an unknown one unless that surely fails."""
+    """Return the deciding limit: the worst known one; an unknown one unless that one fails."""
     known = [standing for standing in by_limit if standing.known]
     worst = min(known, key=lambda standing: standing.margin, default=by_limit[0])
     unknown = [standing for standing in by_limit if not standing.known]
-    return worst if not unknown or worst.verdict == "surely fails" else unknown[0]
+    return worst if not unknown or worst.verdict == "fails" else unknown[0]
 
 
 def _compute_distance(sigma: float, other: float | None) -> float:

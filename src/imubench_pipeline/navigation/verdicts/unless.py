@@ -15,29 +15,15 @@ from typing import Any
 
 from scipy.special import ndtr
 
-from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
 from imubench_pipeline.navigation.suitability.conditions import with_sigma
-from imubench_pipeline.navigation.verdicts.basis import Basis
+from imubench_pipeline.navigation.verdicts.basis import Basis, Key
 from imubench_pipeline.navigation.verdicts.evidence import quantity_behind
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
 
 Factors = Mapping[str, float]  # by quantity
-
-_UNIT_OF_FACTOR = {
-    "gyro": (
-        (math.radians(1.0), "°/s, and not rad/s"),
-        (math.degrees(1.0), "rad/s, and not °/s"),
-    ),
-    "accel": (
-        (STANDARD_GRAVITY, "g, and not m/s²"),
-        (1.0 / STANDARD_GRAVITY, "m/s², and not g"),
-        (1e-3, "mg, and not g"),
-        (1e3, "g, and not mg"),
-    ),
-}
-"""Likely unit mistake for each factor that corrects the data."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +32,9 @@ class Unless:
 
     # the deciding limit with the figures as logged; None if it is the present one
     logged: Standing | None
-    mended: Standing | None  # with corrected units; None if there is no correction
+    corrected: Standing | None  # with corrected units; None if there is no correction
     factors: Factors  # by quantity
-    doubts: Mapping[tuple[str, str], str]  # by sensor and recording, in words
+    doubts: Mapping[Key, tuple[DoubtMark, ...]]  # by sensor and recording
 
 
 def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless | None:
@@ -68,14 +54,14 @@ def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless 
     devices = {name: basis.device((of, name)) for of, name in keys}
     logged = deciding(standings(own, devices))
     factors = {key: basis.factors(key) for key in doubted}
-    mended = deciding(standings(list(_correct_rows(own, factors)), devices)) if factors else None
-    if mended is not None and not unjudged and mended.verdict == logged.verdict:
-        mended = None
-    if not logged.known or (mended is None and not unjudged):
+    corrected = deciding(standings(list(_correct_rows(own, factors)), devices)) if factors else None
+    if corrected is not None and not unjudged and corrected.verdict == logged.verdict:
+        corrected = None
+    if not logged.known or (corrected is None and not unjudged):
         return None
     doubts = {key: basis.doubted(key) for key in (doubted or apart)}
     together = {name: f for of_recording in factors.values() for name, f in of_recording.items()}
-    return Unless(logged if unjudged else None, mended, together, doubts)
+    return Unless(logged if unjudged else None, corrected, together, doubts)
 
 
 def _correct_rows(
@@ -128,40 +114,3 @@ def _compute_chance_within(
     if half <= 0.0:
         return 1.0 if away >= 0.0 else 0.0
     return float(ndtr(NORMAL_QUANTILE * away / half))
-
-
-def unless_words(alternative: Unless) -> str:
-    """Return the alternative verdict in words."""
-    parts = []
-    if alternative.logged is not None:
-        parts.append(f"as logged it {_describe_outcome(alternative.logged)}")
-    if alternative.mended is not None:
-        outcome = _describe_outcome(alternative.mended)
-        if (
-            alternative.logged is not None
-            and alternative.logged.verdict == alternative.mended.verdict
-        ):
-            outcome = outcome.replace(alternative.mended.verdict, "does so too")
-        parts.append(f"if {_describe_units(alternative.factors)}, it {outcome}")
-    return "; ".join(parts)
-
-
-def _describe_outcome(standing: Standing) -> str:
-    if standing.verdict == "not enough data":
-        reason = "" if standing.known else f" ({standing.total.reason})"
-        return f"cannot be judged{reason}"
-    return f"{standing.verdict} (margin {standing.margin:.3g})"
-
-
-def _describe_units(factors: Factors) -> str:
-    named = []
-    for quantity, factor in sorted(factors.items(), reverse=True):
-        name = "gyro" if quantity == "gyro" else "accelerometer"
-        for size, units in _UNIT_OF_FACTOR[quantity]:
-            if math.isclose(factor, size, rel_tol=1e-6):
-                named.append(f"the {name} is in {units}")
-                break
-        else:
-            times, way = (1.0 / factor, "large") if factor < 1.0 else (factor, "small")
-            named.append(f"the figures of the {name} are {times:.3g} times too {way}")
-    return " and ".join(named)

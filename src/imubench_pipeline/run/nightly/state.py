@@ -222,7 +222,7 @@ def leading(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
             first.setdefault(name, None)
             margin = row.margin or 0.0
             if row.rank == 1 and (name not in margins or margin > margins[name]):
-                first[name] = Leader(row.sensor, not row.verdict.endswith("fails"))
+                first[name] = Leader(row.sensor, row.verdict not in ("likely_fails", "fails"))
                 margins[name] = margin
     return first
 

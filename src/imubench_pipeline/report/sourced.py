@@ -11,7 +11,7 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.words.numbers import digits_by, number_text
 
 
-class Told(str):
+class SourcedNumber(str):
     """A number as a page prints it; in HTML it says from which value of the tables it is.
 
     ``source`` is ``ranking/<requirement>/<sensor>/<error>/<time>/<column>``, or that of a total of
@@ -23,7 +23,7 @@ class Told(str):
     source: str
     unit: str
 
-    def __new__(cls, text: str, source: str, unit: str = "") -> Told:
+    def __new__(cls, text: str, source: str, unit: str = "") -> SourcedNumber:
         """Return the text, with its source."""
         told = super().__new__(cls, text)
         told.source, told.unit = source, unit
@@ -35,13 +35,13 @@ class Told(str):
         return Markup('<span data-from="{}"{}>{}</span>').format(self.source, unit, str(self))
 
 
-class Between(str):
+class SourcedInterval(str):
     """Two limits as a page prints them; in HTML each says from which value of the tables it is."""
 
     __slots__ = ("ends",)
-    ends: tuple[Told, Told]
+    ends: tuple[SourcedNumber, SourcedNumber]
 
-    def __new__(cls, lower: Told, upper: Told) -> Between:
+    def __new__(cls, lower: SourcedNumber, upper: SourcedNumber) -> SourcedInterval:
         """Return ``lower to upper``."""
         between = super().__new__(cls, f"{lower} to {upper}")
         between.ends = (lower, upper)
@@ -52,24 +52,26 @@ class Between(str):
         return Markup("{} to {}").format(*self.ends)
 
 
-def of_ranking(row: RankingRow, column: str, text: str, unit: str = "") -> Told:
+def of_ranking(row: RankingRow, column: str, text: str, unit: str = "") -> SourcedNumber:
     """Return a number of a row of the table ``ranking``."""
-    return _told(row, (row.requirement, row.sensor), column, text, unit)
+    return _make(row, (row.requirement, row.sensor), column, text, unit)
 
 
-def of_budget(row: ErrorBudgetRow, column: str, text: str, unit: str = "") -> Told:
+def of_budget(row: ErrorBudgetRow, column: str, text: str, unit: str = "") -> SourcedNumber:
     """Return a number of a total of the table ``error_budget``, of a requirement."""
     names = (row.requirement or "", row.sensor, row.recording)
-    return _told(row, names, column, text, unit)
+    return _make(row, names, column, text, unit)
 
 
-def _told(
+def _make(
     row: RankingRow | ErrorBudgetRow, names: Iterable[str], column: str, text: str, unit: str
-) -> Told:
-    return Told(text, "/".join([row.table, *names, row.error, f"{row.time:g}", column]), unit)
+) -> SourcedNumber:
+    return SourcedNumber(
+        text, "/".join([row.table, *names, row.error, f"{row.time:g}", column]), unit
+    )
 
 
-def margin(row: RankingRow) -> tuple[Told, Told, Told] | None:
+def margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None:
     """Return the margin of a row of the table ``ranking`` with its 95 % limits, if there is one."""
     if row.margin is None:
         return None

@@ -1,0 +1,79 @@
+"""What verdicts on sensors consist of, beside their codes (`imubench_pipeline.model.states`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Property = Literal[
+    "price_class",
+    "quantity",
+    "axis",
+    "full_scale",
+    "bandwidth",
+    "rate",
+    "temperature",
+    "mass",
+    "power",
+]
+"""Properties of a sensor that a requirement can demand."""
+
+Figure = Literal[
+    "turn_on_bias", "temperature", "scale_factor", "g_sensitivity", "vibration_rectification"
+]
+"""Figures of a sensor that its logs at rest do not show, as causes of errors in use."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """An unknown figure, or property, on which a verdict depends.
+
+    ``subject`` is the quantity (gyro, accel), or the axis of a property; ``largest`` is the largest
+    figure with which every limit is met, 1 sigma, SI (None: of a property).
+    """
+
+    figure: Figure | None
+    property: Property | None
+    subject: str
+    largest: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Shortfall:
+    """A demanded property that a sensor does not have.
+
+    ``subject`` is the quantity or axis, or the price class of the sensor; ``asked`` is as in the
+    requirement; ``has`` are the figures of the sensor, SI (empty: it has none).
+    """
+
+    property: Property
+    subject: str
+    asked: str
+    has: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """A source of an error, and its part of the variance."""
+
+    source: str
+    share: float
+    kind: str | None = None
+    """Kind of a figure of the data sheet, such as typ; None: not from the data sheet."""
+
+
+@dataclass(frozen=True, slots=True)
+class UnitFactor:
+    """Factor that corrects the data of a quantity whose unit is in doubt."""
+
+    quantity: str
+    factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class DoubtMark:
+    """A doubt about a recording: its code in the table ``doubts``, and its channels."""
+
+    recording: str
+    code: str
+    channels: tuple[str, ...] = ()

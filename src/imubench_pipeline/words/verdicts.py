@@ -1,0 +1,318 @@
+"""Verdicts on sensors in words: conditions, evidence, doubts and alternatives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from decimal import ROUND_DOWN, Decimal
+from typing import get_args
+
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.model.states import ShortlistVerdict, SpreadOf, Verdict
+from imubench_pipeline.model.verdicts import (
+    Condition,
+    DoubtMark,
+    Figure,
+    Property,
+    Share,
+    Shortfall,
+    UnitFactor,
+)
+from imubench_pipeline.settings.printed import SENSORS
+from imubench_pipeline.units import from_si
+from imubench_pipeline.words.doubts import doubt_text
+from imubench_pipeline.words.numbers import counted, duration_text, number_text, percent_text
+
+VERDICT_WORDS: Mapping[Verdict, str] = {
+    "meets": "meets the limits",
+    "likely_meets": "likely meets the limits",
+    "not_enough_data": "not enough data",
+    "likely_fails": "likely fails",
+    "fails": "fails",
+    "excluded": "excluded",
+}
+"""Verdict on a sensor, the best first."""
+
+SHORT_VERDICTS: Mapping[Verdict, str] = {
+    **VERDICT_WORDS,
+    "meets": "meets",
+    "likely_meets": "likely meets",
+}
+"""Verdict in a table cell."""
+
+VERDICT_MEANINGS: Mapping[Verdict, str] = {
+    "meets": "probability of 97.5 % or more",
+    "likely_meets": "50 to 97.5 %",
+    "not_enough_data": "the logs cannot answer",
+    "likely_fails": "2.5 to 50 %",
+    "fails": "2.5 % or less",
+    "excluded": "lacks a demanded property",
+}
+
+SHORTLIST_WORDS: Mapping[ShortlistVerdict, str] = {
+    "cannot_meet": "cannot meet the limits",
+    "worth_logging": "worth logging",
+    "meets_at_worst": "meets the limits",
+    "not_judged": "not enough data",
+}
+"""Verdict by the data sheet alone."""
+
+SHORTLIST_MEANINGS: Mapping[ShortlistVerdict, str] = {
+    "cannot_meet": "lacks a demanded property, or fails even with its best printed figures",
+    "worth_logging": "meets the limits with its best figures, and may not with its worst",
+    "meets_at_worst": "even with its worst printed figures",
+    "not_judged": "too little is published",
+}
+
+_NOUNS: Mapping[Figure, tuple[str, str, str]] = {
+    "turn_on_bias": ("calibrated bias", "deg/s", "mg"),
+    "temperature": ("temperature coefficient", "deg/s/K", "mg/K"),
+    "scale_factor": ("scale factor error", "ppm", "ppm"),
+    "g_sensitivity": ("g-sensitivity", "deg/s/g", ""),
+    "vibration_rectification": ("vibration rectification", "deg/s/g^2", "mg/g^2"),
+}
+"""Name of each figure, and its unit for a gyro and an accelerometer."""
+
+_DIMENSIONS = {
+    "deg/s": "angular_rate",
+    "mg": "acceleration",
+    "deg/s/K": "gyro_temperature_coefficient",
+    "mg/K": "accel_temperature_coefficient",
+    "ppm": "ratio",
+    "deg/s/g": "gyro_acceleration_coefficient",
+    "deg/s/g^2": "gyro_vibration_coefficient",
+    "mg/g^2": "accel_vibration_coefficient",
+}
+
+_PROPERTIES: Mapping[Property, tuple[str, str, str]] = {
+    "price_class": ("price class", "", ""),
+    "quantity": ("{subject}", "", ""),
+    "axis": ("axis {subject}", "", ""),
+    "full_scale": ("{subject} full scale", "", ""),
+    "bandwidth": ("{subject} bandwidth", "Hz", "frequency"),
+    "rate": ("rate", "Hz", "frequency"),
+    "temperature": ("temperature range", "degC", "temperature"),
+    "mass": ("mass", "g", "mass"),
+    "power": ("power", "W", "power"),
+}
+"""Name, unit and dimension of each property."""
+
+_FULL_SCALES = {"gyro": ("deg/s", "angular_rate"), "accel": ("g", "acceleration")}
+
+_UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
+    "gyro": (
+        (math.radians(1.0), "°/s, not rad/s"),
+        (math.degrees(1.0), "rad/s, not °/s"),
+    ),
+    "accel": (
+        (STANDARD_GRAVITY, "g, not m/s²"),
+        (1.0 / STANDARD_GRAVITY, "m/s², not g"),
+        (1e-3, "mg, not g"),
+        (1e3, "g, not mg"),
+    ),
+}
+"""Likely unit mistake for each factor that corrects the data."""
+
+_SPREAD_OF: Mapping[SpreadOf, str] = {
+    "specimens": "between units",
+    "recordings": "between recordings of one unit",
+    "other sensors": "between units of other sensors",
+}
+
+
+def verdict_text(verdict: Verdict, conditions: Sequence[Condition] = ()) -> str:
+    """Return a verdict with its conditions, such as ``meets the limits if its gyro ... is ...``."""
+    text = VERDICT_WORDS[verdict]
+    return f"{text} if {' and '.join(map(condition_text, conditions))}" if conditions else text
+
+
+def stated_verdict(row: RankingRow) -> str:
+    """Return the verdict of a row of ``ranking``, with conditions, or with the shortfalls."""
+    if row.verdict == "excluded":
+        return f"excluded: {'; '.join(map(shortfall_text, row.shortfalls))}"
+    return verdict_text(row.verdict, row.conditions)
+
+
+def condition_text(condition: Condition) -> str:
+    """Return a condition: ``its gyro g-sensitivity is below 0.1 deg/s/g (1σ)``."""
+    if condition.figure is None:
+        return f"its {subject_text(condition)} meets the requirement"
+    _, *units = _NOUNS[condition.figure]
+    unit = units[condition.subject == "accel"]
+    largest = _round_down(from_si(condition.largest or 0.0, unit, _DIMENSIONS[unit]))
+    return f"its {subject_text(condition)} is below {largest:g} {unit} (1σ)"
+
+
+def subject_text(condition: Condition) -> str:
+    """Return the name of the figure or property of a condition, such as ``gyro g-sensitivity``."""
+    if condition.figure is not None:
+        return f"{SENSORS[condition.subject]} {_NOUNS[condition.figure][0]}"
+    assert condition.property is not None  # one of the two
+    name = SENSORS.get(condition.subject, condition.subject)
+    return _PROPERTIES[condition.property][0].format(subject=name)
+
+
+def _round_down(value: float) -> float:
+    """Return a number of at least 0, rounded down to three digits to stay within the limit."""
+    if not value:
+        return 0.0
+    step = Decimal(1).scaleb(Decimal(value).adjusted() - 2)
+    return float(Decimal(value).quantize(step, rounding=ROUND_DOWN))
+
+
+def shortfall_text(shortfall: Shortfall) -> str:
+    """Return a missing property: ``gyro full scale 250 deg/s, required 300 deg/s``."""
+    if shortfall.property == "price_class":
+        return f"price class {shortfall.subject or 'not stated'}, required {shortfall.asked}"
+    name, unit, dimension = _PROPERTIES[shortfall.property]
+    if shortfall.property == "full_scale":
+        unit, dimension = _FULL_SCALES[shortfall.subject]
+    name = name.format(subject=SENSORS.get(shortfall.subject, shortfall.subject))
+    if not shortfall.has:
+        return f"no {name}"
+    own = " to ".join(f"{from_si(value, unit, dimension):.4g}" for value in shortfall.has)
+    return f"{name} {own} {unit}, required {shortfall.asked}"
+
+
+def share_text(share: Share) -> str:
+    """Return a source of an error with its share: ``gyro N 40 %``."""
+    origin = f" (data sheet, {share.kind})" if share.kind else ""
+    return f"{share.source}{origin} {100.0 * share.share:.0f} %"
+
+
+def evidence_text(row: RankingRow) -> str:
+    """Return why the evidence of a verdict is weak; empty if it is strong or there is none."""
+    if row.evidence != "weak":
+        return ""
+    return "; ".join(_describe_weakness(code, row) for code in row.evidence_reasons)
+
+
+def _describe_weakness(code: str, row: RankingRow) -> str:
+    match code:
+        case "one_specimen":
+            borrowed = row.spread_of == "other sensors"
+            return "one unit" + ", with the spread of other sensors" * borrowed
+        case "short_log":
+            length = duration_text(row.longest_log)
+            return f"one log of {length}" if row.recordings == 1 else f"no log beyond {length}"
+        case "wide_interval" if row.spread_of == "specimens":
+            return f"wide interval from {row.specimens} units"
+        case "wide_interval":
+            return "wide interval"
+        case "few_axes":
+            return "fewer than three axes"
+    return doubt_text(code)
+
+
+def doubts_text(doubts: Iterable[DoubtMark], *, named: bool = False, most: int = 3) -> str:
+    """Return doubts about recordings in words, the first few; ``named``: with the recording."""
+    texts = list(
+        dict.fromkeys(
+            f"{doubt.recording}: " * named + doubt_text(doubt.code, doubt.channels)
+            for doubt in doubts
+        )
+    )
+    more = len(texts) - most
+    return "; ".join(texts[:most]) + (f"; {more} more" if more > 0 else "")
+
+
+def spread_text(row: RankingRow) -> str:
+    """Return the spread between units, of a row of ``ranking``; empty if it is not known."""
+    if row.spread is None or row.spread_of is None:
+        return ""
+    return f"{percent_text(row.spread, 2)} {_SPREAD_OF[row.spread_of]}"
+
+
+def corrected_text(row: RankingRow) -> str:
+    """Return the verdict with a corrected unit, or with the recordings that are not used."""
+    parts = []
+    if row.logged_verdict is not None:
+        parts.append(f"as logged it {_describe_outcome(row.logged_verdict, row.logged_margin)}")
+    if row.corrected_verdict is not None:
+        outcome = _describe_outcome(row.corrected_verdict, row.corrected_margin)
+        still = "still " * (row.logged_verdict == row.corrected_verdict)
+        parts.append(f"it {still}{outcome} if {_describe_units(row.corrected_units)}")
+    return "; ".join(parts)
+
+
+def _describe_outcome(verdict: Verdict, margin: float | None) -> str:
+    if verdict == "not_enough_data":
+        return "cannot be judged"
+    return f"{VERDICT_WORDS[verdict]} (margin {number_text(margin, 3)})"
+
+
+def _describe_units(factors: Iterable[UnitFactor]) -> str:
+    named = []
+    for each in factors:
+        name, factor = SENSORS[each.quantity], each.factor
+        for size, units in _UNIT_MISTAKES[each.quantity]:
+            if math.isclose(factor, size, rel_tol=1e-6):
+                named.append(f"the {name} data are in {units}")
+                break
+        else:
+            times, way = (1.0 / factor, "large") if factor < 1.0 else (factor, "small")
+            named.append(f"the {name} data are {number_text(times, 3)} times too {way}")
+    return " and ".join(named)
+
+
+def answer_text(rows: Sequence[RankingRow], names: Mapping[str, str], asked: int) -> str:
+    """Return in a line which sensor to choose: the best first, of those that are judged.
+
+    Parameters
+    ----------
+    rows : sequence of RankingRow
+        The deciding rows of the judged sensors, the best first.
+    names : mapping of str to str
+        Name of each sensor.
+    asked : int
+        Number of sensors, judged or not.
+    """
+    if not rows:
+        return "No sensor has usable data." if asked else "No recording answers it."
+    best = rows[0]
+    name = names[best.sensor]
+    if best.verdict in ("meets", "likely_meets"):
+        text = f"{name} {VERDICT_WORDS[best.verdict]}"
+        if best.conditions:
+            are = "is" if len(best.conditions) == 1 else "are"
+            text += f"; {counted(len(best.conditions), 'figure')} {are} unknown"
+    elif best.verdict == "not_enough_data":
+        text = f"No sensor is shown to meet the limits. {name} is closest: not enough data"
+    else:
+        text = f"No sensor meets the limits. {name} is closest, but {VERDICT_WORDS[best.verdict]}"
+    weak = evidence_text(best)
+    only = len(rows) == 1
+    rank = "Only sensor with usable data" if only else f"Best of {len(rows)} sensors"
+    return f"{text}. {rank}{f' (weak evidence: {weak})' if weak else ''}."
+
+
+_HEADINGS: Mapping[Verdict, str] = {
+    "meets": "Also meet the limits",
+    "likely_meets": "Likely meet the limits",
+    "not_enough_data": "Not enough data",
+    "likely_fails": "Likely fail",
+    "fails": "Fail",
+    "excluded": "Excluded",
+}
+
+_MAX_NAMES = 4
+"""Maximum number of sensors that are named with one verdict."""
+
+
+def list_others(rows: Iterable[RankingRow], names: Mapping[str, str]) -> list[str]:
+    """Return the sensors with each verdict, or their number, from their deciding rows."""
+    by_heading: dict[str, list[str]] = {}
+    listed = list(rows)
+    for verdict in get_args(Verdict):
+        for row in listed:
+            if row.verdict == verdict:
+                heading = _HEADINGS[verdict] + " on conditions" * bool(row.conditions)
+                if verdict == "not_enough_data" and row.reason:
+                    heading += f" ({row.reason})"
+                why = f" ({'; '.join(map(shortfall_text, row.shortfalls))})" * bool(row.shortfalls)
+                by_heading.setdefault(heading, []).append(names[row.sensor] + why)
+    return [
+        f"{heading}: {', '.join(own) if len(own) <= _MAX_NAMES else counted(len(own), 'sensor')}."
+        for heading, own in by_heading.items()
+    ]
