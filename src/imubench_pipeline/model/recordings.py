@@ -92,8 +92,10 @@ class FindingRow(OfRecordingRow):
     ] = None
     finding: Annotated[str, Column("what was found")]
     severity: Annotated[Severity, Column("fatal: not analysed")]
+    affects: Annotated[tuple[str, ...], Column("parameters whose estimates it puts in doubt")] = ()
     detail: Annotated[str, Column("in words, with what to do")]
     value: Annotated[float | None, Column("its size", "as the finding says")] = None
+    data: Annotated[str | None, Column("its data, JSON")] = None
     start: Annotated[
         float | None,
         Column("begin of the part concerned, from the first sample", "s"),

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.model.states import Severity
 from imubench_pipeline.readers.stated_units import StatedUnit, contradictions
 from imubench_pipeline.settings.sensor import (
     CHANNELS,
@@ -22,7 +23,7 @@ from imubench_pipeline.settings.sensor import (
     LogFormat,
     quantity_of,
 )
-from imubench_pipeline.tables.findings import Finding, Severity
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import conversion
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}

@@ -26,6 +26,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
+from imubench_pipeline.model.states import Severity
 from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile
 from imubench_pipeline.readers.compressed import BLOCK_BYTES, blocks
 from imubench_pipeline.readers.file_format import (
@@ -39,7 +40,7 @@ from imubench_pipeline.readers.file_format import (
 from imubench_pipeline.readers.stamps import Clock, date_of
 from imubench_pipeline.readers.text.cells import is_number
 from imubench_pipeline.readers.text.stamps import StampError, stamps_of
-from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _APPENDED_FIELDS = re.compile(rb"(?:,S[0-9A-Fa-f]{4})?(?:,T(\d{1,18}))?$")
 """Fields that the device appends on request: a status, and a counter or time."""

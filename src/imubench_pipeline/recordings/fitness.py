@@ -367,17 +367,19 @@ def _judged(row: RecordingRow, doubts: Sequence[Doubt], included: Collection[str
 def _casts_doubt(row: FindingRow) -> bool:
     if row.finding in LEFT_OUT:
         return False
-    return row.severity == "warning" or row.finding in UNFIT
+    affects = bool(row.affects) or row.data is None  # no data: of an older kind
+    return (row.severity == "warning" and affects) or row.finding in UNFIT
 
 
 def _of_finding(row: FindingRow) -> Iterator[Doubt]:
     """Yield the doubt of a finding, or one for each factor by which parameters may change."""
     code = row.finding
+    affected = row.affects if row.data is not None else AFFECTED_PARAMETERS.get(code, ())
     by_factor: dict[float | None, list[str]] = {}
     if row.value is not None:
         for name, power in SCALES.get(code, {}).items():
             by_factor.setdefault(row.value**power, []).append(name)
-    for factor, names in (by_factor or {None: [*AFFECTED_PARAMETERS.get(code, ())]}).items():
+    for factor, names in (by_factor or {None: [*affected]}).items():
         yield Doubt(
             *_place(row),
             code,

@@ -61,7 +61,7 @@ class Quality:
         """
         try:
             content = read_sealed_json(path)
-            content["findings"] = [FindingRow(**row) for row in content.get("findings", ())]
+            content["findings"] = [FindingRow.from_json(row) for row in content.get("findings", ())]
             return cls(**content)
         except (ValueError, TypeError) as error:  # other letters, or other keys
             raise RecordingError(f"{path}: is not as the ingest wrote it: {MEND}") from error

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.model.states import Severity
 from imubench_pipeline.recordings.stamps import (
     MIN_SET_BACK,
     MIN_SHARED_STAMPS,
@@ -27,7 +28,7 @@ from imubench_pipeline.recordings.stamps import (
     typical_interval,
 )
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _MAX_INTERVAL_ERROR = 1e-5
 """Largest relative error of the interval at which stamps get the same grid points."""

@@ -15,17 +15,14 @@ from imubench_pipeline.model.estimates import AllanRow
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.words.findings.estimation import TooSparse
 
 
 def too_sparse(channel: str, log: ChannelLog) -> Finding:
     """Return why a channel has no Allan variance, and so no estimates."""
-    detail = (
-        f"so many samples of {channel} are missing that no two adjacent clusters have enough; the "
-        f"grid has {log.grid} points at {log.rate:.6g} Hz; record without losses, or for longer"
-    )
-    return Finding("too_short", "fatal", detail, log.grid, channel)
+    return find(TooSparse(log.grid, log.rate), "fatal", log.grid, channel)
 
 
 def curves(

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
-from dataclasses import dataclass, fields
-from typing import Literal
+from dataclasses import asdict, dataclass, fields
 
 from imubench_pipeline.model.recordings import FindingRow
+from imubench_pipeline.model.states import Severity
+from imubench_pipeline.words.findings.base import FindingData
 
 LEFT_OUT = ("rejected", "failed")
 """Findings that a recording is left out, with the reason: they are listed by themselves."""
-
-Severity = Literal["note", "warning", "fatal"]
 
 
 _HALF_REASON = 700
@@ -35,6 +35,10 @@ class Finding:
     start: float | None = None
     end: float | None = None
     """The part of the recording that it concerns, s from the first sample; None: all of it."""
+    affects: tuple[str, ...] = ()
+    """Parameters whose estimates it puts in doubt."""
+    data: str | None = None
+    """Its data (`imubench_pipeline.words.findings`) as JSON."""
 
     def row(self, sensor: str, recording: str) -> FindingRow:
         """Return the row of the table ``findings``."""
@@ -48,7 +52,31 @@ class Finding:
             value=self.value,
             start=self.start,
             end=self.end,
+            affects=self.affects,
+            data=self.data,
         )
+
+
+def find(
+    data: FindingData,
+    severity: Severity,
+    value: float,
+    channel: str | None = None,
+    start: float | None = None,
+    end: float | None = None,
+) -> Finding:
+    """Return a finding from its data; the other arguments are as in `Finding`."""
+    return Finding(
+        data.code,
+        severity,
+        data.text(channel or ""),
+        value,
+        channel,
+        start,
+        end,
+        tuple(sorted(data.affects)),
+        json.dumps(asdict(data)),
+    )
 
 
 def finding_of(row: FindingRow) -> Finding:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+from imubench_pipeline.model.states import Severity
 from imubench_pipeline.recordings.quality import copies, held, joined, levels, stationarity
 from imubench_pipeline.recordings.quality.copies import shared_noise
 from imubench_pipeline.recordings.quality.summary import MAX_MEASUREMENT, ColumnSummary
@@ -20,7 +21,7 @@ from imubench_pipeline.settings.sensor import (
     TEMPERATURE,
     quantity_of,
 )
-from imubench_pipeline.tables.findings import Finding, Severity
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import SI_UNITS, from_si
 
 _COUNT_SIGMAS = 4.0

@@ -1,0 +1,78 @@
+"""Base class of findings: their data, the parameters that they affect, and their sentence.
+
+A finding is declared as a dataclass of its data:
+
+    @dataclass(frozen=True)
+    class Stuck(FindingData, code="stuck", affects=ALL, unfit=True):
+        value: float
+        def text(self, channel: str) -> str:
+            return f"{channel} stays at {self.value:.4g} ..."
+
+The check that finds it passes the data to `imubench_pipeline.tables.findings.find`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
+"""Parameters of slow noise."""
+
+WHITE = frozenset({"N", "Q"})
+"""Parameters of fast noise."""
+
+ALL = SLOW | WHITE | {"S", "bias"}
+NONE: frozenset[str] = frozenset()
+
+POWERS_OF_UNIT: Mapping[str, float] = dict.fromkeys(
+    ("N", "Q", "B", "B_curve", "sigma_min", "K", "R", "bias"), 1.0
+)
+"""Power with which each parameter scales with the samples."""
+
+POWERS_OF_TIME: Mapping[str, float] = {
+    "N": 0.5,
+    "Q": 1.0,
+    "T_B": 1.0,
+    "tau_min": 1.0,
+    "K": -0.5,
+    "R": -1.0,
+}
+"""Power with which each parameter scales with time: N² = σ²(τ) τ."""
+
+FINDINGS: dict[str, type[FindingData]] = {}
+"""The class of each finding, by its code."""
+
+
+@dataclass(frozen=True)
+class FindingData:
+    """Data of a finding about a recording or a channel."""
+
+    code: ClassVar[str]
+    affects: ClassVar[frozenset[str]]
+    """Parameters whose estimates it puts in doubt; `NONE`: it is no doubt."""
+    unfit: ClassVar[bool]
+    """Whether the log may not be that of one sensor at rest in the stated unit."""
+    scales: ClassVar[Mapping[str, float]]
+    """If its value is a factor that corrects samples or times: the power for each parameter."""
+    doubt: ClassVar[str]
+    """The doubt in a few words; ``{channels}`` stands for the channels."""
+
+    def __init_subclass__(
+        cls,
+        *,
+        code: str,
+        affects: frozenset[str],
+        unfit: bool = False,
+        scales: Mapping[str, float] | None = None,
+        doubt: str = "",
+    ) -> None:
+        """Register a finding by its code."""
+        cls.code, cls.affects, cls.unfit, cls.scales = code, affects, unfit, scales or {}
+        cls.doubt = doubt or code.replace("_", " ") + " ({channels})"
+        FINDINGS[code] = cls
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences, with what to do; ``channel`` may be empty."""
+        raise NotImplementedError
