@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 import imubench_pipeline as imu
+from imubench_pipeline.model.recordings import DoubtRow, FindingRow
 from imubench_pipeline.run.analysis.chain import Analysis
 from imubench_pipeline.run.analysis.compilation import Compilation
 from imubench_pipeline.run.analysis.project import Stated, lay_out
@@ -112,9 +113,9 @@ def test_the_library_says_of_a_log_what_analyse_says(tmp_path: Path, name: str) 
     ]
     names = [field.name for field in fields(Finding)]
     assert [{key: getattr(f, key) for key in names} for f in estimates.findings] == [
-        {key: row[key] for key in names} for row in tables["findings"].to_pylist()
+        {key: row[key] for key in names} for row in FindingRow.rows_of(tables["findings"])
     ]
-    assert [doubt.row() for doubt in estimates.doubts] == tables["doubts"].to_pylist()
+    assert [doubt.row() for doubt in estimates.doubts] == DoubtRow.rows_of(tables["doubts"])
 
 
 def test_copies_of_a_log_have_the_same_limits(tmp_path: Path) -> None:
