@@ -8,17 +8,17 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.model.comparisons import DatasheetRow
 from imubench_pipeline.report.practical import (
-    PageUnit,
     first_choices,
-    interval_text,
     page_unit,
     printed_text,
     unit_of,
     units_of_pages,
 )
 from imubench_pipeline.words.numbers import (
+    Unit,
     degrees_text,
     duration_text,
+    interval_text,
     limit_digits,
     number_text,
     percent_text,
@@ -209,7 +209,7 @@ def test_times_are_told_in_the_unit_in_which_they_are_easily_read(
 
 
 def test_an_interval_needs_both_ends() -> None:
-    unit = PageUnit("x", 10.0)
+    unit = Unit("x", 10.0)
     assert interval_text(0.1234, 2.0, unit) == "1.23 to 20"
     assert interval_text(0.1234, 2.0, unit, 2) == "1.2 to 20"
     for lower, upper in ((None, 2.0), (0.1, None)):
@@ -219,7 +219,7 @@ def test_an_interval_needs_both_ends() -> None:
 @given(magnitudes, st.floats(1e-4, 1.0), st.integers(2, 4))
 def test_the_ends_of_an_interval_are_seen_to_differ(lower: float, width: float, least: int) -> None:
     upper = lower + abs(lower) * width
-    begin, _, end = interval_text(lower, upper, PageUnit("x", 1.0), least).partition(" to ")
+    begin, _, end = interval_text(lower, upper, Unit("x", 1.0), least).partition(" to ")
     assert number_of(begin) < number_of(end)
     digits = limit_digits(lower, upper, least)
     assert least <= digits <= 7

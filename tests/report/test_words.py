@@ -7,21 +7,19 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import ParameterRow
-from imubench_pipeline.report.practical import PageUnit
-from imubench_pipeline.report.words import (
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.words.estimates import estimate_text, model_text, precision_text
+from imubench_pipeline.words.numbers import (
+    Unit,
     counted,
-    model_text,
-    precision,
     requirement_verdict,
     requirement_words,
     sentence,
     started_text,
-    untold,
     verdict_words,
 )
-from imubench_pipeline.settings.requirements import Requirement
 
-UNIT = PageUnit("°/h", 2.0)
+UNIT = Unit("°/h", 2.0)
 HOUR = 3600.0
 
 
@@ -32,7 +30,7 @@ def row(status: str = "ok", **values: Any) -> ParameterRow:
 
 
 def test_a_value_that_is_known_needs_no_words() -> None:
-    assert untold(row(value=1.0), UNIT, HOUR) == ""
+    assert estimate_text(row(value=1.0), UNIT, HOUR) == ""
 
 
 @pytest.mark.parametrize(
@@ -67,13 +65,13 @@ def test_a_value_that_is_known_needs_no_words() -> None:
     ],
 )
 def test_why_a_parameter_has_no_plain_value(given_: ParameterRow, sentence: str) -> None:
-    assert untold(given_, UNIT, 3 * HOUR) == sentence
+    assert estimate_text(given_, UNIT, 3 * HOUR) == sentence
 
 
 def test_a_log_of_unknown_length_is_not_spoken_of() -> None:
     given_ = row("not_identified", duration_needed=HOUR)
-    assert untold(given_, UNIT, None) == "K cannot be told; 60 min would do for 10 %."
-    assert untold(row("not_identified"), UNIT, None) == "K cannot be told."
+    assert estimate_text(given_, UNIT, None) == "K cannot be told; 60 min would do for 10 %."
+    assert estimate_text(row("not_identified"), UNIT, None) == "K cannot be told."
 
 
 @pytest.mark.parametrize(
@@ -93,7 +91,7 @@ def test_a_log_of_unknown_length_is_not_spoken_of() -> None:
     ],
 )
 def test_how_well_a_value_is_known(given_: ParameterRow, words: str) -> None:
-    assert precision(given_, UNIT) == words
+    assert precision_text(given_, UNIT) == words
 
 
 @given(st.floats(1e-9, 1e3), st.floats(0.001, 0.9), st.floats(0.001, 3.0))
@@ -101,7 +99,7 @@ def test_a_percentage_never_hides_that_an_interval_is_wide(
     value: float, below: float, above: float
 ) -> None:
     lower, upper = value * (1 - below), value * (1 + above)
-    words = precision(row(value=value, lower=lower, upper=upper), UNIT)
+    words = precision_text(row(value=value, lower=lower, upper=upper), UNIT)
     half = (below + above) / 2
     if not math.isclose(half, 0.3, rel_tol=1e-9):
         assert words.startswith("±") == (half < 0.3)

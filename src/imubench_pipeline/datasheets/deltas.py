@@ -23,6 +23,7 @@ from imubench_pipeline.datasheets.comparable import (
 from imubench_pipeline.datasheets.measured import NO_TEMPERATURE_READINGS, fixed_bias, measured
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 VERDICTS: dict[str, str] = {
     "better than typ": "below a typical figure and the tolerance, or below a printed range",
@@ -174,7 +175,7 @@ def _judge_without_value(
     entry: Comparable, parameter: Parameter, tolerance: float
 ) -> tuple[str, str]:
     """Return verdict and reason if the log gives only limits, or nothing."""
-    reason = f"{parameter.status.replace('_', ' ')}: {parameter.reason}"
+    reason = f"{STATUS_WORDS[parameter.status]}: {parameter.reason}"
     if parameter.upper is not None:
         least = _classify_value(entry, parameter.lower or 0.0, tolerance)
         if least == _classify_value(entry, parameter.upper, tolerance) != "as printed":

@@ -13,6 +13,7 @@ from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError
 from imubench_pipeline.export.temperature import AXES
 from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 Key = tuple[str, str]  # recording, channel
 _Estimated = tuple[str, str, str]  # and method
@@ -161,7 +162,7 @@ def parameter_notes(estimate: Estimate) -> list[str]:
 
 def _describe_substitute(parameter: Parameter) -> str | None:
     reason = f" ({parameter.reason})" if parameter.reason else ""
-    status = parameter.status.replace("_", " ")
+    status = STATUS_WORDS[parameter.status]
     between = ""
     if parameter.lower is not None and parameter.upper is not None:
         between = f", 95 % limits {parameter.lower:.3e} to {parameter.upper:.3e}"

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 AXES = "xyz"
 
@@ -108,7 +109,7 @@ def _find_objection(fit: Mapping[str, TemperatureRow], span: float, horizon: flo
     """Return the reason against a correction with a fit; None if it is safe."""
     s, lag = fit["sensitivity"], fit["lag"]
     if s.value is None or s.lower is None or s.upper is None:
-        return f"the sensitivity is {s.status.replace('_', ' ')}: {s.reason}"
+        return f"the sensitivity is {STATUS_WORDS[s.status]}: {s.reason}"
     if not s.compensated:
         return f"the log does not show it: {s.reason}"
     error = 0.5 * (s.upper - s.lower) / abs(s.value)
@@ -124,7 +125,7 @@ def _find_objection(fit: Mapping[str, TemperatureRow], span: float, horizon: flo
     if lag.status != "absent":
         longest = lag.upper
         if longest is None:
-            return f"its lag is {lag.status.replace('_', ' ')}: {lag.reason}"
+            return f"its lag is {STATUS_WORDS[lag.status]}: {lag.reason}"
         if longest > horizon:
             return (
                 f"it may lag the temperature by {longest:.3g} s, longer than the horizon of "

@@ -13,10 +13,11 @@ from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.navigation.ratios import Ratio, ratio_of_deviations, ratio_of_parameters
-from imubench_pipeline.report.practical import page_unit, symbol_text
+from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import in_si
+from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.numbers import limit_digits, number_text
 
 if TYPE_CHECKING:

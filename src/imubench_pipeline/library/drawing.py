@@ -12,13 +12,14 @@ import numpy as np
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.palette import sensor_appearances
-from imubench_pipeline.report.practical import PageUnit, page_unit
+from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.settings.extras import extra
+from imubench_pipeline.words.numbers import Unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SAMPLE_UNIT = PageUnit("unit of the samples", 1.0)
+_SAMPLE_UNIT = Unit("unit of the samples", 1.0)
 
 
 def panels(count: int, wide: int = 3) -> Any:
@@ -46,7 +47,7 @@ def axes_or_new(ax: Axes | None) -> Any:
     return panels(1)[0] if ax is None else ax
 
 
-def deviation_unit(quantity: str | None) -> PageUnit:
+def deviation_unit(quantity: str | None) -> Unit:
     """Return the unit of an Allan deviation in plots; the unit of the samples if not known."""
     return _SAMPLE_UNIT if quantity is None else page_unit(quantity, "adev", "practical")
 
@@ -61,7 +62,7 @@ def draw_curves(axes: Axes, curves: Mapping[str, AllanCurve], quantity: str | No
     _draw_slopes(axes, next(iter(curves.values())), unit)
 
 
-def draw_measured(axes: Axes, curve: AllanCurve, unit: PageUnit, name: str, colour: str) -> None:
+def draw_measured(axes: Axes, curve: AllanCurve, unit: Unit, name: str, colour: str) -> None:
     """Draw an Allan deviation with its 95 % limits."""
     lower, upper = (limit * unit.per_si for limit in curve.limits())
     axes.fill_between(curve.tau, lower, upper, color=colour, alpha=0.2, linewidth=0)
@@ -115,7 +116,7 @@ def draw_ratios(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
     axes.grid(True, axis="x", color="0.9")
 
 
-def _format_axes(axes: Axes, unit: PageUnit) -> None:
+def _format_axes(axes: Axes, unit: Unit) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("averaging time τ (s)")
@@ -124,7 +125,7 @@ def _format_axes(axes: Axes, unit: PageUnit) -> None:
     axes.legend(fontsize="small", frameon=False)
 
 
-def _draw_slopes(axes: Axes, curve: AllanCurve, unit: PageUnit) -> None:
+def _draw_slopes(axes: Axes, curve: AllanCurve, unit: Unit) -> None:
     """Draw the slopes of white noise and of a random walk, in grey, through the ends of a curve."""
     told = curve.up_to(1.0 / 9.0)
     limits = axes.get_xlim(), axes.get_ylim()

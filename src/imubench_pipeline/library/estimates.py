@@ -19,7 +19,7 @@ from imubench_pipeline.library.logs import Log, log_of
 from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import Doubt, doubts
-from imubench_pipeline.report.practical import System, interval_text, page_unit, symbol_text
+from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.settings.config import AllanSettings, EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of, shipped_sensors
 from imubench_pipeline.settings.validation import parse
@@ -28,6 +28,8 @@ from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.steps.sensor_tables import findings_of
 from imubench_pipeline.tables.findings import Finding, finding_of
 from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
+from imubench_pipeline.words.numbers import interval_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -333,7 +335,7 @@ def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
             unit.text(parameter.value, 3),
             interval,
             unit.sign,
-            parameter.status.replace("_", " "),
+            STATUS_WORDS[parameter.status],
         ]
 
 

@@ -43,7 +43,7 @@ from scipy.special import stdtr, stdtrit
 from imubench_pipeline.model.comparisons import DriftRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.model.states import DriftVerdict
+from imubench_pipeline.model.states import DriftVerdict, Status
 from imubench_pipeline.navigation.pooled import (
     POOLED_PARAMETERS,
     bounded_exp,
@@ -51,6 +51,7 @@ from imubench_pipeline.navigation.pooled import (
     usable,
 )
 from imubench_pipeline.noise import PARAMETERS, TERMS
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 Order = Literal["started", "name"]
 
@@ -215,7 +216,7 @@ def _make_rows(
             )
 
 
-def _get_status(row: Estimated | None) -> str:
+def _get_status(row: Estimated | None) -> Status:
     """Return the status of an estimate; a mean is always ``ok``."""
     if row is None:
         return "absent"
@@ -248,7 +249,7 @@ def _make_point(row: Estimated) -> tuple[float, ...]:
 
 
 def _explain_no_verdict(row: Estimated | None, count: float) -> str:
-    status = _get_status(row).replace("_", " ")
+    status = STATUS_WORDS[_get_status(row)]
     reason = row.reason if isinstance(row, ParameterRow) else None
     if status != "ok":
         return f"{status}: {reason}" if reason else status

@@ -43,6 +43,7 @@ from imubench_pipeline.settings.requirements import (
 )
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 NO_FIGURES_OF_CHANNELS: Mapping[str, Figures] = MappingProxyType({})
 
@@ -362,4 +363,4 @@ def _list_doubts(
     for channel in chosen.values():
         for _, name, parameter in estimates[channel].components() if channel else ():
             if parameter.status in ("not_identified", "at_bound"):
-                yield f"{name} of {channel} is {parameter.status.replace('_', ' ')}"
+                yield f"{name} of {channel} is {STATUS_WORDS[parameter.status]}"

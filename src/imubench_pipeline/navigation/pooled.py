@@ -40,6 +40,7 @@ from scipy.special import chdtrc, chdtri, fdtrc, stdtrit
 
 from imubench_pipeline.model.comparisons import PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 Verdict = Literal["agree", "differ"]
 
@@ -379,7 +380,7 @@ def _make_parameter_row(
         if usable(triple):
             logs.append((math.log(triple[0]), of))
         else:
-            left_out[row.status.replace("ok", "no limits").replace("_", " ")] += 1
+            left_out["no limits" if row.status == "ok" else STATUS_WORDS[row.status]] += 1
     reasons = [f"{number} left out: {status}" for status, number in left_out.items()]
     if pooled.contradicting:
         reasons.append(f"limits of {pooled.contradicting} left out lie outside what is predicted")

@@ -28,6 +28,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.noise.stacked import summed
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 Verdict = Literal["lower", "higher", "not told apart", "not known"]
 
@@ -93,7 +94,7 @@ def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
 def _list_doubts(first: Parameter, second: Parameter) -> list[str]:
     words = ("the first", first), ("the second", second)
     return [
-        f"{which} is {parameter.status.replace('_', ' ')}"
+        f"{which} is {STATUS_WORDS[parameter.status]}"
         for which, parameter in words
         if parameter.status != "ok"
     ]

@@ -11,8 +11,7 @@ from imubench_pipeline.model.experiments import AlignmentRow
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.words import sentence
-from imubench_pipeline.words.numbers import degrees_text, duration_text, number_text
+from imubench_pipeline.words.numbers import degrees_text, duration_text, number_text, sentence
 
 _SHOWN = (60.0, 600.0, 3600.0)
 """Times of the table, s; the figure has more."""

@@ -10,8 +10,14 @@ from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import noise_words, sentence
-from imubench_pipeline.words.numbers import degrees_text, limit_digits, number_text, percent_text
+from imubench_pipeline.words.estimates import noise_model_text
+from imubench_pipeline.words.numbers import (
+    degrees_text,
+    limit_digits,
+    number_text,
+    percent_text,
+    sentence,
+)
 
 WORDS = {
     "bias": "bias at the start",
@@ -186,7 +192,7 @@ def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
         "channel": rows[0].channel,
         "lines": [line for line in lines(rows) if line["status"] != "not_observable"],
         "open": not_observable(rows),
-        "noise": noise_words(rows),
+        "noise": noise_model_text(rows),
         "scatter": scatter_words(rows),
         "earth": earth_words(rows, system),
     }

@@ -9,10 +9,10 @@ from typing import Any
 
 from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
 from imubench_pipeline.model.published import CoverageRow
-from imubench_pipeline.report.practical import PageUnit, System, page_unit, printed_text
+from imubench_pipeline.report.practical import System, page_unit, printed_text
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.words.numbers import NO_VALUE
+from imubench_pipeline.words.numbers import NO_VALUE, Unit
 
 _STATISTIC_NAMES = {
     "N": "N",
@@ -149,7 +149,7 @@ def _deltas(rows: Iterable[DatasheetRow]) -> list[float]:
     return [row.delta for row in rows if row.delta is not None]
 
 
-def _over_recordings(rows: Sequence[DatasheetRow], unit: PageUnit) -> dict[str, Any]:
+def _over_recordings(rows: Sequence[DatasheetRow], unit: Unit) -> dict[str, Any]:
     """Return one way to read a printed figure against all recordings of a sensor."""
     deltas = sorted(_deltas(rows))
     measured = sorted(row.measured for row in rows if row.measured is not None)
@@ -220,7 +220,7 @@ def _percent(share: float | None) -> str:
     return "–" if share is None else f"{round(100 * share):+d} %".replace("-", "−")
 
 
-def _with_limits(row: DatasheetRow | RepeatabilityRow, unit: PageUnit) -> list[str]:
+def _with_limits(row: DatasheetRow | RepeatabilityRow, unit: Unit) -> list[str]:
     """Return what was measured, and its 95 % limits below it."""
     value, lower, upper = row.measured, row.lower, row.upper
     if value is None or lower is None or upper is None:

@@ -17,9 +17,9 @@ from jinja2.runtime import Context
 from markupsafe import Markup, escape
 
 from imubench_pipeline.report.glossary import term
-from imubench_pipeline.report.practical import PageUnit, System, page_unit, symbol_text
-from imubench_pipeline.report.words import started_text
-from imubench_pipeline.words.numbers import NO_VALUE, duration_text, number_text
+from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.words.estimates import symbol_text
+from imubench_pipeline.words.numbers import NO_VALUE, Unit, duration_text, number_text, started_text
 from imubench_pipeline.words.verdicts import doubts_text
 
 
@@ -99,7 +99,7 @@ def _shown(value: Any) -> Any:
 
 
 @cache
-def _unit(reference: str, system: System) -> PageUnit:
+def _unit(reference: str, system: System) -> Unit:
     quantity, symbol = reference.split(".")
     return page_unit(quantity, symbol, system)
 

@@ -10,7 +10,7 @@ from typing import Any
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.navigation.suitability.conditions import shares_of
 from imubench_pipeline.report.backtest import standing_text
-from imubench_pipeline.report.practical import PageUnit, System, interval_text, unit_of
+from imubench_pipeline.report.practical import System, unit_of
 from imubench_pipeline.report.sourced import (
     SourcedInterval,
     SourcedNumber,
@@ -19,7 +19,7 @@ from imubench_pipeline.report.sourced import (
     of_ranking,
 )
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
-from imubench_pipeline.words.numbers import NO_VALUE, duration_text
+from imubench_pipeline.words.numbers import NO_VALUE, Unit, duration_text, interval_text
 from imubench_pipeline.words.verdicts import (
     VERDICT_WORDS,
     corrected_text,
@@ -330,7 +330,7 @@ def _sensible(row: ErrorRow, sigma: float) -> bool:
     return DIMENSIONS[row.error] != "angle" or sigma <= _QUARTER_TURN
 
 
-def _shown(row: ErrorRow, sigma: float, unit: PageUnit) -> str:
+def _shown(row: ErrorRow, sigma: float, unit: Unit) -> str:
     """Return the error of a row with its unit, with the digits that its limits leave."""
     if not _sensible(row, sigma):
         north = row.error == "north"

@@ -11,10 +11,10 @@ import numpy as np
 from imubench_pipeline.estimators.estimate import PARAMETERS, SENSOR, SHOWN
 from imubench_pipeline.estimators.model_choice import MIN_AKAIKE_WEIGHT, information_weights
 from imubench_pipeline.model.estimates import ParameterRow, SimulatedTruthRow
-from imubench_pipeline.report.practical import PageUnit, System, page_unit
+from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.view import ChannelView
-from imubench_pipeline.report.words import model_text, untold
-from imubench_pipeline.words.numbers import counted, limit_digits
+from imubench_pipeline.words.estimates import estimate_text, model_text
+from imubench_pipeline.words.numbers import Unit, counted, limit_digits
 
 
 def shown_symbols(rows: Iterable[ParameterRow]) -> list[str]:
@@ -79,7 +79,7 @@ def cell(
         for row in rows
     ]
     digits = max((digits_of(unit, row.value, row.lower, row.upper) for row in rows), default=3)
-    words = [sentence for row in rows if (sentence := untold(row, unit, duration))]
+    words = [sentence for row in rows if (sentence := estimate_text(row, unit, duration))]
     return {
         "parts": parts,
         "words": " ".join(words),
@@ -88,7 +88,7 @@ def cell(
     }
 
 
-def digits_of(unit: PageUnit, value: float | None, lower: float | None, upper: float | None) -> int:
+def digits_of(unit: Unit, value: float | None, lower: float | None, upper: float | None) -> int:
     """Return with how many digits a parameter and its limits are printed in a unit.
 
     Those that its interval leaves, and no fewer than tell the limits apart.

@@ -10,7 +10,7 @@ from imubench_pipeline.report.calibration import attitude_lines
 from imubench_pipeline.report.recording import about_of, summary_words
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import noise_words
+from imubench_pipeline.words.estimates import noise_model_text
 
 
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
@@ -21,7 +21,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         **about_of(site, view, [], folder),
         "summary": summary_words(view, [] if number is None else [f"{number} positions"]),
         "lines": list(attitude_lines(rows)),
-        "noise": noise_words(rows),
+        "noise": noise_model_text(rows),
         "findings": view.findings,
         "command": site.again(view, "calibration"),
         "page": {"looks": {}, "channels": [], "findings": []},

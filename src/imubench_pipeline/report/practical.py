@@ -7,34 +7,15 @@ it needs for that. The first choice is the practical one, the last is SI.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Literal, Protocol
 
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import conversion
-from imubench_pipeline.words.numbers import NO_VALUE, digits_by, limit_digits, number_text
+from imubench_pipeline.words.numbers import NO_VALUE, Unit
 
 System = Literal["practical", "si"]
-
-
-@dataclass(frozen=True)
-class PageUnit:
-    """A unit of the page: its sign, and the factor from SI."""
-
-    sign: str
-    per_si: float
-
-    def text(self, value: float | None, digits: int = 4) -> str:
-        """Return a SI value in this unit, rounded to some digits; a dash where there is none."""
-        return number_text(None if value is None else value * self.per_si, digits)
-
-    def digits(self, value: float | None, lower: float | None, upper: float | None) -> int:
-        """Return with how many digits a SI value and its limits are printed in this unit."""
-        if value is None or lower is None or upper is None:
-            return digits_by(value, None, None)
-        return digits_by(value * self.per_si, lower * self.per_si, upper * self.per_si)
 
 
 def _signs(
@@ -74,21 +55,7 @@ _OF_DIMENSION: dict[System, dict[str, str]] = {
 }
 
 
-_SYMBOL_TEXTS = {
-    "N_sensor": "N (sensor)",
-    "B_curve": "B (curve)",
-    "sigma_min": "σ_min",
-    "tau_min": "τ_min",
-    "bias": "fixed bias",
-}
-
-
-def symbol_text(symbol: str) -> str:
-    """Return how a page writes a parameter."""
-    return _SYMBOL_TEXTS.get(symbol, symbol)
-
-
-def page_unit(quantity: str, symbol: str, system: System) -> PageUnit:
+def page_unit(quantity: str, symbol: str, system: System) -> Unit:
     """Return the unit in which a page first shows a figure of a quantity.
 
     The symbol is a parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log
@@ -97,7 +64,7 @@ def page_unit(quantity: str, symbol: str, system: System) -> PageUnit:
     return _unit(quantity, symbol, _chosen(quantity, system))
 
 
-def units_of_pages() -> dict[str, dict[str, dict[str, PageUnit]]]:
+def units_of_pages() -> dict[str, dict[str, dict[str, Unit]]]:
     """Return quantity -> name of the choice -> symbol -> unit, the practical choice first."""
     return {
         quantity: {
@@ -119,7 +86,7 @@ def _chosen(quantity: str, system: System) -> str:
 
 
 @cache
-def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
+def _unit(quantity: str, symbol: str, choice: str) -> Unit:
     dimensions = DIMENSIONS[quantity]
     dimension = dimensions.get(symbol) or {
         "psd": f"{quantity}_density",
@@ -132,7 +99,7 @@ def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
     return _page_unit(signs.get(symbol) or signs[alike], dimension)
 
 
-def unit_of(dimension: str, system: System, size: float | None = None) -> PageUnit:
+def unit_of(dimension: str, system: System, size: float | None = None) -> Unit:
     """Return the unit in which a page shows an angle, a velocity or a length.
 
     ``size``, SI: of what is shown, for which a prefix is chosen; SI has none.
@@ -143,7 +110,7 @@ def unit_of(dimension: str, system: System, size: float | None = None) -> PageUn
     return next(unit for least, unit in units if abs(size) >= least)
 
 
-def units_by_size(dimension: str, system: System) -> list[tuple[float, PageUnit]]:
+def units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
     """Return the units of an angle, a velocity or a length, each from a size in SI on."""
     sign = _OF_DIMENSION[system][dimension]
     prefixed = system == "practical" and dimension in _PREFIXED
@@ -156,9 +123,9 @@ _PREFIXES = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
 """From which size in SI a prefix is easily read."""
 
 
-def _page_unit(sign: str, dimension: str) -> PageUnit:
+def _page_unit(sign: str, dimension: str) -> Unit:
     factor, _ = conversion(sign, dimension)
-    return PageUnit(sign, 1.0 / factor)
+    return Unit(sign, 1.0 / factor)
 
 
 def printed_text(row: Printed) -> str:
@@ -178,11 +145,3 @@ class Printed(Protocol):
     @property
     def unit(self) -> str | None:
         """Its unit."""
-
-
-def interval_text(lower: float | None, upper: float | None, unit: PageUnit, least: int = 3) -> str:
-    """Return ``lower to upper``; a dash where they are not known."""
-    if lower is None or upper is None:
-        return NO_VALUE
-    digits = limit_digits(lower, upper, least)
-    return f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"

@@ -25,6 +25,7 @@ from imubench_pipeline.tables import read, read_json, write_content
 from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 _SETTINGS = "settings.json"
 _OF_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
@@ -196,7 +197,7 @@ def _script() -> str:
     terms = {key: entry.short for key, entry in glossary().items()}
     head = "".join(
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
-        for name, value in (("UNITS", units), ("TERMS", terms))
+        for name, value in (("UNITS", units), ("TERMS", terms), ("STATUSES", STATUS_WORDS))
     )
     return '(() => {\n"use strict";\n' + head + "\n".join(parts) + "})();\n"
 

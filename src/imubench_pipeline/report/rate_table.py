@@ -19,7 +19,7 @@ from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.recording import about_of, summary_words
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import noise_words
+from imubench_pipeline.words.estimates import noise_model_text
 from imubench_pipeline.words.numbers import counted, number_text
 
 
@@ -33,7 +33,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "answer": answer(rows, site.system),
         "lines": list(lines(rows)),
         "open": not_observable(rows),
-        "noise": noise_words(rows),
+        "noise": noise_model_text(rows),
         "scatter": scatter_words(rows),
         "earth": earth_words(rows, site.system),
         "points": points,

@@ -25,19 +25,21 @@ from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.parameters import digits_of, methods_table
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks, samples_payload
-from imubench_pipeline.report.practical import System, page_unit, symbol_text
+from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.shell import imubench
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
-from imubench_pipeline.report.words import model_text, precision, sentence, started_text
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.words.estimates import model_text, precision_text, symbol_text
 from imubench_pipeline.words.numbers import (
     NO_VALUE,
     counted,
     duration_text,
     number_text,
     rates_text,
+    sentence,
+    started_text,
 )
 
 _EXACT = 1e-9
@@ -243,7 +245,7 @@ def _answer(channel: ChannelView, system: System) -> str:
         for row in channel.named(channel.recommended, symbol)[:1]:
             if row.value is not None:
                 doubt = "doubtful" if row.status == "doubtful" else ""
-                certainty = ", ".join(filter(None, [precision(row, unit), doubt]))
+                certainty = ", ".join(filter(None, [precision_text(row, unit), doubt]))
                 size = unit.text(row.value, digits_of(unit, row.value, row.lower, row.upper))
                 text = f"{symbol_text(symbol)} {size} {unit.sign}"
                 parts.append(f"{text} ({certainty})" if certainty else text)

@@ -16,10 +16,10 @@ from imubench_pipeline.report.evidence import evidence
 from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.palette import places
 from imubench_pipeline.report.payload import FOREST, looks
-from imubench_pipeline.report.practical import symbol_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
+from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.numbers import counted, limit_digits
 
 _MANY = 12

@@ -19,9 +19,8 @@ from imubench_pipeline.report.meaning import Group, rankings
 from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import sentence
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.words.numbers import counted, duration_text, join_names
+from imubench_pipeline.words.numbers import counted, duration_text, join_names, sentence
 from imubench_pipeline.words.requirements import requirement_text
 from imubench_pipeline.words.verdicts import (
     answer_text,

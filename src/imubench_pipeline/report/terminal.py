@@ -17,13 +17,15 @@ from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.table import OfRecordingRow
 from imubench_pipeline.report.meaning import Group, rankings
 from imubench_pipeline.report.parameters import shown_symbols
-from imubench_pipeline.report.practical import PageUnit, System, page_unit, symbol_text
+from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.report.terminal_table import fitting
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 from imubench_pipeline.words.numbers import (
     NO_VALUE,
+    Unit,
     counted,
     duration_text,
     number_text,
@@ -297,11 +299,11 @@ def _parameter_lines(
     ], lines
 
 
-def _cell(rows: Sequence[ParameterRow], unit: PageUnit, duration: float | None) -> str:
+def _cell(rows: Sequence[ParameterRow], unit: Unit, duration: float | None) -> str:
     """Return the value of each component with its interval, or why there is none."""
     lines = []
     for row in rows:
-        status = row.status.replace("_", " ")
+        status = STATUS_WORDS[row.status]
         if row.value is None:
             lines.append(status)
         else:

@@ -11,8 +11,7 @@ from imubench_pipeline.estimators.estimate import SENSOR
 from imubench_pipeline.model.estimates import LowPassRow, ParameterRow, TemperatureRow
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.view import ChannelView
-from imubench_pipeline.report.words import sentence
-from imubench_pipeline.words.numbers import limit_digits, number_text
+from imubench_pipeline.words.numbers import limit_digits, number_text, sentence
 
 _TEMPERATURE = (
     ("sensitivity", "temperature_sensitivity", "sensitivity"),

@@ -20,7 +20,7 @@ from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import noise_words, sentence
+from imubench_pipeline.words.estimates import noise_model_text
 from imubench_pipeline.words.numbers import (
     counted,
     degrees_text,
@@ -28,6 +28,7 @@ from imubench_pipeline.words.numbers import (
     limit_digits,
     number_text,
     percent_text,
+    sentence,
 )
 
 METHOD_TERMS = {
@@ -71,7 +72,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "findings": view.findings,
         "lines": [line(row) for row in rows],
         "given": given_words(rows),
-        "noise": noise_words(rows),
+        "noise": noise_model_text(rows),
         "has_range": any(row.sigma_lower is not None for row in rows),
         "latitude": latitude_text(rows) if rows else "",
         "parts": parts,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 from functools import cache
 
@@ -115,3 +117,42 @@ def percent_text(share: float | None, digits: int = 3) -> str:
 def degrees_text(angle: float | None, digits: int = 4) -> str:
     """Return an angle in rad in degrees; `NO_VALUE` where there is none."""
     return NO_VALUE if angle is None else f"{number_text(math.degrees(angle), digits)}°"
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit in which a figure is shown: its sign, and the factor from SI."""
+
+    sign: str
+    per_si: float
+
+    def text(self, value: float | None, digits: int = 4) -> str:
+        """Return a SI value in this unit, rounded to some digits; a dash where there is none."""
+        return number_text(None if value is None else value * self.per_si, digits)
+
+    def digits(self, value: float | None, lower: float | None, upper: float | None) -> int:
+        """Return the number of digits of a SI value and its limits in this unit."""
+        if value is None or lower is None or upper is None:
+            return digits_by(value, None, None)
+        return digits_by(value * self.per_si, lower * self.per_si, upper * self.per_si)
+
+
+def interval_text(lower: float | None, upper: float | None, unit: Unit, least: int = 3) -> str:
+    """Return ``lower to upper``; a dash where they are not known."""
+    if lower is None or upper is None:
+        return NO_VALUE
+    digits = limit_digits(lower, upper, least)
+    return f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"
+
+
+def sentence(text: str | None) -> str:
+    """Return a text as a sentence: a capital first, a full stop at the end; empty if none."""
+    return text[:1].upper() + text[1:].rstrip(".") + "." if text else ""
+
+
+def started_text(started: str | None) -> str:
+    """Return date and time without the T and a zero fraction."""
+    return _ISO.sub(r"\1 \2", started or "")
+
+
+_ISO = re.compile(r"^(\d{4}-\d\d-\d\d)T(\d\d:\d\d(?::\d\d)?)(?:\.0+(?!\d))?")

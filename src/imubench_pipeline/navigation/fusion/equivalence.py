@@ -18,6 +18,7 @@ from imubench_pipeline.navigation.fusion.board import divided
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 _MIN_RELEVANT_SHARE = 0.1
 """Minimum share of the Allan variance for which an unknown parameter matters."""
@@ -109,7 +110,7 @@ class FusionChannel:
                     continue
                 part = _bound_variance(name, group, tau)
                 if part > _MIN_RELEVANT_SHARE * total:
-                    status = parameter.status.replace("_", " ")
+                    status = STATUS_WORDS[parameter.status]
                     yield f"{name} of {self.sensor}/{self.recording} {self.channel} is {status}"
 
 

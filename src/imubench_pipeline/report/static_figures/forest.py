@@ -30,6 +30,7 @@ from imubench_pipeline.report.static_figures.style import (
     style,
 )
 from imubench_pipeline.report.view import ChannelView
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 Kind = Literal["estimate", "not identified", "limit"]
 
@@ -283,7 +284,7 @@ def _draw_marks(
 def _say_why(axes: Axes, block: _Block, symbol: str) -> None:
     """Write why a row of a panel is empty."""
     statuses = {
-        row.status.replace("_", " ")
+        STATUS_WORDS[row.status]
         for view in block.views
         if view.recommended in view.parameters
         for row in view.named(view.recommended, symbol)

@@ -18,6 +18,7 @@ from imubench_pipeline.report.static_figures.curves import channel_axes, draw_me
 from imubench_pipeline.report.static_figures.names import SYMBOLS, TERM_NAMES
 from imubench_pipeline.report.static_figures.style import style
 from imubench_pipeline.report.view import ChannelView
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 TERM_LOOKS: dict[str, dict[str, Any]] = {
     "Q": {"color": "#9A6B00", "linestyle": (0, (1, 1.4))},
@@ -148,7 +149,7 @@ def term_label(view: ChannelView, term: Term, system: System) -> str:
         for unit in [page_unit(view.quantity, symbol, system)]
     )
     doubts = {
-        row.status.replace("_", " ")
+        STATUS_WORDS[row.status]
         for symbol, value in term.values.items()
         for row in view.named(view.recommended, symbol)
         if row.value is None and row.fitted is not None

@@ -1,0 +1,100 @@
+"""Estimates in words: their status, interval, model, and the reason for a missing value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
+from imubench_pipeline.model.states import Status
+from imubench_pipeline.words.numbers import (
+    Unit,
+    counted,
+    duration_text,
+    interval_text,
+    percent_text,
+)
+
+STATUS_WORDS: Mapping[Status, str] = {
+    "ok": "estimated",
+    "doubtful": "doubtful",
+    "not_shown": "not determined",
+    "at_bound": "not determined",
+    "not_identified": "not determined",
+    "absent": "not in the model",
+    "does_not_decide": "not used",
+}
+"""Status of an estimate as people read it."""
+
+_SYMBOLS = {
+    "N_sensor": "N (sensor)",
+    "B_curve": "B (curve)",
+    "sigma_min": "σ_min",
+    "tau_min": "τ_min",
+    "bias": "fixed bias",
+}
+
+_MAX_SYMMETRIC = 0.3
+"""Maximum half-width of an interval over its value that ± describes."""
+
+
+def symbol_text(symbol: str) -> str:
+    """Return the symbol of a parameter as it is printed."""
+    return _SYMBOLS.get(symbol, symbol)
+
+
+def estimate_text(row: ParameterRow, unit: Unit, duration: float | None) -> str:
+    """Return why a parameter has no plain value, in sentences; may be empty.
+
+    ``duration`` is the length of the recording, s.
+    """
+    symbol, status = symbol_text(row.parameter), row.status
+    if status == "ok":
+        return f"{symbol}: {row.reason.rstrip('.')}." if row.reason else ""
+    if status == "absent":
+        text = f"{symbol} is not in the model: the data do not support it"
+        below = f"; below {unit.text(row.upper, 2)} {unit.sign}" if row.upper is not None else ""
+        return f"{text}{below}."
+    if status == "not_identified":
+        text = f"{symbol} is not determined"
+        if row.lower is not None and row.upper is not None:
+            text += f"; 95 % interval: {interval_text(row.lower, row.upper, unit, 2)} {unit.sign}"
+        if duration:
+            text = f"{duration_text(duration)} is too short: {text}"
+        return f"{text}{_describe_needed(row, duration)}."
+    reason = (row.reason or STATUS_WORDS[status]).rstrip(".")
+    return f"{symbol}: {reason}{_describe_needed(row, duration)}."
+
+
+def _describe_needed(row: ParameterRow, duration: float | None) -> str:
+    needed = row.duration_needed
+    if needed is None or (duration is not None and needed <= duration):
+        return ""
+    return f"; 10 % needs {duration_text(needed)}"
+
+
+def precision_text(row: ParameterRow, unit: Unit) -> str:
+    """Return the uncertainty of a value: ``± 4 %``, or its interval; empty if not known."""
+    if row.value is None or row.lower is None or row.upper is None or not row.value:
+        return ""
+    half = (row.upper - row.lower) / 2.0 / abs(row.value)
+    if half > _MAX_SYMMETRIC:
+        return interval_text(row.lower, row.upper, unit, 2)
+    return f"± {percent_text(half, 2)}"
+
+
+def model_text(name: str) -> str:
+    """Return the terms of a model with its number of spectral lines: ``N+F + 3 lines``."""
+    terms = name.split("+")
+    lines = terms.count("S")
+    rest = "+".join(term for term in terms if term != "S")
+    return f"{rest} + {counted(lines, 'line')}" if lines else rest
+
+
+def noise_model_text(rows: Sequence[EarthRateRow | CalibrationRow]) -> str:
+    """Return the noise model that weights the data of an experiment, in a sentence."""
+    fitted = next((row for row in rows if row.model), None)
+    if fitted is None:
+        return ""
+    origin = f", from {fitted.model_from}" if fitted.model_from else ""
+    return f"Noise model: {fitted.model}{origin}."
