@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -70,12 +71,11 @@ def choose(
     ExportError
         If there is no estimate of the quantity, or of the device.
     """
-    everywhere: dict[_Estimated, list[ParameterRow]] = {}
+    everywhere: dict[_Estimated, list[ParameterRow]] = defaultdict(list)
     for row in rows:
         wanted = row.recommended if method is None else row.method == method
         if wanted and row.channel.startswith(f"{quantity}_"):
-            key = (row.recording, row.channel, row.method)
-            everywhere.setdefault(key, []).append(row)
+            everywhere[row.recording, row.channel, row.method].append(row)
     estimated = everywhere
     if axis not in (WORST, MEDIAN):
         device = {recording: recording for recording, _, _ in everywhere} | dict(devices or {})
@@ -100,17 +100,19 @@ def choose(
         f"{channel} of recording {recording} by method {used}, {which}{whose} at {horizon:g} s "
         f"({error:.3g} {unit} there, with a bias averaged as long before)"
     )
-    others: dict[str, list[Key]] = {}
+    others: dict[str, list[Key]] = defaultdict(list)
     for key in everywhere:
         if key not in estimated:
-            others.setdefault("of another device", []).append(key[:2])
+            others["of another device"].append(key[:2])
         elif key not in (entry[1] for entry in ranked):
-            others.setdefault("no white noise in the model", []).append(key[:2])
+            others["no white noise in the model"].append(key[:2])
         elif key != (recording, channel, used):
             why = "not the median" if axis == MEDIAN else "less noise"
-            others.setdefault(f"{why} at {horizon:g} s", []).append(key[:2])
+            others[f"{why} at {horizon:g} s"].append(key[:2])
     notes = [*_describe_other_axes(others, channel), *parameter_notes(estimate)]
-    noise = AxisNoise(estimate.model, origin, notes, _find_limit_of_absent_walk(estimate))
+    K = estimate.parameters.get("K")
+    limit_of_absent_walk = K.upper if K is not None and K.in_model is None else None
+    noise = AxisNoise(estimate.model, origin, notes, limit_of_absent_walk)
     return Choice(recording, channel, used, noise, deviation, len(ranked))
 
 
@@ -132,9 +134,9 @@ def _describe_other_axes(others: Mapping[str, Sequence[Key]], chosen: str) -> li
     quantity, _ = chosen.split("_")
     statements = []
     for why, keys in others.items():
-        of: dict[str, list[str]] = {}
+        of: dict[str, list[str]] = defaultdict(list)
         for recording, channel in keys:
-            of.setdefault(recording, []).append(channel)
+            of[recording].append(channel)
         named = [f"{' and '.join(channels)} of {recording}" for recording, channels in of.items()]
         more = len(named) - _MAX_NAMED_RECORDINGS
         statements.append(
@@ -174,9 +176,3 @@ def _describe_substitute(parameter: Parameter) -> str | None:
     if parameter.upper is not None:
         return f"is {status}{reason}: 0 in the model; its upper limit is {parameter.upper:.3e}"
     return None
-
-
-def _find_limit_of_absent_walk(estimate: Estimate) -> float | None:
-    """Return the upper limit of K if K is not in the model."""
-    K = estimate.parameters.get("K")
-    return K.upper if K is not None and K.in_model is None else None

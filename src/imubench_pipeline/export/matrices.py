@@ -105,11 +105,16 @@ def write_json(imu: Imu) -> str:
         "inflation": imu.inflation,
     }
     for name, axis in imu.axes.items():
-        of_axis = matrices(axis.model, imu.rate, imu.horizon)
+        model = axis.model
+        of_axis = matrices(model, imu.rate, imu.horizon)
         content[name] = {
-            "model": axis.model.name,
+            "model": model.name,
             "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
-            "parameters": _list_parameters(axis.model),
+            "parameters": {
+                **{key: getattr(model, key) for key in ("Q", "N", "B", "K", "R", "T_B")},
+                "further": [{"term": term.symbol} | term.values for term in model.further],
+                "sinusoids": [line.values for line in model.sinusoids],
+            },
             "density_bounded": list(axis.bounded) if axis.bounded else None,
             "states": list(of_axis.states),
             "continuous": {
@@ -128,16 +133,6 @@ def write_json(imu: Imu) -> str:
             },
         }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
-
-
-def _list_parameters(model: NoiseModel) -> dict[str, object]:
-    parameters: dict[str, object] = {
-        name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")
-    }
-    parameters["T_B"] = model.T_B
-    parameters["further"] = [{"term": term.symbol} | term.values for term in model.further]
-    parameters["sinusoids"] = [line.values for line in model.sinusoids]
-    return parameters
 
 
 def write_npz(imu: Imu) -> bytes:

@@ -250,6 +250,8 @@ def overbound(
         if above.min() < _MAX_RATIO_AT_CONTACT:
             touches[limit.kind] = float(limit.x[np.argmin(above)])
     lowest = float(ratio[np.argmin(measured)])
+    frequency = np.geomspace(ends[0], _MIN_FREQUENCY_RATIO * ends[0], 400)
+    passed = np.flatnonzero(fitted.psd(frequency, rate) > model.psd(frequency))
     return Overbound(
         model,
         family,
@@ -261,7 +263,7 @@ def overbound(
         lowest,
         touches,
         excess,
-        _find_crossing_frequency(model, fitted, rate, ends[0]),
+        float(frequency[passed[0]]) if len(passed) else None,
         warning,
     )
 
@@ -275,8 +277,7 @@ def _find_excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
 
 def _describe_unsuited_family(fitted: NoiseModel, family: Family, horizon: float) -> str | None:
     """Describe a family whose random walk would have to follow a process beyond 2 T_B."""
-    processes = [term.gauss_markov for term in fitted.terms if term.gauss_markov is not None]
-    times = [process.T_B for process in processes]
+    times = [term.gauss_markov.T_B for term in fitted.terms if term.gauss_markov is not None]
     if "GM" in family or not times or horizon <= _MAX_HORIZON_OVER_T_B * min(times):
         return None
     return (
@@ -312,15 +313,6 @@ def _compare_families(
         return f"{words}{reason}; the smallest {offer} at most"
     least = min([excess[0], *others.values()])
     return f"{words}{reason}; no family comes closer than {least:.3g} times"
-
-
-def _find_crossing_frequency(
-    model: NoiseModel, fitted: NoiseModel, rate: float, lowest: float
-) -> float | None:
-    """Return the highest frequency below the band where the fitted density is the larger."""
-    frequency = np.geomspace(lowest, _MIN_FREQUENCY_RATIO * lowest, 400)
-    passed = np.flatnonzero(fitted.psd(frequency, rate) > model.psd(frequency))
-    return float(frequency[passed[0]]) if len(passed) else None
 
 
 def limits_of(

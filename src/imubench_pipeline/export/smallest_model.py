@@ -131,7 +131,10 @@ def _minimise_mean_log_ratio(
     rows = np.concatenate(parts)
     scale = rows.max(axis=0)
     curve, rows = parts[0] / scale, rows / scale
-    weights = _log_weights(limits[0].x)
+    # Weights of a mean over log tau.
+    x = limits[0].x
+    edges = np.log(np.concatenate((x[:1], np.sqrt(x[1:] * x[:-1]), x[-1:])))
+    weights = np.diff(edges) / (edges[-1] - edges[0]) if len(x) > 1 else np.ones(1)
     cost, powers, ratio = math.inf, np.zeros(len(terms)), np.ones(len(curve))
     for _ in range(_MAX_PROGRAMS):
         answer = linprog(
@@ -148,14 +151,6 @@ def _minimise_mean_log_ratio(
             break
         cost, powers = lower, solution
     return cost, np.asarray(powers / scale)
-
-
-def _log_weights(x: Array) -> Array:
-    """Return weights of a mean over log x."""
-    if len(x) == 1:
-        return np.ones(1)
-    edges = np.log(np.concatenate((x[:1], np.sqrt(x[1:] * x[:-1]), x[-1:])))
-    return np.asarray(np.diff(edges) / (edges[-1] - edges[0]))
 
 
 def count_of_points(start: float, stop: float, a_decade: int) -> int:

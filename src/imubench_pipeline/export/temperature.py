@@ -89,10 +89,12 @@ def temperature_effect(
         slope[axis] = _require_value(s) + 2.0 * q * (reference - _require_value(fit["T_0"]))
         if q:
             square[axis] = q
+        longest = fit["lag"].upper
+        lag = "no lag" if longest is None else f"a lag of up to {longest:.3g} s is not corrected"
         bends = f", square {q:.3e} {unit}/K^2" if q else ""
         notes.append(
             f"axis {axis}: {s.value:.4e} {unit}/K, 95 % limits {s.lower:.3e} to "
-            f"{s.upper:.3e}{bends}; {_describe_lag(fit['lag'])}"
+            f"{s.upper:.3e}{bends}; {lag}"
         )
     return TemperatureEffect(reference, float(low), float(high), slope, square, notes)
 
@@ -131,9 +133,3 @@ def _find_objection(fit: Mapping[str, TemperatureRow], span: float, horizon: flo
                 f"{horizon:g} s, and the program has no lag"
             )
     return None
-
-
-def _describe_lag(lag: TemperatureRow) -> str:
-    if lag.upper is None:
-        return "no lag"
-    return f"a lag of up to {lag.upper:.3g} s is not corrected"
