@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError
 from imubench_pipeline.export.temperature import AXES
@@ -155,24 +155,21 @@ def parameter_notes(estimate: Estimate) -> list[str]:
     notes = []
     for number, name, parameter in estimate.components():
         label = name if number == 1 else f"{name} of component {number}"
-        note = _describe_substitute(parameter)
-        if note:
-            notes.append(f"{label} {note}")
+        reason = f" ({parameter.reason})" if parameter.reason else ""
+        status = parameter.status.replace("_", " ")
+        lower, upper = parameter.lower, parameter.upper
+        between = ""
+        if lower is not None and upper is not None:
+            between = f", 95 % limits {lower:.3e} to {upper:.3e}"
+        if parameter.status == "at_bound":
+            value = f"{parameter.value:.4e} is used{between}"
+            notes.append(f"{label} is at the end of its search{reason}: {value}")
+        elif parameter.value is not None:
+            continue
+        elif parameter.fitted is not None:
+            value = f"the fitted {parameter.fitted:.3e} is used{between}"
+            notes.append(f"{label} is {status}{reason}: {value}")
+        elif upper is not None:
+            limit = f"0 in the model; its upper limit is {upper:.3e}"
+            notes.append(f"{label} is {status}{reason}: {limit}")
     return notes
-
-
-def _describe_substitute(parameter: Parameter) -> str | None:
-    reason = f" ({parameter.reason})" if parameter.reason else ""
-    status = parameter.status.replace("_", " ")
-    between = ""
-    if parameter.lower is not None and parameter.upper is not None:
-        between = f", 95 % limits {parameter.lower:.3e} to {parameter.upper:.3e}"
-    if parameter.status == "at_bound":
-        return f"is at the end of its search{reason}: {parameter.value:.4e} is used{between}"
-    if parameter.value is not None:
-        return None
-    if parameter.fitted is not None:
-        return f"is {status}{reason}: the fitted {parameter.fitted:.3e} is used{between}"
-    if parameter.upper is not None:
-        return f"is {status}{reason}: 0 in the model; its upper limit is {parameter.upper:.3e}"
-    return None

@@ -234,7 +234,14 @@ def overbound(
     times = (2.0 / rate, _MAX_TIME_RATIO * max(horizon, reach))
     model = find_smallest(limits, family, times)
     excess = _find_excess(limits[0], model)
-    unsuited = _describe_unsuited_family(fitted, family, max(horizon, reach))
+    unsuited = None
+    processes = [term.gauss_markov for term in fitted.terms if term.gauss_markov is not None]
+    shortest = min((process.T_B for process in processes), default=math.inf)
+    if "GM" not in family and max(horizon, reach) > _MAX_HORIZON_OVER_T_B * shortest:
+        unsuited = (
+            f"a random walk cannot follow a Gauss-Markov process of T_B = {shortest:.4g} s beyond "
+            f"2 T_B = {_MAX_HORIZON_OVER_T_B * shortest:.4g} s"
+        )
     warning = None
     if excess[0] > most_excess or unsuited:
         offer = _compare_families(limits, family, times, excess, unsuited, most_excess)
@@ -273,17 +280,6 @@ def _find_excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
     above = limit.ratio(model)
     worst = int(np.argmax(above))
     return math.sqrt(float(above[worst])), float(limit.x[worst])
-
-
-def _describe_unsuited_family(fitted: NoiseModel, family: Family, horizon: float) -> str | None:
-    """Describe a family whose random walk would have to follow a process beyond 2 T_B."""
-    times = [term.gauss_markov.T_B for term in fitted.terms if term.gauss_markov is not None]
-    if "GM" in family or not times or horizon <= _MAX_HORIZON_OVER_T_B * min(times):
-        return None
-    return (
-        f"a random walk cannot follow a Gauss-Markov process of T_B = {min(times):.4g} s beyond "
-        f"2 T_B = {_MAX_HORIZON_OVER_T_B * min(times):.4g} s"
-    )
 
 
 def _compare_families(

@@ -62,36 +62,20 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[]
     try:
         yield lambda: _identity(source) == before
     except (RecordingError, OSError) as raised:
-        for cause in _causes(raised):
-            if cause.errno in OF_RESULTS:
+        cause: BaseException | None = raised
+        while cause is not None:
+            if isinstance(cause, OSError) and cause.errno in OF_RESULTS:
                 raise cause from None
-            if _is_of_surroundings(cause, source, before):
-                raise _unavailable(source, cause) from None
+            if isinstance(cause, OSError) and cause.errno in _OF_SURROUNDINGS | _ABSENT:
+                # A file that was not there before either may be missing in the log.
+                name = cause.filename
+                if name is None or any(Path(name) == source / file for file in before):
+                    raise _unavailable(source, cause) from None
+            cause = cause.__cause__ or cause.__context__
         if isinstance(raised, RecordingError) and _identity(source) != before:
             reason = f"{source.name}: changed while it was read, was replaced, or was away"
             raise UnavailableError(reason) from None
         raise
-
-
-def _causes(error: BaseException) -> Iterator[OSError]:
-    """Yield the errors of the system that led to an error."""
-    cause: BaseException | None = error
-    while cause is not None:
-        if isinstance(cause, OSError):
-            yield cause
-        cause = cause.__cause__ or cause.__context__
-
-
-def _is_of_surroundings(error: OSError, source: Path, files: Collection[str]) -> bool:
-    """Return whether a file of a log could not be read for a reason outside of it.
-
-    A file that is not there, and was not before, is no such reason: it may be missing in the log.
-    """
-    if error.errno not in _OF_SURROUNDINGS | _ABSENT:
-        return False
-    if error.filename is None:
-        return True
-    return any(Path(error.filename) == source / name for name in files)
 
 
 def _identity(source: Path) -> dict[str, tuple[int, ...]] | None:

@@ -300,18 +300,11 @@ def _fault(path: Path, name: str) -> str | None:
     if not files:
         return f"the folder {shown} has no files"
     for file in files:
-        if not _is_text(file.name):
+        try:
+            file.name.encode()
+        except UnicodeEncodeError:
             return f"{shown} holds a file of the name {file.name!a}: rename it in UTF-8"
     return None
-
-
-def _is_text(name: str) -> bool:
-    """Return whether a name is text in the encoding of the system."""
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _stem(path: Path) -> str:

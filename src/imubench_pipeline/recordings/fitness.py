@@ -10,16 +10,12 @@ said beside them.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
-from imubench_pipeline.model.comparisons import (
-    DatasheetRow,
-    ErrorBudgetRow,
-    FusionRow,
-    PooledRow,
-)
+from imubench_pipeline.model.comparisons import DatasheetRow, ErrorBudgetRow, FusionRow, PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, FindingRow, RecordingRow
 from imubench_pipeline.model.table import ChannelRow, OfRecordingRow
@@ -30,17 +26,8 @@ Fitness = Literal["fit", "fit with doubts", "unfit"]
 
 UNFIT = frozenset(
     {
-        "motion",
-        "turning",
-        "suspicious_unit",
-        "unit_contradicts",
-        "rate_implausible",
-        "stuck",
-        "channel_twice",
-        "log_twice",
-        "recording_twice",
-        "joined",
-        "interleaved",
+        *("motion", "turning", "suspicious_unit", "unit_contradicts", "rate_implausible", "stuck"),
+        *("channel_twice", "log_twice", "recording_twice", "joined", "interleaved"),
     }
 )
 """Findings after which a log need not be that of one sensor at rest in its unit."""
@@ -140,32 +127,39 @@ Doubted = TypeVar("Doubted", bound=ErrorBudgetRow | DatasheetRow | FusionRow)
 
 
 def doubts(
-    findings: Iterable[FindingRow],
-    parameters: Iterable[ParameterRow],
-    models: Iterable[ModelRow],
+    findings: Iterable[FindingRow], parameters: Iterable[ParameterRow], models: Iterable[ModelRow]
 ) -> Iterator[Doubt]:
-    """Yield what is doubted of recordings, the unfit first of each.
-
-    Parameters
-    ----------
-    findings : iterable of FindingRow
-    parameters : iterable of ParameterRow
-        Of the recommended methods.
-    models : iterable of ModelRow
-    """
-    every = [doubt for row in findings if _casts_doubt(row) for doubt in _of_finding(row)]
+    """Yield doubts about recordings, the unfit first; ``parameters``: by recommended methods."""
+    every: list[Doubt] = []
+    for finding in findings:
+        code = finding.finding
+        if code in LEFT_OUT or not (finding.severity == "warning" or code in UNFIT):
+            continue
+        # One doubt for each factor by which parameters may change.
+        by_factor: dict[float | None, list[str]] = {}
+        if finding.value is not None:
+            for name, power in SCALES.get(code, {}).items():
+                by_factor.setdefault(finding.value**power, []).append(name)
+        every += [
+            Doubt(
+                *_place(finding),
+                code,
+                finding.detail,
+                parameters=tuple(sorted(names)),
+                unfit=code in UNFIT,
+                factor=factor,
+                start=finding.start,
+                end=finding.end,
+            )
+            for factor, names in (by_factor or {None: [*BEARS_ON.get(code, ())]}).items()
+        ]
     every += [
         Doubt(*_place(row), "not_explained", f"no model explains the spectrum of {row.channel}")
         for row in models
         if row.chosen and row.verdict == "not explained"
     ]
     every += [
-        Doubt(
-            *_place(row),
-            "doubtful",
-            row.reason or "its status is doubtful",
-            parameters=(row.parameter,),
-        )
+        Doubt(*_place(row), "doubtful", row.reason or "its status is doubtful", (row.parameter,))
         for row in parameters
         if row.status == "doubtful"
     ]
@@ -173,61 +167,32 @@ def doubts(
 
 
 def not_sold(recordings: Iterable[RecordingRow], sensors: Collection[str]) -> Iterator[Doubt]:
-    """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing.
-
-    Parameters
-    ----------
-    recordings : iterable of RecordingRow
-    sensors : collection of str
-        Those that are not sold.
-    """
+    """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing."""
     for row in recordings:
         if row.sensor in sensors:
-            yield Doubt(
-                row.sensor,
-                row.recording,
-                None,
-                "not_sold",
-                "no such sensor is sold",
-                unfit=True,
-            )
+            yield Doubt(*_key(row), None, "not_sold", "no such sensor is sold", unfit=True)
 
 
 def simulated_beside_measured(recordings: Sequence[RecordingRow]) -> Iterator[Doubt]:
     """Yield a doubt for each simulated recording, where any measured one was analysed.
 
-    Parameters
-    ----------
-    recordings : sequence of RecordingRow
-        Of one sensor or of all.
+    ``recordings``: of one sensor or of all.
     """
+    reason = "it is simulated, and other recordings are measured"
     if any(row.status == "ok" and not row.simulated for row in recordings):
         for row in recordings:
             if row.simulated:
-                yield Doubt(
-                    row.sensor,
-                    row.recording,
-                    None,
-                    BESIDE_MEASURED,
-                    "it is simulated, and other recordings are measured",
-                    unfit=True,
-                )
+                yield Doubt(*_key(row), None, BESIDE_MEASURED, reason, unfit=True)
 
 
-def without_simulated(
-    recordings: Sequence[RecordingRow],
-) -> tuple[list[RecordingRow], list[Doubt]]:
+def without_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[RecordingRow], list[Doubt]]:
     """Return the recordings of all sensors, judged anew, and the doubts that are new.
 
     Sensors are judged each by itself: a simulated recording of one decides until a measured one of
     another is known.
-
-    Parameters
-    ----------
-    recordings : sequence of RecordingRow
-        With whether they decide.
     """
-    known = {_key(row) for row in recordings if _names(row.doubts, BESIDE_MEASURED)}
+    stated = BESIDE_MEASURED.replace("_", " ")
+    known = {_key(row) for row in recordings if (row.doubts or "").startswith(stated)}
     new = [
         doubt
         for doubt in simulated_beside_measured(recordings)
@@ -249,13 +214,7 @@ def without_simulated(
 
 
 def fitness(of_recording: Iterable[Doubt]) -> Fitness:
-    """Return the verdict on a recording.
-
-    Parameters
-    ----------
-    of_recording : iterable of Doubt
-        All of one recording.
-    """
+    """Return the verdict on a recording from all doubts about it."""
     of_log = [doubt for doubt in of_recording if doubt.of_recording]
     if any(doubt.unfit for doubt in of_log):
         return "unfit"
@@ -267,34 +226,33 @@ def judged(
 ) -> list[RecordingRow]:
     """Return the rows of recordings with whether they decide, and their doubts.
 
-    Parameters
-    ----------
-    recordings : sequence of RecordingRow
-    doubts : iterable of Doubt
-        Of all of them.
-    included : collection of str
-        Those that decide although they are unfit, as ``sensor/recording``.
+    ``included``: recordings that decide although they are unfit, as ``sensor/recording``.
     """
-    by_recording: dict[Key, list[Doubt]] = {}
+    by_recording: dict[Key, list[Doubt]] = defaultdict(list)
     for doubt in doubts:
-        by_recording.setdefault((doubt.sensor, doubt.recording), []).append(doubt)
-    return [_judged(row, by_recording.get(_key(row), []), included) for row in recordings]
+        by_recording[doubt.sensor, doubt.recording].append(doubt)
+    rows = []
+    for row in recordings:
+        own = by_recording[_key(row)]
+        verdict = fitness(own) if row.status == "ok" else None
+        named = f"{row.sensor}/{row.recording}" in included
+        named &= all(doubt.code != BESIDE_MEASURED for doubt in own)
+        decides = verdict is not None and (verdict != "unfit" or named)
+        rows.append(replace(row, fitness=verdict, decides=decides, doubts=words(own)))
+    return rows
 
 
 def words(of_recording: Iterable[Doubt]) -> str:
     """Return the doubts of a recording in a line, the unfit first; empty where there are none."""
-    channels: dict[str, dict[str, None]] = {}
+    channels: dict[str, dict[str, None]] = defaultdict(dict)
     for doubt in of_recording:
         if doubt.of_recording:
-            channels.setdefault(doubt.code, {})
-            if doubt.channel:
-                channels[doubt.code][doubt.channel] = None
-    return _shortened(
-        [
-            code.replace("_", " ") + (f" ({', '.join(where)})" if where else "")
-            for code, where in channels.items()
-        ]
-    )
+            channels[doubt.code] |= {doubt.channel: None} if doubt.channel else {}
+    texts = [
+        code.replace("_", " ") + (f" ({', '.join(where)})" if where else "")
+        for code, where in channels.items()
+    ]
+    return _shortened(texts)
 
 
 def left_out(recordings: Iterable[RecordingRow]) -> dict[Key, str]:
@@ -310,12 +268,6 @@ def undecided(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Itera
     """Yield rows of estimates, without the values of recordings that do not decide.
 
     A mean that is left out is NaN, as a row of it has a value.
-
-    Parameters
-    ----------
-    rows : iterable of ParameterRow or of FixedBiasRow
-    not_deciding : collection of (str, str)
-        Sensor and recording.
     """
     for row in rows:
         if _key(row) not in not_deciding:
@@ -332,16 +284,11 @@ def with_doubts(rows: Iterable[Doubted], recordings: Iterable[RecordingRow]) -> 
         _key(row): row.doubts or "" for row in recordings
     }
     for row in rows:
-        texts = [by_recording.get(key, "") for key in _stands_on(row)]
+        keys = [(row.sensor, row.recording)]
+        if isinstance(row, FusionRow):
+            keys.append((row.other, row.other_recording))
+        texts = [by_recording.get(key, "") for key in keys]
         yield replace(row, doubts="; ".join(filter(None, dict.fromkeys(texts))))
-
-
-def _stands_on(
-    row: ErrorBudgetRow | DatasheetRow | FusionRow,
-) -> Sequence[tuple[str, str | None]]:
-    """Return sensor and recording of what a row stands on; of a comparison of two, both."""
-    own = row.sensor, row.recording
-    return (own, (row.other, row.other_recording)) if isinstance(row, FusionRow) else (own,)
 
 
 def with_doubts_of_all(
@@ -361,48 +308,6 @@ def with_doubts_of_all(
 def _shortened(texts: Sequence[str]) -> str:
     more = len(texts) - _SHOWN
     return "; ".join(texts[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
-
-
-def _judged(row: RecordingRow, doubts: Sequence[Doubt], included: Collection[str]) -> RecordingRow:
-    verdict = fitness(doubts) if row.status == "ok" else None
-    named = f"{row.sensor}/{row.recording}" in included
-    named &= all(doubt.code != BESIDE_MEASURED for doubt in doubts)
-    return replace(
-        row,
-        fitness=verdict,
-        decides=verdict is not None and (verdict != "unfit" or named),
-        doubts=words(doubts),
-    )
-
-
-def _names(words_of_doubts: str | None, code: str) -> bool:
-    return (words_of_doubts or "").startswith(code.replace("_", " "))
-
-
-def _casts_doubt(row: FindingRow) -> bool:
-    if row.finding in LEFT_OUT:
-        return False
-    return row.severity == "warning" or row.finding in UNFIT
-
-
-def _of_finding(row: FindingRow) -> Iterator[Doubt]:
-    """Yield the doubt of a finding, or one for each factor by which parameters may change."""
-    code = row.finding
-    by_factor: dict[float | None, list[str]] = {}
-    if row.value is not None:
-        for name, power in SCALES.get(code, {}).items():
-            by_factor.setdefault(row.value**power, []).append(name)
-    for factor, names in (by_factor or {None: [*BEARS_ON.get(code, ())]}).items():
-        yield Doubt(
-            *_place(row),
-            code,
-            row.detail,
-            parameters=tuple(sorted(names)),
-            unfit=code in UNFIT,
-            factor=factor,
-            start=row.start,
-            end=row.end,
-        )
 
 
 def _place(row: FindingRow | ChannelRow) -> tuple[str, str, str | None]:

@@ -95,13 +95,7 @@ class KnownFile:
 
 
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
-    """Read the evidence of the last ingest; None where there is none.
-
-    Parameters
-    ----------
-    folder : Path
-        Results of the recording.
-    """
+    """Read the evidence of the last ingest from the results of a recording; None: there is none."""
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
         return {
             name: KnownFile(**{**file, "stamps": file["stamps"] and tuple(file["stamps"])})
@@ -113,17 +107,10 @@ def read_known(folder: Path) -> dict[str, KnownFile] | None:
 def write_known(
     files: Mapping[str, KnownFile], folder: Path, versions: Mapping[str, str] | None = None
 ) -> None:
-    """Write the evidence of an ingest.
+    """Write the evidence of an ingest to the results of a recording: files by place in the log.
 
-    Parameters
-    ----------
-    files : mapping of str to KnownFile
-        By their place in the log.
-    folder : Path
-        Results of the recording.
-    versions : mapping of str to str, optional
-        Versions as the plan named them. A file that was planned and is not among `files` was not
-        there.
+    ``versions`` are as the plan named them. A file that was planned and is not among ``files`` was
+    not there.
     """
     if versions is not None:
         absent = {name: KnownFile(None, None, None) for name in versions}
@@ -138,12 +125,8 @@ def write_known(
 def read_log(source: Path, is_stopped: Callable[[], bool] = lambda: False) -> dict[str, KnownFile]:
     """Read all files of a log, and return their identity by their place in the log.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    is_stopped : callable, optional
-        Asked now and then whether digests of large files are not needed any more.
+    ``source``: the log file, or the folder of a recording. ``is_stopped`` is called now and then:
+    whether digests of large files are not needed any more.
 
     Raises
     ------
@@ -175,23 +158,16 @@ def plan_versions(source: Path, folder: Path) -> dict[str, str]:
     """Return a name of the content of each file of a log; an ingest is needed where it changes.
 
     It is the name that the last ingest was planned with as long as the evidence of that ingest
-    holds, and another one otherwise.
-
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    folder : Path
-        Its results. New stamps of unchanged files are noted there.
+    holds, and another one otherwise. New stamps of unchanged files are noted in ``folder``, the
+    results of the log.
     """
     known = read_known(folder)
+    places: dict[str, Path] = {}
+    versions: dict[str, str] = {}
     try:
         places = _places(source)
     except OSError as error:
-        places = {}
-        versions = {".": _unreadable(error)}
-    else:
-        versions = {}
+        versions["."] = _unreadable(error)
     touched = dict[str, KnownFile]()
     for name, path in places.items():
         before = (known or {}).get(name)
@@ -230,33 +206,28 @@ def _now(path: Path, before: KnownFile) -> KnownFile | None:
 
 
 def is_changed(source: Path, folder: Path) -> bool:
-    """Return whether the files of a log are not those that its results rest on, if it has any.
+    """Return whether the files of a log are not those that its results in ``folder`` rest on.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    folder : Path
-        Its results.
+    False if there are no results.
     """
-    known = read_known(folder)
+    if (known := read_known(folder)) is None:
+        return False
     try:
         places = _places(source)
     except OSError:
-        return known is not None
-    return known is not None and (
-        known.keys() != places.keys()
-        or any(_is_another(path, known[name]) for name, path in places.items())
-    )
-
-
-def _is_another(path: Path, before: KnownFile) -> bool:
-    """Return whether a file has not the content that an ingest found."""
-    try:
-        size = path.stat().st_size
-        return _now(path, before) is None and not (before.stamps is None and before.size == size)
-    except OSError:
-        return before.size is not None
+        return True
+    if known.keys() != places.keys():
+        return True
+    for name, path in places.items():
+        before = known[name]
+        try:
+            uncertain = before.stamps is None and before.size == path.stat().st_size
+            if _now(path, before) is None and not uncertain:
+                return True
+        except OSError:
+            if before.size is not None:
+                return True
+    return False
 
 
 def versions_of(recording: Recording, results: Path) -> dict[str, str]:

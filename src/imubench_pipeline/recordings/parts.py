@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers import Batch, LogFile
+from imubench_pipeline.readers import LogFile
 from imubench_pipeline.recordings.quality import levels
 from imubench_pipeline.recordings.quality.knocks import Knock, knocks, suspects
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
@@ -138,12 +139,17 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     read_rows = 0
     with new_part(file, file.sources, scratch, f"part{number}") as (part, writer):
         for batch in file.batches():
-            keep = _select_used(batch, use, read_rows, rate)
+            clock, columns = batch.time, batch.columns
+            if use.start > 0.0 or use.end is not None:
+                if clock is None:
+                    assert rate is not None  # checked with the sensor file
+                    clock = np.arange(read_rows, read_rows + len(batch)) / rate
+                # Records without a stamp are used: they are not known to lie outside.
+                keep = ~((clock < use.start) | (clock > (math.inf if use.end is None else use.end)))
+                clock = clock[keep]
+                columns = {name: values[keep] for name, values in columns.items()}
             read_rows += len(batch)
-            writer.add(
-                None if batch.time is None else batch.time[keep],
-                {name: values[keep] for name, values in batch.columns.items()},
-            )
+            writer.add(None if batch.time is None else clock, columns)
     part.not_used = read_rows - part.rows
     if part.rows == 0:
         raise RecordingError(
@@ -156,40 +162,14 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     return part
 
 
-def _select_used(
-    batch: Batch, use: UsedPart, before: int, rate: float | None
-) -> slice | NDArray[np.bool_]:
-    """Return a selection of the records of a batch in the part to use.
-
-    ``before``: number of records before the batch.
-    ``rate``: stated rate, Hz; needed if there are no stamps.
-    """
-    if use.start == 0.0 and use.end is None:
-        return slice(None)
-    clock = batch.time
-    if clock is None:
-        assert rate is not None  # checked with the sensor file
-        clock = np.arange(before, before + len(batch)) / rate
-    # Records without a stamp are used: they are not known to lie outside.
-    keep = ~(clock < use.start)
-    if use.end is not None:
-        keep &= ~(clock > use.end)
-    return keep
-
-
 def leave_out_knocks(
     part: Part, sigmas: float, longest: int, scratch: Path
 ) -> dict[str, list[Knock]]:
     """Replace the samples of knocks by NaN; return the knocks by column.
 
-    Parameters
-    ----------
-    part : Part
-        Its scratch file is written again if there is a knock.
-    sigmas : float
-        Least distance of a knock from the level, in standard deviations.
-    longest : int
-        Longest knock, records; a longer event is motion.
+    The scratch file of the part is written again if there is a knock. ``sigmas``: least distance of
+    a knock from the level, in standard deviations. ``longest``: longest knock, records; a longer
+    event is motion.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(suspects(b, sigmas)[0])]
@@ -201,17 +181,10 @@ def leave_out_knocks(
     part.writer.finish({})
     knocks_of = {}
     for name in doubtful:
-        here = list(
-            knocks(_read_row_groups(part.data, name), blocks[name], sigmas, longest, step[name])
-        )
-        if here:
+        values = _read_row_groups(part.data, name)
+        if here := list(knocks(values, blocks[name], sigmas, longest, step[name])):
             knocks_of[name] = here
-    _rewrite_without_knocks(part, knocks_of, scratch)
-    return knocks_of
-
-
-def _rewrite_without_knocks(part: Part, knocks_of: dict[str, list[Knock]], scratch: Path) -> None:
-    """Write the columns again without the samples of knocks; the new writer stays open."""
+    # Write the columns again without the samples of knocks; the new writer stays open.
     old = part.data
     part.data = scratch / f"{old.stem}.calm.parquet"
     part.writer = LogWriter(part.data, dict.fromkeys(part.columns, pa.float64()))
@@ -222,16 +195,17 @@ def _rewrite_without_knocks(part: Part, knocks_of: dict[str, list[Knock]], scrat
             table = checked_row_group(file, number)
             columns = {}
             for name in part.columns:
-                values = np.array(table.column(name).to_numpy(), dtype=np.float64)
-                before = int(np.isfinite(values).sum())
+                samples = np.array(table.column(name).to_numpy(), dtype=np.float64)
+                before = int(np.isfinite(samples).sum())
                 for knock in knocks_of.get(name, []):
                     start = max(knock.first - reached, 0)
-                    values[start : max(knock.last - reached, 0)] = np.nan
-                part.knocks[name] += before - int(np.isfinite(values).sum())
-                columns[name] = values
+                    samples[start : max(knock.last - reached, 0)] = np.nan
+                part.knocks[name] += before - int(np.isfinite(samples).sum())
+                columns[name] = samples
             reached += table.num_rows
             part.writer.write(columns)
     old.unlink()
+    return knocks_of
 
 
 def _read_row_groups(path: Path, name: str) -> Iterator[NDArray[np.float64]]:

@@ -8,7 +8,6 @@ null. Where channels have clocks of their own, each clock has a file: ``log.gyro
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -69,7 +68,13 @@ class LogWriter:
         rows = len(next(iter(columns.values())))
         if rows == 0:
             return
-        self._waiting.append(self._batch(columns))
+        arrays = []
+        for field in self._schema:
+            values = columns[field.name]
+            # NaN becomes null; a column without NaN is not copied.
+            holes = values.dtype.kind == "f" and bool(np.isnan(values.sum()))
+            arrays.append(pa.array(values, type=field.type, from_pandas=holes))
+        self._waiting.append(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
         self._rows += rows
         while self._rows >= ROW_GROUP:
             self._flush(ROW_GROUP)
@@ -87,16 +92,6 @@ class LogWriter:
         self._writer.write_table(waiting.slice(0, rows), row_group_size=ROW_GROUP)
         self._waiting = waiting.slice(rows).to_batches()
         self._rows -= rows
-
-    def _batch(self, columns: Mapping[str, NDArray[Any]]) -> pa.RecordBatch:
-        arrays = [_to_arrow(columns[field.name], field.type) for field in self._schema]
-        return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
-
-
-def _to_arrow(values: NDArray[Any], kind: pa.DataType) -> pa.Array:
-    """Return numbers as Arrow keeps them, null for NaN; not copied where there is none."""
-    holes = values.dtype.kind == "f" and np.isnan(values.sum())
-    return pa.array(values, type=kind, from_pandas=bool(holes))
 
 
 def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
@@ -144,26 +139,29 @@ class ChannelLog:
         RecordingError
             If the file is damaged.
         """
-        with _named_if_damaged(self.path), checked_parquet(self.path) as file:
-            placed = "sample" in file.schema_arrow.names
-            columns = [self.channel, *(["sample"] if placed else [])]
-            reached = 0
-            for number in range(file.num_row_groups):
-                table = checked_row_group(file, number, columns)
-                values = _to_numpy(table.column(self.channel))
-                if not placed:
-                    yield values
-                    continue
-                points = _to_numpy(table.column("sample"))
-                start = 0
-                while start < len(points):
-                    # Long holes: a row group can stand for many times its rows on the grid.
-                    stop = int(np.searchsorted(points, max(reached, points[start]) + ROW_GROUP))
-                    block = np.full(int(points[stop - 1]) + 1 - reached, np.nan)
-                    block[points[start:stop] - reached] = values[start:stop]
-                    reached = int(points[stop - 1]) + 1
-                    start = stop
-                    yield block
+        try:
+            with checked_parquet(self.path) as file:
+                placed = "sample" in file.schema_arrow.names
+                columns = [self.channel, *(["sample"] if placed else [])]
+                reached = 0
+                for number in range(file.num_row_groups):
+                    table = checked_row_group(file, number, columns)
+                    values = _to_numpy(table.column(self.channel))
+                    if not placed:
+                        yield values
+                        continue
+                    points = _to_numpy(table.column("sample"))
+                    start = 0
+                    while start < len(points):
+                        # Long holes: a row group can stand for many times its rows on the grid.
+                        stop = int(np.searchsorted(points, max(reached, points[start]) + ROW_GROUP))
+                        block = np.full(int(points[stop - 1]) + 1 - reached, np.nan)
+                        block[points[start:stop] - reached] = values[start:stop]
+                        reached = int(points[stop - 1]) + 1
+                        start = stop
+                        yield block
+        except (OSError, pa.ArrowException) as error:
+            raise RecordingError(f"{self.path}: is damaged ({error}): {MEND}") from error
 
     def temperatures(self) -> Iterator[NDArray[np.float64]]:
         """Yield the readings of the temperature, °C, in blocks like those of the samples."""
@@ -196,14 +194,6 @@ def mean_of(blocks: Iterable[Array]) -> float:
         total += float(present.sum(dtype=np.float64))
         number += len(present)
     return total / number if number else math.nan
-
-
-@contextlib.contextmanager
-def _named_if_damaged(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except (OSError, pa.ArrowException) as error:
-        raise RecordingError(f"{path}: is damaged ({error}): {MEND}") from error
 
 
 def read_metadata(path: Path) -> dict[str, Any]:
@@ -254,20 +244,7 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
 
 
 def on_grid(blocks: Iterable[Array], grid: int) -> Array:
-    """Return a column on the whole grid of a log.
-
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        In order, in any unit.
-    grid : int
-        L, samples of the log.
-
-    Returns
-    -------
-    ndarray, shape (L,)
-        In the unit of the blocks, NaN where nothing is.
-    """
+    """Return consecutive blocks of a column on a grid of L points, shape (L,); NaN at the end."""
     values = np.full(grid, np.nan)
     reached = 0
     for block in blocks:

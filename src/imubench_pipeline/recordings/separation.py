@@ -97,9 +97,8 @@ class _Records:
         """
 
         def stamps() -> Iterator[NDArray[np.float64]]:
-            for block, present in zip(
-                self.times(numbered=numbered), self._part.present(), strict=True
-            ):
+            times = self.times(numbered=numbered)
+            for block, present in zip(times, self._part.present(), strict=True):
                 yield block[has_one(present, bits)]
 
         settings = self._settings
@@ -136,9 +135,9 @@ class _Records:
 
 def has_one(present: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
     """Return a mask of the records with a number in any of these columns, or of `ALL_RECORDS`."""
-    return (
-        np.ones(len(present), np.bool_) if bits == ALL_RECORDS else present & np.uint16(bits) != 0
-    )
+    if bits == ALL_RECORDS:
+        return np.ones(len(present), np.bool_)
+    return present & np.uint16(bits) != 0
 
 
 def separate_clocks(
@@ -181,15 +180,16 @@ def separate_clocks(
         base = None
     grid = base if base is not None and (base.uniform or base.stamped) else None
     limit = (1.0 - settings.rate_tolerance) * (base.rate if base is not None else math.inf)
-    own = {}
-    for name in channels:
-        found = _find_own_clock(name, channels, part, records, grid)
-        if found is not None:
-            own[name] = found
+    found = {name: _find_own_clock(name, channels, part, records, grid) for name in channels}
+    own = {name: clock for name, clock in found.items() if clock is not None}
     leaders = {name: _find_complete_sibling(name, own, records) for name in own}
-    own = {name: found for name, found in own.items() if leaders[name] is None}
-    if grid is not None and all(found.rate >= limit for found in own.values()):
-        part.findings = _find_rate_changes(channels, grid, records, part)
+    own = {name: clock for name, clock in own.items() if leaders[name] is None}
+    if grid is not None and all(clock.rate >= limit for clock in own.values()):
+        # By stamps of arrival, losses cannot be located.
+        for name in channels if grid.stamped or not part.stamped else ():
+            if records.count(name) < (1.0 - timebase.MIN_MISSING) * part.rows:
+                points = records.points(grid, records.bit[name])
+                part.findings += timebase.rate_changes(points, grid.rate, name)
         return [part]
     clocks = _group_by_clock(own, records, settings)
     rest = _assign_to_clocks(channels, own, clocks, records, leaders)
@@ -202,9 +202,13 @@ def separate_clocks(
         rest = []
     if rest:
         clocks.append(_Clock(base or whole(), rest, ALL_RECORDS))
-    for clock in clocks:
-        if clock.bits != ALL_RECORDS:
-            clock.base = _find_base_of_group(clock, records, settings)
+    for group in clocks:
+        if group.bits != ALL_RECORDS:
+            rate, joint = group.base.rate, records.base(group.bits)
+            same = joint.stamped and abs(joint.rate / rate - 1.0) <= settings.rate_tolerance
+            if not same and group.base.stamped:
+                joint = records.base(group.bits, known=1.0 / rate)
+            group.base = joint
     return _write_parts(part, clocks, records, scratch)
 
 
@@ -222,20 +226,6 @@ def _find_complete_sibling(name: str, own: Mapping[str, TimeBase], records: _Rec
         and (other not in own or own[other].rate > (1.0 + _MAX_COMMON_IF_SEPARATE) * own[name].rate)
     ]
     return max(siblings, key=records.count, default=None)
-
-
-def _find_rate_changes(
-    channels: list[str], grid: TimeBase, records: _Records, part: Part
-) -> list[Finding]:
-    """Return a finding for each channel with a lower rate in a part of the log."""
-    if not grid.stamped and part.stamped:  # stamps of arrival: losses cannot be located
-        return []
-    findings = []
-    for name in channels:
-        if records.count(name) < (1.0 - timebase.MIN_MISSING) * part.rows:
-            points = records.points(grid, records.bit[name])
-            findings += timebase.rate_changes(points, grid.rate, name)
-    return findings
 
 
 def _find_own_clock(
@@ -287,14 +277,6 @@ def _group_by_clock(
     return clocks
 
 
-def _find_base_of_group(clock: _Clock, records: _Records, settings: QualitySettings) -> TimeBase:
-    """Return the time base of the records with a number in any channel of a clock."""
-    rate = clock.base.rate
-    base = records.base(clock.bits)
-    same = base.stamped and abs(base.rate / rate - 1.0) <= settings.rate_tolerance
-    return base if same or not clock.base.stamped else records.base(clock.bits, known=1.0 / rate)
-
-
 def _assign_to_clocks(
     channels: list[str],
     own: dict[str, TimeBase],
@@ -311,16 +293,11 @@ def _assign_to_clocks(
         if name in own:
             continue
         leader = leaders.get(name)
-        within = [
-            clock
-            for clock in clocks
-            if (
-                leader in clock.channels
-                if leader
-                else records.common[name, clock.channels[0]]
-                >= _MIN_CONTAINED_RECORDS * records.count(name)
-            )
-        ]
+        least = _MIN_CONTAINED_RECORDS * records.count(name)
+        if leader:
+            within = [clock for clock in clocks if leader in clock.channels]
+        else:
+            within = [c for c in clocks if records.common[name, c.channels[0]] >= least]
         if within:
             clock = min(within, key=lambda clock: records.count(clock.channels[0]))
             clock.channels.append(name)
@@ -346,9 +323,8 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
             made.append(stack.enter_context(new_part(part.source, names + beside, scratch, stem)))
         waiting = [dict.fromkeys(beside, math.nan) for _ in clocks]
         with checked_parquet(part.data) as file:
-            for group, (times, present) in enumerate(
-                zip(records.times(), part.present(), strict=True)
-            ):
+            blocks = zip(records.times(), part.present(), strict=True)
+            for group, (times, present) in enumerate(blocks):
                 table = checked_row_group(file, group)
                 for clock, (of_clock, writer), readings in zip(clocks, made, waiting, strict=True):
                     chosen = has_one(present, clock.bits)
@@ -364,28 +340,25 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
     parts = [of_clock for of_clock, _ in made]
     for clock, of_clock in zip(clocks, parts, strict=True):
         of_clock.stamped = part.stamped
-        _describe(of_clock, clock, part)
+        base = clock.base
+        findings = [
+            replace(each, channel=name) for name in clock.channels for each in base.findings
+        ]
+        if of_clock.rows < part.rows:
+            names = [name for name in of_clock.columns if name in clock.channels]
+            verb = "has a number" if len(clock.channels) == 1 else "have numbers"
+            detail = (
+                f"{', '.join(names)}: {verb} in {of_clock.rows} of {part.rows} records, and a "
+                f"clock of its own: analysed at {base.rate:.6g} Hz"
+            )
+            findings.append(Finding("own_rate", "note", detail, base.rate))
+        of_clock.base = replace(base, findings=tuple(findings))
     parts[0].left_out = {
         name: column
         for name, column in part.columns.items()
         if name not in BESIDE and not any(name in clock.channels for clock in clocks)
     }
     return parts
-
-
-def _describe(of_clock: Part, clock: _Clock, part: Part) -> None:
-    """Set the time base of a part, with its findings."""
-    names = ", ".join(name for name in of_clock.columns if name in clock.channels)
-    base = clock.base
-    findings = [replace(found, channel=name) for name in clock.channels for found in base.findings]
-    if of_clock.rows < part.rows:
-        verb = "has a number" if len(clock.channels) == 1 else "have numbers"
-        detail = (
-            f"{names}: {verb} in {of_clock.rows} of {part.rows} records, and a clock of its own: "
-            f"analysed at {base.rate:.6g} Hz"
-        )
-        findings.append(Finding("own_rate", "note", detail, base.rate))
-    of_clock.base = replace(base, findings=tuple(findings))
 
 
 def _carry(

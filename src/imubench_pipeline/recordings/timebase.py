@@ -104,11 +104,7 @@ def without_stamps(rows: int, rate: float) -> TimeBase:
 
 
 def from_stamps(
-    stamps: Stamps,
-    stated: float | None,
-    settings: QualitySettings,
-    *,
-    known: float | None = None,
+    stamps: Stamps, stated: float | None, settings: QualitySettings, *, known: float | None = None
 ) -> TimeBase:
     """Return the time base of a file from its stamps.
 
@@ -157,12 +153,10 @@ def from_stamps(
     shared = track.duplicates > MIN_SHARED_STAMPS * track.rows
     if typical.has_repeats and interval == typical.mean:
         base = _assume_consecutive(stamps, track, stated, settings)
-        coarse = (
-            []
-            if stated
-            else [_describe_coarse_stamps(base.rate, 1.0 / (typical.other or interval))]
-        )
-        return replace(base, findings=(*base.findings, *coarse))
+        if stated:
+            return base
+        coarse = _describe_coarse_stamps(base.rate, 1.0 / (typical.other or interval))
+        return replace(base, findings=(*base.findings, coarse))
     if track.off_grid > settings.jitter * track.rows or bursts or shared:
         if stated and known is None and not complete:  # many samples may be missing
             of_stated = from_stamps(stamps, stated, settings, known=1.0 / stated)
@@ -218,14 +212,8 @@ def rate_changes(
 ) -> list[Finding]:
     """Return a finding if a part of a log has every second (third, ...) sample only.
 
-    Random losses do not give 32 equal steps in a row.
-
-    Parameters
-    ----------
-    points : iterator of ndarray
-        Grid points of the samples, in blocks; below 0 for those left out.
-    rate : float
-        Rate of the grid, Hz.
+    Random losses do not give 32 equal steps in a row. ``points``: grid points of the samples, in
+    blocks; below 0 for those left out. ``rate``: of the grid, Hz.
     """
     samples: Counter[int] = Counter()
     begin: dict[int, int] = {}
@@ -259,9 +247,8 @@ def rate_changes(
             f"if the sensor was set to the lower rate, their N is {percent:.0f} % low. Analyse the "
             "parts separately, with 'use' in the notes"
         )
-        findings.append(
-            Finding("rate_changes", "warning", detail, rate / step, channel, first, last)
-        )
+        slower = rate / step
+        findings.append(Finding("rate_changes", "warning", detail, slower, channel, first, last))
     return findings
 
 
@@ -275,11 +262,9 @@ def _describe_coarse_stamps(rate: float, other: float) -> Finding:
 
     ``other``: rate, Hz, if double steps are lost samples and zero steps are copies, not rounding.
     """
-    steps, instead, change = (
-        ("double steps", "samples are lost so regularly", "less")
-        if other > rate
-        else ("repeated stamps", "records are written twice so regularly", "more")
-    )
+    steps, instead, change = "repeated stamps", "records are written twice so regularly", "more"
+    if other > rate:
+        steps, instead, change = "double steps", "samples are lost so regularly", "less"
     percent = 100.0 * abs(1.0 - math.sqrt(rate / other))
     return Finding(
         "coarse_stamps",
@@ -426,9 +411,20 @@ def _assume_consecutive(
         raise RecordingError("the time stamps do not advance; is the right column named?")
     _check_segments(len(starts))
     rate, others = groups.rate()
-    findings = [_describe_jitter(track, rate, worst, worst_at / rate)]
+    at_worst = worst_at / rate
+    detail = (
+        f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
+        f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at {at_worst:.5g} s);"
+        f" the samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost samples "
+        "cannot be seen"
+    )
+    findings = [Finding("jittered_stamps", "warning", detail, worst, start=at_worst, end=at_worst)]
     if others:
-        findings.append(_describe_irregular_groups(others, rate))
+        detail = (
+            f"{others} stamps have more or fewer samples than the others: the clock was set, "
+            f"or samples are lost; the rate of {rate:.6g} Hz is taken from the others"
+        )
+        findings.append(Finding("irregular_stamps", "warning", detail, others))
     findings += _compare_rates(rate, stated, settings)
     segments = tuple(zip(starts, [*starts[1:], rows], strict=True))
     if len(segments) > 1:
@@ -493,26 +489,6 @@ class Groups:
         counted = sum(pair[0] * number_of for pair, number_of in regular.items())
         duration = sum(pair[1] * number_of for pair, number_of in regular.items())
         return 1e9 * counted / duration, self._number - number
-
-
-def _describe_irregular_groups(groups: int, rate: float) -> Finding:
-    """Return the finding about stamps with more or fewer samples than the others."""
-    detail = (
-        f"{groups} stamps have more or fewer samples than the others: the clock was set, "
-        f"or samples are lost; the rate of {rate:.6g} Hz is taken from the others"
-    )
-    return Finding("irregular_stamps", "warning", detail, groups)
-
-
-def _describe_jitter(track: Track, rate: float, worst: float, at: float) -> Finding:
-    """Return the finding about stamps on no grid; ``worst``: the longest interval, s."""
-    detail = (
-        f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
-        f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at {at:.5g} s); the "
-        f"samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost samples "
-        "cannot be seen"
-    )
-    return Finding("jittered_stamps", "warning", detail, worst, start=at, end=at)
 
 
 def _measure_span(stamps: Stamps) -> float:

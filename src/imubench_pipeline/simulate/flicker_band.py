@@ -50,15 +50,6 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     return processes
 
 
-def ripple(lowest: float, highest: float) -> float:
-    """Return the max. relative error of the density of a bank in its band, Hz, for any B."""
-    terms = bank(1.0, lowest, highest)
-    decades = math.log10(highest / lowest)
-    f = np.geomspace(lowest, highest, 2 + math.ceil(decades * 10 * _POINTS_PER_DECADE))
-    density = np.sum([term.psd(f) for term in terms], axis=0)
-    return float(np.max(np.abs(density * 2.0 * np.pi * f - 1.0)))
-
-
 def mixture(shortest: float, longest: float) -> tuple[Array, float]:
     """Return correlation times and common variance of processes that sum to flicker noise, B = 1.
 

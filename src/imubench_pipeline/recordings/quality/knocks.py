@@ -94,18 +94,8 @@ def knocks(
 ) -> Iterator[Knock]:
     """Yield the knocks of a column.
 
-    Parameters
-    ----------
-    pieces : iterable of ndarray
-        The column in order, SI; NaN where a sample is missing.
-    blocks : BlockStatistics
-        Statistics of the same column.
-    sigmas : float
-        As `suspects` takes it.
-    longest : int
-        Longest knock, records; a longer event is motion.
-    step : float or None
-        As `suspects` takes it.
+    ``pieces``: the column in order, SI; NaN where a sample is missing. ``longest``: longest knock,
+    records; a longer event is motion. For the other parameters see `suspects`.
     """
     number, level, noise = suspects(blocks, sigmas, step)
     if len(number) == 0:
@@ -118,10 +108,8 @@ def knocks(
             away = np.abs(values - level[i]) / noise[i]
             for first, last in _find_events(away, sigmas):
                 if last - first <= longest:
-                    size = float(np.nanmax(away[first:last]))
-                    yield Knock(
-                        reached + first - _MARGIN_SAMPLES, reached + last + _MARGIN_SAMPLES, size
-                    )
+                    begin, end = reached + first - _MARGIN_SAMPLES, reached + last + _MARGIN_SAMPLES
+                    yield Knock(begin, end, float(np.nanmax(away[first:last])))
         reached += len(values)
 
 

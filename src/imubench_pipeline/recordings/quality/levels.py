@@ -22,7 +22,6 @@ _MIN_BLOCK_STEPS = 8
 _NORMAL_MEDIAN = 0.4549
 """Median of the square of a standard normal variable."""
 
-
 _MAX_STEP_FOR_PILING = 1.0
 """Largest ratio of step to noise at which neighbouring levels are about equally frequent: a level
 at the mean has 1.65 times the samples of the next one."""
@@ -70,9 +69,8 @@ def quantisation(column: ColumnSummary) -> Quantisation | None:
     if step < 20.0 * spread / column.present:
         return None
     over_noise = step / spread if spread > 0.0 else math.inf  # most blocks have one value
-    return Quantisation(
-        step, (column.high - column.low) / step + 1.0, over_noise, hidden is not None
-    )
+    levels = (column.high - column.low) / step + 1.0
+    return Quantisation(step, levels, over_noise, hidden is not None)
 
 
 def noise_of(column: ColumnSummary) -> float:
@@ -86,11 +84,6 @@ def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, flo
     Neighbouring levels of a fine register are about equally frequent. A constant that replaces lost
     samples, or the 0 of a dead band, is more frequent. Coarse registers are not tested.
 
-    Parameters
-    ----------
-    steps : Quantisation or None
-        Quantisation of the column.
-
     Returns
     -------
     (value, share) or None
@@ -102,16 +95,13 @@ def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, flo
     if len(at) == 0:
         return None
     most = int(np.argmax(counts))
-    around = np.delete(
-        counts[max(0, most - _COMPARED_LEVELS) : most + _COMPARED_LEVELS + 1],
-        min(most, _COMPARED_LEVELS),
-    )
+    near = counts[max(0, most - _COMPARED_LEVELS) : most + _COMPARED_LEVELS + 1]
+    around = np.delete(near, min(most, _COMPARED_LEVELS))
     if at[most] in (column.low, column.high) or len(around) < 2 * _COMPARED_LEVELS:
         return None  # saturated, or too few levels
     share = counts[most] / counts.sum()
-    if share < _MIN_PILED_SHARE or counts[most] < _MIN_PILING_RATIO * max(
-        around.max(), _MIN_COMPARED_COUNT
-    ):
+    least = _MIN_PILING_RATIO * max(around.max(), _MIN_COMPARED_COUNT)
+    if share < _MIN_PILED_SHARE or counts[most] < least:
         return None
     return float(at[most]), float(share)
 
@@ -127,14 +117,8 @@ def kept_level(
 ) -> dict[str, Any]:
     """Return the level and noise of a channel, to be compared with its datasheet.
 
-    Parameters
-    ----------
-    rate : float
-        Hz.
-    unit : str
-        Unit of the channel, as stated in the sensor file.
-    timed : bool
-        The log has stamps; otherwise the rate is the stated one.
+    ``unit``: as stated in the sensor file. ``timed``: the log has stamps; otherwise the rate, Hz,
+    is the stated one.
 
     Returns
     -------
@@ -185,12 +169,7 @@ def saturated(
 ) -> tuple[str, int] | None:
     """Return the extreme where a column is saturated; None if it is not.
 
-    Parameters
-    ----------
-    steps : Quantisation or None
-        Quantisation of the column.
-    share : float
-        Least share of the samples at a saturated extreme.
+    ``share``: least share of the samples at a saturated extreme.
 
     Returns
     -------

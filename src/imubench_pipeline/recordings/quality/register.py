@@ -93,31 +93,22 @@ def _find_hidden_step(values: Array) -> float | None:
         return None
     lengths = np.unique(gaps)
     apart = np.concatenate((lengths[:1], np.diff(lengths)))
-    return _resolve_mirror_frequency(
-        levels, counts, float(apart[apart > least_sure].min()), frequency
-    )
+    digit = float(apart[apart > least_sure].min())
+    return _resolve_mirror_frequency(levels, counts, digit, frequency)
 
 
 def _find_peak(levels: Array, counts: NDArray[np.int64], sigma: float) -> float | None:
     """Return the lowest frequency at which A has a peak, 1 / SI."""
     span = float(np.ptp(levels)) * (1.0 + 1.0 / _HISTOGRAM_BINS)
-    histogram = np.bincount(
-        ((levels - levels[0]) / span * _HISTOGRAM_BINS).astype(np.int64),
-        weights=counts,
-        minlength=_HISTOGRAM_BINS,
-    )
+    bins = ((levels - levels[0]) / span * _HISTOGRAM_BINS).astype(np.int64)
+    histogram = np.bincount(bins, weights=counts, minlength=_HISTOGRAM_BINS)
     # Zero-padded to twice the length, so that no peak between two frequencies is missed.
     height = np.abs(np.fft.rfft(histogram, 2 * _HISTOGRAM_BINS)) / counts.sum()
     frequencies = np.arange(len(height)) / (2.0 * span)
-    inner = slice(1, -1)
-    peaks = (
-        (height[inner] >= height[:-2])
-        & (height[inner] >= height[2:])
-        & (height[inner] > _MIN_PEAK_HEIGHT)
-    )
-    peaks &= (frequencies[inner] > 1.0 / (_MAX_STEP_OVER_NOISE * sigma)) & (
-        frequencies[inner] < 1.0 / (_MIN_STEP_OVER_NOISE * sigma)
-    )
+    inner, f = height[1:-1], frequencies[1:-1]
+    peaks = (inner >= height[:-2]) & (inner >= height[2:]) & (inner > _MIN_PEAK_HEIGHT)
+    peaks &= f > 1.0 / (_MAX_STEP_OVER_NOISE * sigma)
+    peaks &= f < 1.0 / (_MIN_STEP_OVER_NOISE * sigma)
     places = np.flatnonzero(peaks)
     if len(places) == 0:
         return None

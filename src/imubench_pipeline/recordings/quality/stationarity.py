@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.recordings.quality.summary import BlockStatistics, present_median
-from imubench_pipeline.typing import Array
 
 _NUMBER_OF_PARTS = 20
 _MIN_BLOCKS_PER_PART = 8
@@ -58,7 +57,10 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     ``sigmas``: least size of a step, in robust standard deviations of all steps.
     """
     size = max(1, len(blocks.mean) // 400)
-    means = _take_median_means(blocks, size)
+    # Medians are robust to knocks. The means of blocks with few samples scatter too much.
+    mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)
+    grouped = mean[: len(mean) // size * size].reshape(-1, size)
+    means = np.array([present_median(group) for group in grouped])
     if len(means) < 16:
         return []
     # Difference over two windows, so that a step inside a window counts in full.
@@ -118,37 +120,21 @@ def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
     size = len(blocks.spread) // _NUMBER_OF_PARTS
     if size < _MIN_BLOCKS_PER_PART:
         return None
-    spreads = np.array(
-        [
-            present_median(part)
-            for part in blocks.spread[: size * _NUMBER_OF_PARTS].reshape(_NUMBER_OF_PARTS, size)
-        ]
-    )
+    parts = blocks.spread[: size * _NUMBER_OF_PARTS].reshape(_NUMBER_OF_PARTS, size)
+    spreads = np.array([present_median(part) for part in parts])
     calm = float(np.min(spreads[spreads > 0.0], initial=np.inf))
     noisy = int(np.argmax(np.nan_to_num(spreads)))
     if not np.isfinite(calm):
         return None
-    return (
-        float(spreads[noisy]) / calm,
-        noisy * size * blocks.size,
-        (noisy + 1) * size * blocks.size,
-    )
+    records = size * blocks.size
+    return float(spreads[noisy]) / calm, noisy * records, (noisy + 1) * records
 
 
 def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[tuple[int, int]]:
     """Return the parts with motion: a large standard deviation that no knock explains.
 
-    Parameters
-    ----------
-    times : float
-        Least ratio of the standard deviation to its median during motion.
-    least : float
-        Least standard deviation during motion, SI.
-
-    Returns
-    -------
-    list of (int, int)
-        First and one-past-last record of each.
+    ``times``, ``least``: lower limits of the standard deviation, over its median and in SI. A part
+    is its first and one-past-last record.
     """
     usual = present_median(blocks.spread)
     if not usual > 0.0:
@@ -162,16 +148,3 @@ def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[t
         return []
     groups = np.split(shaken, np.flatnonzero(np.diff(shaken) > 2) + 1)
     return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
-
-
-def _take_median_means(blocks: BlockStatistics, size: int) -> Array:
-    """Return medians of the means of ``size`` blocks, which are robust to knocks.
-
-    Blocks with few samples, such as the last one, are left out: their means scatter too much.
-    """
-    whole = len(blocks.mean) // size
-    mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)
-    grouped = mean[: whole * size].reshape(whole, size)
-    if np.isfinite(grouped).all():
-        return np.median(grouped, axis=1)
-    return np.array([present_median(group) for group in grouped])

@@ -37,10 +37,6 @@ class BlockStatistics:
     are none."""
 
 
-def _create_empty_rows() -> Array:
-    return np.empty((0, 5))
-
-
 @dataclass
 class BlockAccumulator:
     """Accumulates blocks: rows of count, mean, standard deviation, lowest and highest sample."""
@@ -48,7 +44,7 @@ class BlockAccumulator:
     _size: int = MIN_BLOCK_SIZE
     _rows: list[Array] = field(default_factory=list)
     _number: int = 0
-    _waiting: Array = field(default_factory=_create_empty_rows)
+    _waiting: Array = field(default_factory=lambda: np.empty((0, 5)))
 
     def add(self, rows: Array) -> None:
         """Add consecutive blocks of `MIN_BLOCK_SIZE` records, shape (n, 5)."""
@@ -162,17 +158,9 @@ class Excerpts:
 
 
 def common_samples(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
-    """Return the samples of two columns at the same records, those present in both.
+    """Return the samples of two columns of one table that are present in both.
 
-    Parameters
-    ----------
-    first, other : list of Excerpt
-        Excerpts of columns of the same table.
-
-    Returns
-    -------
-    list of (ndarray, ndarray)
-        Two arrays of equal shape for each piece that both columns have.
+    There are two arrays of equal shape for each excerpt that both columns have.
     """
     places = {piece.first: piece.values for piece in other}
     pairs = []
@@ -189,34 +177,13 @@ MAX_MEASUREMENT = 1e30
 
 # Indices of the state of a column
 
-(
-    _PRESENT_SAMPLES,
-    _MISSING_SAMPLES,
-    _INFINITE_SAMPLES,
-    _LOWEST_SAMPLE,
-    _HIGHEST_SAMPLE,
-    _COUNT_AT_LOWEST,
-    _COUNT_AT_HIGHEST,
-) = range(7)
-(
-    _LAST_SAMPLE,
-    _RUN_LENGTH,
-    _LONGEST_RUN,
-    _LONGEST_RUN_END,
-    _REPEAT_COUNT,
-    _SMALLEST_STEP,
-    _RECORDS,
-) = range(7, 14)
-(
-    _BLOCK_RECORDS,
-    _BLOCK_COUNT,
-    _BLOCK_SUM,
-    _BLOCK_SQUARES,
-    _BLOCK_LOWEST,
-    _BLOCK_HIGHEST,
-    _BLOCK_SHIFT,
-) = range(14, 21)
-_PAIR_COUNT, _FAR_PAIRS, _FAR_REPEATS, _CHANGE_COUNT, _SINGLE_STEPS = range(21, 26)
+_PRESENT_SAMPLES, _MISSING_SAMPLES, _INFINITE_SAMPLES, _RECORDS = range(4)
+_LOWEST_SAMPLE, _HIGHEST_SAMPLE, _COUNT_AT_LOWEST, _COUNT_AT_HIGHEST = range(4, 8)
+_LAST_SAMPLE, _RUN_LENGTH, _LONGEST_RUN, _LONGEST_RUN_END = range(8, 12)
+_REPEAT_COUNT, _SMALLEST_STEP, _CHANGE_COUNT, _SINGLE_STEPS = range(12, 16)
+_PAIR_COUNT, _FAR_PAIRS, _FAR_REPEATS = range(16, 19)
+_BLOCK_RECORDS, _BLOCK_COUNT, _BLOCK_SUM, _BLOCK_SQUARES = range(19, 23)
+_BLOCK_LOWEST, _BLOCK_HIGHEST, _BLOCK_SHIFT = range(23, 26)
 _GAP_LENGTH, _LONGEST_GAP, _GAP_END = range(26, 29)
 _STATE_SIZE = 29
 
@@ -321,15 +288,10 @@ class ColumnSummary:
 
     def blocks(self) -> BlockStatistics:
         """Return the statistics of the blocks; the last one may be incomplete."""
-        return self._blocks.blocks(_close_open_block(self._state))
-
-
-def _close_open_block(state: Array) -> Array:
-    """Return the incomplete block as a row, or no row, shape (n, 5)."""
-    rows = np.empty((int(state[_BLOCK_RECORDS] > 0), 5))
-    for row in rows:
-        _close_block(state.copy(), row)
-    return rows
+        incomplete = np.empty((int(self._state[_BLOCK_RECORDS] > 0), 5))
+        for row in incomplete:
+            _close_block(self._state.copy(), row)
+        return self._blocks.blocks(incomplete)
 
 
 @njit(cache=True, nogil=True)
@@ -437,12 +399,8 @@ def _find_extremes(piece: Array, last: float) -> tuple[float, float, float]:
 def _count_each_sample(piece: Array, state: Array) -> None:
     """Add samples one by one."""
     last, run, step = state[_LAST_SAMPLE], state[_RUN_LENGTH], state[_SMALLEST_STEP]
-    low, high, at_low, at_high = (
-        state[_LOWEST_SAMPLE],
-        state[_HIGHEST_SAMPLE],
-        state[_COUNT_AT_LOWEST],
-        state[_COUNT_AT_HIGHEST],
-    )
+    low, high = state[_LOWEST_SAMPLE], state[_HIGHEST_SAMPLE]
+    at_low, at_high = state[_COUNT_AT_LOWEST], state[_COUNT_AT_HIGHEST]
     shift, total, squares = state[_BLOCK_SHIFT], state[_BLOCK_SUM], state[_BLOCK_SQUARES]
     least, most = state[_BLOCK_LOWEST], state[_BLOCK_HIGHEST]
     changes, single = state[_CHANGE_COUNT], state[_SINGLE_STEPS]
@@ -500,12 +458,8 @@ def _count_each_sample(piece: Array, state: Array) -> None:
     state[_PAIR_COUNT] += count
     state[_CHANGE_COUNT], state[_SINGLE_STEPS] = changes, single
     state[_LAST_SAMPLE], state[_RUN_LENGTH], state[_SMALLEST_STEP] = last, run, step
-    (
-        state[_LOWEST_SAMPLE],
-        state[_HIGHEST_SAMPLE],
-        state[_COUNT_AT_LOWEST],
-        state[_COUNT_AT_HIGHEST],
-    ) = low, high, at_low, at_high
+    state[_LOWEST_SAMPLE], state[_HIGHEST_SAMPLE] = low, high
+    state[_COUNT_AT_LOWEST], state[_COUNT_AT_HIGHEST] = at_low, at_high
     state[_BLOCK_SHIFT], state[_BLOCK_SUM], state[_BLOCK_SQUARES] = shift, total, squares
     state[_BLOCK_LOWEST], state[_BLOCK_HIGHEST] = least, most
     state[_GAP_LENGTH] = gap
