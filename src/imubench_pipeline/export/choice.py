@@ -20,8 +20,7 @@ _Estimated = tuple[str, str, str]  # and method
 
 WORST, MEDIAN = "worst", "median"
 
-_MAX_NAMED_RECORDINGS = 40
-"""Max. recordings that are named for a reason; further ones are counted."""
+_MAX_NAMED_RECORDINGS = 40  # max. recordings that are named for a reason; further ones are counted
 
 
 @dataclass(frozen=True)

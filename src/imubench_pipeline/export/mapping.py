@@ -31,9 +31,7 @@ from imubench_pipeline.typing import Array
 _MIN_TIME_OVER_HORIZON = 1 / 30
 """Shortest tau of the fit of a process, and shortest T_B of its search, over the horizon."""
 
-_MAX_TIME_OVER_HORIZON = 100.0
-"""Longest T_B of the search, over the horizon."""
-
+_MAX_TIME_OVER_HORIZON = 100.0  # longest T_B of the search, over the horizon
 _TRIED_CORRELATION_TIMES = 120
 _ROLES_NOT_REPLACED = (Role.WHITE, Role.NOT_GROWING, Role.NO_NOISE)
 

@@ -41,9 +41,7 @@ _CONVENTION = (
     "SampleRate = {rate:g} Hz. R2023b or newer."
 )
 _MAX_POLES = 2000
-_REFERENCE_TEMPERATURE = 25.0
-"""Temperature at which TemperatureBias adds nothing, degC."""
-
+_REFERENCE_TEMPERATURE = 25.0  # temperature at which TemperatureBias adds nothing, degC
 _MAX_SAMPLES_PER_POLE = 5.0
 """Max. samples per pole; up to them the Allan deviation of flicker noise is within 11 %."""
 

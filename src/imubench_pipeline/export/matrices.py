@@ -33,6 +33,7 @@ from imubench_pipeline.typing import Array
 FLICKER_TAU_OVER_HORIZON = 4.0
 """Longest tau of the approximation of flicker noise, over the horizon."""
 
+_MATRICES = ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0")
 _CONVENTION = (
     "SI; densities are two-sided. Continuous: x' = F x + w, z = H x + v with densities Q and R of "
     "w and v. Discrete at {rate:g} Hz: Phi, Q_d, H, R_d, exact; x0 and P0: mean and covariance of "
@@ -107,6 +108,8 @@ def write_json(imu: Imu) -> str:
     for name, axis in imu.axes.items():
         model = axis.model
         of_axis = matrices(model, imu.rate, imu.horizon)
+        lists = [np.asarray(getattr(of_axis, key)).tolist() for key in _MATRICES]
+        F, Q, H_continuous, R, Phi, Q_d, H, R_d, x0, P0 = lists
         content[name] = {
             "model": model.name,
             "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
@@ -117,20 +120,8 @@ def write_json(imu: Imu) -> str:
             },
             "density_bounded": list(axis.bounded) if axis.bounded else None,
             "states": list(of_axis.states),
-            "continuous": {
-                "F": of_axis.F.tolist(),
-                "Q": of_axis.Q.tolist(),
-                "H": of_axis.H_continuous.tolist(),
-                "R": of_axis.R,
-            },
-            "discrete": {
-                "Phi": of_axis.Phi.tolist(),
-                "Q_d": of_axis.Q_d.tolist(),
-                "H": of_axis.H.tolist(),
-                "R_d": of_axis.R_d,
-                "x0": of_axis.x0.tolist(),
-                "P0": of_axis.P0.tolist(),
-            },
+            "continuous": {"F": F, "Q": Q, "H": H_continuous, "R": R},
+            "discrete": {"Phi": Phi, "Q_d": Q_d, "H": H, "R_d": R_d, "x0": x0, "P0": P0},
         }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
@@ -142,7 +133,7 @@ def write_npz(imu: Imu) -> bytes:
         of_axis = matrices(axis.model, imu.rate, imu.horizon)
         if axis.bounded:
             arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
-        for key in ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0"):
+        for key in _MATRICES:
             arrays[f"{name}_{key}"] = np.asarray(getattr(of_axis, key))
     about = np.array(heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
     stream = io.BytesIO()

@@ -70,13 +70,9 @@ _ALLAN_PEAK_FREQUENCY = 0.37
 
 The function is sin^4(x) / x^2 with x = pi f tau; the constant is x at its maximum, over pi."""
 
-_MIN_FREQUENCY_TIMES_HORIZON = 0.1
-"""Default of the lowest frequency of the band, in 1 / horizon."""
-
+_MIN_FREQUENCY_TIMES_HORIZON = 0.1  # default of the lowest frequency of the band, in 1 / horizon
 _POINTS_A_DECADE = 12
-_MAX_TIME_RATIO = 30.0
-"""Max. T_B of the search, over the larger of the longest tau and the horizon."""
-
+_MAX_TIME_RATIO = 30.0  # max. T_B of the search, over the larger of the longest tau and the horizon
 MAX_EXCESS = 3.0
 """Default of the max. ratio of a model's Allan deviation to its limit."""
 
@@ -160,19 +156,8 @@ def simultaneous_upper(curve: AllanCurve, longest: float, confidence: float = 0.
     """Return simultaneous upper confidence limits of an Allan variance.
 
     They follow from the limits at single tau by a Bonferroni correction for the number of octaves.
-
-    Parameters
-    ----------
-    curve : AllanCurve
-    longest : float
-        Longest tau for which the limits hold, s.
-    confidence : float
-        Probability that the true curve lies below the limits at every tau up to ``longest``.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        (rad/s)^2 or (m/s^2)^2, at every tau of the curve.
+    The true curve lies below the limits at every tau up to ``longest``, s, with the probability
+    ``confidence``. The limits are at every tau of the curve, shape (m,), in its unit squared.
     """
     n = curve.cluster_size[curve.tau <= longest * (1.0 + 1e-9)]
     octaves = 1.0 + math.log2(n[-1] / n[0])
@@ -259,19 +244,9 @@ def overbound(
     lowest = float(ratio[np.argmin(measured)])
     frequency = np.geomspace(ends[0], _MIN_FREQUENCY_RATIO * ends[0], 400)
     passed = np.flatnonzero(fitted.psd(frequency, rate) > model.psd(frequency))
+    below = float(frequency[passed[0]]) if len(passed) else None
     return Overbound(
-        model,
-        family,
-        horizon,
-        reach,
-        ends,
-        tau,
-        ratio,
-        lowest,
-        touches,
-        excess,
-        float(frequency[passed[0]]) if len(passed) else None,
-        warning,
+        model, family, horizon, reach, ends, tau, ratio, lowest, touches, excess, below, warning
     )
 
 

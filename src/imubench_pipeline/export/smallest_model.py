@@ -31,15 +31,9 @@ Family = Literal["N+K", "N+GM", "N+GM+K"]
 
 FAMILIES: Sequence[Family] = get_args(Family)
 
-_TIMES_PER_DECADE = 6
-"""Correlation times of the grid search, which a bounded search refines."""
-
-_MAX_PROGRAMS = 12
-"""Max. number of successive linear programs for one T_B."""
-
-_CONVERGED_DECREASE = 1e-6
-"""Converged where the mean logarithm decreases by less."""
-
+_TIMES_PER_DECADE = 6  # correlation times of the grid search, which a bounded search refines
+_MAX_PROGRAMS = 12  # max. number of successive linear programs for one T_B
+_CONVERGED_DECREASE = 1e-6  # converged where the mean logarithm decreases by less
 _ROUNDING_MARGIN = 1e-9
 """Relative increase of the densities, so that rounding does not put the model below a limit."""
 
@@ -108,12 +102,8 @@ def find_smallest(
         raise ValueError(f"no model {family} lies above the limits")
     powers = powers * (1.0 + _ROUNDING_MARGIN)
     B = bias_instability(float(powers[-1]), T_B) if T_B else 0.0
-    return NoiseModel(
-        N=math.sqrt(powers[0]),
-        B=B,
-        T_B=T_B if B > 0.0 else None,
-        K=math.sqrt(powers[1]) if walks else 0.0,
-    )
+    K = math.sqrt(powers[1]) if walks else 0.0
+    return NoiseModel(N=math.sqrt(powers[0]), B=B, T_B=T_B if B > 0.0 else None, K=K)
 
 
 def _minimise_mean_log_ratio(

@@ -32,8 +32,7 @@ class Compared:
     """Comparison of one figure of one channel between two logs; values in SI."""
 
     channel: str
-    symbol: str
-    """A parameter, or ``adev``."""
+    symbol: str  # A parameter, or ``adev``
     tau: float | None  # s, of the Allan deviation
     names: tuple[str, str]
     values: tuple[float | None, float | None]

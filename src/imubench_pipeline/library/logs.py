@@ -48,9 +48,7 @@ if TYPE_CHECKING:
 
 _SENSOR_FOLDER = Path("config/sensors")
 _YAML_SUFFIXES = (".yaml", ".yml")
-_MAX_FINDINGS = 6
-"""Max. number of findings in the summary."""
-
+_MAX_FINDINGS = 6  # max. number of findings in the summary
 _UNKNOWN_MODEL = {"vendor": "unknown", "model": "unknown"}
 
 

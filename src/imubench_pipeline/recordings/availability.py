@@ -1,7 +1,7 @@
-"""Whether an error is a property of a log, or of what surrounds it: a mount, a disk, a permission.
+"""Distinguish errors of a log from errors of its surroundings: a mount, a disk, a permission.
 
-A property of a log rejects it, and is true until the log is another one. What surrounds it may be
-different an hour later: the ingest fails, nothing is concluded, and the next run tries again.
+An error of a log rejects it until it changes. The surroundings may be different an hour later: the
+ingest fails, nothing is concluded, and the next run tries again.
 """
 
 from __future__ import annotations
@@ -31,13 +31,8 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[]
     """Let a `RecordingError` pass only where it is a property of the log.
 
     It gives a function that returns whether the log is still the one that was there at first.
-
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    planned : collection of str
-        The files that the plan found there, by their place in the log.
+    ``source``: the log file, or the folder of a recording. ``planned``: the files that the plan
+    found there, by their place in the log.
 
     Raises
     ------

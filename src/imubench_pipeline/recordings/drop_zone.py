@@ -23,9 +23,7 @@ NO_SENSOR = "(no sensor)"
 """Stands for the sensor of logs that lie beside the folders of the sensors."""
 
 _NOTES = ".yaml"
-_MISNAMED_NOTES = {".yml", _NOTES}
-"""In lower case."""
-
+_MISNAMED_NOTES = {".yml", _NOTES}  # in lower case
 _NOT_LOGS = {".md"} | _MISNAMED_NOTES | PARTIAL
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
 _LONGEST_NAME, _MOST_BYTES = 120, 160
@@ -41,17 +39,13 @@ class Recording:
 
     sensor: str
     name: str
-    path: Path
-    """The log file, or the folder of a recording that has several."""
-    notes: Path | None
-    """The file of notes beside it."""
+    path: Path  # the log file, or the folder of a recording that has several
+    notes: Path | None  # the file of notes beside it
     simulated: bool
     error: str | None = None
     """Why the file cannot be used, where its name or its place says so already."""
-    unavailable: str | None = None
-    """Why it cannot be looked at now; nothing is known about it."""
-    held_back: bool = False
-    """The log is not read in this run: the results that are there stay."""
+    unavailable: str | None = None  # why it cannot be looked at now; nothing is known about it
+    held_back: bool = False  # the log is not read in this run: the results that are there stay
 
     @property
     def files(self) -> list[Path]:
@@ -81,12 +75,10 @@ class Recording:
 class FoundFile:
     """A file in the drop zone: it belongs to a recording, or is skipped."""
 
-    file: str
-    """Its place in the drop zone."""
+    file: str  # its place in the drop zone
     sensor: str | None = None
     recording: str | None = None
-    reason: str | None = None
-    """Why it is skipped."""
+    reason: str | None = None  # why it is skipped
 
 
 def found_logs(logs: Path) -> list[Recording]:
@@ -115,12 +107,7 @@ def account_for(
 ) -> list[FoundFile]:
     """Return every file in the drop zone once, with its recording, or why it is skipped.
 
-    Parameters
-    ----------
-    logs : Path
-        The drop zone.
-    recordings, held_back : iterable of Recording
-        Those of a run; those that it leaves alone because they are still being written.
+    ``held_back``: recordings that the run leaves alone because they are still being written.
     """
     owners = {file: recording for recording in recordings for file in recording.files}
     waiting = {file for recording in held_back for file in recording.files}
@@ -136,8 +123,7 @@ def account_for(
     return found
 
 
-_FOLLOWED = 2
-"""Levels of folders where links are followed: sensors, and recordings."""
+_FOLLOWED = 2  # levels of folders where links are followed: sensors, and recordings
 
 
 def _every_file(folder: Path) -> Iterator[Path]:
@@ -247,7 +233,7 @@ def _behind_link(path: Path, sensor: str, name: str) -> Recording:
 
 
 def _shown(folder: Path) -> list[Path]:
-    """Return what lies in a folder, in order, without what is hidden and backups of editors."""
+    """Return the content of a folder, in order, without hidden files and backups of editors."""
     names = (path for path in folder.iterdir() if not path.name.startswith("."))
     return sorted(path for path in names if not path.name.endswith("~"))
 

@@ -1,10 +1,8 @@
-"""Whether a recording may decide: what findings, statuses and verdicts on models cast doubt on.
+"""Decide from findings and estimates whether a recording is used in comparisons.
 
-All doubts are derived here, from the rows that the steps leave, and what decides or is exported
-(ranking, pooling, exports) asks here. A doubt is *unfit* where the figures may be of something else
-than the noise of a sensor at rest in the unit that is stated: it was moved or turned, the unit is
-another, an axis is dead; or where no such sensor can be bought. Others leave the figures, and are
-said beside them.
+A doubt is *unfit* if the figures may not be the noise of a sensor at rest in the stated unit (it
+was moved, the unit is wrong, an axis is dead), or if no such sensor is sold. Other doubts are
+reported with the figures.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ UNFIT = frozenset(
         *("channel_twice", "log_twice", "recording_twice", "joined", "interleaved"),
     }
 )
-"""Findings after which a log need not be that of one sensor at rest in its unit."""
+"""Findings after which a log may not be of one sensor at rest in its unit."""
 
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 _WHITE = frozenset({"N", "Q"})
@@ -75,8 +73,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
 }
 """The parameters on which a finding casts doubt; a warning that is not here, on all."""
 
-_SHOWN = 3
-"""Doubts of a recording that are named; of more the number."""
+_SHOWN = 3  # doubts of a recording that are named; of more the number
 
 
 @dataclass(frozen=True)
@@ -85,18 +82,14 @@ class Doubt:
 
     sensor: str
     recording: str
-    channel: str | None
-    """None: the whole recording."""
+    channel: str | None  # None: the whole recording
     code: str
     """The finding, ``not_explained`` (no model explains the spectrum), or the status of a
     parameter."""
     reason: str
-    parameters: tuple[str, ...] = ()
-    """On which it bears; none: on all."""
-    unfit: bool = False
-    """The figures may be of something else."""
-    factor: float | None = None
-    """By which it may change a value, where that is known."""
+    parameters: tuple[str, ...] = ()  # that it affects; none: all
+    unfit: bool = False  # the figures may be of something else
+    factor: float | None = None  # of a possible change of a value, if known
     start: float | None = None
     end: float | None = None
     """The part of the recording that it concerns, s from the first sample; None: all of it."""
@@ -279,7 +272,7 @@ def undecided(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Itera
 
 
 def with_doubts(rows: Iterable[Doubted], recordings: Iterable[RecordingRow]) -> Iterator[Doubted]:
-    """Yield rows with the doubts of the recordings that they stand on."""
+    """Yield rows with the doubts about their recordings."""
     by_recording: dict[tuple[str, str | None], str] = {
         _key(row): row.doubts or "" for row in recordings
     }

@@ -1,4 +1,4 @@
-"""Log files -> Parquet in SI, with what was found wrong on the way; memory stays bounded."""
+"""Convert log files to Parquet in SI, with findings, in bounded memory."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Ingested:
     """A row of the table ``recordings`` without the names."""
     findings: list[Finding]
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Rate in Hz, points of the grid, segments and levels of each channel that goes on."""
+    """Rate in Hz, points of the grid, segments and levels of each analysed channel."""
     kept: dict[str, dict[str, Any]] = field(default_factory=dict)
     """The files of samples (`imubench_pipeline.recordings.kept.identified`)."""
     gravity: GravityTurn | None = None
@@ -53,7 +53,7 @@ class Ingested:
     """The files of the log, by their place in it; None: they were not read to their end."""
 
     def quality(self, names: dict[str, Any]) -> Quality:
-        """Return what ``quality.json`` says, with the names of the recording."""
+        """Return the content of ``quality.json``, with the names of the recording."""
         status = "ok" if self.channels else "rejected"
         sensor, recording = names["sensor"], names["recording"]
         return Quality(
@@ -119,7 +119,7 @@ def ingest(
 
 
 def remove_kept(folder: Path) -> None:
-    """Remove the log of an earlier run, and what a killed one left."""
+    """Remove the log of an earlier run, and the scratch files of a killed one."""
     for path in log_paths(folder):
         path.unlink()
     for path in folder.glob(".ingest.*.part"):
@@ -230,7 +230,7 @@ def _findings(
     *,
     static: bool,
 ) -> list[Finding]:
-    """Return what is wrong with the files, their columns and their clocks."""
+    """Return the findings about the files, their columns and their clocks."""
     files = {id(part.source): part.source for part in parts}.values()
     findings = [finding for file in files for finding in file.findings]
     findings += [finding for file in files for finding in file.contradicted_units()]
@@ -239,7 +239,7 @@ def _findings(
         found = column_findings(columns, base.rate, settings, static=static)
         findings += [finding for finding in found if finding not in findings]
         findings += part.findings
-        if static:  # what is sensed of a turn looks like a knock
+        if static:  # a turn looks like a knock
             findings += _knock_findings(part, base.rate, settings, scratch)
     findings += copied_channels(
         {name: c for part in parts for name, c in part.columns.items() if name not in BESIDE}
@@ -266,7 +266,7 @@ def _findings(
 
 
 def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
-    """Return what the metadata of a file of samples say of its time base, and of holes in it."""
+    """Return the metadata of a file of samples about its time base and holes."""
     holes, empty = {}, []
     for part in parts:
         for name, column in part.columns.items():
@@ -429,6 +429,6 @@ def _stated_simulated(plan: dict[str, Any]) -> bool:
 
 
 def rejected(error: RecordingError, notes: RecordingNotes) -> Ingested:
-    """Return what is recorded of a recording that cannot be used."""
+    """Return the results of a recording that cannot be used."""
     summary = {"started": notes.started, "reason": str(error)}
     return Ingested(summary, [Finding("rejected", "fatal", str(error), 1)])

@@ -1,14 +1,10 @@
-"""The evidence that the result of an ingest rests on: which files were read, and their identity.
+"""The evidence of an ingest: the files that were read, and their identity.
 
-The plan must see every change of a log and still be cheap: it looks at sizes, at the stamps of the
-last change of the content (mtime) and of anything (ctime, which nobody can set), and at a few
-blocks of a file. Whole files are read in the ingest, which has limits of time and memory. Only a
-file of moderate size whose stamps changed is read in the plan: where its content is the same, as
-after a restored backup, hours of analysis need not be repeated.
-
-A log may be edited in place, keep its size and get its old date back; it may be away for a moment,
-with a mount or while somebody moves it. Whatever an ingest concluded, an analysis or a rejection,
-is looked at again as soon as the files are no longer those that the conclusion rests on.
+The plan must see every change of a log and still be cheap: it compares sizes, mtime, ctime (which
+nobody can set), and a few blocks of a file. The ingest reads whole files, within limits of time and
+memory. The plan reads a whole file only if its size is moderate and its stamps have changed: if its
+content is the same, as after a restored backup, hours of analysis need not be repeated. Any result
+of an ingest, also a rejection, is computed again as soon as the files have changed.
 """
 
 from __future__ import annotations
@@ -54,15 +50,13 @@ Stamps = tuple[int, int]
 class KnownFile:
     """A file of a log as an ingest found it."""
 
-    size: int | None
-    """Bytes; None: it was not there."""
+    size: int | None  # bytes; None: it was not there
     sha256: str | None
     """SHA-256 of the content; None: it was not read to its end, or changed meanwhile."""
     stamps: Stamps | None
     """None: the file changed while it was read, or so shortly before that a later change might
     have the same stamps."""
-    version: str = ""
-    """The name of this content in the settings of the ingest."""
+    version: str = ""  # the name of this content in the settings of the ingest
     inode: int = 0
     """The number of the file. Two files may have the same size and stamps. Some network disks give
     other numbers each time: then only the content of a file of moderate size is compared."""
@@ -84,7 +78,7 @@ class KnownFile:
         return cls(before.st_size, digest, stamps, inode=before.st_ino)
 
     def distrusted(self) -> KnownFile:
-        """Return the file without what says that it has not changed."""
+        """Return the file without digest and stamps, so that it counts as changed."""
         return replace(self, sha256=None, stamps=None)
 
     def is_unchanged(self, about: os.stat_result) -> bool:
@@ -206,7 +200,7 @@ def _now(path: Path, before: KnownFile) -> KnownFile | None:
 
 
 def is_changed(source: Path, folder: Path) -> bool:
-    """Return whether the files of a log are not those that its results in ``folder`` rest on.
+    """Return whether the files of a log have changed since its results in ``folder``.
 
     False if there are no results.
     """

@@ -10,9 +10,7 @@ from imubench_pipeline.recordings.availability import watched
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError, UnavailableError
 
-_MEMORY = 1 << 29
-"""Bytes; the bounds of the readers take up to half of them."""
-
+_MEMORY = 1 << 29  # bytes; the bounds of the readers take up to half of them
 _SLOWEST = 5e6
 """Bytes/s. A bag without an index is searched to its end for a topic that it does not have: one of
 511 MB, most of it in messages of 300 bytes, took 21 s on a busy core."""

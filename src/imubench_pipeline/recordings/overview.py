@@ -1,11 +1,8 @@
-"""What a recording looks like: each channel's envelope over time, and its histogram.
+"""Compute envelope over time and histogram of each channel, to draw 1e8 samples on a page.
 
-A page draws 1e8 samples with them. Each channel is read twice, in bounded memory.
-
-Time is that of the uniform grid, from the first sample of the log: point i lies at i / rate after
-the first sample that was kept of the channel's file. A hole has its length. A pause that begins a
-segment has none: the segment follows at once. Samples whose stamps lie on no grid are taken as
-consecutive. Where channels have clocks of their own, each counts from its own first sample.
+Each channel is read twice, in bounded memory. Times are on the uniform grid: point i is i / rate
+after the first sample of the channel's file. Holes have their length, but pauses between segments
+have none. Samples whose stamps lie on no grid are taken as consecutive.
 """
 
 from __future__ import annotations
@@ -33,7 +30,7 @@ from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 
 BUCKETS = 400
-"""Stretches of time of an envelope, unless told otherwise."""
+"""Default number of intervals of time of an envelope."""
 
 BUCKETS_OF_TURNS = 2400
 """The same of a recording with turns in it, which should be seen."""
@@ -43,15 +40,11 @@ MOST_BINS = 120
 
 _BINS = 100  # where no steps show
 
-_DRAWN = 1 << 16
-"""Samples, spread over the recording, that tell the bins of a histogram."""
-
+_DRAWN = 1 << 16  # samples, spread over the recording, that tell the bins of a histogram
 _BEYOND = 0.8
 """Widths of the middle that bins go beyond it: to 6 standard deviations, of Gaussian samples."""
 
-_SAME = 0.01
-"""Part of the mean gap between levels within which two are one, written in two ways."""
-
+_SAME = 0.01  # part of the mean gap between levels within which two are one, written in two ways
 _GOLDEN_RATIO = 0.6180339887498949
 _LOW, _HIGH, TOTAL, PRESENT = range(4)
 

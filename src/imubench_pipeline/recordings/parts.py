@@ -38,20 +38,17 @@ class Part:
     present_path: Path
     """Scratch files: the columns as Parquet, the stamps, and a bit mask per record of the columns
     with a number."""
-    writer: LogWriter
-    """Writer of ``data``; open until the metadata are known."""
+    writer: LogWriter  # writer of ``data``; open until the metadata are known
     rows: int = 0
     not_used: int = 0
     """Number of records that are used, and of records outside the part to use."""
-    columns: dict[str, ColumnSummary] = field(default_factory=dict)
-    """Statistics of each column."""
+    columns: dict[str, ColumnSummary] = field(default_factory=dict)  # statistics of each column
     patterns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """Number of records for each bit mask of columns with a number: entry 5 counts the records with
     the first and the third column."""
     knocks: dict[str, int] = field(default_factory=dict)
     """Number of samples of each column that are left out as part of a knock."""
-    stamped: bool = False
-    """Records have stamps."""
+    stamped: bool = False  # records have stamps
     base: TimeBase | None = None
     """Time base, if it was set when the columns of a file were separated."""
     findings: list[Finding] = field(default_factory=list)

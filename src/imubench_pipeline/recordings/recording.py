@@ -80,14 +80,14 @@ class LogWriter:
             self._flush(ROW_GROUP)
 
     def finish(self, metadata: Mapping[str, Any]) -> None:
-        """Write what is waiting, and the metadata of the file; close it."""
+        """Write the remaining rows and the metadata of the file; close it."""
         if self._rows:
             self._flush(self._rows)
         self._writer.add_key_value_metadata({METADATA: json.dumps(metadata)})
         self._writer.close()
 
     def _flush(self, rows: int) -> None:
-        """Write the first rows of what is waiting, which is not copied for it."""
+        """Write the first of the waiting rows, without a copy."""
         waiting = pa.Table.from_batches(self._waiting, schema=self._schema)
         self._writer.write_table(waiting.slice(0, rows), row_group_size=ROW_GROUP)
         self._waiting = waiting.slice(rows).to_batches()
@@ -113,21 +113,14 @@ def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
 class ChannelLog:
     """One channel of a kept recording."""
 
-    path: Path
-    """Its Parquet file."""
+    path: Path  # its Parquet file
     channel: str
-    rate: float
-    """Hz."""
-    grid: int
-    """Points of the uniform grid."""
-    segments: tuple[tuple[int, int], ...]
-    """Grid points that begin and end each segment."""
-    holes: bool
-    """Samples are missing: blocks have NaN in their place."""
-    temperature: bool = False
-    """There are readings of the temperature on the same grid."""
-    position: bool = False
-    """There is a column on the same grid that says how the sensor stood."""
+    rate: float  # Hz
+    grid: int  # points of the uniform grid
+    segments: tuple[tuple[int, int], ...]  # grid points that begin and end each segment
+    holes: bool  # samples are missing: blocks have NaN in their place
+    temperature: bool = False  # there are readings of the temperature on the same grid
+    position: bool = False  # there is a column on the same grid that says how the sensor stood
     table_rate: bool = False
     """There is a column on the same grid with the rate of the table that the sensor stood on."""
 
@@ -164,20 +157,20 @@ class ChannelLog:
             raise RecordingError(f"{self.path}: is damaged ({error}): {MEND}") from error
 
     def temperatures(self) -> Iterator[NDArray[np.float64]]:
-        """Yield the readings of the temperature, °C, in blocks like those of the samples."""
+        """Yield the readings of the temperature, °C, in the blocks of the samples."""
         return replace(self, channel=TEMPERATURE).blocks()
 
     def positions(self) -> Iterator[NDArray[np.float64]]:
-        """Yield how the sensor stood, as written, in blocks like those of the samples."""
+        """Yield the position of the sensor, as written, in the blocks of the samples."""
         return replace(self, channel=POSITION).blocks()
 
     def table_rates(self) -> Iterator[NDArray[np.float64]]:
-        """Yield the rate of the table, rad/s, in blocks like those of the samples."""
+        """Yield the rate of the table, rad/s, in the blocks of the samples."""
         return replace(self, channel=TABLE_RATE).blocks()
 
     @property
     def position_elsewhere(self) -> bool:
-        """How the sensor stood is kept too, but on another clock than this channel."""
+        """Whether the position of the sensor is on another clock than this channel."""
         others = (path for path in log_paths(self.path.parent) if path != self.path)
         return any(POSITION in pq.read_schema(path).names for path in others)
 

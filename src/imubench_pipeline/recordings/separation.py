@@ -51,8 +51,7 @@ class _Clock:
 
     base: TimeBase
     channels: list[str]
-    bits: int
-    """Bit mask of the channels in `Part.present`."""
+    bits: int  # bit mask of the channels in `Part.present`
 
 
 class _Records:
@@ -149,16 +148,8 @@ def separate_clocks(
 ) -> list[Part]:
     """Return one part for each clock of a file; the part itself if there is only one clock.
 
-    Parameters
-    ----------
-    part : Part
-        Its scratch file is read again if it is separated.
-    stated : float or None
-        Stated rate of its records, Hz.
-    whole : callable
-        Returns the time base of all records.
-    scratch : Path
-        Folder for the scratch files.
+    The scratch file of a part that is separated is read again. ``stated``: rate of its records, Hz.
+    ``whole`` returns the time base of all records. ``scratch``: folder for the scratch files.
 
     Raises
     ------

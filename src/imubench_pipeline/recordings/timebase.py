@@ -57,33 +57,25 @@ _MIN_GROUP_SIZE, _MIN_GROUPS, _MIN_REGULAR_GROUPS = 5, 5, 0.8
 """Least samples per stamp, number of stamps, and share of equal groups, for which the rate is taken
 from the equal groups alone."""
 
-_MAX_SEGMENTS = 10_000
-"""Largest number of segments; each takes 0.1 ms in a step of the pipeline."""
+_MAX_SEGMENTS = 10_000  # largest number of segments; each takes 0.1 ms in a step of the pipeline
 
 
 @dataclass(frozen=True)
 class TimeBase:
     """The uniform grid of the samples of a file."""
 
-    rate: float
-    """Hz."""
-    source: str
-    """Source of the rate: ``stated`` or ``stamps``."""
-    rows: int
-    """Records in the file."""
-    grid: int
-    """Grid points from the first to the last sample, all segments together."""
+    rate: float  # Hz
+    source: str  # source of the rate: ``stated`` or ``stamps``
+    rows: int  # records in the file
+    grid: int  # grid points from the first to the last sample, all segments together
     segments: tuple[tuple[int, int], ...]
     """First and one-past-last grid point of each; differences must not span two segments."""
-    uniform: bool
-    """Every grid point has one sample, so that stamps need not be stored."""
-    stamped: bool
-    """The stamps give the grid point of each sample."""
+    uniform: bool  # every grid point has one sample, so that stamps need not be stored
+    stamped: bool  # the stamps give the grid point of each sample
     findings: tuple[Finding, ...] = ()
     tracking_interval: float | None = None
     """Initial interval of the grid that follows the stamps, s."""
-    repeated: int = 0
-    """Records left out because an earlier one has the same grid point."""
+    repeated: int = 0  # records left out because an earlier one has the same grid point
     rate_error: float | None = None
     """Standard deviation of the rate from the scatter of the stamps, Hz; None for a stated rate."""
 
@@ -106,17 +98,10 @@ def without_stamps(rows: int, rate: float) -> TimeBase:
 def from_stamps(
     stamps: Stamps, stated: float | None, settings: QualitySettings, *, known: float | None = None
 ) -> TimeBase:
-    """Return the time base of a file from its stamps.
+    """Return the time base of a file from its stamps, which are read several times.
 
-    Parameters
-    ----------
-    stamps : callable
-        Yields the stamps in s, in blocks; called several times.
-    stated : float or None
-        The rate in the sensor file, Hz.
-    settings : QualitySettings
-    known : float or None
-        The sampling interval, s, if known; needed if most samples are missing.
+    ``stated``: rate in the sensor file, Hz. ``known``: sampling interval, s, if known; needed if
+    most samples are missing.
 
     Raises
     ------
@@ -430,17 +415,8 @@ def _assume_consecutive(
     if len(segments) > 1:
         times = [start / rate for start in starts[1:]]
         findings.append(_describe_segments("the stamps stop or run backwards", times, jumps))
-    return TimeBase(
-        rate,
-        "stamps",
-        rows,
-        rows,
-        segments,
-        False,
-        False,
-        tuple(findings),
-        rate_error=rate * worst / groups.elapsed,
-    )
+    found, error = tuple(findings), rate * worst / groups.elapsed
+    return TimeBase(rate, "stamps", rows, rows, segments, False, False, found, rate_error=error)
 
 
 class Groups:

@@ -50,17 +50,6 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     return processes
 
 
-def mixture(shortest: float, longest: float) -> tuple[Array, float]:
-    """Return correlation times and common variance of processes that sum to flicker noise, B = 1.
-
-    The times are log-spaced from the shortest to the longest, s, five per decade; the ripple is
-    below 1e-8. Both ends must lie well outside the band in which the sum is used.
-    """
-    count = 2 + math.ceil(5.0 * math.log10(longest / shortest))
-    times = np.geomspace(shortest, longest, count)
-    return times, math.log(times[1] / times[0]) / math.pi
-
-
 @lru_cache(maxsize=16)
 def _fit_unit_bank(decades: float) -> tuple[Array, Array]:
     """Return correlation times and variances for B = 1 from 1 to 10^decades rad/s."""

@@ -18,8 +18,7 @@ from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
 from imubench_pipeline.units import dimension_of, quantity_to_si, to_si
 
-_STEPS_PER_SIDE = 1 << 15
-"""Steps on each side of 0 of a 16-bit register."""
+_STEPS_PER_SIDE = 1 << 15  # steps on each side of 0 of a 16-bit register
 
 
 def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:

@@ -45,12 +45,8 @@ def with_estimates(
         raise ConfigError(str(error)) from error
     recorded = _select_recording(tables["recordings"], folder, name, recording)
     chosen = recorded.recording
-    of_log = {
-        table: tables[table].filter(
-            (pc.field("sensor") == name) & (pc.field("recording") == chosen)
-        )
-        for table in _NEEDED_TABLES[1:]
-    }
+    here = (pc.field("sensor") == name) & (pc.field("recording") == chosen)
+    of_log = {table: tables[table].filter(here) for table in _NEEDED_TABLES[1:]}
     axes: dict[str, SensorModel] = {}
     figures: dict[str, list[Remark]] = {}
     topics: list[set[Topic]] = []

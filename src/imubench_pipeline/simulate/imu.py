@@ -85,10 +85,9 @@ def simulate_imu(
         Hz.
     samples : int
     seed : int
-        Seed and names determine all samples. An axis does not depend on the other simulated axes
-        or on the number of threads.
     names : tuple of str
-        Such as sensor and recording.
+        Such as sensor and recording; seed and names determine all samples. An axis does not depend
+        on the other simulated axes or on the number of threads.
     motion : mapping of str to Profile, optional
         True rate, rad/s, and specific force, m/s², by channel; 0 where there is none.
     temperature : Profile, optional

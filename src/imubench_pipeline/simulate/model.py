@@ -32,8 +32,7 @@ from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.simulate import flicker_band, spectra
 from imubench_pipeline.typing import Array
 
-_LOW_FREQUENCY = 1e-4
-"""Frequency far below any cut-off, rad/sample."""
+_LOW_FREQUENCY = 1e-4  # frequency far below any cut-off, rad/sample
 
 
 @dataclass(frozen=True, kw_only=True)

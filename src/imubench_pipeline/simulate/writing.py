@@ -89,10 +89,7 @@ def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) 
 def check_notes(notes: Path, path: Path) -> None:
     """Check that the notes of a simulated log are the notes of no other recording.
 
-    Parameters
-    ----------
-    notes, path : Path
-        The notes, and the log; they need not exist.
+    ``notes``, ``path``: the notes, and the log; they need not exist.
 
     Raises
     ------

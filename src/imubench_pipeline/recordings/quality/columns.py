@@ -18,9 +18,7 @@ from imubench_pipeline.settings.sensor import QUANTITIES, TEMPERATURE, quantity_
 from imubench_pipeline.tables.findings import Finding, Severity
 from imubench_pipeline.units import SI_UNITS, from_si
 
-_COUNT_SIGMAS = 4.0
-"""Upper confidence bound of a count, in standard errors."""
-
+_COUNT_SIGMAS = 4.0  # upper confidence bound of a count, in standard errors
 _MIN_DIFFERENCE_SD, _MAX_DIFFERENCE_SD = 0.6, 300.0
 """Range of the standard deviation of the difference between neighbours, in steps of the register,
 that the share of one-step changes determines. Below it all changes are by one step, and the share
@@ -43,12 +41,8 @@ def repeats_beyond_chance(column: ColumnSummary) -> tuple[float, float]:
     changes like independent samples. Samples also repeat by chance, for two reasons, and the larger
     of the two shares is subtracted. Coarse steps: the share of samples that equal the sample
     `summary.FAR_LAG` before. Low-passed noise, whose neighbours are alike: the share of repeats in
-    rounded normal noise with the same share of one-step changes.
-
-    Returns
-    -------
-    (beyond, chance) : float
-        Share of all samples that repeat beyond chance, and share of pairs that repeat by chance.
+    rounded normal noise with the same share of one-step changes. The result is the share of all
+    samples that repeat beyond chance, and the share of pairs that repeat by chance.
     """
     pairs, far_pairs = column.pairs, column.far_pairs
     if pairs == 0 or far_pairs == 0:

@@ -26,9 +26,7 @@ from imubench_pipeline.recordings.quality.summary import ColumnSummary, Excerpt,
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-_MIN_NONZERO_INCREMENTS = 64
-"""Least number of increments of a piece that are not 0."""
-
+_MIN_NONZERO_INCREMENTS = 64  # least number of increments of a piece that are not 0
 _MIN_COPY_CORRELATION = 1.0 - 1e-6
 """Least correlation of the increments of a copy. A vibration that both axes measure reaches it only
 if it is 1000 times the noise."""
@@ -47,8 +45,7 @@ _MIN_SHARE_LOG_TWICE = 0.1
 """Least share of repeated samples for which the whole log counts as copied."""
 
 
-_FINGERPRINT_FORMAT = ".8e"
-"""Nine digits, to find copies of a log."""
+_FINGERPRINT_FORMAT = ".8e"  # nine digits, to find copies of a log
 
 
 def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:

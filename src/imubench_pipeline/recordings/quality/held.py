@@ -12,18 +12,10 @@ from numpy.typing import NDArray
 from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding
 
-_MAX_PERIOD = 256
-"""Longest period of repeats that is tested, records."""
-
-_MAX_PIECES = 8
-"""Pieces that are tested; each is tested for every period."""
-
-_MIN_REPEATS_OF_PHASE = 0.98
-"""Least share of repeats in the fullest phase of a period."""
-
-_MAX_REPEATS_OF_OTHERS = 0.9
-"""Largest share of repeats in any other phase."""
-
+_MAX_PERIOD = 256  # longest period of repeats that is tested, records
+_MAX_PIECES = 8  # pieces that are tested; each is tested for every period
+_MIN_REPEATS_OF_PHASE = 0.98  # least share of repeats in the fullest phase of a period
+_MAX_REPEATS_OF_OTHERS = 0.9  # largest share of repeats in any other phase
 _MAX_LOG10_CHANCE = -12.0
 """Largest decimal logarithm of the probability that the repeats are random."""
 
@@ -32,10 +24,8 @@ _MAX_LOG10_CHANCE = -12.0
 class Held:
     """Samples that repeat periodically."""
 
-    every: int
-    """Period, records."""
-    share: float
-    """Share of repeats among the other samples."""
+    every: int  # period, records
+    share: float  # share of repeats among the other samples
 
 
 def regular_repeats(pieces: list[Excerpt]) -> Held | None:

@@ -18,9 +18,7 @@ from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSumma
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-_CHANGE_SIGMAS = 8.0
-"""Least change of level or noise, in standard deviations."""
-
+_CHANGE_SIGMAS = 8.0  # least change of level or noise, in standard deviations
 _MIN_LOG_NOISE_CHANGE = math.log(1.2)
 """Least change of the log of the noise: one log of one sensor has a ratio of 1.12 with a small step
 of its level."""
@@ -32,24 +30,17 @@ noise of one sensor alternate."""
 _MIN_NOISE_WIDTH, _MAX_NOISE_WIDTH = 8, 64
 """Range of the number of blocks on either side whose noise is compared."""
 
-_LEVEL_WIDTH = 4
-"""Number of blocks on either side whose mean is compared."""
-
-_MIN_STEP_RATIO = 1.2
-"""Least ratio of the steps of two different registers."""
-
+_LEVEL_WIDTH = 4  # number of blocks on either side whose mean is compared
+_MIN_STEP_RATIO = 1.2  # least ratio of the steps of two different registers
 _MIN_LEVEL_ALTERNATION = 5.0
 """Least difference of alternating levels, in standard deviations of the noise, if nothing else
 alternates."""
 
-_PAIRS_PER_PART = 128
-"""Pairs of samples in a part."""
-
+_PAIRS_PER_PART = 128  # pairs of samples in a part
 _MEDIAN_SD_OVER_MEAN_SD = 1.2533
 """Standard deviation of a median over the standard deviation of a mean, for normal noise."""
 
-_SD_OVER_MAD = 1.4826
-"""Standard deviation over the median absolute deviation, of normal noise."""
+_SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise
 
 
 def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:

@@ -13,29 +13,21 @@ from imubench_pipeline.recordings.quality.register import hidden_step
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, present_median
 from imubench_pipeline.typing import Array
 
-_MAX_RUN_PROBABILITY = 1e-9
-"""Probability that a longer run of one value occurs by chance."""
-
+_MAX_RUN_PROBABILITY = 1e-9  # probability that a longer run of one value occurs by chance
 _MIN_BLOCK_STEPS = 8
 """Least number of steps between block means; they determine an Allan deviation to a third."""
 
-_NORMAL_MEDIAN = 0.4549
-"""Median of the square of a standard normal variable."""
-
+_NORMAL_MEDIAN = 0.4549  # median of the square of a standard normal variable
 _MAX_STEP_FOR_PILING = 1.0
 """Largest ratio of step to noise at which neighbouring levels are about equally frequent: a level
 at the mean has 1.65 times the samples of the next one."""
 
-_COMPARED_LEVELS = 4
-"""Number of levels on either side that a level is compared with."""
-
+_COMPARED_LEVELS = 4  # number of levels on either side that a level is compared with
 _MIN_PILING_RATIO = 2.5
 """Least ratio to the most frequent of the compared levels. A ratio of 2 is normal if values are
 rounded to digits somewhat coarser than the register: some digits then have two of its steps."""
 
-_MIN_PILED_SHARE = 0.005
-"""Least share of the samples at a piled-up level."""
-
+_MIN_PILED_SHARE = 0.005  # least share of the samples at a piled-up level
 _MIN_COMPARED_COUNT = 10
 """Least count that a level is compared with, so that few samples do not pile up by chance."""
 
@@ -48,10 +40,8 @@ of them with a probability of exp(-12)."""
 class Quantisation:
     """Quantisation of a column."""
 
-    step: float
-    """Least significant bit, SI."""
-    levels: float
-    """Number of levels from the lowest to the highest sample."""
+    step: float  # least significant bit, SI
+    levels: float  # number of levels from the lowest to the highest sample
     over_noise: float
     """Ratio of the step to the standard deviation; infinite if most blocks have one value."""
     hidden: bool = False
@@ -82,12 +72,8 @@ def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, flo
     """Return a value that is far more frequent than its neighbours; None if there is none.
 
     Neighbouring levels of a fine register are about equally frequent. A constant that replaces lost
-    samples, or the 0 of a dead band, is more frequent. Coarse registers are not tested.
-
-    Returns
-    -------
-    (value, share) or None
-        Value, SI, and its share of the samples in the excerpts.
+    samples, or the 0 of a dead band, is more frequent. Coarse registers are not tested. The result
+    is the value, SI, and its share of the samples in the excerpts.
     """
     if steps is not None and steps.over_noise > _MAX_STEP_FOR_PILING:
         return None
@@ -117,14 +103,9 @@ def kept_level(
 ) -> dict[str, Any]:
     """Return the level and noise of a channel, to be compared with its datasheet.
 
-    ``unit``: as stated in the sensor file. ``timed``: the log has stamps; otherwise the rate, Hz,
-    is the stated one.
-
-    Returns
-    -------
-    dict
-        ``mean``, SI, the median of the block means, which is robust to knocks; ``density``, see
-        `density_of`; ``unit``; ``rate``; ``timed``.
+    ``mean`` is the median of the block means, SI, which is robust to knocks; for ``density`` see
+    `density_of`. ``unit``: as stated in the sensor file. ``timed``: the log has stamps; otherwise
+    the rate, Hz, is the stated one.
     """
     level, density = present_median(column.blocks().mean), density_of(column, rate)
     return {"mean": level, "density": density, "unit": unit, "rate": rate, "timed": timed}
@@ -135,14 +116,8 @@ def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]
 
     Two estimates are used. The standard deviation within blocks over √rate is too small behind a
     low-pass. The Allan deviation of the block means times √τ is too large if slow noise dominates
-    at τ. The upper bound is at least the quantisation noise of the register.
-
-    ``column``, ``rate``: see `kept_level`.
-
-    Returns
-    -------
-    (least, most) : float, float or None
-        Bounds of N, SI/√Hz, two-sided. ``most`` is None if there are too few blocks.
+    at τ. The upper bound is at least the quantisation noise of the register; it is None if there
+    are too few blocks. The bounds are of N, SI/√Hz, two-sided; the rate is in Hz.
     """
     blocks = column.blocks()
     spread = noise_of(column) / math.sqrt(rate)
@@ -169,12 +144,8 @@ def saturated(
 ) -> tuple[str, int] | None:
     """Return the extreme where a column is saturated; None if it is not.
 
-    ``share``: least share of the samples at a saturated extreme.
-
-    Returns
-    -------
-    (side, number) or None
-        ``lowest`` or ``highest``, and the number of samples there.
+    The result is ``lowest`` or ``highest``, and the number of samples there. ``share``: least share
+    of the samples at a saturated extreme.
     """
     if steps is not None and steps.levels < 10:
         return None  # with so few levels an extreme is frequent in any case

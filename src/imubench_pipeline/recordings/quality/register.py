@@ -22,12 +22,8 @@ from numpy.typing import NDArray
 from imubench_pipeline.recordings.quality.summary import Excerpt
 from imubench_pipeline.typing import Array
 
-_MAX_PIECES = 4
-"""Pieces of a column that are examined."""
-
-_MIN_SAMPLES = 1000
-"""Least number of samples of a piece."""
-
+_MAX_PIECES = 4  # pieces of a column that are examined
+_MIN_SAMPLES = 1000  # least number of samples of a piece
 _HISTOGRAM_BINS = 4096
 _MIN_STEP_OVER_NOISE = 0.02
 _MAX_STEP_OVER_NOISE = 2.0
@@ -41,12 +37,8 @@ exp(-n A^2): 1e-27 for 1000 samples at each frequency."""
 _MIN_PERIODS = 2.0
 """Least number of steps between the 5 % and the 95 % quantile: two levels are no register."""
 
-_HEIGHT_TOLERANCE = 0.1
-"""Largest difference of a peak from its expected height sinc(d / q)."""
-
-_MAX_DIGIT_OVER_STEP = 0.65
-"""Largest ratio of digit to step; above it the rounding hides the step."""
-
+_HEIGHT_TOLERANCE = 0.1  # largest difference of a peak from its expected height sinc(d / q)
+_MAX_DIGIT_OVER_STEP = 0.65  # largest ratio of digit to step; above it the rounding hides the step
 _MAX_MEAN_OVER_LEAST_GAP = 1.01
 """Ratio of mean to least difference of neighbouring levels, below which the least difference is the
 step: nothing was rounded again."""
@@ -57,12 +49,9 @@ all levels are used."""
 
 
 def hidden_step(pieces: Sequence[Excerpt]) -> float | None:
-    """Return the least significant bit of a register whose values were rounded again.
+    """Return the least significant bit, SI, of a register whose values were rounded again.
 
-    Returns
-    -------
-    float or None
-        SI. None if the least difference of values is the step, or if there is no step.
+    None: the least difference of values is the step, or there is no step.
     """
     chosen = [piece.present for piece in pieces if len(piece.present) >= _MIN_SAMPLES]
     chosen = chosen[:: max(1, len(chosen) // _MAX_PIECES)][:_MAX_PIECES]

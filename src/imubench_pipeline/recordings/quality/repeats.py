@@ -35,9 +35,7 @@ _SLOTS = 1 << 16
 _MAX_WINDOWS = _SLOTS // 2
 """Largest number of stored windows; beyond it, the half with the lowest hashes is kept."""
 
-_MAX_STRETCHES = 64
-"""Largest number of stretches that are listed."""
-
+_MAX_STRETCHES = 64  # largest number of stretches that are listed
 _MAX_MISSED_WINDOWS = 12
 """Longest interruption of a stretch, in mean distances between stored windows."""
 
@@ -63,10 +61,8 @@ class Stretch:
     last: int
     """First and one-past-last record of the copy, to the resolution of the windows: it may begin a
     little earlier and end a little later."""
-    lag: int
-    """Records from the original to the copy."""
-    changes: int
-    """Changes of value within it."""
+    lag: int  # records from the original to the copy
+    changes: int  # changes of value within it
 
 
 class Repeats:

@@ -14,41 +14,31 @@ import numpy as np
 from imubench_pipeline.recordings.quality.summary import BlockStatistics, present_median
 
 _NUMBER_OF_PARTS = 20
-_MIN_BLOCKS_PER_PART = 8
-"""Least number of blocks in a part; a shorter recording is not tested."""
-
+_MIN_BLOCKS_PER_PART = 8  # least number of blocks in a part; a shorter recording is not tested
 _MAX_MOTION_CREST_FACTOR = 6.0
 """Largest crest factor of motion: distance of the extremes from the mean, in standard deviations of
 the block. A knock exceeds it."""
 
-_SD_OVER_MAD = 1.4826
-"""Standard deviation over the median absolute deviation, of normal noise."""
+_SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise
 
 
 @dataclass(frozen=True)
 class Step:
     """A sudden change of the mean."""
 
-    sample: int
-    """Record of the step, to half a window."""
-    size: float
-    """SI."""
-    sigmas: float
-    """Size over the robust standard deviation of all steps."""
-    window: int
-    """Records of a window."""
+    sample: int  # record of the step, to half a window
+    size: float  # SI
+    sigmas: float  # size over the robust standard deviation of all steps
+    window: int  # records of a window
 
 
 @dataclass(frozen=True)
 class WarmUp:
     """A beginning that drifts."""
 
-    end: int
-    """Record from which the drift is as small as in the rest."""
-    drift: float
-    """Change of the mean during the warm-up, SI."""
-    usual: float
-    """Median change over a part of the rest, SI."""
+    end: int  # record from which the drift is as small as in the rest
+    drift: float  # change of the mean during the warm-up, SI
+    usual: float  # median change over a part of the rest, SI
 
 
 def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
@@ -110,12 +100,9 @@ def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
 
 
 def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
-    """Return the ratio of the largest to the smallest noise of a part, and the noisiest part.
+    """Return the ratio of the largest to the smallest noise of a part; None if it is too short.
 
-    Returns
-    -------
-    (ratio, first, last) or None
-        ``first`` and ``last`` record of the noisiest part; None for a short recording.
+    The ratio is followed by the first and one-past-last record of the noisiest part.
     """
     size = len(blocks.spread) // _NUMBER_OF_PARTS
     if size < _MIN_BLOCKS_PER_PART:

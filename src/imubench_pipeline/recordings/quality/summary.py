@@ -17,18 +17,15 @@ from imubench_pipeline.typing import Array
 MIN_BLOCK_SIZE = 256
 """Records of a block, until there are `2 * _MAX_BLOCKS` blocks."""
 
-_MAX_BLOCKS = 1 << 15
-"""Pairs of blocks are merged when there are twice this number."""
+_MAX_BLOCKS = 1 << 15  # pairs of blocks are merged when there are twice this number
 
 
 @dataclass(frozen=True)
 class BlockStatistics:
     """Statistics of consecutive blocks of records."""
 
-    size: int
-    """Records of a block; the last one may have fewer."""
-    count: Array
-    """Number of samples present, shape (b,)."""
+    size: int  # records of a block; the last one may have fewer
+    count: Array  # number of samples present, shape (b,)
     mean: Array
     spread: Array
     low: Array
@@ -82,15 +79,10 @@ def _merge_blocks(rows: Array, together: int) -> Array:
     away = mean - np.repeat(united, together)[: len(rows)]
     squares = np.add.reduceat(np.where(present, count * (spread**2 + away**2), 0.0), begins)
     empty = total == 0
-    return np.column_stack(
-        [
-            total,
-            np.where(empty, np.nan, united),
-            np.where(empty, np.nan, np.sqrt(squares / weight)),
-            np.fmin.reduceat(low, begins),
-            np.fmax.reduceat(high, begins),
-        ]
-    )
+    united[empty] = np.nan
+    deviation = np.where(empty, np.nan, np.sqrt(squares / weight))
+    extremes = np.fmin.reduceat(low, begins), np.fmax.reduceat(high, begins)
+    return np.column_stack([total, united, deviation, *extremes])
 
 
 def present_median(values: Array) -> float:
@@ -110,10 +102,8 @@ MAX_PIECES = 16
 class Excerpt:
     """Consecutive records of a column."""
 
-    first: int
-    """Number of the first record."""
-    values: Array
-    """SI, shape (n,); NaN where the sample is missing."""
+    first: int  # number of the first record
+    values: Array  # SI, shape (n,); NaN where the sample is missing
 
     @property
     def present(self) -> Array:
@@ -222,20 +212,15 @@ class ColumnSummary:
     _excerpts: Excerpts = field(default_factory=Excerpts)
     repeated: Repeats = field(default_factory=Repeats)
 
-    present = _StateCount(_PRESENT_SAMPLES)
-    """Samples that are finite numbers."""
-    missing = _StateCount(_MISSING_SAMPLES)
-    """Records without a number."""
-    not_finite = _StateCount(_INFINITE_SAMPLES)
-    """Infinities, and values beyond `MAX_MEASUREMENT`."""
-    repeats = _StateCount(_REPEAT_COUNT)
-    """Samples that equal their predecessor."""
+    present = _StateCount(_PRESENT_SAMPLES)  # samples that are finite numbers
+    missing = _StateCount(_MISSING_SAMPLES)  # records without a number
+    not_finite = _StateCount(_INFINITE_SAMPLES)  # infinities, and values beyond `MAX_MEASUREMENT`
+    repeats = _StateCount(_REPEAT_COUNT)  # samples that equal their predecessor
     pairs = _StateCount(_PAIR_COUNT)
     """Pairs of neighbours that were compared. Pieces without equal neighbours may be left out."""
     far_pairs = _StateCount(_FAR_PAIRS)
     """Pairs at the distance `FAR_LAG` in the pieces where neighbours were compared."""
-    far_repeats = _StateCount(_FAR_REPEATS)
-    """Pairs among them of equal samples."""
+    far_repeats = _StateCount(_FAR_REPEATS)  # pairs among them of equal samples
     steps = _StateCount(_CHANGE_COUNT)
     """Unequal neighbours that were compared since the smallest step was found."""
     single_steps = _StateCount(_SINGLE_STEPS)
