@@ -43,33 +43,19 @@ _CONVENTION = (
 
 @dataclass(frozen=True)
 class Matrices:
-    """A noise model in continuous and discrete time; m states.
+    """A noise model in continuous and discrete time; m states."""
 
-    Attributes
-    ----------
-    F, Q : ndarray, shape (m, m)
-        Continuous in time, without the states of quantization noise.
-    H_continuous : ndarray, shape (m,)
-    R : float
-        Density of the white noise, N^2.
-    Phi, Q_d, P0 : ndarray, shape (m, m)
-    H, x0 : ndarray, shape (m,)
-    R_d : float
-    states : sequence of str
-        Term of each state of the discrete model.
-    """
-
-    F: Array
-    Q: Array
-    H_continuous: Array
-    R: float
-    Phi: Array
-    Q_d: Array
-    H: Array
+    F: Array  # shape (m, m); continuous in time, without the states of quantization noise
+    Q: Array  # shape (m, m)
+    H_continuous: Array  # shape (m,)
+    R: float  # density of the white noise, N^2
+    Phi: Array  # shape (m, m)
+    Q_d: Array  # shape (m, m)
+    H: Array  # shape (m,)
     R_d: float
-    x0: Array
-    P0: Array
-    states: Sequence[str]
+    x0: Array  # shape (m,)
+    P0: Array  # shape (m, m)
+    states: Sequence[str]  # term of each state of the discrete model
 
 
 def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:

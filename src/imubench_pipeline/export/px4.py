@@ -59,10 +59,7 @@ _CONVENTION = (
 def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
     """Return a parameter file for a `period`, EKF2_PREDICT_US, in us.
 
-    Raises
-    ------
-    ExportError
-        If gyro or accelerometer has no estimate, or the period is outside its range.
+    Raises ExportError if gyro or accelerometer has no estimate, or the period is outside its range.
     """
     if not _PERIOD_RANGE[0] <= period <= _PERIOD_RANGE[1]:
         raise ExportError(

@@ -40,22 +40,12 @@ _ROUNDING_MARGIN = 1e-9
 
 @dataclass(frozen=True)
 class Limits:
-    """Lower limits of a model.
+    """Lower limits of a model."""
 
-    Attributes
-    ----------
-    kind : str
-        Name of the limited quantity, for texts.
-    x, value : ndarray, shape (m,)
-        Tau or time in s, or frequency in Hz, and the lower limit there.
-    of_term : callable
-        Term -> contribution of this term to the limited quantity at ``x``.
-    """
-
-    kind: str
-    x: Array
-    value: Array
-    of_term: Callable[[Term], Array]
+    kind: str  # name of the limited quantity, for texts
+    x: Array  # shape (m,); tau or time, s, or frequency, Hz
+    value: Array  # shape (m,); lower limit there
+    of_term: Callable[[Term], Array]  # contribution of a term to the limited quantity at `x`
 
     def ratio(self, model: NoiseModel) -> Array:
         """Return the ratio of a model to its limit, shape (m,)."""
@@ -70,10 +60,7 @@ def find_smallest(
     The first of the `limits` must be on the Allan variance: the model is minimised there.
     `times`: shortest and longest T_B of the search, s.
 
-    Raises
-    ------
-    ValueError
-        If the family is not known, or no model of it lies above.
+    Raises ValueError if the family is not known, or no model of it lies above.
     """
     if family not in FAMILIES:
         raise ValueError(f"family {family!r} is not known, expected one of {', '.join(FAMILIES)}")

@@ -29,25 +29,16 @@ about T_0 it would not correct anything."""
 class TemperatureEffect:
     """Effect of temperature on the biases of a quantity.
 
-    Attributes
-    ----------
-    reference : float
-        T_0, the temperature of zero effect, °C.
-    low, high : float
-        Range of the temperature of the recording, where the effect is valid, °C.
-    slope, square : dict of str to float
-        s and q of each axis with a usable estimate, rad/s or m/s² per K and K²; q only for axes
-        with a quadratic term.
-    notes : list of str
-        Source of each axis, and reasons for omitted axes.
+    ``slope`` and ``square`` are s and q of each axis with a usable estimate, rad/s or m/s² per K
+    and K²; q only for axes with a quadratic term.
     """
 
-    reference: float = 0.0
-    low: float = 0.0
+    reference: float = 0.0  # T_0, the temperature of zero effect, °C
+    low: float = 0.0  # range of the temperature of the recording, °C
     high: float = 0.0
     slope: Mapping[str, float] = field(default_factory=dict)
     square: Mapping[str, float] = field(default_factory=dict)
-    notes: Sequence[str] = ()
+    notes: Sequence[str] = ()  # source of each axis, and reasons for omitted axes
 
 
 def temperature_effect(

@@ -25,12 +25,7 @@ _SAMPLE_UNIT = PageUnit("unit of the samples", 1.0)
 def panels(names: Sequence[str], ax: Axes | Sequence[Axes] | None = None) -> Any:
     """Return the given axes, or new ones, at most three in a row: one for each name, (n,).
 
-    Raises
-    ------
-    ExtraError
-        If matplotlib is not installed.
-    ValueError
-        If the number of axes is another one.
+    Raises ExtraError if matplotlib is not installed, and ValueError for another number of axes.
     """
     count = len(names)
     if ax is not None:

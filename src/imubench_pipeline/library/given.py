@@ -51,10 +51,8 @@ def dimension_of(name: str) -> str:
 def rate_of(rate: float | str | None, data: object) -> float:
     """Return the sampling rate of samples, Hz; a table may state it in its ``attrs``.
 
-    Raises
-    ------
-    ValueError
-        If none is given, or it is not a frequency above 0 (`UnitError`: another dimension).
+    Raises ValueError if none is given, or it is not a frequency above 0 (`UnitError`: another
+    dimension).
     """
     stated = rate if rate is not None else getattr(data, "attrs", {}).get("rate")
     if stated is None:
@@ -66,13 +64,7 @@ def rate_of(rate: float | str | None, data: object) -> float:
 
 
 def numbers(values: object, name: str) -> Array:
-    """Return samples as double-precision numbers; masked ones are NaN.
-
-    Raises
-    ------
-    ValueError
-        If they are not real numbers.
-    """
+    """Return samples as floats, NaN where masked; ValueError if they are not real numbers."""
     filled = values.filled(np.nan) if isinstance(values, np.ma.MaskedArray) else values
     try:
         array = np.asarray(filled)
@@ -101,11 +93,8 @@ def columns_of(
     units : mapping of str to str, optional
         By ``gyro``, ``accel``, or channel. Default: SI, but the units of a table must be stated.
 
-    Raises
-    ------
-    ValueError
-        If the shape or a name is not one of these, or a channel has no finite number
-        (`UnitError`: a unit is missing, not known or of another dimension).
+    Raises ValueError if the shape or a name is not one of these, or a channel has no finite number
+    (`UnitError`: a unit is missing, not known or of another dimension).
     """
     known = (*QUANTITIES, *CHANNELS, TEMPERATURE)
     if units is not None and not isinstance(units, Mapping):
@@ -126,13 +115,7 @@ def columns_of(
 
 
 def check_present(values: Array, name: str) -> None:
-    """Check that samples, shape (L,), contain a finite number.
-
-    Raises
-    ------
-    ValueError
-        If they do not.
-    """
+    """Raise ValueError if samples, shape (L,), contain no finite number."""
     if not len(values):
         raise ValueError(f"{name} is empty; expected two samples or more")
     if not np.isfinite(values).any():
@@ -156,10 +139,7 @@ def _is_table(data: object) -> bool:
 def listed(channels: Channels | None) -> list[str] | None:
     """Return the names of channels; ``gyro`` and ``accel`` are expanded to three axes.
 
-    Raises
-    ------
-    ValueError
-        If a name is not a channel, is repeated, or is not text.
+    Raises ValueError if a name is not a channel, is repeated, or is not text.
     """
     if channels is None:
         return None

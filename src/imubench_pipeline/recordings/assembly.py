@@ -101,10 +101,7 @@ def counted(
 
     For the assembled file and the repeated samples see `assemble`.
 
-    Raises
-    ------
-    RuntimeError
-        If the numbers do not add up, which is an error of this program.
+    Raises RuntimeError if the numbers do not add up, which is an error of this program.
     """
     file = pq.read_metadata(path)
     used = dict.fromkeys(file.schema.names, 0)

@@ -34,15 +34,10 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[]
     ``source``: the log file, or the folder of a recording. ``planned``: the files that the plan
     found there, by their place in the log.
 
-    Raises
-    ------
-    RecordingError
-        If the path itself cannot be used, such as a link to itself or an empty folder.
-    UnavailableError
-        If the log is not there, cannot be read for a reason outside of it, or changed while it was
-        rejected.
-    OSError
-        If a disk is full, or there are too many open files.
+    Raises RecordingError if the path itself cannot be used, such as a link to itself or an empty
+    folder. Raises UnavailableError if the log is not there, cannot be read for a reason outside of
+    it, or changed while it was rejected. Raises OSError if a disk is full, or there are too many
+    open files.
     """
     try:
         before = identity(source)

@@ -241,9 +241,8 @@ def _findings(
         findings += part.findings
         if static:  # a turn looks like a knock
             findings += _knock_findings(part, base.rate, settings, scratch)
-    findings += copied_channels(
-        {name: c for part in parts for name, c in part.columns.items() if name not in BESIDE}
-    )
+    channels = {name: column for part in parts for name, column in part.columns.items()}
+    findings += copied_channels({n: c for n, c in channels.items() if n not in BESIDE})
     whole = [part for part in parts if part.base is None]
     if len({part.rows for part in whole if not part.stamped}) > 1:
         lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in whole)

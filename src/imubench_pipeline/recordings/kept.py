@@ -53,10 +53,7 @@ class Quality:
     def read(cls, path: Path) -> Quality:
         """Read the file that `write` wrote.
 
-        Raises
-        ------
-        RecordingError
-            If it is damaged.
+        Raises RecordingError if it is damaged.
         """
         try:
             content = read_sealed_json(path)
@@ -129,10 +126,8 @@ def kept_logs(folder: Path) -> dict[str, ChannelLog]:
 
     ``folder`` contains its ``quality.json``.
 
-    Raises
-    ------
-    RecordingError
-        If files of samples are not there, are not those that the ingest left, or are damaged.
+    Raises RecordingError if files of samples are not there, are not those that the ingest left, or
+    are damaged.
     """
     quality = Quality.read(folder / "quality.json")
     if fault := quality.fault(folder):

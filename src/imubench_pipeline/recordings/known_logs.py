@@ -122,10 +122,7 @@ def read_log(source: Path, is_stopped: Callable[[], bool] = lambda: False) -> di
     ``source``: the log file, or the folder of a recording. ``is_stopped`` is called now and then:
     whether digests of large files are not needed any more.
 
-    Raises
-    ------
-    OSError
-        If the folder cannot be listed.
+    Raises OSError if the folder cannot be listed.
     """
     return {name: KnownFile.of(file, is_stopped) for name, file in _places(source).items()}
 
@@ -135,10 +132,7 @@ def identity(source: Path) -> dict[str, tuple[int, ...]]:
 
     It is another value whenever a file was changed, replaced, renamed, or moved away and back.
 
-    Raises
-    ------
-    OSError
-        If the log is not there, or cannot be listed.
+    Raises OSError if the log is not there, or cannot be listed.
     """
     paths = {".": source} | _places(source)
     return {
@@ -238,10 +232,7 @@ def glimpse(path: Path) -> str:
     The first and the last block are among them. In a file above 1 MB, a change that leaves the
     size and all 16 blocks of 4 kB as they are has no effect; the stamps tell that one.
 
-    Raises
-    ------
-    OSError
-        If it cannot be read.
+    Raises OSError if it cannot be read.
     """
     digest = hashlib.sha256()
     with _opened(path) as file:

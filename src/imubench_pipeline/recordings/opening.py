@@ -22,12 +22,8 @@ def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
     ``source``: the log file, or the folder of a recording.
     ``seconds``: how long it may take, and a second more for each 5 MB of the log.
 
-    Raises
-    ------
-    RecordingError
-        If they cannot be read, or that takes longer or more than 512 MiB, or crashes.
-    OSError
-        If the log is not there, or its disk does not answer in that time.
+    Raises RecordingError if they cannot be read, or that takes longer or more than 512 MiB, or
+    crashes. Raises OSError if the log is not there, or its disk does not answer in that time.
     """
     size = sum(path.stat().st_size for path in log_files(source))
     try:

@@ -23,6 +23,7 @@ from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.sensor import UsedPart
 from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.typing import Array
 
 STAMP_BLOCK = ROW_GROUP
 """Records of a block of stamps, equal to the records of a row group."""
@@ -56,7 +57,7 @@ class Part:
     left_out: dict[str, ColumnSummary] = field(default_factory=dict)
     """Columns that were not written in the separation, since they have too few samples."""
 
-    def stamps(self) -> Iterator[NDArray[np.float64]]:
+    def stamps(self) -> Iterator[Array]:
         """Yield the stamps in s, read from the scratch file."""
         for start in range(0, self.rows, STAMP_BLOCK):
             yield np.fromfile(self.stamps_path, np.float64, STAMP_BLOCK, offset=8 * start)
@@ -101,9 +102,7 @@ class PartWriter:
     _stamps: BinaryIO
     _present: BinaryIO
 
-    def add(
-        self, time: NDArray[np.float64] | None, columns: Mapping[str, NDArray[np.float64]]
-    ) -> None:
+    def add(self, time: Array | None, columns: Mapping[str, Array]) -> None:
         """Write consecutive records and add them to the statistics: stamps, s, and samples, SI."""
         part = self._part
         # Not `tofile`: it does not report a failed write when the C library closes the file.
@@ -127,10 +126,7 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     ``scratch``: folder for the scratch files.
     ``number``: number of the file, for the names of the scratch files.
 
-    Raises
-    ------
-    RecordingError
-        If the file cannot be read, or no sample lies in the part to use.
+    Raises RecordingError if the file cannot be read, or no sample lies in the part to use.
     """
     rate = file.log.rate_hz
     read_rows = 0
@@ -205,7 +201,7 @@ def leave_out_knocks(
     return knocks_of
 
 
-def _read_row_groups(path: Path, name: str) -> Iterator[NDArray[np.float64]]:
+def _read_row_groups(path: Path, name: str) -> Iterator[Array]:
     with checked_parquet(path) as file:
         for number in range(file.num_row_groups):
             table = checked_row_group(file, number, [name])

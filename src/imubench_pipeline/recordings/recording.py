@@ -124,13 +124,10 @@ class ChannelLog:
     table_rate: bool = False
     """There is a column on the same grid with the rate of the table that the sensor stood on."""
 
-    def blocks(self) -> Iterator[NDArray[np.float64]]:
+    def blocks(self) -> Iterator[Array]:
         """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing.
 
-        Raises
-        ------
-        RecordingError
-            If the file is damaged.
+        Raises RecordingError if the file is damaged.
         """
         try:
             with checked_parquet(self.path) as file:
@@ -156,15 +153,15 @@ class ChannelLog:
         except (OSError, pa.ArrowException) as error:
             raise RecordingError(f"{self.path}: is damaged ({error}): {MEND}") from error
 
-    def temperatures(self) -> Iterator[NDArray[np.float64]]:
+    def temperatures(self) -> Iterator[Array]:
         """Yield the readings of the temperature, °C, in the blocks of the samples."""
         return replace(self, channel=TEMPERATURE).blocks()
 
-    def positions(self) -> Iterator[NDArray[np.float64]]:
+    def positions(self) -> Iterator[Array]:
         """Yield the position of the sensor, as written, in the blocks of the samples."""
         return replace(self, channel=POSITION).blocks()
 
-    def table_rates(self) -> Iterator[NDArray[np.float64]]:
+    def table_rates(self) -> Iterator[Array]:
         """Yield the rate of the table, rad/s, in the blocks of the samples."""
         return replace(self, channel=TABLE_RATE).blocks()
 

@@ -27,6 +27,7 @@ from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.typing import Array
 
 _MIN_COMMON_RECORDS = 0.5
 """Least share of common records, of the sparser channel, for two channels of one clock."""
@@ -71,7 +72,7 @@ class _Records:
         """Return the number of records with a number of a channel."""
         return self.common[channel, channel]
 
-    def times(self, *, numbered: bool = False) -> Iterator[NDArray[np.float64]]:
+    def times(self, *, numbered: bool = False) -> Iterator[Array]:
         """Yield the stamps of all records, s; without stamps, or if ``numbered``, their indices.
 
         Indices are divided by the stated rate, if there is one.
@@ -89,13 +90,10 @@ class _Records:
         The stated rate belongs to all records. It only decides whether double steps are lost
         samples. ``known``: the interval, s, if it is known.
 
-        Raises
-        ------
-        RecordingError
-            If their stamps do not advance, or jump too often.
+        Raises RecordingError if their stamps do not advance, or jump too often.
         """
 
-        def stamps() -> Iterator[NDArray[np.float64]]:
+        def stamps() -> Iterator[Array]:
             times = self.times(numbered=numbered)
             for block, present in zip(times, self._part.present(), strict=True):
                 yield block[has_one(present, bits)]
@@ -151,10 +149,8 @@ def separate_clocks(
     The scratch file of a part that is separated is read again. ``stated``: rate of its records, Hz.
     ``whole`` returns the time base of all records. ``scratch``: folder for the scratch files.
 
-    Raises
-    ------
-    RecordingError
-        If channels have no clock of their own, and all records together have none either.
+    Raises RecordingError if channels have no clock of their own, and all records together have none
+    either.
     """
     records = _Records(part, stated, settings)
     channels = [
@@ -352,9 +348,7 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
     return parts
 
 
-def _carry(
-    values: NDArray[np.float64], chosen: NDArray[np.bool_], waiting: float
-) -> tuple[NDArray[np.float64], float]:
+def _carry(values: Array, chosen: NDArray[np.bool_], waiting: float) -> tuple[Array, float]:
     """Return the latest reading since the previous chosen record, for each chosen record.
 
     ``waiting``: reading after the last chosen record of the previous block. The same for this block

@@ -9,7 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Stamps = Callable[[], Iterator[NDArray[np.float64]]]
+from imubench_pipeline.typing import Array
+
+Stamps = Callable[[], Iterator[Array]]
 """Returns a new iterator over the stamps of a file in s, block by block; NaN where missing."""
 
 _MAX_GRID_DISTANCE = 0.48
@@ -100,7 +102,7 @@ def _sum_steps_up_to(stamps: Stamps, limit: float) -> tuple[float, int]:
     return total, count
 
 
-def _take_forward_steps(block: NDArray[np.float64]) -> NDArray[np.float64]:
+def _take_forward_steps(block: Array) -> Array:
     """Return the positive steps of the first stamps of a block, or else of the whole block."""
     for part in (block[:_MAX_EXAMINED_STAMPS], block):
         steps = np.diff(part)
@@ -153,9 +155,7 @@ class Track:
     """Step of the stamps at the start of each segment, s; NaN at the first."""
     marks: list[tuple[int, float]] = field(default_factory=list)
     """Grid point and stamp of every 1024th record, to detect a drift of the rate."""
-    _state: NDArray[np.float64] = field(
-        default_factory=lambda: np.array([np.nan, np.nan, np.nan, np.nan, 0.0])
-    )
+    _state: Array = field(default_factory=lambda: np.array([np.nan, np.nan, np.nan, np.nan, 0.0]))
 
     @property
     def scatter(self) -> float:
@@ -172,7 +172,7 @@ class Track:
         """Mean interval of the grid, s; None if no segment has two stamps."""
         return self.elapsed / self.steps if self.steps else None
 
-    def follow(self, block: NDArray[np.float64]) -> NDArray[np.int64]:
+    def follow(self, block: Array) -> NDArray[np.int64]:
         """Return the grid point of each record of a block; -1 for a repeated stamp."""
         points = np.empty(len(block), dtype=np.int64)
         breaks = np.empty(len(block), dtype=np.int64)
@@ -209,7 +209,7 @@ def tracked(stamps: Stamps, interval: float, longest_hole: float) -> Track:
 
 
 @njit(cache=True, nogil=True)
-def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: float) -> bool:
+def is_set_back(stamps: Array, i: int, step: float, interval: float) -> bool:
     """Return whether the clock was set back before a record.
 
     In that case the stamps on both sides increase, but their median decreases. Scattered stamps and
@@ -230,13 +230,13 @@ def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: floa
 
 @njit(cache=True, nogil=True)
 def _assign_grid_points(
-    block: NDArray[np.float64],
+    block: Array,
     longest_hole: float,
     grid: int,
-    state: NDArray[np.float64],
+    state: Array,
     points: NDArray[np.int64],
     breaks: NDArray[np.int64],
-    jumps: NDArray[np.float64],
+    jumps: Array,
     counts: NDArray[np.int64],
 ) -> float:
     """Assign a grid point to each stamp; return the time between stamps within segments, s.

@@ -28,6 +28,7 @@ from imubench_pipeline.recordings.stamps import (
 )
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+from imubench_pipeline.typing import Array
 
 _MAX_INTERVAL_ERROR = 1e-5
 """Largest relative error of the interval at which stamps get the same grid points."""
@@ -103,10 +104,7 @@ def from_stamps(
     ``stated``: rate in the sensor file, Hz. ``known``: sampling interval, s, if known; needed if
     most samples are missing.
 
-    Raises
-    ------
-    RecordingError
-        If the stamps do not advance, or jump or stop too often.
+    Raises RecordingError if the stamps do not advance, or jump or stop too often.
     """
     typical = typical_interval(stamps) if known is None else Interval(known)
     if typical is None:
@@ -427,7 +425,7 @@ class Groups:
         # Number of groups by size and duration in ns; None: no regular groups.
         self._pairs: Counter[tuple[int, int]] | None = Counter()
 
-    def add(self, samples: NDArray[np.int64], times: NDArray[np.float64]) -> None:
+    def add(self, samples: NDArray[np.int64], times: Array) -> None:
         """Add consecutive groups: their sizes, and their durations in s; shape (n,) each."""
         self.samples += int(samples.sum())
         self.elapsed += float(times.sum())

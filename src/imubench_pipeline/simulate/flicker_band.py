@@ -34,10 +34,7 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     The variances are fitted by non-negative least squares of the relative error. B is the bias
     instability, rad/s or m/s^2, whose plateau is 0.664 B; the band is in Hz.
 
-    Raises
-    ------
-    ValueError
-        If the band is empty.
+    Raises ValueError if the band is empty.
     """
     if not 0 < lowest < highest:
         raise ValueError(f"the band from {lowest} to {highest} Hz is empty")

@@ -22,12 +22,8 @@ _NOISE_PARAMETERS = ("N", "B", "T_B", "K", "R", "Q")
 def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
     """Return the model of an axis, ``gyro_x`` to ``accel_z``, in SI.
 
-    Raises
-    ------
-    UnitError
-        If a unit has another dimension than its figure.
-    ValueError
-        If a figure is out of its range.
+    Raises UnitError if a unit has another dimension than its figure. Raises ValueError if a figure
+    is out of its range.
     """
     quantity, figures = quantity_of(channel), settings.si(channel)
     drift, low_pass = settings.drift, settings.low_pass
@@ -51,10 +47,7 @@ def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
 def imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> ImuModel:
     """Return the model of a sensor, in SI, from its axes by channel and their common settings.
 
-    Raises
-    ------
-    ValueError
-        As `axis_model`, with the name of the channel.
+    Raises ValueError as `axis_model`, with the name of the channel.
     """
     models = {}
     for channel, axis in axes.items():
