@@ -1,9 +1,8 @@
-"""A recording as it is kept: Parquet files in SI, one a time base, with its provenance.
+"""An ingested recording: Parquet files in SI, one for each time base, with its provenance.
 
-The columns of ``log.parquet`` are the channels, and ``temperature`` in °C. Where the stamps
-are needed there is ``time`` (s from the first sample); where samples are missing there is also
-``sample``, the position on the uniform grid. A sample that is missing in one channel only is
-null. Where channels have clocks of their own, each clock has a file: ``log.gyro.parquet``.
+The columns are the channels, and ``temperature`` in °C. If stamps are needed there is ``time``
+(s from the first sample), and if samples are missing also ``sample``, the position on the uniform
+grid. A sample that is missing in one channel only is null.
 """
 
 from __future__ import annotations

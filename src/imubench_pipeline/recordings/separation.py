@@ -1,11 +1,9 @@
 """Separate the columns of one table by their sampling rates: each clock becomes a part.
 
-Phones and programs that merge logs write a row for each stamp, and leave cells empty for sensors
-without a new sample. A channel has a clock of its own in two cases: its records with a number lie
-on a uniform grid that is slower than the grid of all records, or all records together lie on no
-grid. Randomly missing numbers do not lie on a slower grid: such a channel stays on the common grid.
-The axes of a gyro, or of an accelerometer, are sampled together: an axis with fewer numbers than
-another one has missing samples.
+Merged logs have a row for each stamp, and empty cells for sensors without a new sample. A channel
+has a clock of its own if its numbers lie on a uniform grid that is slower than the grid of all
+records, or if all records together lie on no grid. An axis of a gyro, or of an accelerometer, with
+fewer numbers than another axis has missing samples.
 """
 
 from __future__ import annotations

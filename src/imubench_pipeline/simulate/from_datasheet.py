@@ -71,8 +71,7 @@ class _Printed:
             return None
         self._note("N", density)
         if density.figure and density.quantity == "N" and "assumed" in (density.reason or ""):
-            text = "the printed noise density is one-sided (N is it / sqrt(2))"
-            self._assume("noise", text)
+            self._assume("noise", "the printed noise density is one-sided (N is it / sqrt(2))")
         B = T_B = K = None
         floor = _select_best([row for row in rows if row.statistic == "adev_minimum"])
         time = _select_best([row for row in rows if row.statistic == "T_B"])
@@ -102,41 +101,26 @@ class _Printed:
             self._assume("drift", "no drift at 25 degC, and no thermal lag; its sign is drawn")
         else:
             self._assume("drift", "no drift with temperature, no coefficient is printed")
-        step = self._step()
+        steps = (self._single(name, "register", name) for name in ("sensitivity", "resolution"))
+        step = next((each for each in steps if each is not None), None)
+        if step is None:
+            self._assume("register", "not rounded, no sensitivity is printed")
+        stated = self._sensor.log.bandwidth
+        if stated is not None:
+            self._remarks.append(Remark("low-pass", f"cut-off {stated}: of the log format"))
+            cutoff: float | None = quantity_to_si(stated, "frequency")
+        else:
+            cutoff = self._single("bandwidth", "low-pass", "cut-off")
+        text = "no low-pass, its cut-off is not known"
+        self._assume("low-pass", text if cutoff is None else "the low-pass is of first order")
         return SensorModel(
             noise=noise,
             bias=signs[0] * bias if bias else 0.0,
             drift=drift,
-            low_pass=self._low_pass(),
+            low_pass=None if cutoff is None else LowPass(cutoff),
             resolution=step or 0.0,
             full_scale=self._full_scale(step),
         )
-
-    def _low_pass(self) -> LowPass | None:
-        stated = self._sensor.log.bandwidth
-        printed = self._single("bandwidth", "low-pass", "cut-off") if stated is None else None
-        if stated is not None:
-            self._remarks.append(Remark("low-pass", f"cut-off {stated}: of the log format"))
-            printed = quantity_to_si(stated, "frequency")
-        if printed is None:
-            self._assume("low-pass", "no low-pass, its cut-off is not known")
-            return None
-        self._assume("low-pass", "the low-pass is of first order")
-        return LowPass(printed)
-
-    def _step(self) -> float | None:
-        for name in ("sensitivity", "resolution"):
-            for figure in self._typical(name):
-                value = figure.on_axis(self._axis)
-                if not isinstance(value, float) or figure.unit is None:
-                    continue
-                dimension = dimension_of(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
-                step = to_si(value, figure.unit, dimension)
-                text = f"{name} {value:g} {figure.unit}: {figure.kind}, datasheet"
-                self._remarks.append(Remark("register", text))
-                return 1.0 / step if dimension.endswith("sensitivity") else step
-        self._assume("register", "not rounded, no sensitivity is printed")
-        return None
 
     def _full_scale(self, step: float | None) -> float | None:
         (dimension,) = FIGURE_DIMENSIONS[self._quantity]["full_scale"]
@@ -162,14 +146,18 @@ class _Printed:
         self._origin.assume(topic, f"{self._quantity}: {text}")
 
     def _single(self, name: str, topic: Topic, label: str) -> float | None:
-        """Return a figure with a single value, in SI; None if none is printed."""
-        (dimension,) = FIGURE_DIMENSIONS[self._quantity][name]
+        """Return a figure with a single value, in SI; None if none is printed.
+
+        The inverse of a figure in steps a unit is returned: the step.
+        """
         for figure in self._typical(name):
             value = figure.on_axis(self._axis)
             if isinstance(value, float) and figure.unit is not None:
                 text = f"{label} {value:g} {figure.unit}: {figure.kind}, datasheet"
                 self._remarks.append(Remark(topic, text))
-                return to_si(value, figure.unit, dimension)
+                dimension = dimension_of(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
+                in_si = to_si(value, figure.unit, dimension)
+                return 1.0 / in_si if dimension.endswith("sensitivity") else in_si
         return None
 
     def _typical(self, name: str, *, choices: bool = False) -> list[PrintedFigure]:

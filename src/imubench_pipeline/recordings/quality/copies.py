@@ -1,10 +1,7 @@
-"""Find copied samples and noise that two axes share.
+"""Find copied samples, copied recordings, and noise that two axes share.
 
-A channel may be a copy of another channel, and a stretch of a log a copy of an earlier stretch.
-
-A log may also be in the folder of its sensor twice. The copy would count as another unit, with no
-spread between the two. Copies are found by the log-likelihood and the mean of each channel: no two
-different logs agree in nine digits of both.
+A copy of a recording would count as another unit, with no spread between the two. It is found by
+the log-likelihood and the mean of each channel: no two logs agree in nine digits of both.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Test the stationarity of a column: steps of the mean, warm-up, changing variance, motion.
 
-All tests use block means and standard deviations. The bias of a static sensor has random walk and
-flicker noise, which the benchmark measures. Only clear deviations from it are reported: a step far
-larger than the other steps of the log, or a drift at the beginning far above any later drift.
+All tests use block means and standard deviations. Random walk and flicker noise are no findings:
+only a step far larger than the others, or a first drift far above any later drift, is reported.
 """
 
 from __future__ import annotations
