@@ -34,7 +34,7 @@ _MIN_SAMPLES_IN_T_B = 20.0
 
 def write(imu: Imu) -> str:
     """Return Python that defines ``imu_err``, for ``imu_model.IMU(accuracy=imu_err)``."""
-    imu.both()
+    imu.require_both()
     mapped = {name: as_process(a.model, imu.horizon, imu.rate) for name, a in imu.axes.items()}
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     about = heading(imu, "gnss-ins-sim", _CONVENTION, mapped)

@@ -75,15 +75,13 @@ class Imu:
             if axis is not None
         }
 
-    def both(self) -> tuple[AxisNoise, AxisNoise]:
-        """Return gyro and accelerometer; ExportError if one is missing: the program needs both."""
-        axes = self.axes
-        missing = [name for name in ("gyro", "accel") if name not in axes]
+    def require_both(self) -> None:
+        """Raise ExportError if there is no estimate of gyro or accelerometer."""
+        missing = [name for name in ("gyro", "accel") if name not in self.axes]
         if missing:
             raise ExportError(
                 f"{self.sensor}: no estimate of {' and '.join(missing)}, which this program needs"
             )
-        return axes["gyro"], axes["accel"]
 
 
 def inflate(model: NoiseModel, factor: float) -> NoiseModel:

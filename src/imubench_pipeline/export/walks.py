@@ -17,7 +17,7 @@ TOPIC = "/imu0"
 
 def walks(imu: Imu) -> dict[str, Mapped]:
     """Return gyro and accelerometer as white noise and random walk; ExportError without both."""
-    imu.both()
+    imu.require_both()
     return {
         name: as_walk(axis.model, imu.horizon, imu.rate, axis.least_walk)
         for name, axis in imu.axes.items()

@@ -25,6 +25,7 @@ NO_SENSOR = "(no sensor)"
 _NOTES = ".yaml"
 _MISNAMED_NOTES = {".yml", _NOTES}  # in lower case
 _NOT_LOGS = {".md"} | _MISNAMED_NOTES | PARTIAL
+_FOLLOWED = 2  # levels of folders where links are followed: sensors, and recordings
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
 _LONGEST_NAME, _MOST_BYTES = 120, 160
 """Letters, and bytes: the name of a page is longer, and systems take 255 bytes."""
@@ -98,7 +99,8 @@ def found_logs(logs: Path) -> list[Recording]:
                 f"{path.name} lies beside the folders of the sensors; expected it in "
                 f"{logs / '<sensor>'}, a folder of the name of its sensor file: move it there"
             )
-            recordings.append(_found(NO_SENSOR, path, _stem(path), fault))
+            name = name_of(path.name)
+            recordings.append(Recording(NO_SENSOR, name, path, None, simulated=False, error=fault))
     return recordings
 
 
@@ -121,9 +123,6 @@ def account_for(
         else:
             found.append(FoundFile(place, reason=_why_skipped(file, logs)))
     return found
-
-
-_FOLLOWED = 2  # levels of folders where links are followed: sensors, and recordings
 
 
 def _every_file(folder: Path) -> Iterator[Path]:
@@ -203,7 +202,7 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
         fault = _fault(path, name)
         if fault is None and other:
             fault = f"{other.name}: notes end in {_NOTES}; rename it to {name}{_NOTES}"
-        yield _found(sensor, path, name, fault, notes)
+        yield Recording(sensor, _usable(name), path, notes, simulated=False, error=fault)
 
 
 def _holds_itself(path: Path) -> bool:
@@ -241,12 +240,6 @@ def _shown(folder: Path) -> list[Path]:
 def _is_log(path: Path) -> bool:
     """Return whether a file of the drop zone is to be a log, by its name."""
     return path.suffix.lower() not in _NOT_LOGS
-
-
-def _found(
-    sensor: str, path: Path, name: str, error: str | None, notes: Path | None = None
-) -> Recording:
-    return Recording(sensor, _usable(name), path, notes, simulated=False, error=error)
 
 
 def name_of(file: str) -> str:

@@ -40,9 +40,7 @@ class Part:
     """Scratch files: the columns as Parquet, the stamps, and a bit mask per record of the columns
     with a number."""
     writer: LogWriter  # writer of ``data``; open until the metadata are known
-    rows: int = 0
-    not_used: int = 0
-    """Number of records that are used, and of records outside the part to use."""
+    rows: int = 0  # number of records that are used
     columns: dict[str, ColumnSummary] = field(default_factory=dict)  # statistics of each column
     patterns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """Number of records for each bit mask of columns with a number: entry 5 counts the records with
@@ -143,15 +141,15 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
                 columns = {name: values[keep] for name, values in columns.items()}
             read_rows += len(batch)
             writer.add(None if batch.time is None else clock, columns)
-    part.not_used = read_rows - part.rows
+    not_used = read_rows - part.rows
     if part.rows == 0:
         raise RecordingError(
             f"{file.path.name}: none of its {read_rows} samples lies in the part to use "
             f"(use: start {use.start} s, end {use.end or 'open'})"
         )
-    if part.not_used:
-        detail = f"{part.not_used} samples lie outside the part to use"
-        file.note("not_used", detail, part.not_used, "note")
+    if not_used:
+        detail = f"{not_used} samples lie outside the part to use"
+        file.note("not_used", detail, not_used, "note")
     return part
 
 
