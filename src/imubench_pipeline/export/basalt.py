@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import json
 
-from imubench_pipeline.export.comments import heading, mapping_words
+from imubench_pipeline.export.comments import heading
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import positive, walks
+from imubench_pipeline.export.walks import positive_walks
 
 _CONVENTION = (
     "*_noise_std is N (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)) and *_bias_std is K (rad/s^2/sqrt(Hz), "
@@ -28,11 +28,10 @@ _CONVENTION = (
 
 def write(imu: Imu) -> str:
     """Return JSON with the fields of the sensor in ``value0``; Basalt divides by K."""
-    mapped = walks(imu)
-    positive(mapped, "Basalt")
+    mapped = positive_walks(imu, "Basalt")
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     content = {
-        "about": [*heading(imu, "Basalt", _CONVENTION), *mapping_words(mapped)],
+        "about": heading(imu, "Basalt", _CONVENTION, mapped),
         "value0": {
             "imu_update_rate": imu.rate,
             "accel_noise_std": [accel.N] * 3,

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError
 from imubench_pipeline.export.temperature import AXES
 from imubench_pipeline.model.estimates import ParameterRow
-from imubench_pipeline.words.estimates import STATUS_WORDS
 
 Key = tuple[str, str]  # recording, channel
 _Estimated = tuple[str, str, str]  # and method
 
 WORST, MEDIAN = "worst", "median"
 
-_MAX_NAMED_RECORDINGS = 40
-"""Max. recordings that are named for a reason; further ones are counted."""
+_MAX_NAMED_RECORDINGS = 40  # max. recordings that are named for a reason; further ones are counted
 
 
 @dataclass(frozen=True)
@@ -71,12 +70,11 @@ def choose(
     ExportError
         If there is no estimate of the quantity, or of the device.
     """
-    everywhere: dict[_Estimated, list[ParameterRow]] = {}
+    everywhere: dict[_Estimated, list[ParameterRow]] = defaultdict(list)
     for row in rows:
         wanted = row.recommended if method is None else row.method == method
         if wanted and row.channel.startswith(f"{quantity}_"):
-            key = (row.recording, row.channel, row.method)
-            everywhere.setdefault(key, []).append(row)
+            everywhere[row.recording, row.channel, row.method].append(row)
     estimated = everywhere
     if axis not in (WORST, MEDIAN):
         device = {recording: recording for recording, _, _ in everywhere} | dict(devices or {})
@@ -101,17 +99,19 @@ def choose(
         f"{channel} of recording {recording} by method {used}, {which}{whose} at {horizon:g} s "
         f"({error:.3g} {unit} there, with a bias averaged as long before)"
     )
-    others: dict[str, list[Key]] = {}
+    others: dict[str, list[Key]] = defaultdict(list)
     for key in everywhere:
         if key not in estimated:
-            others.setdefault("of another device", []).append(key[:2])
+            others["of another device"].append(key[:2])
         elif key not in (entry[1] for entry in ranked):
-            others.setdefault("no white noise in the model", []).append(key[:2])
+            others["no white noise in the model"].append(key[:2])
         elif key != (recording, channel, used):
             why = "not the median" if axis == MEDIAN else "less noise"
-            others.setdefault(f"{why} at {horizon:g} s", []).append(key[:2])
+            others[f"{why} at {horizon:g} s"].append(key[:2])
     notes = [*_describe_other_axes(others, channel), *parameter_notes(estimate)]
-    noise = AxisNoise(estimate.model, origin, notes, _find_limit_of_absent_walk(estimate))
+    K = estimate.parameters.get("K")
+    limit_of_absent_walk = K.upper if K is not None and K.in_model is None else None
+    noise = AxisNoise(estimate.model, origin, notes, limit_of_absent_walk)
     return Choice(recording, channel, used, noise, deviation, len(ranked))
 
 
@@ -133,9 +133,9 @@ def _describe_other_axes(others: Mapping[str, Sequence[Key]], chosen: str) -> li
     quantity, _ = chosen.split("_")
     statements = []
     for why, keys in others.items():
-        of: dict[str, list[str]] = {}
+        of: dict[str, list[str]] = defaultdict(list)
         for recording, channel in keys:
-            of.setdefault(recording, []).append(channel)
+            of[recording].append(channel)
         named = [f"{' and '.join(channels)} of {recording}" for recording, channels in of.items()]
         more = len(named) - _MAX_NAMED_RECORDINGS
         statements.append(
@@ -154,30 +154,21 @@ def parameter_notes(estimate: Estimate) -> list[str]:
     notes = []
     for number, name, parameter in estimate.components():
         label = name if number == 1 else f"{name} of component {number}"
-        note = _describe_substitute(parameter)
-        if note:
-            notes.append(f"{label} {note}")
+        reason = f" ({parameter.reason})" if parameter.reason else ""
+        status = parameter.status.replace("_", " ")
+        lower, upper = parameter.lower, parameter.upper
+        between = ""
+        if lower is not None and upper is not None:
+            between = f", 95 % limits {lower:.3e} to {upper:.3e}"
+        if parameter.status == "at_bound":
+            value = f"{parameter.value:.4e} is used{between}"
+            notes.append(f"{label} is at the end of its search{reason}: {value}")
+        elif parameter.value is not None:
+            continue
+        elif parameter.fitted is not None:
+            value = f"the fitted {parameter.fitted:.3e} is used{between}"
+            notes.append(f"{label} is {status}{reason}: {value}")
+        elif upper is not None:
+            limit = f"0 in the model; its upper limit is {upper:.3e}"
+            notes.append(f"{label} is {status}{reason}: {limit}")
     return notes
-
-
-def _describe_substitute(parameter: Parameter) -> str | None:
-    reason = f" ({parameter.reason})" if parameter.reason else ""
-    status = STATUS_WORDS[parameter.status]
-    between = ""
-    if parameter.lower is not None and parameter.upper is not None:
-        between = f", 95 % limits {parameter.lower:.3e} to {parameter.upper:.3e}"
-    if parameter.status == "at_bound":
-        return f"is at the end of its search{reason}: {parameter.value:.4e} is used{between}"
-    if parameter.value is not None:
-        return None
-    if parameter.fitted is not None:
-        return f"is {status}{reason}: the fitted {parameter.fitted:.3e} is used{between}"
-    if parameter.upper is not None:
-        return f"is {status}{reason}: 0 in the model; its upper limit is {parameter.upper:.3e}"
-    return None
-
-
-def _find_limit_of_absent_walk(estimate: Estimate) -> float | None:
-    """Return the upper limit of K if K is not in the model."""
-    K = estimate.parameters.get("K")
-    return K.upper if K is not None and K.in_model is None else None

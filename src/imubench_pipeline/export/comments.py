@@ -11,14 +11,20 @@ from imubench_pipeline.export.mapping import Mapped, describe_terms
 from imubench_pipeline.tables.texts import printable
 
 _LINE_WIDTH = 96
-_TAB_OR_NEWLINE = re.compile(r"[\t\n]")
 
 
-def heading(imu: Imu, program: str, convention: str, *, temperature: bool = False) -> list[str]:
+def heading(
+    imu: Imu,
+    program: str,
+    convention: str,
+    mapped: Mapping[str, Mapped] | None = None,
+    *,
+    temperature: bool = False,
+) -> list[str]:
     """Return the header of a file as printable statements.
 
-    `program` is the program that loads the file; `convention` describes its numbers; `temperature`:
-    the file contains the effect of temperature on the biases.
+    `program` is the program that loads the file; `convention` describes its numbers; `mapped`: the
+    replacements of the models; `temperature`: the file contains the effect on the biases.
     """
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
@@ -54,14 +60,9 @@ def heading(imu: Imu, program: str, convention: str, *, temperature: bool = Fals
             f"INFLATED: from here on all densities and amplitudes are {imu.inflation:g} times "
             f"those above, because: {imu.because}."
         )
-    return [_join_lines(words) for words in statements]
-
-
-def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
-    """Return the replacements in the models, one statement each."""
-    return [
-        f"{name}: {words}." for name, replacement in mapped.items() for words in replacement.words
-    ]
+    printed = [_join_lines(words) for words in statements]
+    replacements = (mapped or {}).items()
+    return printed + [f"{name}: {words}." for name, model in replacements for words in model.words]
 
 
 def commented(statements: Sequence[str], mark: str = "#") -> str:
@@ -89,7 +90,7 @@ def commented_python(statements: Sequence[str]) -> str:
 
 
 def _join_lines(statement: str) -> str:
-    return printable(_TAB_OR_NEWLINE.sub(" ", statement))
+    return printable(re.sub(r"[\t\n]", " ", statement))
 
 
 def setting(key: str, value: str, comment: str, indent: str = "") -> str:

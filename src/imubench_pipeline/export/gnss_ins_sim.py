@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 
-from imubench_pipeline.export.comments import commented_python, heading, mapping_words
+from imubench_pipeline.export.comments import commented_python, heading
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import as_process
 from imubench_pipeline.export.target import Target
@@ -34,10 +34,10 @@ _MIN_SAMPLES_IN_T_B = 20.0
 
 def write(imu: Imu) -> str:
     """Return Python that defines ``imu_err``, for ``imu_model.IMU(accuracy=imu_err)``."""
-    imu.both()
+    imu.require_both()
     mapped = {name: as_process(a.model, imu.horizon, imu.rate) for name, a in imu.axes.items()}
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
-    about = [*heading(imu, "gnss-ins-sim", _CONVENTION), *mapping_words(mapped)]
+    about = heading(imu, "gnss-ins-sim", _CONVENTION, mapped)
     for name, process in mapped.items():
         if process.model.T_B is not None and process.model.T_B * imu.rate < _MIN_SAMPLES_IN_T_B:
             about.append(
@@ -48,15 +48,11 @@ def write(imu: Imu) -> str:
     entries = [
         ("gyro_b", 0.0, "deg/h, fixed bias"),
         ("gyro_arw", gyro.N * degrees * 60.0, "deg/sqrt(h), N"),
-        (
-            "gyro_b_stability",
-            _compute_stationary_deviation(gyro) * degrees * 3600.0,
-            "deg/h, 1 sigma",
-        ),
+        ("gyro_b_stability", _stationary_deviation(gyro) * degrees * 3600.0, "deg/h, 1 sigma"),
         ("gyro_b_corr", gyro.T_B or imu.horizon, "s, T_B"),
         ("accel_b", 0.0, "m/s^2, fixed bias"),
         ("accel_vrw", accel.N * 60.0, "m/s/sqrt(h), N"),
-        ("accel_b_stability", _compute_stationary_deviation(accel), "m/s^2, 1 sigma"),
+        ("accel_b_stability", _stationary_deviation(accel), "m/s^2, 1 sigma"),
         ("accel_b_corr", accel.T_B or imu.horizon, "s, T_B"),
     ]
     lines = [
@@ -66,7 +62,7 @@ def write(imu: Imu) -> str:
     return commented_python(about) + "import numpy as np\n\nimu_err = {\n" + "".join(lines) + "}\n"
 
 
-def _compute_stationary_deviation(model: NoiseModel) -> float:
+def _stationary_deviation(model: NoiseModel) -> float:
     if model.T_B is None or model.B == 0.0:
         return 0.0
     return math.sqrt(driving_density(model.B, model.T_B) * model.T_B / 2.0)

@@ -17,71 +17,37 @@ class ExportError(ValueError):
 
 @dataclass(frozen=True)
 class AxisNoise:
-    """Noise model of one axis, SI, used for all axes of its quantity.
-
-    Attributes
-    ----------
-    origin : str
-        Axis, recording and method of the model, in words.
-    notes : sequence of str
-        Remarks on parameters without a plain value (not identified, absent) and their treatment.
-    least_walk : float or None
-        Upper limit of K, where K is absent; used for programs that need a random walk.
-    bounded : tuple of float, or None
-        Of an overbound: lowest and highest frequency, Hz, between which the model is above the
-        spectral density. None: the model is not an overbound.
-    """
+    """Noise model of one axis, SI, used for all axes of its quantity."""
 
     model: NoiseModel
-    origin: str
-    notes: Sequence[str] = ()
-    least_walk: float | None = None
+    origin: str  # axis, recording and method of the model, in words
+    notes: Sequence[str] = ()  # treatment of parameters without a plain value
+    least_walk: float | None = None  # upper limit of an absent K, for programs that need a walk
     bounded: tuple[float, float] | None = None
+    """Lowest and highest frequency of an overbound, Hz; None: the model is no overbound."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Imu:
     """The noise of a sensor.
 
-    Attributes
-    ----------
-    rate : float
-        Of the samples that the program will get, Hz.
-    gyro, accel : AxisNoise or None
-        None: no estimate.
-    horizon : float
-        Longest time that the program predicts without a measurement, s. A replacement for a model
-        that the program does not support has the same Allan variance at this time.
-    gravity : float
-        m/s^2.
-    inflation : float
-        Factor on all densities and amplitudes, not on variances.
-    because : str or None
-        Reason of the inflation, or of the use of a recording that is excluded from decisions.
-    simulated : bool
-        Whether the recordings are simulated.
-    cautions : sequence of str
-        Doubts about the recordings that were used, and the recordings that were left out.
-    temperature : mapping of str to TemperatureEffect
-        Effect of the temperature on the biases, by quantity.
-
-    Raises
-    ------
-    ExportError
-        If a number is out of range, or an inflation has no reason.
+    Raises ExportError if a number is out of range, or an inflation has no reason.
     """
 
     sensor: str
-    rate: float
-    gyro: AxisNoise | None = None
+    rate: float  # of the samples that the program will get, Hz
+    gyro: AxisNoise | None = None  # None: no estimate
     accel: AxisNoise | None = None
     horizon: float = 60.0
-    gravity: float = STANDARD_GRAVITY
-    inflation: float = 1.0
+    """Longest time that the program predicts without a measurement, s. A replacement for a model
+    that the program does not support has the same Allan variance at this time."""
+    gravity: float = STANDARD_GRAVITY  # m/s^2
+    inflation: float = 1.0  # factor on all densities and amplitudes, not on variances
     because: str | None = None
-    simulated: bool = False
-    cautions: Sequence[str] = ()
-    temperature: Mapping[str, TemperatureEffect] = field(default_factory=dict)
+    """Reason of the inflation, or of the use of a recording that is excluded from decisions."""
+    simulated: bool = False  # whether the recordings are simulated
+    cautions: Sequence[str] = ()  # doubts about the recordings, and those that were left out
+    temperature: Mapping[str, TemperatureEffect] = field(default_factory=dict)  # by quantity
 
     def __post_init__(self) -> None:
         for name in ("rate", "horizon", "gravity", "inflation"):
@@ -109,15 +75,13 @@ class Imu:
             if axis is not None
         }
 
-    def both(self) -> tuple[AxisNoise, AxisNoise]:
-        """Return gyro and accelerometer; ExportError if one is missing: the program needs both."""
-        axes = self.axes
-        missing = [name for name in ("gyro", "accel") if name not in axes]
+    def require_both(self) -> None:
+        """Raise ExportError if there is no estimate of gyro or accelerometer."""
+        missing = [name for name in ("gyro", "accel") if name not in self.axes]
         if missing:
             raise ExportError(
                 f"{self.sensor}: no estimate of {' and '.join(missing)}, which this program needs"
             )
-        return axes["gyro"], axes["accel"]
 
 
 def inflate(model: NoiseModel, factor: float) -> NoiseModel:

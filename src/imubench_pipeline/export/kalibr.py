@@ -10,18 +10,17 @@ ImuParameters (names, checks, conversion).
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import commented, heading, mapping_words, plain, setting
+from imubench_pipeline.export.comments import commented, heading, plain, setting
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, positive, walks
+from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, positive_walks
 
 
 def write(imu: Imu) -> str:
     """Return ``imu.yaml``."""
-    mapped = walks(imu)
-    positive(mapped, "Kalibr")
+    mapped = positive_walks(imu, "Kalibr")
     return (
-        commented([*heading(imu, "Kalibr", CONVENTION), *mapping_words(mapped)])
+        commented(heading(imu, "Kalibr", CONVENTION, mapped))
         + densities(mapped)
         + setting("rostopic", TOPIC, "of sensor_msgs/Imu")
         + setting("update_rate", plain(imu.rate), "Hz")

@@ -31,10 +31,9 @@ from imubench_pipeline.typing import Array
 _MIN_TIME_OVER_HORIZON = 1 / 30
 """Shortest tau of the fit of a process, and shortest T_B of its search, over the horizon."""
 
-_MAX_TIME_OVER_HORIZON = 100.0
-"""Longest T_B of the search, over the horizon."""
-
+_MAX_TIME_OVER_HORIZON = 100.0  # longest T_B of the search, over the horizon
 _TRIED_CORRELATION_TIMES = 120
+_ROLES_NOT_REPLACED = (Role.WHITE, Role.NOT_GROWING, Role.NO_NOISE)
 
 
 @dataclass(frozen=True)
@@ -76,24 +75,20 @@ def as_walk(
         K of the replacement if the model has no slow term.
     """
     slow = _select_slow_terms(model)
-    if not slow and least_walk:
-        words = [
-            f"the model has no random walk; K = {least_walk:.3e}, its upper 95 % limit, stands in, "
-            "since a filter whose bias is never to move stops to estimate it"
-        ]
-        return Mapped(
-            NoiseModel(N=model.N, K=least_walk), [*words, *_describe_omitted_terms(model)]
-        )
     if not slow:
-        words = ["the model has no random walk, and no upper limit of one is known: it is 0"]
-        return Mapped(NoiseModel(N=model.N), [*words, *_describe_omitted_terms(model)])
+        words = "the model has no random walk, and no upper limit of one is known: it is 0"
+        if least_walk:
+            words = (
+                f"the model has no random walk; K = {least_walk:.3e}, its upper 95 % limit, stands "
+                "in, since a filter whose bias is never to move stops to estimate it"
+            )
+        replacement = NoiseModel(N=model.N, K=least_walk or 0.0)
+        return Mapped(replacement, [words, *_describe_omitted_terms(model)])
     if all(term.role is Role.RANDOM_WALK for term in slow):
         return Mapped(NoiseModel(N=model.N, K=model.K), _describe_omitted_terms(model))
     K = math.sqrt(3.0 * _sum_allan_variance(slow, horizon) / horizon)
-    replacement = NoiseModel(N=model.N, K=K)
-    return _describe_replacement(
-        model, replacement, f"a random walk K = {K:.3e}", slow, horizon, rate
-    )
+    words = f"a random walk K = {K:.3e}"
+    return _describe_replacement(model, NoiseModel(N=model.N, K=K), words, slow, horizon, rate)
 
 
 def as_process(model: NoiseModel, horizon: float, rate: float, *, walk: bool = False) -> Mapped:
@@ -106,7 +101,7 @@ def as_process(model: NoiseModel, horizon: float, rate: float, *, walk: bool = F
     replaced = [
         term for term in _select_slow_terms(model) if not (walk and term.role is Role.RANDOM_WALK)
     ]
-    processes = _select_processes(replaced)
+    processes = [term.gauss_markov for term in replaced if term.gauss_markov is not None]
     K = model.K if walk else 0.0
     if len(replaced) == len(processes) <= 1:
         B, T_B = (processes[0].B, processes[0].T_B) if processes else (0.0, None)
@@ -122,15 +117,8 @@ def describe_terms(terms: Sequence[Term]) -> str:
     return ", ".join(term.in_words for term in terms) or "no noise"
 
 
-_ROLES_NOT_REPLACED = (Role.WHITE, Role.NOT_GROWING, Role.NO_NOISE)
-
-
 def _select_slow_terms(model: NoiseModel) -> list[Term]:
     return [term for term in model.terms if term.role not in _ROLES_NOT_REPLACED]
-
-
-def _select_processes(terms: Sequence[Term]) -> list[GaussMarkov]:
-    return [term.gauss_markov for term in terms if term.gauss_markov is not None]
 
 
 def _describe_omitted_terms(model: NoiseModel) -> list[str]:
@@ -157,9 +145,8 @@ def _fit_nearest_process(slow: Sequence[Term], N: float, horizon: float) -> Gaus
 
     def process(T_B: float) -> GaussMarkov:
         unit = GaussMarkov(bias_instability(1.0, T_B), T_B)
-        return GaussMarkov(
-            bias_instability(variance / _sum_allan_variance([unit], horizon), T_B), T_B
-        )
+        density = variance / _sum_allan_variance([unit], horizon)
+        return GaussMarkov(bias_instability(density, T_B), T_B)
 
     times = np.geomspace(
         _MIN_TIME_OVER_HORIZON * horizon, _MAX_TIME_OVER_HORIZON * horizon, _TRIED_CORRELATION_TIMES

@@ -28,7 +28,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from imubench_pipeline.export.comments import commented, heading, mapping_words
+from imubench_pipeline.export.comments import commented, heading
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.export.mapping import Mapped, as_process
 from imubench_pipeline.export.target import Target
@@ -41,18 +41,16 @@ _CONVENTION = (
     "SampleRate = {rate:g} Hz. R2023b or newer."
 )
 _MAX_POLES = 2000
-_REFERENCE_TEMPERATURE = 25.0
-"""Temperature at which TemperatureBias adds nothing, degC."""
-
+_REFERENCE_TEMPERATURE = 25.0  # temperature at which TemperatureBias adds nothing, degC
 _MAX_SAMPLES_PER_POLE = 5.0
 """Max. samples per pole; up to them the Allan deviation of flicker noise is within 11 %."""
 
 
 @dataclass(frozen=True)
 class _Parameters:
-    noise_density: float
-    random_walk: float
-    bias_instability: float
+    N: float
+    K: float
+    drive: float
     coefficients: str
 
 
@@ -63,26 +61,22 @@ def write(imu: Imu) -> str:
     for name, axis in imu.axes.items():
         mapped[name], parameters[name] = _map_parameters(axis, imu)
     convention = _CONVENTION.format(rate=imu.rate)
-    about = heading(imu, "MATLAB imuSensor", convention, temperature=True)
-    about += mapping_words(mapped)
+    about = heading(imu, "MATLAB imuSensor", convention, mapped, temperature=True)
     biases = {name: _map_temperature(imu.temperature.get(name)) for name in parameters}
     about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
     text = commented(about, "%") + "IMU = imuSensor('accel-gyro');\n"
     text += f"IMU.SampleRate = {imu.rate:.9g};  % Hz\n"
-    units = {"gyro": "rad/s", "accel": "m/s^2"}
-    words = {"gyro": ("Gyroscope", "gyroparams"), "accel": ("Accelerometer", "accelparams")}
+    members = {
+        "gyro": ("Gyroscope", "gyroparams", "rad/s"),
+        "accel": ("Accelerometer", "accelparams", "m/s^2"),
+    }
     for name, figures in parameters.items():
-        member, maker = words[name]
-        unit = units[name]
+        member, maker, unit = members[name]
         lines = [
             ("'NoiseType'", "'single-sided'", "two-sided density, see above"),
-            ("'NoiseDensity'", _format_equal_vector(figures.noise_density), f"N, {unit}/sqrt(Hz)"),
-            ("'RandomWalk'", _format_equal_vector(figures.random_walk), f"K, {unit} sqrt(Hz)"),
-            (
-                "'BiasInstability'",
-                _format_equal_vector(figures.bias_instability),
-                f"of the drive, {unit}",
-            ),
+            ("'NoiseDensity'", _format_vector([figures.N] * 3), f"N, {unit}/sqrt(Hz)"),
+            ("'RandomWalk'", _format_vector([figures.K] * 3), f"K, {unit} sqrt(Hz)"),
+            ("'BiasInstability'", _format_vector([figures.drive] * 3), f"of the drive, {unit}"),
             *biases[name][0],
             ("'BiasInstabilityCoefficients'", figures.coefficients, "of the filter"),
         ]
@@ -144,10 +138,6 @@ def _map_parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
     drive = math.sqrt(-stationary * math.expm1(-2.0 / (imu.rate * process.T_B)))
     coefficients = f"struct('Numerator', 1, 'Denominator', [1, {-p:.17g}])"
     return mapped, _Parameters(process.N, process.K, drive, coefficients)
-
-
-def _format_equal_vector(value: float) -> str:
-    return _format_vector([value] * 3)
 
 
 def _format_vector(values: Sequence[float]) -> str:

@@ -33,6 +33,7 @@ from imubench_pipeline.typing import Array
 FLICKER_TAU_OVER_HORIZON = 4.0
 """Longest tau of the approximation of flicker noise, over the horizon."""
 
+_MATRICES = ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0")
 _CONVENTION = (
     "SI; densities are two-sided. Continuous: x' = F x + w, z = H x + v with densities Q and R of "
     "w and v. Discrete at {rate:g} Hz: Phi, Q_d, H, R_d, exact; x0 and P0: mean and covariance of "
@@ -42,33 +43,19 @@ _CONVENTION = (
 
 @dataclass(frozen=True)
 class Matrices:
-    """A noise model in continuous and discrete time; m states.
+    """A noise model in continuous and discrete time; m states."""
 
-    Attributes
-    ----------
-    F, Q : ndarray, shape (m, m)
-        Continuous in time, without the states of quantization noise.
-    H_continuous : ndarray, shape (m,)
-    R : float
-        Density of the white noise, N^2.
-    Phi, Q_d, P0 : ndarray, shape (m, m)
-    H, x0 : ndarray, shape (m,)
-    R_d : float
-    states : sequence of str
-        Term of each state of the discrete model.
-    """
-
-    F: Array
-    Q: Array
-    H_continuous: Array
-    R: float
-    Phi: Array
-    Q_d: Array
-    H: Array
+    F: Array  # shape (m, m); continuous in time, without the states of quantization noise
+    Q: Array  # shape (m, m)
+    H_continuous: Array  # shape (m,)
+    R: float  # density of the white noise, N^2
+    Phi: Array  # shape (m, m)
+    Q_d: Array  # shape (m, m)
+    H: Array  # shape (m,)
     R_d: float
-    x0: Array
-    P0: Array
-    states: Sequence[str]
+    x0: Array  # shape (m,)
+    P0: Array  # shape (m, m)
+    states: Sequence[str]  # term of each state of the discrete model
 
 
 def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
@@ -105,39 +92,24 @@ def write_json(imu: Imu) -> str:
         "inflation": imu.inflation,
     }
     for name, axis in imu.axes.items():
-        of_axis = matrices(axis.model, imu.rate, imu.horizon)
+        model = axis.model
+        of_axis = matrices(model, imu.rate, imu.horizon)
+        lists = [np.asarray(getattr(of_axis, key)).tolist() for key in _MATRICES]
+        F, Q, H_continuous, R, Phi, Q_d, H, R_d, x0, P0 = lists
         content[name] = {
-            "model": axis.model.name,
+            "model": model.name,
             "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
-            "parameters": _list_parameters(axis.model),
+            "parameters": {
+                **{key: getattr(model, key) for key in ("Q", "N", "B", "K", "R", "T_B")},
+                "further": [{"term": term.symbol} | term.values for term in model.further],
+                "sinusoids": [line.values for line in model.sinusoids],
+            },
             "density_bounded": list(axis.bounded) if axis.bounded else None,
             "states": list(of_axis.states),
-            "continuous": {
-                "F": of_axis.F.tolist(),
-                "Q": of_axis.Q.tolist(),
-                "H": of_axis.H_continuous.tolist(),
-                "R": of_axis.R,
-            },
-            "discrete": {
-                "Phi": of_axis.Phi.tolist(),
-                "Q_d": of_axis.Q_d.tolist(),
-                "H": of_axis.H.tolist(),
-                "R_d": of_axis.R_d,
-                "x0": of_axis.x0.tolist(),
-                "P0": of_axis.P0.tolist(),
-            },
+            "continuous": {"F": F, "Q": Q, "H": H_continuous, "R": R},
+            "discrete": {"Phi": Phi, "Q_d": Q_d, "H": H, "R_d": R_d, "x0": x0, "P0": P0},
         }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
-
-
-def _list_parameters(model: NoiseModel) -> dict[str, object]:
-    parameters: dict[str, object] = {
-        name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")
-    }
-    parameters["T_B"] = model.T_B
-    parameters["further"] = [{"term": term.symbol} | term.values for term in model.further]
-    parameters["sinusoids"] = [line.values for line in model.sinusoids]
-    return parameters
 
 
 def write_npz(imu: Imu) -> bytes:
@@ -147,7 +119,7 @@ def write_npz(imu: Imu) -> bytes:
         of_axis = matrices(axis.model, imu.rate, imu.horizon)
         if axis.bounded:
             arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
-        for key in ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0"):
+        for key in _MATRICES:
             arrays[f"{name}_{key}"] = np.asarray(getattr(of_axis, key))
     about = np.array(heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
     stream = io.BytesIO()

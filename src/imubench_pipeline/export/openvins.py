@@ -10,19 +10,17 @@ ov_msckf/src/utils/NoiseManager.h (units), ov_msckf/src/state/Propagator.cpp (di
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import commented, heading, mapping_words, plain, setting
+from imubench_pipeline.export.comments import commented, heading, plain, setting
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, positive, walks
+from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, positive_walks
 
 
 def write(imu: Imu) -> str:
     """Return ``kalibr_imu_chain.yaml``."""
-    mapped = walks(imu)
-    positive(mapped, "OpenVINS")
+    mapped = positive_walks(imu, "OpenVINS")
     about = [
-        *heading(imu, "OpenVINS", CONVENTION),
-        *mapping_words(mapped),
+        *heading(imu, "OpenVINS", CONVENTION, mapped),
         "Extrinsics and intrinsics (T_i_b, Tw, Ta, Tg, R_*) are those of an ideal sensor.",
     ]
     indent = "  "
@@ -42,11 +40,10 @@ def write(imu: Imu) -> str:
 
 
 def _format_matrix(name: str, size: int, diagonal: str = "1.0") -> str:
-    rows = [
-        "    - [" + ", ".join(diagonal if i == j else "0.0" for j in range(size)) + "]\n"
-        for i in range(size)
-    ]
-    return f"  {name}:\n" + "".join(rows)
+    text = f"  {name}:\n"
+    for i in range(size):
+        text += f"    - [{', '.join(diagonal if i == j else '0.0' for j in range(size))}]\n"
+    return text
 
 
 TARGET = Target("openvins", "OpenVINS", "kalibr_imu_chain.yaml", write, "N+K")

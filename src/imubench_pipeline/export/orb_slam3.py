@@ -11,17 +11,10 @@ Sources: UZ-SLAMLab/ORB_SLAM3, src/Settings.cc (readIMU, readParameter<float>), 
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import (
-    commented,
-    heading,
-    mapping_words,
-    number,
-    plain,
-    setting,
-)
+from imubench_pipeline.export.comments import commented, heading, number, plain, setting
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import positive, walks
+from imubench_pipeline.export.walks import positive_walks
 
 _CONVENTION = (
     "N as IMU.Noise* and K as IMU.*Walk: continuous in time, two-sided, SI; the program itself "
@@ -31,12 +24,10 @@ _CONVENTION = (
 
 def write(imu: Imu) -> str:
     """Return the lines of the settings that concern the noise of the sensor; walks are inverted."""
-    mapped = walks(imu)
-    positive(mapped, "ORB-SLAM3")
+    mapped = positive_walks(imu, "ORB-SLAM3")
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     about = [
-        *heading(imu, "ORB-SLAM3", _CONVENTION),
-        *mapping_words(mapped),
+        *heading(imu, "ORB-SLAM3", _CONVENTION, mapped),
         "These lines go into the settings of the camera, beside IMU.T_b_c1.",
     ]
     return (

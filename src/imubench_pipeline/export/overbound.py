@@ -70,13 +70,9 @@ _ALLAN_PEAK_FREQUENCY = 0.37
 
 The function is sin^4(x) / x^2 with x = pi f tau; the constant is x at its maximum, over pi."""
 
-_MIN_FREQUENCY_TIMES_HORIZON = 0.1
-"""Default of the lowest frequency of the band, in 1 / horizon."""
-
+_MIN_FREQUENCY_TIMES_HORIZON = 0.1  # default of the lowest frequency of the band, in 1 / horizon
 _POINTS_A_DECADE = 12
-_MAX_TIME_RATIO = 30.0
-"""Max. T_B of the search, over the larger of the longest tau and the horizon."""
-
+_MAX_TIME_RATIO = 30.0  # max. T_B of the search, over the larger of the longest tau and the horizon
 MAX_EXCESS = 3.0
 """Default of the max. ratio of a model's Allan deviation to its limit."""
 
@@ -160,19 +156,8 @@ def simultaneous_upper(curve: AllanCurve, longest: float, confidence: float = 0.
     """Return simultaneous upper confidence limits of an Allan variance.
 
     They follow from the limits at single tau by a Bonferroni correction for the number of octaves.
-
-    Parameters
-    ----------
-    curve : AllanCurve
-    longest : float
-        Longest tau for which the limits hold, s.
-    confidence : float
-        Probability that the true curve lies below the limits at every tau up to ``longest``.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        (rad/s)^2 or (m/s^2)^2, at every tau of the curve.
+    The true curve lies below the limits at every tau up to ``longest``, s, with the probability
+    ``confidence``. The limits are at every tau of the curve, shape (m,), in its unit squared.
     """
     n = curve.cluster_size[curve.tau <= longest * (1.0 + 1e-9)]
     octaves = 1.0 + math.log2(n[-1] / n[0])
@@ -234,7 +219,14 @@ def overbound(
     times = (2.0 / rate, _MAX_TIME_RATIO * max(horizon, reach))
     model = find_smallest(limits, family, times)
     excess = _find_excess(limits[0], model)
-    unsuited = _describe_unsuited_family(fitted, family, max(horizon, reach))
+    unsuited = None
+    processes = [term.gauss_markov for term in fitted.terms if term.gauss_markov is not None]
+    shortest = min((process.T_B for process in processes), default=math.inf)
+    if "GM" not in family and max(horizon, reach) > _MAX_HORIZON_OVER_T_B * shortest:
+        unsuited = (
+            f"a random walk cannot follow a Gauss-Markov process of T_B = {shortest:.4g} s beyond "
+            f"2 T_B = {_MAX_HORIZON_OVER_T_B * shortest:.4g} s"
+        )
     warning = None
     if excess[0] > most_excess or unsuited:
         offer = _compare_families(limits, family, times, excess, unsuited, most_excess)
@@ -250,19 +242,11 @@ def overbound(
         if above.min() < _MAX_RATIO_AT_CONTACT:
             touches[limit.kind] = float(limit.x[np.argmin(above)])
     lowest = float(ratio[np.argmin(measured)])
+    frequency = np.geomspace(ends[0], _MIN_FREQUENCY_RATIO * ends[0], 400)
+    passed = np.flatnonzero(fitted.psd(frequency, rate) > model.psd(frequency))
+    below = float(frequency[passed[0]]) if len(passed) else None
     return Overbound(
-        model,
-        family,
-        horizon,
-        reach,
-        ends,
-        tau,
-        ratio,
-        lowest,
-        touches,
-        excess,
-        _find_crossing_frequency(model, fitted, rate, ends[0]),
-        warning,
+        model, family, horizon, reach, ends, tau, ratio, lowest, touches, excess, below, warning
     )
 
 
@@ -271,18 +255,6 @@ def _find_excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
     above = limit.ratio(model)
     worst = int(np.argmax(above))
     return math.sqrt(float(above[worst])), float(limit.x[worst])
-
-
-def _describe_unsuited_family(fitted: NoiseModel, family: Family, horizon: float) -> str | None:
-    """Describe a family whose random walk would have to follow a process beyond 2 T_B."""
-    processes = [term.gauss_markov for term in fitted.terms if term.gauss_markov is not None]
-    times = [process.T_B for process in processes]
-    if "GM" in family or not times or horizon <= _MAX_HORIZON_OVER_T_B * min(times):
-        return None
-    return (
-        f"a random walk cannot follow a Gauss-Markov process of T_B = {min(times):.4g} s beyond "
-        f"2 T_B = {_MAX_HORIZON_OVER_T_B * min(times):.4g} s"
-    )
 
 
 def _compare_families(
@@ -312,15 +284,6 @@ def _compare_families(
         return f"{words}{reason}; the smallest {offer} at most"
     least = min([excess[0], *others.values()])
     return f"{words}{reason}; no family comes closer than {least:.3g} times"
-
-
-def _find_crossing_frequency(
-    model: NoiseModel, fitted: NoiseModel, rate: float, lowest: float
-) -> float | None:
-    """Return the highest frequency below the band where the fitted density is the larger."""
-    frequency = np.geomspace(lowest, _MIN_FREQUENCY_RATIO * lowest, 400)
-    passed = np.flatnonzero(fitted.psd(frequency, rate) > model.psd(frequency))
-    return float(frequency[passed[0]]) if len(passed) else None
 
 
 def limits_of(

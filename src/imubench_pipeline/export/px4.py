@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 
-from imubench_pipeline.export.comments import commented, heading, mapping_words
+from imubench_pipeline.export.comments import commented, heading
 from imubench_pipeline.export.imu import ExportError, Imu
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES
@@ -45,8 +45,8 @@ _PARAMETER_RANGES = {
     "EKF2_GYR_B_NOISE": (0.0, 0.01),
 }
 _REAL32_TYPE, _INT32_TYPE = 9, 6  # MAV_PARAM_TYPE
-_TC_PREFIX_LETTERS = {"gyro": "G", "accel": "A"}
-_CAL_PREFIXES = {"gyro": "GYRO", "accel": "ACC"}
+_TEMPERATURE_PREFIXES = {"gyro": ("G", "GYRO"), "accel": ("A", "ACC")}
+"""Letter after ``TC_``, and word after ``CAL_``."""
 
 _CONVENTION = (
     "Noise a step of the filter of {step:g} ms: N / sqrt(dt) and K / sqrt(dt), dt = "
@@ -59,10 +59,7 @@ _CONVENTION = (
 def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
     """Return a parameter file for a `period`, EKF2_PREDICT_US, in us.
 
-    Raises
-    ------
-    ExportError
-        If gyro or accelerometer has no estimate, or the period is outside its range.
+    Raises ExportError if gyro or accelerometer has no estimate, or the period is outside its range.
     """
     if not _PERIOD_RANGE[0] <= period <= _PERIOD_RANGE[1]:
         raise ExportError(
@@ -78,7 +75,7 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         "EKF2_GYR_NOISE": (gyro.N / step, "rad/s, from N"),
     }
     convention = _CONVENTION.format(step=period / 1000.0)
-    about = heading(imu, "PX4 EKF2", convention, temperature=True) + mapping_words(mapped)
+    about = heading(imu, "PX4 EKF2", convention, mapped, temperature=True)
     rows = []
     for name, (value, comment) in values.items():
         low, high = _PARAMETER_RANGES[name]
@@ -91,37 +88,29 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         about.append(f"{name} = {clipped:.6g} {comment}.")
         rows.append(f"1\t1\t{name}\t{clipped:.9g}\t{_REAL32_TYPE}\n")
     rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INT32_TYPE}\n")
-    for quantity in imu.temperature:
-        corrections = _list_corrections(imu, quantity)
+    for quantity, effect in imu.temperature.items():
+        if not effect.slope:
+            continue
+        letter, calibration = _TEMPERATURE_PREFIXES[quantity]
+        corrections = {"TREF": effect.reference, "TMIN": effect.low, "TMAX": effect.high}
+        for number, axis in enumerate(AXES):
+            # All four, to overwrite the values of an earlier calibration.
+            corrections[f"X0_{number}"] = corrections[f"X3_{number}"] = 0.0
+            corrections[f"X1_{number}"] = effect.slope.get(axis, 0.0)
+            corrections[f"X2_{number}"] = effect.square.get(axis, 0.0)
         rows += [
-            f"1\t1\t{name}\t{value:.9g}\t{_REAL32_TYPE}\n" for name, value in corrections.items()
+            f"1\t1\tTC_{letter}0_{key}\t{value:.9g}\t{_REAL32_TYPE}\n"
+            for key, value in corrections.items()
         ]
-        if corrections:
-            letter = _TC_PREFIX_LETTERS[quantity]
-            about.append(
-                f"TC_{letter}0_*: x, y and z of the log are taken for the axes of the device, and "
-                "its temperature for that of the driver; nothing is corrected before "
-                f"TC_{letter}0_ID names the device, as CAL_{_CAL_PREFIXES[quantity]}0_ID does, and "
-                f"TC_{letter}_ENABLE is 1. The noise above is that of the log as it is, the "
-                "temperature's part included; --method compensated gives what is left."
-            )
+        about.append(
+            f"TC_{letter}0_*: x, y and z of the log are taken for the axes of the device, and "
+            "its temperature for that of the driver; nothing is corrected before "
+            f"TC_{letter}0_ID names the device, as CAL_{calibration}0_ID does, and "
+            f"TC_{letter}_ENABLE is 1. The noise above is that of the log as it is, the "
+            "temperature's part included; --method compensated gives what is left."
+        )
     columns = "# Vehicle-Id Component-Id Name Value Type\n"
     return commented(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)
-
-
-def _list_corrections(imu: Imu, quantity: str) -> dict[str, float]:
-    """Return the parameters of the temperature correction; none if no axis has an estimate."""
-    effect = imu.temperature[quantity]
-    if not effect.slope:
-        return {}
-    name = f"TC_{_TC_PREFIX_LETTERS[quantity]}0_"
-    parameters = {"TREF": effect.reference, "TMIN": effect.low, "TMAX": effect.high}
-    for number, axis in enumerate(AXES):
-        # All four, to overwrite the values of an earlier calibration.
-        parameters[f"X0_{number}"] = parameters[f"X3_{number}"] = 0.0
-        parameters[f"X1_{number}"] = effect.slope.get(axis, 0.0)
-        parameters[f"X2_{number}"] = effect.square.get(axis, 0.0)
-    return {name + key: value for key, value in parameters.items()}
 
 
 TARGET = Target("px4", "PX4 (EKF2)", "ekf2.params", write, "N+K")

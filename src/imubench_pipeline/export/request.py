@@ -23,7 +23,6 @@ from imubench_pipeline.export.temperature import TemperatureEffect, temperature_
 from imubench_pipeline.model.estimates import AllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
 from imubench_pipeline.words.verdicts import doubts_text
@@ -198,19 +197,16 @@ def _select_deciding(
     return deciding, [f"left out: {reasons}", *without]
 
 
-def _load_draws(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseModel]:
-    """Return posterior draws of the noise model of the chosen axis; none if none were stored."""
-    path = folder / sensor / choice.recording / "draws.parquet" if folder is not None else None
-    drawn = draws(path).get((choice.channel, choice.method)) if path and path.is_file() else None
-    return () if drawn is None else [drawn.model(number) for number in range(len(drawn))]
-
-
 def _bound_axis(
     tables: Tables, choice: Choice, request: Request, rate: float, folder: Path | None
 ) -> AxisNoise:
     """Return the smallest model above the measured curve of the chosen axis."""
     family = TARGETS[request.target].family
-    drawn = _load_draws(folder, request.sensor, choice)
+    drawn = None
+    if folder is not None:
+        path = folder / request.sensor / choice.recording / "draws.parquet"
+        if path.is_file():
+            drawn = draws(path).get((choice.channel, choice.method))
     place = {"sensor": request.sensor, "recording": choice.recording, "channel": choice.channel}
     curve = curve_of(_select_rows(AllanRow, tables, **place))
     try:
@@ -221,7 +217,7 @@ def _bound_axis(
             family=family,
             horizon=request.horizon,
             most_excess=request.most_excess,
-            drawn=drawn,
+            drawn=[drawn.model(number) for number in range(len(drawn))] if drawn else [],
         )
     except ValueError as error:
         raise ExportError(

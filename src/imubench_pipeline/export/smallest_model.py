@@ -31,37 +31,21 @@ Family = Literal["N+K", "N+GM", "N+GM+K"]
 
 FAMILIES: Sequence[Family] = get_args(Family)
 
-_TIMES_PER_DECADE = 6
-"""Correlation times of the grid search, which a bounded search refines."""
-
-_MAX_PROGRAMS = 12
-"""Max. number of successive linear programs for one T_B."""
-
-_CONVERGED_DECREASE = 1e-6
-"""Converged where the mean logarithm decreases by less."""
-
+_TIMES_PER_DECADE = 6  # correlation times of the grid search, which a bounded search refines
+_MAX_PROGRAMS = 12  # max. number of successive linear programs for one T_B
+_CONVERGED_DECREASE = 1e-6  # converged where the mean logarithm decreases by less
 _ROUNDING_MARGIN = 1e-9
 """Relative increase of the densities, so that rounding does not put the model below a limit."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Lower limits of a model.
+    """Lower limits of a model."""
 
-    Attributes
-    ----------
-    kind : str
-        Name of the limited quantity, for texts.
-    x, value : ndarray, shape (m,)
-        Tau or time in s, or frequency in Hz, and the lower limit there.
-    of_term : callable
-        Term -> contribution of this term to the limited quantity at ``x``.
-    """
-
-    kind: str
-    x: Array
-    value: Array
-    of_term: Callable[[Term], Array]
+    kind: str  # name of the limited quantity, for texts
+    x: Array  # shape (m,); tau or time, s, or frequency, Hz
+    value: Array  # shape (m,); lower limit there
+    of_term: Callable[[Term], Array]  # contribution of a term to the limited quantity at `x`
 
     def ratio(self, model: NoiseModel) -> Array:
         """Return the ratio of a model to its limit, shape (m,)."""
@@ -76,10 +60,7 @@ def find_smallest(
     The first of the `limits` must be on the Allan variance: the model is minimised there.
     `times`: shortest and longest T_B of the search, s.
 
-    Raises
-    ------
-    ValueError
-        If the family is not known, or no model of it lies above.
+    Raises ValueError if the family is not known, or no model of it lies above.
     """
     if family not in FAMILIES:
         raise ValueError(f"family {family!r} is not known, expected one of {', '.join(FAMILIES)}")
@@ -108,12 +89,8 @@ def find_smallest(
         raise ValueError(f"no model {family} lies above the limits")
     powers = powers * (1.0 + _ROUNDING_MARGIN)
     B = bias_instability(float(powers[-1]), T_B) if T_B else 0.0
-    return NoiseModel(
-        N=math.sqrt(powers[0]),
-        B=B,
-        T_B=T_B if B > 0.0 else None,
-        K=math.sqrt(powers[1]) if walks else 0.0,
-    )
+    K = math.sqrt(powers[1]) if walks else 0.0
+    return NoiseModel(N=math.sqrt(powers[0]), B=B, T_B=T_B if B > 0.0 else None, K=K)
 
 
 def _minimise_mean_log_ratio(
@@ -131,7 +108,10 @@ def _minimise_mean_log_ratio(
     rows = np.concatenate(parts)
     scale = rows.max(axis=0)
     curve, rows = parts[0] / scale, rows / scale
-    weights = _log_weights(limits[0].x)
+    # Weights of a mean over log tau.
+    x = limits[0].x
+    edges = np.log(np.concatenate((x[:1], np.sqrt(x[1:] * x[:-1]), x[-1:])))
+    weights = np.diff(edges) / (edges[-1] - edges[0]) if len(x) > 1 else np.ones(1)
     cost, powers, ratio = math.inf, np.zeros(len(terms)), np.ones(len(curve))
     for _ in range(_MAX_PROGRAMS):
         answer = linprog(
@@ -148,14 +128,6 @@ def _minimise_mean_log_ratio(
             break
         cost, powers = lower, solution
     return cost, np.asarray(powers / scale)
-
-
-def _log_weights(x: Array) -> Array:
-    """Return weights of a mean over log x."""
-    if len(x) == 1:
-        return np.ones(1)
-    edges = np.log(np.concatenate((x[:1], np.sqrt(x[1:] * x[:-1]), x[-1:])))
-    return np.asarray(np.diff(edges) / (edges[-1] - edges[0]))
 
 
 def count_of_points(start: float, stop: float, a_decade: int) -> int:

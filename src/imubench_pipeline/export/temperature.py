@@ -30,25 +30,16 @@ about T_0 it would not correct anything."""
 class TemperatureEffect:
     """Effect of temperature on the biases of a quantity.
 
-    Attributes
-    ----------
-    reference : float
-        T_0, the temperature of zero effect, °C.
-    low, high : float
-        Range of the temperature of the recording, where the effect is valid, °C.
-    slope, square : dict of str to float
-        s and q of each axis with a usable estimate, rad/s or m/s² per K and K²; q only for axes
-        with a quadratic term.
-    notes : list of str
-        Source of each axis, and reasons for omitted axes.
+    ``slope`` and ``square`` are s and q of each axis with a usable estimate, rad/s or m/s² per K
+    and K²; q only for axes with a quadratic term.
     """
 
-    reference: float = 0.0
-    low: float = 0.0
+    reference: float = 0.0  # T_0, the temperature of zero effect, °C
+    low: float = 0.0  # range of the temperature of the recording, °C
     high: float = 0.0
     slope: Mapping[str, float] = field(default_factory=dict)
     square: Mapping[str, float] = field(default_factory=dict)
-    notes: Sequence[str] = ()
+    notes: Sequence[str] = ()  # source of each axis, and reasons for omitted axes
 
 
 def temperature_effect(
@@ -90,10 +81,12 @@ def temperature_effect(
         slope[axis] = _require_value(s) + 2.0 * q * (reference - _require_value(fit["T_0"]))
         if q:
             square[axis] = q
+        longest = fit["lag"].upper
+        lag = "no lag" if longest is None else f"a lag of up to {longest:.3g} s is not corrected"
         bends = f", square {q:.3e} {unit}/K^2" if q else ""
         notes.append(
             f"axis {axis}: {s.value:.4e} {unit}/K, 95 % limits {s.lower:.3e} to "
-            f"{s.upper:.3e}{bends}; {_describe_lag(fit['lag'])}"
+            f"{s.upper:.3e}{bends}; {lag}"
         )
     return TemperatureEffect(reference, float(low), float(high), slope, square, notes)
 
@@ -132,9 +125,3 @@ def _find_objection(fit: Mapping[str, TemperatureRow], span: float, horizon: flo
                 f"{horizon:g} s, and the program has no lag"
             )
     return None
-
-
-def _describe_lag(lag: TemperatureRow) -> str:
-    if lag.upper is None:
-        return "no lag"
-    return f"a lag of up to {lag.upper:.3g} s is not corrected"

@@ -20,14 +20,7 @@ from __future__ import annotations
 
 import math
 
-from imubench_pipeline.export.comments import (
-    commented,
-    heading,
-    mapping_words,
-    number,
-    plain,
-    setting,
-)
+from imubench_pipeline.export.comments import commented, heading, number, plain, setting
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.walks import TOPIC, walks
@@ -45,8 +38,7 @@ def write(imu: Imu) -> str:
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     per_sample, per_step = math.sqrt(2.0 * imu.rate), math.sqrt(imu.rate)
     about = [
-        *heading(imu, "VINS-Fusion", _CONVENTION.format(rate=imu.rate)),
-        *mapping_words(mapped),
+        *heading(imu, "VINS-Fusion", _CONVENTION.format(rate=imu.rate), mapped),
         "These lines replace those of the same name in the configuration.",
     ]
     return (

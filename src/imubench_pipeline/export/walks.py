@@ -11,22 +11,22 @@ CONVENTION = (
     "N^2 / tau and K^2 tau / 3), SI; not multiplied by the root of the rate."
 )
 
-
 TOPIC = "/imu0"
 """ROS topic of the samples."""
 
 
 def walks(imu: Imu) -> dict[str, Mapped]:
     """Return gyro and accelerometer as white noise and random walk; ExportError without both."""
-    imu.both()
+    imu.require_both()
     return {
         name: as_walk(axis.model, imu.horizon, imu.rate, axis.least_walk)
         for name, axis in imu.axes.items()
     }
 
 
-def positive(mapped: dict[str, Mapped], program: str) -> None:
-    """Raise ExportError if a density is 0, for a program that takes values above 0 only."""
+def positive_walks(imu: Imu, program: str) -> dict[str, Mapped]:
+    """Return `walks` for a program that takes densities above 0 only; ExportError if one is 0."""
+    mapped = walks(imu)
     for name, axis in mapped.items():
         for letter in ("N", "K"):
             if not getattr(axis.model, letter) > 0.0:
@@ -34,19 +34,17 @@ def positive(mapped: dict[str, Mapped], program: str) -> None:
                     f"{name}: {letter} is 0, and {program} takes values above 0 only; a longer "
                     "log, or an overbound, gives one"
                 )
+    return mapped
 
 
 def densities(mapped: dict[str, Mapped], indent: str = "") -> str:
     """Return the four lines with the densities."""
-    units = {"accel": ("accelerometer", "m/s"), "gyro": ("gyroscope", "rad/s")}
     text = ""
-    for name in ("accel", "gyro"):
-        word, unit = units[name]
+    for name, word, unit, slower in (
+        ("accel", "accelerometer", "m/s^2", "m/s^3"),
+        ("gyro", "gyroscope", "rad/s", "rad/s^2"),
+    ):
         model = mapped[name].model
-        power = "^2" if name == "accel" else ""
-        slower = f"{unit}^3" if name == "accel" else f"{unit}^2"
-        text += setting(
-            f"{word}_noise_density", number(model.N), f"N, {unit}{power}/sqrt(Hz)", indent
-        )
+        text += setting(f"{word}_noise_density", number(model.N), f"N, {unit}/sqrt(Hz)", indent)
         text += setting(f"{word}_random_walk", number(model.K), f"K, {slower}/sqrt(Hz)", indent)
     return text

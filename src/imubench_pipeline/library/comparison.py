@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
-from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS, Parameter
+from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS
 from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, Method, estimate
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary, cut
@@ -33,8 +33,7 @@ class Compared:
     """Comparison of one figure of one channel between two logs; values in SI."""
 
     channel: str
-    symbol: str
-    """A parameter, or ``adev``."""
+    symbol: str  # A parameter, or ``adev``
     tau: float | None  # s, of the Allan deviation
     names: tuple[str, str]
     values: tuple[float | None, float | None]
@@ -74,19 +73,13 @@ class Comparison(Shown, Sequence[Compared]):
         from imubench_pipeline.library.drawing import axes_or_new, draw_ratios
 
         axes: Axes = axes_or_new(ax)
-        draw_ratios(
-            axes,
-            [
-                {
-                    "label": f"{each.channel} {each.label}" + self._pair(each),
-                    "ratio": each.ratio.value,
-                    "lower": each.ratio.lower,
-                    "upper": each.ratio.upper,
-                }
-                for each in self
-            ],
-        )
-        two = f"{self.names[0]} / {self.names[1]}" if len(self.names) == 2 else "the first / second"
+        labels = []
+        for each in self:
+            labels.append(f"{each.channel} {each.label}")
+            if len(self.names) > 2:
+                labels[-1] += f" {each.names[0]} / {each.names[1]}"
+        draw_ratios(axes, labels, [each.ratio for each in self])
+        two = " / ".join(self.names) if len(self.names) == 2 else "the first / second"
         axes.set_xlabel(f"ratio {two}")
         return axes
 
@@ -115,9 +108,6 @@ class Comparison(Shown, Sequence[Compared]):
             for each in self
         )
 
-    def _pair(self, each: Compared) -> str:
-        return "" if len(self.names) == 2 else f" {each.names[0]} / {each.names[1]}"
-
     def _summary(self) -> Summary:
         heads = ["channel", "", "a", "b", "unit", "a / b", "95 % interval", "verdict", "because"]
         several = len(self.names) > 2
@@ -125,7 +115,14 @@ class Comparison(Shown, Sequence[Compared]):
         for each in self:
             unit = page_unit(quantity_of(each.channel), each.symbol, "practical")
             row = [each.channel, each.label, *(unit.text(value, 3) for value in each.values)]
-            row += [unit.sign, *_format_ratio(each.ratio), each.verdict]
+            lower, upper = each.ratio.lower or 0.0, each.ratio.upper
+            digits, interval = limit_digits(each.ratio.lower, upper), "–"
+            if upper is not None:
+                interval = f"{number_text(lower, digits)} to {number_text(upper, digits)}"
+            elif each.ratio.lower is not None:
+                interval = f"above {number_text(lower, digits)}"
+            ratio = "–" if each.ratio.value is None else number_text(each.ratio.value, 3)
+            row += [unit.sign, ratio, interval, each.verdict]
             row.append(cut(each.ratio.reason or "", 50))
             rows.append([f"{each.names[0]} / {each.names[1]}", *row] if several else row)
         if several:
@@ -133,16 +130,6 @@ class Comparison(Shown, Sequence[Compared]):
         a, b, *more = self.names
         title = f"{a} (a) and {b} (b)" if not more else ", ".join(self.names)
         return Summary(f"Comparison of {title}", heads, rows)
-
-
-def _format_ratio(ratio: Ratio) -> tuple[str, str]:
-    value = "–" if ratio.value is None else number_text(ratio.value, 3)
-    digits = limit_digits(ratio.lower, ratio.upper)
-    if ratio.lower is None and ratio.upper is None:
-        return value, "–"
-    if ratio.upper is None:
-        return value, f"above {number_text(ratio.lower or 0.0, digits)}"
-    return value, f"{number_text(ratio.lower or 0.0, digits)} to {number_text(ratio.upper, digits)}"
 
 
 def compare(
@@ -191,8 +178,20 @@ def compare(
     """
     if len(logs) < 2:
         raise ValueError(f"{len(logs)} given; expected two or more logs, or estimates")
-    estimates = [_require_estimates(log, method) for log in logs]
-    called = list(names) if names is not None else _choose_names(estimates)
+    estimates = []
+    for log in logs:
+        if not isinstance(log, Log | Estimates):
+            raise ValueError(
+                f"found {type(log).__name__}; expected what read_log or estimate returns"
+            )
+        estimates.append(estimate(log, method=method) if isinstance(log, Log) else log)
+    called = list(names or ())
+    if names is None:
+        called = [each.log.recording for each in estimates]
+        if len(set(called)) < len(called):
+            called = [each.name for each in estimates]
+        if len(set(called)) < len(called):
+            called = [f"{name} ({place})" for place, name in enumerate(called, start=1)]
     if len(called) != len(logs) or len(set(called)) < len(called):
         raise ValueError(
             f"names are {', '.join(called)}; expected {len(logs)} of them, all distinct"
@@ -204,21 +203,6 @@ def compare(
         for figure in _pair((a, b), first, second, seconds)
     ]
     return Comparison(compared, called)
-
-
-def _require_estimates(log: object, method: Method) -> Estimates:
-    if isinstance(log, Estimates):
-        return log
-    if isinstance(log, Log):
-        return estimate(log, method=method)
-    raise ValueError(f"found {type(log).__name__}; expected what read_log or estimate returns")
-
-
-def _choose_names(estimates: Sequence[Estimates]) -> list[str]:
-    for names in ([each.log.recording for each in estimates], [each.name for each in estimates]):
-        if len(set(names)) == len(names):
-            return names
-    return [f"{name} ({place})" for place, name in enumerate(names, start=1)]
 
 
 def _pair(
@@ -233,7 +217,7 @@ def _pair(
     for channel in channels:
         pair = first[channel], second[channel]
         for symbol in COMPARED:
-            a, b = (_find_parameter(one, symbol) for one in pair)
+            a, b = ({**one.parameters, **one.curve}.get(symbol) for one in pair)
             if a is not None and b is not None:
                 ratio = ratio_of_parameters(a, b)
                 yield Compared(channel, symbol, None, names, (a.value, b.value), ratio)
@@ -251,10 +235,6 @@ def _pair(
             )
             deviations = a_log.variance(tau) ** 0.5, b_log.variance(tau) ** 0.5
             yield Compared(channel, "adev", tau, names, deviations, ratio)
-
-
-def _find_parameter(estimate: ChannelEstimate, symbol: str) -> Parameter | None:
-    return {**estimate.parameters, **estimate.curve}.get(symbol)
 
 
 def _make_fusion_channel(estimate: ChannelEstimate) -> FusionChannel:

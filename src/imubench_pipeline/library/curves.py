@@ -121,9 +121,7 @@ class Curves(Shown, Mapping[str, Curve]):
         by_quantity: dict[str, dict[str, AllanCurve]] = {}
         for channel, curve in self.items():
             by_quantity.setdefault(quantity_of(channel), {})[channel] = curve
-        axes = panels(len(by_quantity)) if ax is None else np.atleast_1d(np.asarray(ax)).ravel()
-        if len(axes) != len(by_quantity):
-            raise ValueError(f"{len(axes)} axes; expected one for each of {', '.join(by_quantity)}")
+        axes = panels([*by_quantity], ax)
         for panel, (quantity, curves) in zip(axes, by_quantity.items(), strict=True):
             draw_curves(panel, curves, quantity)
         return axes

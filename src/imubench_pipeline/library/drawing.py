@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.navigation.ratios import Ratio
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.palette import sensor_appearances
 from imubench_pipeline.report.practical import page_unit
@@ -22,18 +23,21 @@ if TYPE_CHECKING:
 _SAMPLE_UNIT = Unit("unit of the samples", 1.0)
 
 
-def panels(count: int, wide: int = 3) -> Any:
-    """Return new axes, shape (count,), at most ``wide`` in a row.
+def panels(names: Sequence[str], ax: Axes | Sequence[Axes] | None = None) -> Any:
+    """Return the given axes, or new ones, at most three in a row: one for each name, (n,).
 
-    Raises
-    ------
-    ExtraError
-        If matplotlib is not installed.
+    Raises ExtraError if matplotlib is not installed, and ValueError for another number of axes.
     """
+    count = len(names)
+    if ax is not None:
+        given = np.atleast_1d(np.asarray(ax)).ravel()
+        if len(given) != count:
+            raise ValueError(f"{len(given)} axes; expected one for each of {', '.join(names)}")
+        return given
     with extra("workflow", "draw"):
         from matplotlib import pyplot as plt
 
-    columns = min(count, wide)
+    columns = min(count, 3)
     rows = math.ceil(count / columns)
     size = (5.0 * columns, 3.8 * rows)
     _, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
@@ -44,7 +48,7 @@ def panels(count: int, wide: int = 3) -> Any:
 
 def axes_or_new(ax: Axes | None) -> Any:
     """Return the given axes, or new ones."""
-    return panels(1)[0] if ax is None else ax
+    return panels([""])[0] if ax is None else ax
 
 
 def deviation_unit(quantity: str | None) -> Unit:
@@ -59,7 +63,29 @@ def draw_curves(axes: Axes, curves: Mapping[str, AllanCurve], quantity: str | No
     for (name, curve), look in zip(curves.items(), looks, strict=False):
         draw_measured(axes, curve, unit, name, look.light)
     _format_axes(axes, unit)
-    _draw_slopes(axes, next(iter(curves.values())), unit)
+    # The slopes of white noise and of a random walk, through the ends of the first curve.
+    curve = next(iter(curves.values()))
+    level = curve.deviation * unit.per_si
+    limits = axes.get_xlim(), axes.get_ylim()
+    last = max(len(curve.up_to(1.0 / 9.0)) - 1, 0)
+    for place, slope, label in ((0, -0.5, "−1/2"), (last, 0.5, "+1/2")):
+        line = level[place] * (curve.tau / curve.tau[place]) ** slope
+        axes.plot(curve.tau, line, color="0.6", linewidth=0.8, linestyle=":", zorder=1.0)
+        inside = np.flatnonzero((line > limits[1][0]) & (line < limits[1][1]))
+        if len(inside):
+            at = inside[len(inside) * 3 // 4 if slope < 0.0 else len(inside) // 4]
+            axes.annotate(
+                label,
+                (curve.tau[at], line[at]),
+                xytext=(-3.0, -3.0),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                color="0.4",
+                fontsize="small",
+            )
+    axes.set_xlim(*limits[0])
+    axes.set_ylim(*limits[1])
 
 
 def draw_measured(axes: Axes, curve: AllanCurve, unit: Unit, name: str, colour: str) -> None:
@@ -93,11 +119,11 @@ def draw_model(axes: Axes, curve: AllanCurve, model: NoiseModel, quantity: str) 
     _format_axes(axes, unit)
 
 
-def draw_ratios(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Draw ratios with 95 % intervals in rows, with the keys label, ratio, lower and upper."""
-    places = range(len(rows), 0, -1)
-    for place, row in zip(places, rows, strict=True):
-        lower, upper = row["lower"] or None, row["upper"]
+def draw_ratios(axes: Axes, labels: Sequence[str], ratios: Sequence[Ratio]) -> None:
+    """Draw ratios with 95 % intervals in rows."""
+    places = range(len(ratios), 0, -1)
+    for place, ratio in zip(places, ratios, strict=True):
+        lower, upper = ratio.lower or None, ratio.upper
         look: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.5, "markersize": 5.0}
         if lower is not None and upper is not None:
             axes.plot([lower, upper], [place, place], **look)
@@ -105,14 +131,14 @@ def draw_ratios(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
             axes.plot(upper, place, marker="<", **look)
         elif lower is not None:
             axes.plot(lower, place, marker=">", **look)
-        if row["ratio"] is not None:
-            axes.plot(row["ratio"], place, marker="o", **look)
+        if ratio.value is not None:
+            axes.plot(ratio.value, place, marker="o", **look)
     axes.axvline(1.0, color="0.4", linewidth=0.8)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter("{x:g}")
-    axes.set_yticks(list(places), [row["label"] for row in rows])
-    axes.set_ylim(0.0, len(rows) + 1.0)
+    axes.set_yticks(list(places), labels)
+    axes.set_ylim(0.0, len(ratios) + 1.0)
     axes.grid(True, axis="x", color="0.9")
 
 
@@ -123,28 +149,3 @@ def _format_axes(axes: Axes, unit: Unit) -> None:
     axes.set_ylabel(f"Allan deviation ({unit.sign})")
     axes.grid(True, which="major", color="0.9")
     axes.legend(fontsize="small", frameon=False)
-
-
-def _draw_slopes(axes: Axes, curve: AllanCurve, unit: Unit) -> None:
-    """Draw the slopes of white noise and of a random walk, in grey, through the ends of a curve."""
-    told = curve.up_to(1.0 / 9.0)
-    limits = axes.get_xlim(), axes.get_ylim()
-    for place, slope, name in ((0, -0.5, "−1/2"), (max(len(told) - 1, 0), 0.5, "+1/2")):
-        level = curve.deviation * unit.per_si
-        line = level[place] * (curve.tau / curve.tau[place]) ** slope
-        axes.plot(curve.tau, line, color="0.6", linewidth=0.8, linestyle=":", zorder=1.0)
-        inside = np.flatnonzero((line > limits[1][0]) & (line < limits[1][1]))
-        if len(inside):
-            at = inside[len(inside) * 3 // 4 if slope < 0.0 else len(inside) // 4]
-            axes.annotate(
-                name,
-                (curve.tau[at], line[at]),
-                xytext=(-3.0, -3.0),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                color="0.4",
-                fontsize="small",
-            )
-    axes.set_xlim(*limits[0])
-    axes.set_ylim(*limits[1])

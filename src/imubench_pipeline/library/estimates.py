@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import numpy as np
-
 from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.threads import available
 from imubench_pipeline.datasheets.suspicion import usual_figures
@@ -167,9 +165,7 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
         """Draw curve and terms of each channel; return the axes, shape (channels,)."""
         from imubench_pipeline.library.drawing import panels
 
-        axes = panels(len(self)) if ax is None else np.atleast_1d(np.asarray(ax)).ravel()
-        if len(axes) != len(self):
-            raise ValueError(f"{len(axes)} axes; expected one for each of {', '.join(self)}")
+        axes = panels([*self], ax)
         for panel, estimate in zip(axes, self.values(), strict=True):
             estimate.plot(panel)
         return axes
@@ -285,7 +281,13 @@ def estimate(
         estimate_channel(key, kept, curve, how, log.bandwidth, into)
         found = into.estimates[channel].get(method)
         if found is None:
-            left_out[channel] = _explain_missing_compensation(into, channel)
+            reasons = [
+                row.reason or "the data do not favour it"
+                for row in into.temperature
+                if (row.channel, row.parameter) == (channel, "sensitivity")
+            ]
+            reason = "its clock has no readings of the temperature"
+            left_out[channel] = "; ".join(reasons) or reason
         else:
             estimates.append(ChannelEstimate.of(found, channel, curve, log.name))
     if not estimates:
@@ -303,16 +305,6 @@ def estimate(
     )
     doubted = list(doubts(rows, recommended, into.models))
     return Estimates(estimates, log, method, list(map(finding_of, rows)), doubted, left_out)
-
-
-def _explain_missing_compensation(into: Estimation, channel: str) -> str:
-    """Return the reason why the temperature effect of a channel was not compensated."""
-    reasons = [
-        row.reason or "the data do not favour it"
-        for row in into.temperature
-        if (row.channel, row.parameter) == (channel, "sensitivity")
-    ]
-    return "; ".join(reasons) or "its clock has no readings of the temperature"
 
 
 def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:

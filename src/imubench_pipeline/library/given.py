@@ -28,7 +28,6 @@ _CHANNELS_OF_QUANTITY = {
 }
 _LABEL_PATTERN = re.compile(r"^\s*(.*?)\s*[\[(]\s*(.+?)\s*[\])]\s*$")
 _TIME_COLUMNS = ("time", "t", "timestamp")
-_NAME_SOURCE = "the name of the column"
 
 
 @dataclass(frozen=True)
@@ -52,10 +51,8 @@ def dimension_of(name: str) -> str:
 def rate_of(rate: float | str | None, data: object) -> float:
     """Return the sampling rate of samples, Hz; a table may state it in its ``attrs``.
 
-    Raises
-    ------
-    ValueError
-        If none is given, or it is not a frequency above 0 (`UnitError`: another dimension).
+    Raises ValueError if none is given, or it is not a frequency above 0 (`UnitError`: another
+    dimension).
     """
     stated = rate if rate is not None else getattr(data, "attrs", {}).get("rate")
     if stated is None:
@@ -67,13 +64,7 @@ def rate_of(rate: float | str | None, data: object) -> float:
 
 
 def numbers(values: object, name: str) -> Array:
-    """Return samples as double-precision numbers; masked ones are NaN.
-
-    Raises
-    ------
-    ValueError
-        If they are not real numbers.
-    """
+    """Return samples as floats, NaN where masked; ValueError if they are not real numbers."""
     filled = values.filled(np.nan) if isinstance(values, np.ma.MaskedArray) else values
     try:
         array = np.asarray(filled)
@@ -102,13 +93,14 @@ def columns_of(
     units : mapping of str to str, optional
         By ``gyro``, ``accel``, or channel. Default: SI, but the units of a table must be stated.
 
-    Raises
-    ------
-    ValueError
-        If the shape or a name is not one of these, or a channel has no finite number
-        (`UnitError`: a unit is missing, not known or of another dimension).
+    Raises ValueError if the shape or a name is not one of these, or a channel has no finite number
+    (`UnitError`: a unit is missing, not known or of another dimension).
     """
-    _check_units(units)
+    known = (*QUANTITIES, *CHANNELS, TEMPERATURE)
+    if units is not None and not isinstance(units, Mapping):
+        raise ValueError(f"units are {units!r}; expected such as {{'gyro': 'deg/s', 'accel': 'g'}}")
+    if unknown := [key for key in units or () if key not in known]:
+        raise ValueError(f"units name {unknown[0]!r}; expected of {', '.join(known)}")
     is_table = _is_table(data)
     if has_columns(data):
         columns = dict(_select_columns(data, listed(channels), units or {}, stated=is_table))
@@ -123,13 +115,7 @@ def columns_of(
 
 
 def check_present(values: Array, name: str) -> None:
-    """Check that samples, shape (L,), contain a finite number.
-
-    Raises
-    ------
-    ValueError
-        If they do not.
-    """
+    """Raise ValueError if samples, shape (L,), contain no finite number."""
     if not len(values):
         raise ValueError(f"{name} is empty; expected two samples or more")
     if not np.isfinite(values).any():
@@ -153,10 +139,7 @@ def _is_table(data: object) -> bool:
 def listed(channels: Channels | None) -> list[str] | None:
     """Return the names of channels; ``gyro`` and ``accel`` are expanded to three axes.
 
-    Raises
-    ------
-    ValueError
-        If a name is not a channel, is repeated, or is not text.
+    Raises ValueError if a name is not a channel, is repeated, or is not text.
     """
     if channels is None:
         return None
@@ -174,14 +157,6 @@ def listed(channels: Channels | None) -> list[str] | None:
     if len(set(names)) < len(names):
         raise ValueError(f"channels are {', '.join(names)}; expected each of them once")
     return names
-
-
-def _check_units(units: Units | None) -> None:
-    known = (*QUANTITIES, *CHANNELS, TEMPERATURE)
-    if units is not None and not isinstance(units, Mapping):
-        raise ValueError(f"units are {units!r}; expected such as {{'gyro': 'deg/s', 'accel': 'g'}}")
-    if unknown := [key for key in units or () if key not in known]:
-        raise ValueError(f"units name {unknown[0]!r}; expected of {', '.join(known)}")
 
 
 def _find_unit(name: str, units: Units) -> str | None:
@@ -216,10 +191,8 @@ def _name_columns(
             mend = f"expected a column for each of {', '.join(names)}"
         raise ValueError(f"the array has shape {array.shape}; {mend}")
     for place, name in enumerate(names):
-        yield (
-            name,
-            Column(table[:, place], _find_unit(name, units) or SI_UNITS[dimension_of(name)]),
-        )
+        unit = _find_unit(name, units) or SI_UNITS[dimension_of(name)]
+        yield name, Column(table[:, place], unit)
 
 
 def _select_columns(
@@ -251,11 +224,18 @@ def _select_columns(
             raise ValueError(f"{name} has shape {values.shape}, expected one dimension")
         lengths.add(len(values))
         sources = {
-            _NAME_SOURCE: written[there[name]][1],
+            "the name of the column": written[there[name]][1],
             "units=": _find_unit(name, units),
             "attrs['units']": attrs.get(there[name]) or _find_unit(name, attrs),
         }
-        unit = _require_one_unit(name, {source: unit for source, unit in sources.items() if unit})
+        factors = {}
+        for source, unit in sources.items():
+            if unit:
+                with naming(f"{name}: "):
+                    factors[conversion(unit, dimension_of(name))] = f"{unit!r} by {source}"
+        if len(factors) > 1:
+            raise UnitError(f"{name} is in {' and in '.join(factors.values())}; expected one unit")
+        unit = next(filter(None, sources.values()), None)
         if unit is None and stated:
             raise UnitError(
                 f"{name}: the table does not say its unit, which is never guessed; expected such "
@@ -272,14 +252,3 @@ def _split_label(label: object) -> tuple[str, str | None]:
     match = _LABEL_PATTERN.match(str(label))
     name, unit = (match[1], match[2]) if match else (str(label).strip(), None)
     return name.lower(), unit
-
-
-def _require_one_unit(name: str, units: Mapping[str, str]) -> str | None:
-    """Return the unit stated by the sources, which must agree; None if none states it."""
-    factors = {}
-    for source, unit in units.items():
-        with naming(f"{name}: "):
-            factors[conversion(unit, dimension_of(name))] = f"{unit!r} by {source}"
-    if len(factors) > 1:
-        raise UnitError(f"{name} is in {' and in '.join(factors.values())}; expected one unit")
-    return next(iter(units.values()), None)

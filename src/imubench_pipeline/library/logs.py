@@ -8,7 +8,8 @@ import tempfile
 import weakref
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import getitem
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
 _SENSOR_FOLDER = Path("config/sensors")
 _YAML_SUFFIXES = (".yaml", ".yml")
+_MAX_FINDINGS = 6  # max. number of findings in the summary
 _UNKNOWN_MODEL = {"vendor": "unknown", "model": "unknown"}
 
 
@@ -198,15 +200,8 @@ class Log(Shown):
     def _summary(self) -> Summary:
         rows = []
         for name, log in self._logs.items():
-            rows.append(
-                [
-                    name,
-                    f"{number_text(log.rate, 6)} Hz",
-                    f"{log.grid:,}",
-                    self.units[name],
-                    "yes" if log.holes else "no",
-                ]
-            )
+            rate, holes = f"{number_text(log.rate, 6)} Hz", "yes" if log.holes else "no"
+            rows.append([name, rate, f"{log.grid:,}", self.units[name], holes])
         serious = [finding for finding in self.findings if finding.severity != "note"]
         notes = [
             f"{f.severity}: {f.finding}: {cut(f.detail, 100)}" for f in serious[:_MAX_FINDINGS]
@@ -217,10 +212,6 @@ class Log(Shown):
         made = " (simulated)" * self.simulated
         title = f"Log {self.name}{made}, {duration_text(self.duration)}"
         return Summary(title, heads, rows, notes)
-
-
-_MAX_FINDINGS = 6
-"""Max. number of findings in the summary."""
 
 
 def read_log(
@@ -318,14 +309,8 @@ def log_of(columns: Mapping[str, Column], rate: float, name: str) -> Log:
             temperature = entry
         else:
             channels[channel] = entry
-    log = LogFormat.model_validate(
-        {
-            "reader": "numpy",
-            "rate": f"{rate!r} Hz",
-            "channels": channels,
-            "temperature": temperature,
-        }
-    )
+    keys = {"reader": "numpy", "rate": f"{rate!r} Hz", "channels": channels}
+    log = LogFormat.model_validate(keys | {"temperature": temperature})
     with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
         file = Path(folder) / f"{name}.npy"
         np.save(file, np.column_stack([column.values for column in columns.values()]))
@@ -404,7 +389,11 @@ def _draft_sensor(source: Path, rate: float | str | None, units: Units | None) -
             column["unit"] = stated
     if unknown := [key for key in units or () if key not in (*CHANNELS, "gyro", "accel")]:
         raise ValueError(f"units name {unknown[0]!r}; expected gyro, accel, or a channel")
-    left = [key for key in inspection.draft.unfilled() if _look_up(log, key) == UNKNOWN]
+    left = [
+        key
+        for key in inspection.draft.unfilled()
+        if reduce(getitem, key.split("."), log) == UNKNOWN
+    ]
     if left:
         raise ValueError(
             f"{source.name}: the log does not say {', '.join(left)}; expected units= or rate= that "
@@ -412,9 +401,3 @@ def _draft_sensor(source: Path, rate: float | str | None, units: Units | None) -
             f"{inspection.block}"
         )
     return parse(Sensor, sensor, f"the sensor file drafted from {source.name}")
-
-
-def _look_up(log: Any, key: str) -> Any:
-    for part in key.split("."):
-        log = log[part]
-    return log

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-_MAX_ROWS = 60
-"""Max. number of rows in a summary."""
+_MAX_ROWS = 60  # max. number of rows in a summary
 
 
 @dataclass(frozen=True)

@@ -44,33 +44,19 @@ def assemble(
 ) -> tuple[Path, dict[str, int]]:
     """Write the columns of the files that share a clock to one Parquet file.
 
-    Parameters
-    ----------
-    base : TimeBase
-        Time base of the parts.
-    metadata : dict
-        Metadata of the file.
-    path : Path
-        Path of the file, unless the file of a part can be used unchanged.
-
-    Returns
-    -------
-    path : Path
-    repeated : dict of str to int
-        Number of samples of each column that are left out because they repeat a stamp.
+    The file is ``path``, unless the file of a part can be used unchanged. Return its path, and the
+    number of samples of each column that are left out because they repeat a stamp.
     """
     for part in parts:
         part.writer.finish(metadata)
     if len(parts) == 1 and base.uniform:
         return parts[0].data, {}
     repeated: dict[str, int] = {}
-    columns: dict[str, pa.DataType] = {}
+    names = [name for part in parts for name in part.columns]
+    columns = dict.fromkeys(names, pa.float64())
     if not base.uniform:
-        columns["time"] = pa.float64()
-    if base.stamped and not base.uniform:
-        columns["sample"] = pa.int64()
-    for part in parts:
-        columns |= dict.fromkeys(part.columns, pa.float64())
+        sample = {"sample": pa.int64()} if base.stamped else {}
+        columns = {"time": pa.float64()} | sample | columns
     blocks = _read_columns(parts)
     with LogWriter(path, columns) as writer:
         if base.uniform:
@@ -85,7 +71,7 @@ def assemble(
                 if base.stamped:
                     block["sample"] = points
                 keep = points >= 0
-                for name in (name for part in parts for name in part.columns):
+                for name in names:
                     left = int(np.isfinite(block[name][~keep]).sum())
                     repeated[name] = repeated.get(name, 0) + left
                 writer.write({name: values[keep] for name, values in block.items()})
@@ -113,19 +99,9 @@ def counted(
 ) -> dict[str, dict[str, int]]:
     """Return the number of samples of each column that were used and left out, by reason.
 
-    Parameters
-    ----------
-    path : Path
-        The assembled file.
-    parts : list of Part
-        The parts of the file.
-    repeated : mapping of str to int
-        Number of samples of each column that repeat a stamp.
+    For the assembled file and the repeated samples see `assemble`.
 
-    Raises
-    ------
-    RuntimeError
-        If the numbers do not add up, which is an error of this program.
+    Raises RuntimeError if the numbers do not add up, which is an error of this program.
     """
     file = pq.read_metadata(path)
     used = dict.fromkeys(file.schema.names, 0)

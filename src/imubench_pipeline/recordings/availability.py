@@ -1,7 +1,7 @@
-"""Whether an error is a property of a log, or of what surrounds it: a mount, a disk, a permission.
+"""Distinguish errors of a log from errors of its surroundings: a mount, a disk, a permission.
 
-A property of a log rejects it, and is true until the log is another one. What surrounds it may be
-different an hour later: the ingest fails, nothing is concluded, and the next run tries again.
+An error of a log rejects it until it changes. The surroundings may be different an hour later: the
+ingest fails, nothing is concluded, and the next run tries again.
 """
 
 from __future__ import annotations
@@ -31,23 +31,13 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[]
     """Let a `RecordingError` pass only where it is a property of the log.
 
     It gives a function that returns whether the log is still the one that was there at first.
+    ``source``: the log file, or the folder of a recording. ``planned``: the files that the plan
+    found there, by their place in the log.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    planned : collection of str
-        The files that the plan found there, by their place in the log.
-
-    Raises
-    ------
-    RecordingError
-        If the path itself cannot be used, such as a link to itself or an empty folder.
-    UnavailableError
-        If the log is not there, cannot be read for a reason outside of it, or changed while it was
-        rejected.
-    OSError
-        If a disk is full, or there are too many open files.
+    Raises RecordingError if the path itself cannot be used, such as a link to itself or an empty
+    folder. Raises UnavailableError if the log is not there, cannot be read for a reason outside of
+    it, or changed while it was rejected. Raises OSError if a disk is full, or there are too many
+    open files.
     """
     try:
         before = identity(source)
@@ -62,36 +52,20 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[]
     try:
         yield lambda: _identity(source) == before
     except (RecordingError, OSError) as raised:
-        for cause in _causes(raised):
-            if cause.errno in OF_RESULTS:
+        cause: BaseException | None = raised
+        while cause is not None:
+            if isinstance(cause, OSError) and cause.errno in OF_RESULTS:
                 raise cause from None
-            if _is_of_surroundings(cause, source, before):
-                raise _unavailable(source, cause) from None
+            if isinstance(cause, OSError) and cause.errno in _OF_SURROUNDINGS | _ABSENT:
+                # A file that was not there before either may be missing in the log.
+                name = cause.filename
+                if name is None or any(Path(name) == source / file for file in before):
+                    raise _unavailable(source, cause) from None
+            cause = cause.__cause__ or cause.__context__
         if isinstance(raised, RecordingError) and _identity(source) != before:
             reason = f"{source.name}: changed while it was read, was replaced, or was away"
             raise UnavailableError(reason) from None
         raise
-
-
-def _causes(error: BaseException) -> Iterator[OSError]:
-    """Yield the errors of the system that led to an error."""
-    cause: BaseException | None = error
-    while cause is not None:
-        if isinstance(cause, OSError):
-            yield cause
-        cause = cause.__cause__ or cause.__context__
-
-
-def _is_of_surroundings(error: OSError, source: Path, files: Collection[str]) -> bool:
-    """Return whether a file of a log could not be read for a reason outside of it.
-
-    A file that is not there, and was not before, is no such reason: it may be missing in the log.
-    """
-    if error.errno not in _OF_SURROUNDINGS | _ABSENT:
-        return False
-    if error.filename is None:
-        return True
-    return any(Path(error.filename) == source / name for name in files)
 
 
 def _identity(source: Path) -> dict[str, tuple[int, ...]] | None:

@@ -23,10 +23,9 @@ NO_SENSOR = "(no sensor)"
 """Stands for the sensor of logs that lie beside the folders of the sensors."""
 
 _NOTES = ".yaml"
-_MISNAMED_NOTES = {".yml", _NOTES}
-"""In lower case."""
-
+_MISNAMED_NOTES = {".yml", _NOTES}  # in lower case
 _NOT_LOGS = {".md"} | _MISNAMED_NOTES | PARTIAL
+_FOLLOWED = 2  # levels of folders where links are followed: sensors, and recordings
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
 _LONGEST_NAME, _MOST_BYTES = 120, 160
 """Letters, and bytes: the name of a page is longer, and systems take 255 bytes."""
@@ -41,17 +40,13 @@ class Recording:
 
     sensor: str
     name: str
-    path: Path
-    """The log file, or the folder of a recording that has several."""
-    notes: Path | None
-    """The file of notes beside it."""
+    path: Path  # the log file, or the folder of a recording that has several
+    notes: Path | None  # the file of notes beside it
     simulated: bool
     error: str | None = None
     """Why the file cannot be used, where its name or its place says so already."""
-    unavailable: str | None = None
-    """Why it cannot be looked at now; nothing is known about it."""
-    held_back: bool = False
-    """The log is not read in this run: the results that are there stay."""
+    unavailable: str | None = None  # why it cannot be looked at now; nothing is known about it
+    held_back: bool = False  # the log is not read in this run: the results that are there stay
 
     @property
     def files(self) -> list[Path]:
@@ -81,12 +76,10 @@ class Recording:
 class FoundFile:
     """A file in the drop zone: it belongs to a recording, or is skipped."""
 
-    file: str
-    """Its place in the drop zone."""
+    file: str  # its place in the drop zone
     sensor: str | None = None
     recording: str | None = None
-    reason: str | None = None
-    """Why it is skipped."""
+    reason: str | None = None  # why it is skipped
 
 
 def found_logs(logs: Path) -> list[Recording]:
@@ -106,7 +99,8 @@ def found_logs(logs: Path) -> list[Recording]:
                 f"{path.name} lies beside the folders of the sensors; expected it in "
                 f"{logs / '<sensor>'}, a folder of the name of its sensor file: move it there"
             )
-            recordings.append(_found(NO_SENSOR, path, _stem(path), fault))
+            name = name_of(path.name)
+            recordings.append(Recording(NO_SENSOR, name, path, None, simulated=False, error=fault))
     return recordings
 
 
@@ -115,12 +109,7 @@ def account_for(
 ) -> list[FoundFile]:
     """Return every file in the drop zone once, with its recording, or why it is skipped.
 
-    Parameters
-    ----------
-    logs : Path
-        The drop zone.
-    recordings, held_back : iterable of Recording
-        Those of a run; those that it leaves alone because they are still being written.
+    ``held_back``: recordings that the run leaves alone because they are still being written.
     """
     owners = {file: recording for recording in recordings for file in recording.files}
     waiting = {file for recording in held_back for file in recording.files}
@@ -134,10 +123,6 @@ def account_for(
         else:
             found.append(FoundFile(place, reason=_why_skipped(file, logs)))
     return found
-
-
-_FOLLOWED = 2
-"""Levels of folders where links are followed: sensors, and recordings."""
 
 
 def _every_file(folder: Path) -> Iterator[Path]:
@@ -217,7 +202,7 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
         fault = _fault(path, name)
         if fault is None and other:
             fault = f"{other.name}: notes end in {_NOTES}; rename it to {name}{_NOTES}"
-        yield _found(sensor, path, name, fault, notes)
+        yield Recording(sensor, _usable(name), path, notes, simulated=False, error=fault)
 
 
 def _holds_itself(path: Path) -> bool:
@@ -247,7 +232,7 @@ def _behind_link(path: Path, sensor: str, name: str) -> Recording:
 
 
 def _shown(folder: Path) -> list[Path]:
-    """Return what lies in a folder, in order, without what is hidden and backups of editors."""
+    """Return the content of a folder, in order, without hidden files and backups of editors."""
     names = (path for path in folder.iterdir() if not path.name.startswith("."))
     return sorted(path for path in names if not path.name.endswith("~"))
 
@@ -255,12 +240,6 @@ def _shown(folder: Path) -> list[Path]:
 def _is_log(path: Path) -> bool:
     """Return whether a file of the drop zone is to be a log, by its name."""
     return path.suffix.lower() not in _NOT_LOGS
-
-
-def _found(
-    sensor: str, path: Path, name: str, error: str | None, notes: Path | None = None
-) -> Recording:
-    return Recording(sensor, _usable(name), path, notes, simulated=False, error=error)
 
 
 def name_of(file: str) -> str:
@@ -300,18 +279,11 @@ def _fault(path: Path, name: str) -> str | None:
     if not files:
         return f"the folder {shown} has no files"
     for file in files:
-        if not _is_text(file.name):
+        try:
+            file.name.encode()
+        except UnicodeEncodeError:
             return f"{shown} holds a file of the name {file.name!a}: rename it in UTF-8"
     return None
-
-
-def _is_text(name: str) -> bool:
-    """Return whether a name is text in the encoding of the system."""
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _stem(path: Path) -> str:

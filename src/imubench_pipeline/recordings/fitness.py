@@ -1,25 +1,19 @@
-"""Whether a recording may decide: what findings, statuses and verdicts on models cast doubt on.
+"""Decide from findings and estimates whether a recording is used in comparisons.
 
-All doubts are derived here, from the rows that the steps leave, and what decides or is exported
-(ranking, pooling, exports) asks here. A doubt is *unfit* where the figures may be of something else
-than the noise of a sensor at rest in the unit that is stated: it was moved or turned, the unit is
-another, an axis is dead; or where no such sensor can be bought. Others leave the figures, and are
-said beside them.
+A doubt is *unfit* if the figures may not be the noise of a sensor at rest in the stated unit (it
+was moved, the unit is wrong, an axis is dead), or if no such sensor is sold. Other doubts are
+reported with the figures.
 """
 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from imubench_pipeline.model.comparisons import (
-    DatasheetRow,
-    ErrorBudgetRow,
-    FusionRow,
-    PooledRow,
-)
+from imubench_pipeline.model.comparisons import DatasheetRow, ErrorBudgetRow, FusionRow, PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, FindingRow, RecordingRow
 from imubench_pipeline.model.states import Fitness
@@ -31,20 +25,11 @@ Key = tuple[str, str]  # sensor, recording
 
 UNFIT = frozenset(
     {
-        "motion",
-        "turning",
-        "suspicious_unit",
-        "unit_contradicts",
-        "rate_implausible",
-        "stuck",
-        "channel_twice",
-        "log_twice",
-        "recording_twice",
-        "joined",
-        "interleaved",
+        *("motion", "turning", "suspicious_unit", "unit_contradicts", "rate_implausible", "stuck"),
+        *("channel_twice", "log_twice", "recording_twice", "joined", "interleaved"),
     }
 )
-"""Findings after which a log need not be that of one sensor at rest in its unit."""
+"""Findings after which a log may not be of one sensor at rest in its unit."""
 
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 _WHITE = frozenset({"N", "Q"})
@@ -96,18 +81,14 @@ class Doubt:
 
     sensor: str
     recording: str
-    channel: str | None
-    """None: the whole recording."""
+    channel: str | None  # None: the whole recording
     code: str
     """The finding, ``not_explained`` (no model explains the spectrum), or the status of a
     parameter."""
     reason: str
-    parameters: tuple[str, ...] = ()
-    """Affected parameters; none: all."""
-    unfit: bool = False
-    """The figures may be of something else."""
-    factor: float | None = None
-    """By which it may change a value, where that is known."""
+    parameters: tuple[str, ...] = ()  # that it affects; none: all
+    unfit: bool = False  # the figures may be of something else
+    factor: float | None = None  # of a possible change of a value, if known
     start: float | None = None
     end: float | None = None
     """The part of the recording that it concerns, s from the first sample; None: all of it."""
@@ -138,32 +119,41 @@ Doubted = TypeVar("Doubted", bound=ErrorBudgetRow | DatasheetRow | FusionRow)
 
 
 def doubts(
-    findings: Iterable[FindingRow],
-    parameters: Iterable[ParameterRow],
-    models: Iterable[ModelRow],
+    findings: Iterable[FindingRow], parameters: Iterable[ParameterRow], models: Iterable[ModelRow]
 ) -> Iterator[Doubt]:
-    """Yield what is doubted of recordings, the unfit first of each.
-
-    Parameters
-    ----------
-    findings : iterable of FindingRow
-    parameters : iterable of ParameterRow
-        Of the recommended methods.
-    models : iterable of ModelRow
-    """
-    every = [doubt for row in findings if _casts_doubt(row) for doubt in _of_finding(row)]
+    """Yield doubts about recordings, the unfit first; ``parameters``: by recommended methods."""
+    every: list[Doubt] = []
+    for finding in findings:
+        code = finding.finding
+        affected = finding.affects if finding.data else AFFECTED_PARAMETERS.get(code, ())
+        harmless = finding.severity != "warning" or (finding.data and not affected)
+        if code in LEFT_OUT or (harmless and code not in UNFIT):
+            continue
+        # One doubt for each factor by which parameters may change.
+        by_factor: dict[float | None, list[str]] = {}
+        if finding.value is not None:
+            for name, power in SCALES.get(code, {}).items():
+                by_factor.setdefault(finding.value**power, []).append(name)
+        every += [
+            Doubt(
+                *_place(finding),
+                code,
+                finding.detail,
+                parameters=tuple(sorted(names)),
+                unfit=code in UNFIT,
+                factor=factor,
+                start=finding.start,
+                end=finding.end,
+            )
+            for factor, names in (by_factor or {None: [*affected]}).items()
+        ]
     every += [
         Doubt(*_place(row), "not_explained", f"no model explains the spectrum of {row.channel}")
         for row in models
         if row.chosen and row.verdict == "not explained"
     ]
     every += [
-        Doubt(
-            *_place(row),
-            "doubtful",
-            row.reason or "its status is doubtful",
-            parameters=(row.parameter,),
-        )
+        Doubt(*_place(row), "doubtful", row.reason or "its status is doubtful", (row.parameter,))
         for row in parameters
         if row.status == "doubtful"
     ]
@@ -171,59 +161,29 @@ def doubts(
 
 
 def not_sold(recordings: Iterable[RecordingRow], sensors: Collection[str]) -> Iterator[Doubt]:
-    """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing.
-
-    Parameters
-    ----------
-    recordings : iterable of RecordingRow
-    sensors : collection of str
-        Those that are not sold.
-    """
+    """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing."""
     for row in recordings:
         if row.sensor in sensors:
-            yield Doubt(
-                row.sensor,
-                row.recording,
-                None,
-                "not_sold",
-                "no such sensor is sold",
-                unfit=True,
-            )
+            yield Doubt(*_key(row), None, "not_sold", "no such sensor is sold", unfit=True)
 
 
 def simulated_beside_measured(recordings: Sequence[RecordingRow]) -> Iterator[Doubt]:
     """Yield a doubt for each simulated recording, where any measured one was analysed.
 
-    Parameters
-    ----------
-    recordings : sequence of RecordingRow
-        Of one sensor or of all.
+    ``recordings``: of one sensor or of all.
     """
+    reason = "it is simulated, and other recordings are measured"
     if any(row.status == "ok" and not row.simulated for row in recordings):
         for row in recordings:
             if row.simulated:
-                yield Doubt(
-                    row.sensor,
-                    row.recording,
-                    None,
-                    BESIDE_MEASURED,
-                    "it is simulated, and other recordings are measured",
-                    unfit=True,
-                )
+                yield Doubt(*_key(row), None, BESIDE_MEASURED, reason, unfit=True)
 
 
-def without_simulated(
-    recordings: Sequence[RecordingRow],
-) -> tuple[list[RecordingRow], list[Doubt]]:
+def without_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[RecordingRow], list[Doubt]]:
     """Return the recordings of all sensors, judged anew, and the doubts that are new.
 
     Sensors are judged each by itself: a simulated recording of one decides until a measured one of
     another is known.
-
-    Parameters
-    ----------
-    recordings : sequence of RecordingRow
-        With whether they decide.
     """
     known = {_key(row) for row in recordings if any(d.code == BESIDE_MEASURED for d in row.doubts)}
     new = [
@@ -247,13 +207,7 @@ def without_simulated(
 
 
 def fitness(of_recording: Iterable[Doubt]) -> Fitness:
-    """Return the verdict on a recording.
-
-    Parameters
-    ----------
-    of_recording : iterable of Doubt
-        All of one recording.
-    """
+    """Return the verdict on a recording from all doubts about it."""
     of_log = [doubt for doubt in of_recording if doubt.of_recording]
     if any(doubt.unfit for doubt in of_log):
         return "unfit"
@@ -265,18 +219,20 @@ def judged(
 ) -> list[RecordingRow]:
     """Return the rows of recordings with whether they decide, and their doubts.
 
-    Parameters
-    ----------
-    recordings : sequence of RecordingRow
-    doubts : iterable of Doubt
-        Of all of them.
-    included : collection of str
-        Those that decide although they are unfit, as ``sensor/recording``.
+    ``included``: recordings that decide although they are unfit, as ``sensor/recording``.
     """
-    by_recording: dict[Key, list[Doubt]] = {}
+    by_recording: dict[Key, list[Doubt]] = defaultdict(list)
     for doubt in doubts:
-        by_recording.setdefault((doubt.sensor, doubt.recording), []).append(doubt)
-    return [_judged(row, by_recording.get(_key(row), []), included) for row in recordings]
+        by_recording[doubt.sensor, doubt.recording].append(doubt)
+    rows = []
+    for row in recordings:
+        own = by_recording[_key(row)]
+        verdict = fitness(own) if row.status == "ok" else None
+        named = f"{row.sensor}/{row.recording}" in included
+        named &= all(doubt.code != BESIDE_MEASURED for doubt in own)
+        decides = verdict is not None and (verdict != "unfit" or named)
+        rows.append(replace(row, fitness=verdict, decides=decides, doubts=mark_doubts(own)))
+    return rows
 
 
 def mark_doubts(of_recording: Iterable[Doubt]) -> tuple[DoubtMark, ...]:
@@ -303,12 +259,6 @@ def undecided(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Itera
     """Yield rows of estimates, without the values of recordings that do not decide.
 
     A mean that is left out is NaN, as a row of it has a value.
-
-    Parameters
-    ----------
-    rows : iterable of ParameterRow or of FixedBiasRow
-    not_deciding : collection of (str, str)
-        Sensor and recording.
     """
     for row in rows:
         if _key(row) not in not_deciding:
@@ -350,46 +300,6 @@ def with_doubts_of_all(
             for doubt in recording.doubts
         )
         yield replace(row, doubts=tuple(own))
-
-
-def _judged(row: RecordingRow, doubts: Sequence[Doubt], included: Collection[str]) -> RecordingRow:
-    verdict = fitness(doubts) if row.status == "ok" else None
-    named = f"{row.sensor}/{row.recording}" in included
-    named &= all(doubt.code != BESIDE_MEASURED for doubt in doubts)
-    return replace(
-        row,
-        fitness=verdict,
-        decides=verdict is not None and (verdict != "unfit" or named),
-        doubts=mark_doubts(doubts),
-    )
-
-
-def _casts_doubt(row: FindingRow) -> bool:
-    if row.finding in LEFT_OUT:
-        return False
-    affects = bool(row.affects) or row.data is None  # no data: of an older kind
-    return (row.severity == "warning" and affects) or row.finding in UNFIT
-
-
-def _of_finding(row: FindingRow) -> Iterator[Doubt]:
-    """Yield the doubt of a finding, or one for each factor by which parameters may change."""
-    code = row.finding
-    affected = row.affects if row.data is not None else AFFECTED_PARAMETERS.get(code, ())
-    by_factor: dict[float | None, list[str]] = {}
-    if row.value is not None:
-        for name, power in SCALES.get(code, {}).items():
-            by_factor.setdefault(row.value**power, []).append(name)
-    for factor, names in (by_factor or {None: [*affected]}).items():
-        yield Doubt(
-            *_place(row),
-            code,
-            row.detail,
-            parameters=tuple(sorted(names)),
-            unfit=code in UNFIT,
-            factor=factor,
-            start=row.start,
-            end=row.end,
-        )
 
 
 def _place(row: FindingRow | ChannelRow) -> tuple[str, str, str | None]:

@@ -1,4 +1,4 @@
-"""Log files -> Parquet in SI, with what was found wrong on the way; memory stays bounded."""
+"""Convert log files to Parquet in SI, with findings, in bounded memory."""
 
 from __future__ import annotations
 
@@ -26,16 +26,10 @@ from imubench_pipeline.recordings.quality.columns import column_findings
 from imubench_pipeline.recordings.quality.copies import copied_channels
 from imubench_pipeline.recordings.quality.levels import kept_level
 from imubench_pipeline.recordings.quality.rotation import GravityTurn, gravity_turn
-from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import BESIDE, channel_logs, log_paths
 from imubench_pipeline.recordings.separation import separate_clocks
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.sensor import (
-    TEMPERATURE,
-    LogFormat,
-    RecordingNotes,
-    UsedPart,
-)
+from imubench_pipeline.settings.sensor import TEMPERATURE, LogFormat, RecordingNotes, UsedPart
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError
 
@@ -50,7 +44,7 @@ class Ingested:
     """A row of the table ``recordings`` without the names."""
     findings: list[Finding]
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Rate in Hz, points of the grid, segments and levels of each channel that goes on."""
+    """Rate in Hz, points of the grid, segments and levels of each analysed channel."""
     kept: dict[str, dict[str, Any]] = field(default_factory=dict)
     """The files of samples (`imubench_pipeline.recordings.kept.identified`)."""
     gravity: GravityTurn | None = None
@@ -59,7 +53,7 @@ class Ingested:
     """The files of the log, by their place in it; None: they were not read to their end."""
 
     def quality(self, names: dict[str, Any]) -> Quality:
-        """Return what ``quality.json`` says, with the names of the recording."""
+        """Return the content of ``quality.json``, with the names of the recording."""
         status = "ok" if self.channels else "rejected"
         sensor, recording = names["sensor"], names["recording"]
         return Quality(
@@ -125,7 +119,7 @@ def ingest(
 
 
 def remove_kept(folder: Path) -> None:
-    """Remove the log of an earlier run, and what a killed one left."""
+    """Remove the log of an earlier run, and the scratch files of a killed one."""
     for path in log_paths(folder):
         path.unlink()
     for path in folder.glob(".ingest.*.part"):
@@ -142,20 +136,31 @@ def _ingest(
     provenance: dict[str, Any],
     sources: Future[dict[str, KnownFile]],
 ) -> Ingested:
-    parts = [
-        part
-        for number, file in enumerate(read(source, log))
-        for part in _separated(read_part(file, notes.use, scratch, number), log, settings, scratch)
-    ]
+    parts: list[Part] = []
+    for number, file in enumerate(read(source, log)):
+        part = read_part(file, notes.use, scratch, number)
+        stated, whole = log.rate_hz or file.rate, partial(_base, part, log, settings)
+        parts += separate_clocks(part, stated, whole, settings, scratch)
     bases = [_base(part, log, settings) for part in parts]
-    groups = _shared_bases(parts, bases)
+    # Files share a clock if they have the same stamps, or as many samples and none.
+    by_clock: dict[tuple[object, ...], list[int]] = {}
+    for index, (part, base) in enumerate(zip(parts, bases, strict=True)):
+        stamps = part.digest() if len(parts) > 1 else ""
+        by_clock.setdefault((stamps, part.rows, base.rate), []).append(index)
+    groups = list(by_clock.values())
     static = provenance.get("kind", "static") == "static"
     findings = _findings(parts, bases, groups, settings, scratch, static=static)
-    findings += _overruled_notes(parts, notes)
+    marked = [part.source.path.name for part in parts if part.source.simulated]
+    if marked and notes.simulated is False:
+        detail = (
+            f"the notes say 'simulated: false', but {marked[0]} has the mark of a simulated log: "
+            "it is taken for simulated; remove the key from the notes, or the mark if it is wrong"
+        )
+        findings.append(Finding("simulated_by_mark", "warning", detail, len(marked)))
     findings += _unused_files(source, parts)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     names = names_of(parts, groups)
-    simulated = _is_simulated(parts, notes, provenance)
+    simulated = bool(marked or notes.simulated or provenance.get("simulated"))
     metadata = provenance | {
         "simulated": simulated,
         "sources": [
@@ -225,7 +230,7 @@ def _findings(
     *,
     static: bool,
 ) -> list[Finding]:
-    """Return what is wrong with the files, their columns and their clocks."""
+    """Return the findings about the files, their columns and their clocks."""
     files = {id(part.source): part.source for part in parts}.values()
     findings = [finding for file in files for finding in file.findings]
     findings += [finding for file in files for finding in file.contradicted_units()]
@@ -234,11 +239,10 @@ def _findings(
         found = column_findings(columns, base.rate, settings, static=static)
         findings += [finding for finding in found if finding not in findings]
         findings += part.findings
-        if static:  # what is sensed of a turn looks like a knock
+        if static:  # a turn looks like a knock
             findings += _knock_findings(part, base.rate, settings, scratch)
-    findings += copied_channels(
-        {name: c for part in parts for name, c in part.columns.items() if name not in BESIDE}
-    )
+    channels = {name: column for part in parts for name, column in part.columns.items()}
+    findings += copied_channels({n: c for n, c in channels.items() if n not in BESIDE})
     whole = [part for part in parts if part.base is None]
     if len({part.rows for part in whole if not part.stamped}) > 1:
         lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in whole)
@@ -260,33 +264,15 @@ def _findings(
     return findings
 
 
-def _is_simulated(parts: list[Part], notes: RecordingNotes, provenance: dict[str, Any]) -> bool:
-    """Return whether the run made the log, its notes say so, or one of its files has the mark."""
-    marked = any(part.source.simulated for part in parts)
-    return marked or bool(notes.simulated or provenance.get("simulated"))
-
-
-def _overruled_notes(parts: list[Part], notes: RecordingNotes) -> list[Finding]:
-    """Return a finding where the notes deny the mark of a simulated log."""
-    marked = [part.source.path.name for part in parts if part.source.simulated]
-    if not marked or notes.simulated is not False:
-        return []
-    detail = (
-        f"the notes say 'simulated: false', but {marked[0]} has the mark of a simulated log: it is "
-        "taken for simulated; remove the key from the notes, or the mark if it is wrong"
-    )
-    return [Finding("simulated_by_mark", "warning", detail, len(marked))]
-
-
 def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
-    """Return what the metadata of a file of samples say of its time base, and of holes in it."""
-    holes = {
-        channel: bool(
-            base.missing or column.missing or column.not_finite or part.knocks.get(channel)
-        )
-        for part in parts
-        for channel, column in part.columns.items()
-    }
+    """Return the metadata of a file of samples about its time base and holes."""
+    holes, empty = {}, []
+    for part in parts:
+        for name, column in part.columns.items():
+            lacks = (base.missing, column.missing, column.not_finite, part.knocks.get(name))
+            holes[name] = any(lacks)
+            if name in BESIDE and not column.present:
+                empty.append(name)
     return {
         "rate": base.rate,
         "rate_from": base.source,
@@ -295,12 +281,7 @@ def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
         "segments": [list(segment) for segment in base.segments],
         "uniform": base.uniform,
         "holes": holes,
-        "empty": [
-            name
-            for part in parts
-            for name, column in part.columns.items()
-            if name in BESIDE and not column.present
-        ],
+        "empty": empty,
     }
 
 
@@ -328,16 +309,9 @@ def _knock_findings(
             f"(at {at}{more} s); {part.knocks[channel]} samples about them are left out"
         )
         begin, end = max(events[0].first, 0) / rate, events[-1].last / rate
-        findings.append(
-            Finding("knocks", "warning", detail, part.knocks[channel], channel, begin, end)
-        )
+        number = part.knocks[channel]
+        findings.append(Finding("knocks", "warning", detail, number, channel, begin, end))
     return findings
-
-
-def _separated(part: Part, log: LogFormat, settings: QualitySettings, scratch: Path) -> list[Part]:
-    stated = log.rate_hz or part.source.rate
-    whole = partial(_base, part, log, settings)
-    return separate_clocks(part, stated, whole, settings, scratch)
 
 
 def _base(part: Part, log: LogFormat, settings: QualitySettings) -> timebase.TimeBase:
@@ -352,27 +326,14 @@ def _base(part: Part, log: LogFormat, settings: QualitySettings) -> timebase.Tim
         raise RecordingError(f"{part.source.path.name}: {error}") from None
 
 
-def _shared_bases(parts: list[Part], bases: list[timebase.TimeBase]) -> list[list[int]]:
-    """Group the files that have the same clock: the same stamps, or as many samples and none."""
-    if len(parts) == 1:
-        return [[0]]
-    groups: dict[tuple[object, ...], list[int]] = {}
-    for index, (part, base) in enumerate(zip(parts, bases, strict=True)):
-        groups.setdefault((part.digest(), part.rows, base.rate), []).append(index)
-    return list(groups.values())
-
-
 def _summary(
     parts: list[Part], bases: list[timebase.TimeBase], started: str | None
 ) -> dict[str, Any]:
     measured = [i for i, part in enumerate(parts) if set(part.columns) - BESIDE]
     longest = max(measured, key=lambda index: bases[index].rows)
     base = bases[longest]
-    temperature = next(
-        (part.columns[TEMPERATURE] for part in parts if TEMPERATURE in part.columns),
-        ColumnSummary(),
-    )
-    measured_temperature = temperature.present > 0
+    readings = [part.columns[TEMPERATURE] for part in parts if TEMPERATURE in part.columns][:1]
+    temperature = next((column for column in readings if column.present), None)
     return {
         "started": started,
         "rate": base.rate,
@@ -380,8 +341,8 @@ def _summary(
         "rate_error": base.rate_error,
         "samples": base.samples,
         "duration": base.grid / base.rate,
-        "temperature_min": temperature.low if measured_temperature else None,
-        "temperature_max": temperature.high if measured_temperature else None,
+        "temperature_min": temperature.low if temperature else None,
+        "temperature_max": temperature.high if temperature else None,
     }
 
 
@@ -440,15 +401,9 @@ def ingest_as_planned(
 
 
 def write_failed(settings: str, failure: Failure, path: Path) -> None:
-    """Write what is recorded of a recording of which the ingest failed, and keep nothing of it.
+    """Write ``path``, the ``quality.json`` of a recording whose ingest failed; remove its samples.
 
-    Parameters
-    ----------
-    settings : str
-        As of `ingest_as_planned`.
-    failure : Failure
-    path : Path
-        The ``quality.json`` of the recording.
+    For the settings see `ingest_as_planned`.
     """
     plan = json.loads(settings)
     notes = plan.get("notes", {})
@@ -473,6 +428,6 @@ def _stated_simulated(plan: dict[str, Any]) -> bool:
 
 
 def rejected(error: RecordingError, notes: RecordingNotes) -> Ingested:
-    """Return what is recorded of a recording that cannot be used."""
+    """Return the results of a recording that cannot be used."""
     summary = {"started": notes.started, "reason": str(error)}
     return Ingested(summary, [Finding("rejected", "fatal", str(error), 1)])

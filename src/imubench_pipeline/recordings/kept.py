@@ -1,4 +1,4 @@
-"""The samples of a recording for the steps that analyse them: as the ingest left them, or none."""
+"""Load ingested samples; refuse altered ones."""
 
 from __future__ import annotations
 
@@ -23,18 +23,17 @@ from imubench_pipeline.tables.parquet import end_of
 
 @dataclass(frozen=True)
 class Quality:
-    """``quality.json``: what the ingest found, and the channels that go on.
+    """``quality.json``: the findings of the ingest, and the channels that are analysed.
 
-    With the digests of the samples that were kept, the file is another one whenever they are: what
-    stands on them is made again, even if the run that read them was stopped in between. A digest of
-    its own stands at its end.
+    It contains the digests of the samples, so that it changes with them: the results are computed
+    again even if the run that read the log was stopped in between. Its own digest is at its end.
     """
 
     recording: dict[str, Any]
     findings: list[FindingRow]
     channels: dict[str, dict[str, Any]]
     kept: dict[str, dict[str, Any]] | None = None
-    """The files of samples, as `identified` gives them; None: it was not kept what they are."""
+    """The files of samples, as `identified` gives them; None: not known."""
     failure: dict[str, Any] | None = None
     """Why the ingest failed (`imubench_pipeline.tables.failures.Failure`)."""
     gravity: dict[str, Any] | None = None
@@ -47,17 +46,14 @@ class Quality:
 
     @property
     def grids(self) -> dict[str, int]:
-        """How many samples each channel has that goes on, missing ones with them."""
+        """Number of samples of each analysed channel, including missing ones."""
         return {channel: int(about["grid"]) for channel, about in self.channels.items()}
 
     @classmethod
     def read(cls, path: Path) -> Quality:
         """Read the file that `write` wrote.
 
-        Raises
-        ------
-        RecordingError
-            If it is damaged.
+        Raises RecordingError if it is damaged.
         """
         try:
             content = read_sealed_json(path)
@@ -71,15 +67,10 @@ class Quality:
         write_sealed_json(asdict(self), path)
 
     def fault(self, folder: Path, *, whole: bool = False) -> str | None:
-        """Return what is wrong with the samples that are kept; None where nothing is seen.
+        """Return what is wrong with the samples kept in a folder; None where nothing is seen.
 
-        Parameters
-        ----------
-        folder : Path
-            Where they are.
-        whole : bool
-            All is read, and not only what the checksums of the pages, which are verified where
-            samples are read, leave out: size and metadata.
+        With ``whole`` all is read, otherwise size and metadata only: the checksums of the pages are
+        verified where samples are read.
         """
         for name, stated in (self.kept or {}).items():
             path = folder / name
@@ -101,7 +92,7 @@ class Quality:
 
 
 def outcome(results: Path, sensor: str, recording: str) -> str:
-    """Return in one line what became of a recording in a run: used, with doubts, or rejected."""
+    """Return the outcome of a recording in one line: used, with doubts, or rejected."""
     name = f"{sensor}/{recording}"
     try:
         quality = Quality.read(results / "recordings" / sensor / recording / "quality.json")
@@ -133,15 +124,10 @@ def _footer(path: Path) -> str:
 def kept_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the channels of a recording that can be analysed, by name; none of a rejected one.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the recording, with its ``quality.json``.
+    ``folder`` contains its ``quality.json``.
 
-    Raises
-    ------
-    RecordingError
-        If files of samples are not there, are not those that the ingest left, or are damaged.
+    Raises RecordingError if files of samples are not there, are not those that the ingest left, or
+    are damaged.
     """
     quality = Quality.read(folder / "quality.json")
     if fault := quality.fault(folder):
@@ -154,6 +140,6 @@ def kept_logs(folder: Path) -> dict[str, ChannelLog]:
 
 
 def kept_static_logs(folder: Path) -> dict[str, ChannelLog]:
-    """Return those that were at rest all the time, as `kept_logs`: none of a turned sensor."""
+    """Return `kept_logs` of a sensor that was at rest all the time; none of a turned sensor."""
     logs = kept_logs(folder)
     return logs if was_at_rest(folder) else {}

@@ -1,14 +1,10 @@
-"""The evidence that the result of an ingest rests on: which files were read, and their identity.
+"""The evidence of an ingest: the files that were read, and their identity.
 
-The plan must see every change of a log and still be cheap: it looks at sizes, at the stamps of the
-last change of the content (mtime) and of anything (ctime, which nobody can set), and at a few
-blocks of a file. Whole files are read in the ingest, which has limits of time and memory. Only a
-file of moderate size whose stamps changed is read in the plan: where its content is the same, as
-after a restored backup, hours of analysis need not be repeated.
-
-A log may be edited in place, keep its size and get its old date back; it may be away for a moment,
-with a mount or while somebody moves it. Whatever an ingest concluded, an analysis or a rejection,
-is looked at again as soon as the files are no longer those that the conclusion rests on.
+The plan must see every change of a log and still be cheap: it compares sizes, mtime, ctime (which
+nobody can set), and a few blocks of a file. The ingest reads whole files, within limits of time and
+memory. The plan reads a whole file only if its size is moderate and its stamps have changed: if its
+content is the same, as after a restored backup, hours of analysis need not be repeated. Any result
+of an ingest, also a rejection, is computed again as soon as the files have changed.
 """
 
 from __future__ import annotations
@@ -54,15 +50,13 @@ Stamps = tuple[int, int]
 class KnownFile:
     """A file of a log as an ingest found it."""
 
-    size: int | None
-    """Bytes; None: it was not there."""
+    size: int | None  # bytes; None: it was not there
     sha256: str | None
     """SHA-256 of the content; None: it was not read to its end, or changed meanwhile."""
     stamps: Stamps | None
     """None: the file changed while it was read, or so shortly before that a later change might
     have the same stamps."""
-    version: str = ""
-    """The name of this content in the settings of the ingest."""
+    version: str = ""  # the name of this content in the settings of the ingest
     inode: int = 0
     """The number of the file. Two files may have the same size and stamps. Some network disks give
     other numbers each time: then only the content of a file of moderate size is compared."""
@@ -84,7 +78,7 @@ class KnownFile:
         return cls(before.st_size, digest, stamps, inode=before.st_ino)
 
     def distrusted(self) -> KnownFile:
-        """Return the file without what says that it has not changed."""
+        """Return the file without digest and stamps, so that it counts as changed."""
         return replace(self, sha256=None, stamps=None)
 
     def is_unchanged(self, about: os.stat_result) -> bool:
@@ -95,13 +89,7 @@ class KnownFile:
 
 
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
-    """Read the evidence of the last ingest; None where there is none.
-
-    Parameters
-    ----------
-    folder : Path
-        Results of the recording.
-    """
+    """Read the evidence of the last ingest from the results of a recording; None: there is none."""
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
         return {
             name: KnownFile(**{**file, "stamps": file["stamps"] and tuple(file["stamps"])})
@@ -113,17 +101,10 @@ def read_known(folder: Path) -> dict[str, KnownFile] | None:
 def write_known(
     files: Mapping[str, KnownFile], folder: Path, versions: Mapping[str, str] | None = None
 ) -> None:
-    """Write the evidence of an ingest.
+    """Write the evidence of an ingest to the results of a recording: files by place in the log.
 
-    Parameters
-    ----------
-    files : mapping of str to KnownFile
-        By their place in the log.
-    folder : Path
-        Results of the recording.
-    versions : mapping of str to str, optional
-        Versions as the plan named them. A file that was planned and is not among `files` was not
-        there.
+    ``versions`` are as the plan named them. A file that was planned and is not among ``files`` was
+    not there.
     """
     if versions is not None:
         absent = {name: KnownFile(None, None, None) for name in versions}
@@ -138,17 +119,10 @@ def write_known(
 def read_log(source: Path, is_stopped: Callable[[], bool] = lambda: False) -> dict[str, KnownFile]:
     """Read all files of a log, and return their identity by their place in the log.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    is_stopped : callable, optional
-        Asked now and then whether digests of large files are not needed any more.
+    ``source``: the log file, or the folder of a recording. ``is_stopped`` is called now and then:
+    whether digests of large files are not needed any more.
 
-    Raises
-    ------
-    OSError
-        If the folder cannot be listed.
+    Raises OSError if the folder cannot be listed.
     """
     return {name: KnownFile.of(file, is_stopped) for name, file in _places(source).items()}
 
@@ -158,10 +132,7 @@ def identity(source: Path) -> dict[str, tuple[int, ...]]:
 
     It is another value whenever a file was changed, replaced, renamed, or moved away and back.
 
-    Raises
-    ------
-    OSError
-        If the log is not there, or cannot be listed.
+    Raises OSError if the log is not there, or cannot be listed.
     """
     paths = {".": source} | _places(source)
     return {
@@ -175,23 +146,16 @@ def plan_versions(source: Path, folder: Path) -> dict[str, str]:
     """Return a name of the content of each file of a log; an ingest is needed where it changes.
 
     It is the name that the last ingest was planned with as long as the evidence of that ingest
-    holds, and another one otherwise.
-
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    folder : Path
-        Its results. New stamps of unchanged files are noted there.
+    holds, and another one otherwise. New stamps of unchanged files are noted in ``folder``, the
+    results of the log.
     """
     known = read_known(folder)
+    places: dict[str, Path] = {}
+    versions: dict[str, str] = {}
     try:
         places = _places(source)
     except OSError as error:
-        places = {}
-        versions = {".": _unreadable(error)}
-    else:
-        versions = {}
+        versions["."] = _unreadable(error)
     touched = dict[str, KnownFile]()
     for name, path in places.items():
         before = (known or {}).get(name)
@@ -230,33 +194,28 @@ def _now(path: Path, before: KnownFile) -> KnownFile | None:
 
 
 def is_changed(source: Path, folder: Path) -> bool:
-    """Return whether the files of a log are not those that its results rest on, if it has any.
+    """Return whether the files of a log have changed since its results in ``folder``.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    folder : Path
-        Its results.
+    False if there are no results.
     """
-    known = read_known(folder)
+    if (known := read_known(folder)) is None:
+        return False
     try:
         places = _places(source)
     except OSError:
-        return known is not None
-    return known is not None and (
-        known.keys() != places.keys()
-        or any(_is_another(path, known[name]) for name, path in places.items())
-    )
-
-
-def _is_another(path: Path, before: KnownFile) -> bool:
-    """Return whether a file has not the content that an ingest found."""
-    try:
-        size = path.stat().st_size
-        return _now(path, before) is None and not (before.stamps is None and before.size == size)
-    except OSError:
-        return before.size is not None
+        return True
+    if known.keys() != places.keys():
+        return True
+    for name, path in places.items():
+        before = known[name]
+        try:
+            uncertain = before.stamps is None and before.size == path.stat().st_size
+            if _now(path, before) is None and not uncertain:
+                return True
+        except OSError:
+            if before.size is not None:
+                return True
+    return False
 
 
 def versions_of(recording: Recording, results: Path) -> dict[str, str]:
@@ -273,10 +232,7 @@ def glimpse(path: Path) -> str:
     The first and the last block are among them. In a file above 1 MB, a change that leaves the
     size and all 16 blocks of 4 kB as they are has no effect; the stamps tell that one.
 
-    Raises
-    ------
-    OSError
-        If it cannot be read.
+    Raises OSError if it cannot be read.
     """
     digest = hashlib.sha256()
     with _opened(path) as file:

@@ -10,9 +10,7 @@ from imubench_pipeline.recordings.availability import watched
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError, UnavailableError
 
-_MEMORY = 1 << 29
-"""Bytes; the bounds of the readers take up to half of them."""
-
+_MEMORY = 1 << 29  # bytes; the bounds of the readers take up to half of them
 _SLOWEST = 5e6
 """Bytes/s. A bag without an index is searched to its end for a topic that it does not have: one of
 511 MB, most of it in messages of 300 bytes, took 21 s on a busy core."""
@@ -24,12 +22,8 @@ def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
     ``source``: the log file, or the folder of a recording.
     ``seconds``: how long it may take, and a second more for each 5 MB of the log.
 
-    Raises
-    ------
-    RecordingError
-        If they cannot be read, or that takes longer or more than 512 MiB, or crashes.
-    OSError
-        If the log is not there, or its disk does not answer in that time.
+    Raises RecordingError if they cannot be read, or that takes longer or more than 512 MiB, or
+    crashes. Raises OSError if the log is not there, or its disk does not answer in that time.
     """
     size = sum(path.stat().st_size for path in log_files(source))
     try:

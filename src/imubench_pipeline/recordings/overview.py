@@ -1,11 +1,8 @@
-"""What a recording looks like: each channel's envelope over time, and its histogram.
+"""Compute envelope over time and histogram of each channel, to draw 1e8 samples on a page.
 
-A page draws 1e8 samples with them. Each channel is read twice, in bounded memory.
-
-Time is that of the uniform grid, from the first sample of the log: point i lies at i / rate after
-the first sample that was kept of the channel's file. A hole has its length. A pause that begins a
-segment has none: the segment follows at once. Samples whose stamps lie on no grid are taken as
-consecutive. Where channels have clocks of their own, each counts from its own first sample.
+Each channel is read twice, in bounded memory. Times are on the uniform grid: point i is i / rate
+after the first sample of the channel's file. Holes have their length, but pauses between segments
+have none. Samples whose stamps lie on no grid are taken as consecutive.
 """
 
 from __future__ import annotations
@@ -33,7 +30,7 @@ from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 
 BUCKETS = 400
-"""Stretches of time of an envelope, unless told otherwise."""
+"""Default number of intervals of time of an envelope."""
 
 BUCKETS_OF_TURNS = 2400
 """The same of a recording with turns in it, which should be seen."""
@@ -43,15 +40,12 @@ MOST_BINS = 120
 
 _BINS = 100  # where no steps show
 
-_DRAWN = 1 << 16
-"""Samples, spread over the recording, that tell the bins of a histogram."""
-
+_DRAWN = 1 << 16  # samples, spread over the recording, that tell the bins of a histogram
 _BEYOND = 0.8
 """Widths of the middle that bins go beyond it: to 6 standard deviations, of Gaussian samples."""
 
-_SAME = 0.01
-"""Part of the mean gap between levels within which two are one, written in two ways."""
-
+_SAME = 0.01  # part of the mean gap between levels within which two are one, written in two ways
+_GOLDEN_RATIO = 0.6180339887498949
 _LOW, _HIGH, TOTAL, PRESENT = range(4)
 
 
@@ -64,23 +58,27 @@ class Overview:
 
 
 def overview(folder: Path, sensor: str, recording: str, buckets: int | None = None) -> Overview:
-    """Return what the channels of a kept recording look like; no row, where it was rejected.
+    """Return envelopes and histograms of a kept recording; no row if it was rejected.
 
     Channels that cannot be analysed are left out. The temperature has an envelope alone.
 
     Parameters
     ----------
     folder : Path
-        Of the recording, with its ``log*.parquet``.
+        Folder of its ``log*.parquet``.
     sensor, recording : str
     buckets : int, optional
-        Stretches of time of an envelope, at most; more where the sensor was turned.
+        Max. intervals of time of an envelope; more by default if the sensor was turned.
     """
     result = Overview([], [])
-    logs = channel_logs(folder)
+    logs = [*channel_logs(folder).values()]
+    for path in log_paths(folder):
+        if TEMPERATURE in pq.read_schema(path).names:
+            about = read_metadata(path)
+            logs.append(ChannelLog(path, TEMPERATURE, about["rate"], about["grid"], (), holes=True))
     if buckets is None:
         buckets = BUCKETS if was_at_rest(folder) else BUCKETS_OF_TURNS
-    for log in (*logs.values(), *_temperature(folder)):
+    for log in logs:
         names = asdict(Key(sensor, recording, log.channel))
         edges = bucket_edges(log.grid, buckets)
         figures, drawn = _follow(log, edges)
@@ -90,17 +88,15 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
         result.envelope.extend(EnvelopeRow(**names, **row) for row in envelope_rows(times, figures))
         if log.channel != TEMPERATURE:
             low, high = float(figures[:, _LOW].min()), float(figures[:, _HIGH].max())
-            bins = _bins(log, bin_edges(drawn, low, high))
-            result.histogram.extend(HistogramRow(**names, **row) for row in bins)
+            limits = bin_edges(drawn, low, high)
+            counts = np.zeros(len(limits) - 1, dtype=np.int64)
+            for values in log.blocks():
+                _count(values, limits, counts)
+            bins = zip(limits[:-1].tolist(), limits[1:].tolist(), counts.tolist(), strict=True)
+            result.histogram.extend(
+                HistogramRow(**names, lower=a, upper=b, count=n) for a, b, n in bins
+            )
     return result
-
-
-def _temperature(folder: Path) -> Iterator[ChannelLog]:
-    """Yield the temperature as if it were a channel, where there is one."""
-    for path in log_paths(folder):
-        if TEMPERATURE in pq.read_schema(path).names:
-            about = read_metadata(path)
-            yield ChannelLog(path, TEMPERATURE, about["rate"], about["grid"], (), holes=True)
 
 
 def bucket_edges(grid: int, buckets: int) -> NDArray[np.int64]:
@@ -123,16 +119,12 @@ def _follow(log: ChannelLog, edges: NDArray[np.int64]) -> tuple[Array, Array]:
     for values in log.blocks():
         gather(values, reached, edges, figures)
         reached += len(values)
-        drawn.append(_drawn(values[~np.isnan(values)] if log.holes else values, stride))
+        present = values[~np.isnan(values)] if log.holes else values
+        # A sample out of so many, at distances that no oscillation has for its period.
+        number = np.arange(np.ceil(len(present) / stride))
+        at = (number + number * _GOLDEN_RATIO % 1.0) * stride
+        drawn.append(present[at[at < len(present)].astype(np.int64)])
     return figures, np.concatenate(drawn)
-
-
-def _drawn(values: Array, stride: float) -> Array:
-    """Return a sample out of so many, at distances that no oscillation has for its period."""
-    number = np.arange(np.ceil(len(values) / stride))
-    golden = 0.6180339887498949
-    at = (number + number * golden % 1.0) * stride
-    return values[at[at < len(values)].astype(np.int64)]
 
 
 def envelope_rows(times: Array, figures: Array) -> Iterator[dict[str, Any]]:
@@ -143,45 +135,31 @@ def envelope_rows(times: Array, figures: Array) -> Iterator[dict[str, Any]]:
     spans = zip(times[:-1].tolist(), times[1:].tolist(), figures.tolist(), strict=True)
     for start, end, (low, high, total, present) in spans:
         row = {"start": start, "end": end, "samples": int(present)}
-        if present:
-            # Rounding can put the mean of equal samples beside them.
-            mean = min(max(total / present, low), high)
-            yield row | {"low": low, "high": high, "mean": mean}
-        else:
-            yield row | {"low": None, "high": None, "mean": None}
-
-
-def _bins(log: ChannelLog, edges: Array) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the table ``histogram``, without the names."""
-    counts = np.zeros(len(edges) - 1, dtype=np.int64)
-    for values in log.blocks():
-        _count(values, edges, counts)
-    for lower, upper, count in zip(edges[:-1], edges[1:], counts, strict=True):
-        yield {"lower": float(lower), "upper": float(upper), "count": int(count)}
+        # Rounding can put the mean of equal samples beside them.
+        mean = min(max(total / present, low), high) if present else None
+        extremes = {"low": low, "high": high} if present else {"low": None, "high": None}
+        yield row | extremes | {"mean": mean}
 
 
 def bin_edges(drawn: Array, low: float, high: float) -> Array:
-    """Return the edges of the bins of a histogram, the same for any order of the samples.
+    """Return the edges of the bins of a histogram, SI, increasing, shape (n + 1,).
 
-    The bins are equally wide, over some 6 standard deviations either side. What lies further out
-    is in the first or the last bin, which ends at the lowest or the highest sample. Where the
-    samples have steps, a bin holds a whole number of levels, and no level is on an edge.
-
-    Parameters
-    ----------
-    drawn : ndarray
-        Samples that stand for all, SI.
-    low, high : float
-        Lowest and highest sample, SI.
-
-    Returns
-    -------
-    ndarray, shape (n + 1,)
-        Increasing; twice the same edge where all samples are equal.
+    The bins are equally wide, over some 6 standard deviations either side. Samples further out are
+    in the first or the last bin, which ends at the lowest or the highest sample. Where the samples
+    have steps, a bin holds a whole number of levels, and no level is on an edge. Where all samples
+    are equal there are two equal edges. ``drawn``: samples that stand for all, in any order, SI.
+    ``low``, ``high``: lowest and highest sample, SI.
     """
     if low == high:
         return np.array([low, high])
-    middle = _middle(drawn)
+    # The samples in order without the outermost, few of which may be outliers.
+    ordered = np.sort(drawn)
+    size = len(ordered)
+    for tail in (max(size // 100, 2), size // 1000, size // 10000, 0):
+        cut = min(tail, size // 4)
+        middle = ordered[cut : size - cut]
+        if middle[0] < middle[-1]:
+            break
     beyond = _BEYOND * (middle[-1] - middle[0])
     start, stop = max(middle[0] - beyond, low), min(middle[-1] + beyond, high)
     lattice = _lattice(middle)
@@ -198,18 +176,6 @@ def bin_edges(drawn: Array, low: float, high: float) -> Array:
         edges = level + (lowest - 0.5 + together * np.arange(number + 1.0)) * step
         edges[0], edges[-1] = min(edges[0], low), max(edges[-1], high)
     return np.unique(edges)  # the steps of float64 can be wider than a bin
-
-
-def _middle(drawn: Array) -> Array:
-    """Return the samples in order without the outermost, few of which may be astray."""
-    ordered = np.sort(drawn)
-    size = len(ordered)
-    for tail in (max(size // 100, 2), size // 1000, size // 10000, 0):
-        cut = min(tail, size // 4)
-        middle = ordered[cut : size - cut]
-        if middle[0] < middle[-1]:
-            break
-    return middle
 
 
 def _lattice(ordered: Array) -> tuple[float, float] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers import Batch, LogFile
+from imubench_pipeline.readers import LogFile
 from imubench_pipeline.recordings.quality import levels
 from imubench_pipeline.recordings.quality.knocks import Knock, knocks, suspects
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
@@ -22,6 +23,7 @@ from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.sensor import UsedPart
 from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.typing import Array
 
 STAMP_BLOCK = ROW_GROUP
 """Records of a block of stamps, equal to the records of a row group."""
@@ -37,20 +39,15 @@ class Part:
     present_path: Path
     """Scratch files: the columns as Parquet, the stamps, and a bit mask per record of the columns
     with a number."""
-    writer: LogWriter
-    """Writer of ``data``; open until the metadata are known."""
-    rows: int = 0
-    not_used: int = 0
-    """Number of records that are used, and of records outside the part to use."""
-    columns: dict[str, ColumnSummary] = field(default_factory=dict)
-    """Statistics of each column."""
+    writer: LogWriter  # writer of ``data``; open until the metadata are known
+    rows: int = 0  # number of records that are used
+    columns: dict[str, ColumnSummary] = field(default_factory=dict)  # statistics of each column
     patterns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """Number of records for each bit mask of columns with a number: entry 5 counts the records with
     the first and the third column."""
     knocks: dict[str, int] = field(default_factory=dict)
     """Number of samples of each column that are left out as part of a knock."""
-    stamped: bool = False
-    """Records have stamps."""
+    stamped: bool = False  # records have stamps
     base: TimeBase | None = None
     """Time base, if it was set when the columns of a file were separated."""
     findings: list[Finding] = field(default_factory=list)
@@ -58,7 +55,7 @@ class Part:
     left_out: dict[str, ColumnSummary] = field(default_factory=dict)
     """Columns that were not written in the separation, since they have too few samples."""
 
-    def stamps(self) -> Iterator[NDArray[np.float64]]:
+    def stamps(self) -> Iterator[Array]:
         """Yield the stamps in s, read from the scratch file."""
         for start in range(0, self.rows, STAMP_BLOCK):
             yield np.fromfile(self.stamps_path, np.float64, STAMP_BLOCK, offset=8 * start)
@@ -103,9 +100,7 @@ class PartWriter:
     _stamps: BinaryIO
     _present: BinaryIO
 
-    def add(
-        self, time: NDArray[np.float64] | None, columns: Mapping[str, NDArray[np.float64]]
-    ) -> None:
+    def add(self, time: Array | None, columns: Mapping[str, Array]) -> None:
         """Write consecutive records and add them to the statistics: stamps, s, and samples, SI."""
         part = self._part
         # Not `tofile`: it does not report a failed write when the C library closes the file.
@@ -129,52 +124,33 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     ``scratch``: folder for the scratch files.
     ``number``: number of the file, for the names of the scratch files.
 
-    Raises
-    ------
-    RecordingError
-        If the file cannot be read, or no sample lies in the part to use.
+    Raises RecordingError if the file cannot be read, or no sample lies in the part to use.
     """
     rate = file.log.rate_hz
     read_rows = 0
     with new_part(file, file.sources, scratch, f"part{number}") as (part, writer):
         for batch in file.batches():
-            keep = _select_used(batch, use, read_rows, rate)
+            clock, columns = batch.time, batch.columns
+            if use.start > 0.0 or use.end is not None:
+                if clock is None:
+                    assert rate is not None  # checked with the sensor file
+                    clock = np.arange(read_rows, read_rows + len(batch)) / rate
+                # Records without a stamp are used: they are not known to lie outside.
+                keep = ~((clock < use.start) | (clock > (math.inf if use.end is None else use.end)))
+                clock = clock[keep]
+                columns = {name: values[keep] for name, values in columns.items()}
             read_rows += len(batch)
-            writer.add(
-                None if batch.time is None else batch.time[keep],
-                {name: values[keep] for name, values in batch.columns.items()},
-            )
-    part.not_used = read_rows - part.rows
+            writer.add(None if batch.time is None else clock, columns)
+    not_used = read_rows - part.rows
     if part.rows == 0:
         raise RecordingError(
             f"{file.path.name}: none of its {read_rows} samples lies in the part to use "
             f"(use: start {use.start} s, end {use.end or 'open'})"
         )
-    if part.not_used:
-        detail = f"{part.not_used} samples lie outside the part to use"
-        file.note("not_used", detail, part.not_used, "note")
+    if not_used:
+        detail = f"{not_used} samples lie outside the part to use"
+        file.note("not_used", detail, not_used, "note")
     return part
-
-
-def _select_used(
-    batch: Batch, use: UsedPart, before: int, rate: float | None
-) -> slice | NDArray[np.bool_]:
-    """Return a selection of the records of a batch in the part to use.
-
-    ``before``: number of records before the batch.
-    ``rate``: stated rate, Hz; needed if there are no stamps.
-    """
-    if use.start == 0.0 and use.end is None:
-        return slice(None)
-    clock = batch.time
-    if clock is None:
-        assert rate is not None  # checked with the sensor file
-        clock = np.arange(before, before + len(batch)) / rate
-    # Records without a stamp are used: they are not known to lie outside.
-    keep = ~(clock < use.start)
-    if use.end is not None:
-        keep &= ~(clock > use.end)
-    return keep
 
 
 def leave_out_knocks(
@@ -182,14 +158,9 @@ def leave_out_knocks(
 ) -> dict[str, list[Knock]]:
     """Replace the samples of knocks by NaN; return the knocks by column.
 
-    Parameters
-    ----------
-    part : Part
-        Its scratch file is written again if there is a knock.
-    sigmas : float
-        Least distance of a knock from the level, in standard deviations.
-    longest : int
-        Longest knock, records; a longer event is motion.
+    The scratch file of the part is written again if there is a knock. ``sigmas``: least distance of
+    a knock from the level, in standard deviations. ``longest``: longest knock, records; a longer
+    event is motion.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(suspects(b, sigmas)[0])]
@@ -201,17 +172,10 @@ def leave_out_knocks(
     part.writer.finish({})
     knocks_of = {}
     for name in doubtful:
-        here = list(
-            knocks(_read_row_groups(part.data, name), blocks[name], sigmas, longest, step[name])
-        )
-        if here:
+        values = _read_row_groups(part.data, name)
+        if here := list(knocks(values, blocks[name], sigmas, longest, step[name])):
             knocks_of[name] = here
-    _rewrite_without_knocks(part, knocks_of, scratch)
-    return knocks_of
-
-
-def _rewrite_without_knocks(part: Part, knocks_of: dict[str, list[Knock]], scratch: Path) -> None:
-    """Write the columns again without the samples of knocks; the new writer stays open."""
+    # Write the columns again without the samples of knocks; the new writer stays open.
     old = part.data
     part.data = scratch / f"{old.stem}.calm.parquet"
     part.writer = LogWriter(part.data, dict.fromkeys(part.columns, pa.float64()))
@@ -222,19 +186,20 @@ def _rewrite_without_knocks(part: Part, knocks_of: dict[str, list[Knock]], scrat
             table = checked_row_group(file, number)
             columns = {}
             for name in part.columns:
-                values = np.array(table.column(name).to_numpy(), dtype=np.float64)
-                before = int(np.isfinite(values).sum())
+                samples = np.array(table.column(name).to_numpy(), dtype=np.float64)
+                before = int(np.isfinite(samples).sum())
                 for knock in knocks_of.get(name, []):
                     start = max(knock.first - reached, 0)
-                    values[start : max(knock.last - reached, 0)] = np.nan
-                part.knocks[name] += before - int(np.isfinite(values).sum())
-                columns[name] = values
+                    samples[start : max(knock.last - reached, 0)] = np.nan
+                part.knocks[name] += before - int(np.isfinite(samples).sum())
+                columns[name] = samples
             reached += table.num_rows
             part.writer.write(columns)
     old.unlink()
+    return knocks_of
 
 
-def _read_row_groups(path: Path, name: str) -> Iterator[NDArray[np.float64]]:
+def _read_row_groups(path: Path, name: str) -> Iterator[Array]:
     with checked_parquet(path) as file:
         for number in range(file.num_row_groups):
             table = checked_row_group(file, number, [name])

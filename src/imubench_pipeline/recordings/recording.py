@@ -1,14 +1,12 @@
-"""A recording as it is kept: Parquet files in SI, one a time base, with its provenance.
+"""An ingested recording: Parquet files in SI, one for each time base, with its provenance.
 
-The columns of ``log.parquet`` are the channels, and ``temperature`` in °C. Where the stamps
-are needed there is ``time`` (s from the first sample); where samples are missing there is also
-``sample``, the position on the uniform grid. A sample that is missing in one channel only is
-null. Where channels have clocks of their own, each clock has a file: ``log.gyro.parquet``.
+The columns are the channels, and ``temperature`` in °C. If stamps are needed there is ``time``
+(s from the first sample), and if samples are missing also ``sample``, the position on the uniform
+grid. A sample that is missing in one channel only is null.
 """
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -69,34 +67,30 @@ class LogWriter:
         rows = len(next(iter(columns.values())))
         if rows == 0:
             return
-        self._waiting.append(self._batch(columns))
+        arrays = []
+        for field in self._schema:
+            values = columns[field.name]
+            # NaN becomes null; a column without NaN is not copied.
+            holes = values.dtype.kind == "f" and bool(np.isnan(values.sum()))
+            arrays.append(pa.array(values, type=field.type, from_pandas=holes))
+        self._waiting.append(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
         self._rows += rows
         while self._rows >= ROW_GROUP:
             self._flush(ROW_GROUP)
 
     def finish(self, metadata: Mapping[str, Any]) -> None:
-        """Write what is waiting, and the metadata of the file; close it."""
+        """Write the remaining rows and the metadata of the file; close it."""
         if self._rows:
             self._flush(self._rows)
         self._writer.add_key_value_metadata({METADATA: json.dumps(metadata)})
         self._writer.close()
 
     def _flush(self, rows: int) -> None:
-        """Write the first rows of what is waiting, which is not copied for it."""
+        """Write the first of the waiting rows, without a copy."""
         waiting = pa.Table.from_batches(self._waiting, schema=self._schema)
         self._writer.write_table(waiting.slice(0, rows), row_group_size=ROW_GROUP)
         self._waiting = waiting.slice(rows).to_batches()
         self._rows -= rows
-
-    def _batch(self, columns: Mapping[str, NDArray[Any]]) -> pa.RecordBatch:
-        arrays = [_to_arrow(columns[field.name], field.type) for field in self._schema]
-        return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
-
-
-def _to_arrow(values: NDArray[Any], kind: pa.DataType) -> pa.Array:
-    """Return numbers as Arrow keeps them, null for NaN; not copied where there is none."""
-    holes = values.dtype.kind == "f" and np.isnan(values.sum())
-    return pa.array(values, type=kind, from_pandas=bool(holes))
 
 
 def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
@@ -118,68 +112,61 @@ def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
 class ChannelLog:
     """One channel of a kept recording."""
 
-    path: Path
-    """Its Parquet file."""
+    path: Path  # its Parquet file
     channel: str
-    rate: float
-    """Hz."""
-    grid: int
-    """Points of the uniform grid."""
-    segments: tuple[tuple[int, int], ...]
-    """Grid points that begin and end each segment."""
-    holes: bool
-    """Samples are missing: blocks have NaN in their place."""
-    temperature: bool = False
-    """There are readings of the temperature on the same grid."""
-    position: bool = False
-    """There is a column on the same grid that says how the sensor stood."""
+    rate: float  # Hz
+    grid: int  # points of the uniform grid
+    segments: tuple[tuple[int, int], ...]  # grid points that begin and end each segment
+    holes: bool  # samples are missing: blocks have NaN in their place
+    temperature: bool = False  # there are readings of the temperature on the same grid
+    position: bool = False  # there is a column on the same grid that says how the sensor stood
     table_rate: bool = False
     """There is a column on the same grid with the rate of the table that the sensor stood on."""
 
-    def blocks(self) -> Iterator[NDArray[np.float64]]:
+    def blocks(self) -> Iterator[Array]:
         """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing.
 
-        Raises
-        ------
-        RecordingError
-            If the file is damaged.
+        Raises RecordingError if the file is damaged.
         """
-        with _named_if_damaged(self.path), checked_parquet(self.path) as file:
-            placed = "sample" in file.schema_arrow.names
-            columns = [self.channel, *(["sample"] if placed else [])]
-            reached = 0
-            for number in range(file.num_row_groups):
-                table = checked_row_group(file, number, columns)
-                values = _to_numpy(table.column(self.channel))
-                if not placed:
-                    yield values
-                    continue
-                points = _to_numpy(table.column("sample"))
-                start = 0
-                while start < len(points):
-                    # Long holes: a row group can stand for many times its rows on the grid.
-                    stop = int(np.searchsorted(points, max(reached, points[start]) + ROW_GROUP))
-                    block = np.full(int(points[stop - 1]) + 1 - reached, np.nan)
-                    block[points[start:stop] - reached] = values[start:stop]
-                    reached = int(points[stop - 1]) + 1
-                    start = stop
-                    yield block
+        try:
+            with checked_parquet(self.path) as file:
+                placed = "sample" in file.schema_arrow.names
+                columns = [self.channel, *(["sample"] if placed else [])]
+                reached = 0
+                for number in range(file.num_row_groups):
+                    table = checked_row_group(file, number, columns)
+                    values = _to_numpy(table.column(self.channel))
+                    if not placed:
+                        yield values
+                        continue
+                    points = _to_numpy(table.column("sample"))
+                    start = 0
+                    while start < len(points):
+                        # Long holes: a row group can stand for many times its rows on the grid.
+                        stop = int(np.searchsorted(points, max(reached, points[start]) + ROW_GROUP))
+                        block = np.full(int(points[stop - 1]) + 1 - reached, np.nan)
+                        block[points[start:stop] - reached] = values[start:stop]
+                        reached = int(points[stop - 1]) + 1
+                        start = stop
+                        yield block
+        except (OSError, pa.ArrowException) as error:
+            raise RecordingError(f"{self.path}: is damaged ({error}): {MEND}") from error
 
-    def temperatures(self) -> Iterator[NDArray[np.float64]]:
-        """Yield the readings of the temperature, °C, in blocks like those of the samples."""
+    def temperatures(self) -> Iterator[Array]:
+        """Yield the readings of the temperature, °C, in the blocks of the samples."""
         return replace(self, channel=TEMPERATURE).blocks()
 
-    def positions(self) -> Iterator[NDArray[np.float64]]:
-        """Yield how the sensor stood, as written, in blocks like those of the samples."""
+    def positions(self) -> Iterator[Array]:
+        """Yield the position of the sensor, as written, in the blocks of the samples."""
         return replace(self, channel=POSITION).blocks()
 
-    def table_rates(self) -> Iterator[NDArray[np.float64]]:
-        """Yield the rate of the table, rad/s, in blocks like those of the samples."""
+    def table_rates(self) -> Iterator[Array]:
+        """Yield the rate of the table, rad/s, in the blocks of the samples."""
         return replace(self, channel=TABLE_RATE).blocks()
 
     @property
     def position_elsewhere(self) -> bool:
-        """How the sensor stood is kept too, but on another clock than this channel."""
+        """Whether the position of the sensor is on another clock than this channel."""
         others = (path for path in log_paths(self.path.parent) if path != self.path)
         return any(POSITION in pq.read_schema(path).names for path in others)
 
@@ -196,14 +183,6 @@ def mean_of(blocks: Iterable[Array]) -> float:
         total += float(present.sum(dtype=np.float64))
         number += len(present)
     return total / number if number else math.nan
-
-
-@contextlib.contextmanager
-def _named_if_damaged(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except (OSError, pa.ArrowException) as error:
-        raise RecordingError(f"{path}: is damaged ({error}): {MEND}") from error
 
 
 def read_metadata(path: Path) -> dict[str, Any]:
@@ -254,20 +233,7 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
 
 
 def on_grid(blocks: Iterable[Array], grid: int) -> Array:
-    """Return a column on the whole grid of a log.
-
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        In order, in any unit.
-    grid : int
-        L, samples of the log.
-
-    Returns
-    -------
-    ndarray, shape (L,)
-        In the unit of the blocks, NaN where nothing is.
-    """
+    """Return consecutive blocks of a column on a grid of L points, shape (L,); NaN at the end."""
     values = np.full(grid, np.nan)
     reached = 0
     for block in blocks:

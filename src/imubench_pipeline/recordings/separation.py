@@ -1,11 +1,9 @@
 """Separate the columns of one table by their sampling rates: each clock becomes a part.
 
-Phones and programs that merge logs write a row for each stamp, and leave cells empty for sensors
-without a new sample. A channel has a clock of its own in two cases: its records with a number lie
-on a uniform grid that is slower than the grid of all records, or all records together lie on no
-grid. Randomly missing numbers do not lie on a slower grid: such a channel stays on the common grid.
-The axes of a gyro, or of an accelerometer, are sampled together: an axis with fewer numbers than
-another one has missing samples.
+Merged logs have a row for each stamp, and empty cells for sensors without a new sample. A channel
+has a clock of its own if its numbers lie on a uniform grid that is slower than the grid of all
+records, or if all records together lie on no grid. An axis of a gyro, or of an accelerometer, with
+fewer numbers than another axis has missing samples.
 """
 
 from __future__ import annotations
@@ -27,6 +25,7 @@ from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.typing import Array
 
 _MIN_COMMON_RECORDS = 0.5
 """Least share of common records, of the sparser channel, for two channels of one clock."""
@@ -51,8 +50,7 @@ class _Clock:
 
     base: TimeBase
     channels: list[str]
-    bits: int
-    """Bit mask of the channels in `Part.present`."""
+    bits: int  # bit mask of the channels in `Part.present`
 
 
 class _Records:
@@ -72,7 +70,7 @@ class _Records:
         """Return the number of records with a number of a channel."""
         return self.common[channel, channel]
 
-    def times(self, *, numbered: bool = False) -> Iterator[NDArray[np.float64]]:
+    def times(self, *, numbered: bool = False) -> Iterator[Array]:
         """Yield the stamps of all records, s; without stamps, or if ``numbered``, their indices.
 
         Indices are divided by the stated rate, if there is one.
@@ -90,16 +88,12 @@ class _Records:
         The stated rate belongs to all records. It only decides whether double steps are lost
         samples. ``known``: the interval, s, if it is known.
 
-        Raises
-        ------
-        RecordingError
-            If their stamps do not advance, or jump too often.
+        Raises RecordingError if their stamps do not advance, or jump too often.
         """
 
-        def stamps() -> Iterator[NDArray[np.float64]]:
-            for block, present in zip(
-                self.times(numbered=numbered), self._part.present(), strict=True
-            ):
+        def stamps() -> Iterator[Array]:
+            times = self.times(numbered=numbered)
+            for block, present in zip(times, self._part.present(), strict=True):
                 yield block[has_one(present, bits)]
 
         settings = self._settings
@@ -136,9 +130,9 @@ class _Records:
 
 def has_one(present: NDArray[np.uint16], bits: int) -> NDArray[np.bool_]:
     """Return a mask of the records with a number in any of these columns, or of `ALL_RECORDS`."""
-    return (
-        np.ones(len(present), np.bool_) if bits == ALL_RECORDS else present & np.uint16(bits) != 0
-    )
+    if bits == ALL_RECORDS:
+        return np.ones(len(present), np.bool_)
+    return present & np.uint16(bits) != 0
 
 
 def separate_clocks(
@@ -150,21 +144,11 @@ def separate_clocks(
 ) -> list[Part]:
     """Return one part for each clock of a file; the part itself if there is only one clock.
 
-    Parameters
-    ----------
-    part : Part
-        Its scratch file is read again if it is separated.
-    stated : float or None
-        Stated rate of its records, Hz.
-    whole : callable
-        Returns the time base of all records.
-    scratch : Path
-        Folder for the scratch files.
+    The scratch file of a part that is separated is read again. ``stated``: rate of its records, Hz.
+    ``whole`` returns the time base of all records. ``scratch``: folder for the scratch files.
 
-    Raises
-    ------
-    RecordingError
-        If channels have no clock of their own, and all records together have none either.
+    Raises RecordingError if channels have no clock of their own, and all records together have none
+    either.
     """
     records = _Records(part, stated, settings)
     channels = [
@@ -181,15 +165,16 @@ def separate_clocks(
         base = None
     grid = base if base is not None and (base.uniform or base.stamped) else None
     limit = (1.0 - settings.rate_tolerance) * (base.rate if base is not None else math.inf)
-    own = {}
-    for name in channels:
-        found = _find_own_clock(name, channels, part, records, grid)
-        if found is not None:
-            own[name] = found
+    found = {name: _find_own_clock(name, channels, part, records, grid) for name in channels}
+    own = {name: clock for name, clock in found.items() if clock is not None}
     leaders = {name: _find_complete_sibling(name, own, records) for name in own}
-    own = {name: found for name, found in own.items() if leaders[name] is None}
-    if grid is not None and all(found.rate >= limit for found in own.values()):
-        part.findings = _find_rate_changes(channels, grid, records, part)
+    own = {name: clock for name, clock in own.items() if leaders[name] is None}
+    if grid is not None and all(clock.rate >= limit for clock in own.values()):
+        # By stamps of arrival, losses cannot be located.
+        for name in channels if grid.stamped or not part.stamped else ():
+            if records.count(name) < (1.0 - timebase.MIN_MISSING) * part.rows:
+                points = records.points(grid, records.bit[name])
+                part.findings += timebase.rate_changes(points, grid.rate, name)
         return [part]
     clocks = _group_by_clock(own, records, settings)
     rest = _assign_to_clocks(channels, own, clocks, records, leaders)
@@ -202,9 +187,13 @@ def separate_clocks(
         rest = []
     if rest:
         clocks.append(_Clock(base or whole(), rest, ALL_RECORDS))
-    for clock in clocks:
-        if clock.bits != ALL_RECORDS:
-            clock.base = _find_base_of_group(clock, records, settings)
+    for group in clocks:
+        if group.bits != ALL_RECORDS:
+            rate, joint = group.base.rate, records.base(group.bits)
+            same = joint.stamped and abs(joint.rate / rate - 1.0) <= settings.rate_tolerance
+            if not same and group.base.stamped:
+                joint = records.base(group.bits, known=1.0 / rate)
+            group.base = joint
     return _write_parts(part, clocks, records, scratch)
 
 
@@ -222,20 +211,6 @@ def _find_complete_sibling(name: str, own: Mapping[str, TimeBase], records: _Rec
         and (other not in own or own[other].rate > (1.0 + _MAX_COMMON_IF_SEPARATE) * own[name].rate)
     ]
     return max(siblings, key=records.count, default=None)
-
-
-def _find_rate_changes(
-    channels: list[str], grid: TimeBase, records: _Records, part: Part
-) -> list[Finding]:
-    """Return a finding for each channel with a lower rate in a part of the log."""
-    if not grid.stamped and part.stamped:  # stamps of arrival: losses cannot be located
-        return []
-    findings = []
-    for name in channels:
-        if records.count(name) < (1.0 - timebase.MIN_MISSING) * part.rows:
-            points = records.points(grid, records.bit[name])
-            findings += timebase.rate_changes(points, grid.rate, name)
-    return findings
 
 
 def _find_own_clock(
@@ -287,14 +262,6 @@ def _group_by_clock(
     return clocks
 
 
-def _find_base_of_group(clock: _Clock, records: _Records, settings: QualitySettings) -> TimeBase:
-    """Return the time base of the records with a number in any channel of a clock."""
-    rate = clock.base.rate
-    base = records.base(clock.bits)
-    same = base.stamped and abs(base.rate / rate - 1.0) <= settings.rate_tolerance
-    return base if same or not clock.base.stamped else records.base(clock.bits, known=1.0 / rate)
-
-
 def _assign_to_clocks(
     channels: list[str],
     own: dict[str, TimeBase],
@@ -311,16 +278,11 @@ def _assign_to_clocks(
         if name in own:
             continue
         leader = leaders.get(name)
-        within = [
-            clock
-            for clock in clocks
-            if (
-                leader in clock.channels
-                if leader
-                else records.common[name, clock.channels[0]]
-                >= _MIN_CONTAINED_RECORDS * records.count(name)
-            )
-        ]
+        least = _MIN_CONTAINED_RECORDS * records.count(name)
+        if leader:
+            within = [clock for clock in clocks if leader in clock.channels]
+        else:
+            within = [c for c in clocks if records.common[name, c.channels[0]] >= least]
         if within:
             clock = min(within, key=lambda clock: records.count(clock.channels[0]))
             clock.channels.append(name)
@@ -346,9 +308,8 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
             made.append(stack.enter_context(new_part(part.source, names + beside, scratch, stem)))
         waiting = [dict.fromkeys(beside, math.nan) for _ in clocks]
         with checked_parquet(part.data) as file:
-            for group, (times, present) in enumerate(
-                zip(records.times(), part.present(), strict=True)
-            ):
+            blocks = zip(records.times(), part.present(), strict=True)
+            for group, (times, present) in enumerate(blocks):
                 table = checked_row_group(file, group)
                 for clock, (of_clock, writer), readings in zip(clocks, made, waiting, strict=True):
                     chosen = has_one(present, clock.bits)
@@ -364,7 +325,19 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
     parts = [of_clock for of_clock, _ in made]
     for clock, of_clock in zip(clocks, parts, strict=True):
         of_clock.stamped = part.stamped
-        _describe(of_clock, clock, part)
+        base = clock.base
+        findings = [
+            replace(each, channel=name) for name in clock.channels for each in base.findings
+        ]
+        if of_clock.rows < part.rows:
+            names = [name for name in of_clock.columns if name in clock.channels]
+            verb = "has a number" if len(clock.channels) == 1 else "have numbers"
+            detail = (
+                f"{', '.join(names)}: {verb} in {of_clock.rows} of {part.rows} records, and a "
+                f"clock of its own: analysed at {base.rate:.6g} Hz"
+            )
+            findings.append(Finding("own_rate", "note", detail, base.rate))
+        of_clock.base = replace(base, findings=tuple(findings))
     parts[0].left_out = {
         name: column
         for name, column in part.columns.items()
@@ -373,24 +346,7 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
     return parts
 
 
-def _describe(of_clock: Part, clock: _Clock, part: Part) -> None:
-    """Set the time base of a part, with its findings."""
-    names = ", ".join(name for name in of_clock.columns if name in clock.channels)
-    base = clock.base
-    findings = [replace(found, channel=name) for name in clock.channels for found in base.findings]
-    if of_clock.rows < part.rows:
-        verb = "has a number" if len(clock.channels) == 1 else "have numbers"
-        detail = (
-            f"{names}: {verb} in {of_clock.rows} of {part.rows} records, and a clock of its own: "
-            f"analysed at {base.rate:.6g} Hz"
-        )
-        findings.append(Finding("own_rate", "note", detail, base.rate))
-    of_clock.base = replace(base, findings=tuple(findings))
-
-
-def _carry(
-    values: NDArray[np.float64], chosen: NDArray[np.bool_], waiting: float
-) -> tuple[NDArray[np.float64], float]:
+def _carry(values: Array, chosen: NDArray[np.bool_], waiting: float) -> tuple[Array, float]:
     """Return the latest reading since the previous chosen record, for each chosen record.
 
     ``waiting``: reading after the last chosen record of the previous block. The same for this block

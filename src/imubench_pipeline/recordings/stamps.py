@@ -9,7 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Stamps = Callable[[], Iterator[NDArray[np.float64]]]
+from imubench_pipeline.typing import Array
+
+Stamps = Callable[[], Iterator[Array]]
 """Returns a new iterator over the stamps of a file in s, block by block; NaN where missing."""
 
 _MAX_GRID_DISTANCE = 0.48
@@ -20,9 +22,7 @@ _TRACKING_GAIN = 0.02
 """Gain of the loop that makes the grid follow the stamps. The gain for its interval is a quarter of
 the square (critical damping)."""
 
-_MIN_DOUBLE_STEP, _MAX_DOUBLE_STEP = 1.75, 2.2
-"""Range of a double step, over the median step."""
-
+_MIN_DOUBLE_STEP, _MAX_DOUBLE_STEP = 1.75, 2.2  # range of a double step, over the median step
 MIN_SHARED_STAMPS = 0.2
 """Share of repeated stamps above which each stamp belongs to a group of samples."""
 
@@ -44,16 +44,14 @@ from records that were written twice or out of order."""
 _RECORDS_ON_EACH_SIDE = 16
 """Records on each side of a step that distinguish a clock that was set back from a late stamp."""
 
-_MAX_EXAMINED_STAMPS = 1 << 17
-"""Stamps of a block that are used for its typical interval."""
+_MAX_EXAMINED_STAMPS = 1 << 17  # stamps of a block that are used for its typical interval
 
 
 @dataclass(frozen=True)
 class Interval:
     """First estimate of the interval between samples."""
 
-    mean: float
-    """Mean of the intervals without missing samples, s."""
+    mean: float  # mean of the intervals without missing samples, s
     other: float | None = None
     """Mean, s, if double steps at regular distances are lost samples, or if repeated stamps at
     regular distances are records written twice; None if there are none. Rounded stamps cause the
@@ -72,14 +70,12 @@ def typical_interval(stamps: Stamps) -> Interval | None:
         steps = _take_forward_steps(block)
         if len(steps):
             medians.append(float(np.quantile(steps, _MEDIAN_LEVEL, method="lower")))
-            long = (steps > _MIN_DOUBLE_STEP * medians[-1]) & (
-                steps < _MAX_DOUBLE_STEP * medians[-1]
-            )
+            long = steps > _MIN_DOUBLE_STEP * medians[-1]
+            long &= steps < _MAX_DOUBLE_STEP * medians[-1]
             rounded.append(_are_regular(long))
             zero = np.diff(block[:_MAX_EXAMINED_STAMPS]) == 0.0
-            repeated.append(
-                _MIN_ROUNDED_REPEATS <= np.mean(zero) <= _MAX_ROUNDED_REPEATS and _are_regular(zero)
-            )
+            few = _MIN_ROUNDED_REPEATS <= np.mean(zero) <= _MAX_ROUNDED_REPEATS
+            repeated.append(few and _are_regular(zero))
     if not medians:
         return None
     median = float(np.median(medians))
@@ -106,7 +102,7 @@ def _sum_steps_up_to(stamps: Stamps, limit: float) -> tuple[float, int]:
     return total, count
 
 
-def _take_forward_steps(block: NDArray[np.float64]) -> NDArray[np.float64]:
+def _take_forward_steps(block: Array) -> Array:
     """Return the positive steps of the first stamps of a block, or else of the whole block."""
     for part in (block[:_MAX_EXAMINED_STAMPS], block):
         steps = np.diff(part)
@@ -131,18 +127,15 @@ def _are_regular(chosen: NDArray[np.bool_]) -> bool:
     return bool(throughout and np.mean(np.abs(distances - median) <= 1) > 0.9)
 
 
-_RECORDS_PER_MARK = 1 << 10
-"""Records from one mark to the next."""
+_RECORDS_PER_MARK = 1 << 10  # records from one mark to the next
 
 
 @dataclass
 class Track:
     """Follows stamps along a grid and counts holes, repeats, jumps and missing stamps."""
 
-    interval: float
-    """Initial interval of the grid, s."""
-    longest_hole: float
-    """Longest hole within a segment, s; a longer step begins a new segment."""
+    interval: float  # initial interval of the grid, s
+    longest_hole: float  # longest hole within a segment, s; a longer step begins a new segment
     rows: int = 0
     grid: int = 0
     """Number of records, and of grid points up to the last record."""
@@ -157,15 +150,12 @@ class Track:
     elapsed: float = 0.0
     steps: int = 0
     """Time, s, and number of grid points between stamped records of the same segment."""
-    starts: list[int] = field(default_factory=list)
-    """First grid point of each segment."""
+    starts: list[int] = field(default_factory=list)  # first grid point of each segment
     jumps: list[float] = field(default_factory=list)
     """Step of the stamps at the start of each segment, s; NaN at the first."""
     marks: list[tuple[int, float]] = field(default_factory=list)
     """Grid point and stamp of every 1024th record, to detect a drift of the rate."""
-    _state: NDArray[np.float64] = field(
-        default_factory=lambda: np.array([np.nan, np.nan, np.nan, np.nan, 0.0])
-    )
+    _state: Array = field(default_factory=lambda: np.array([np.nan, np.nan, np.nan, np.nan, 0.0]))
 
     @property
     def scatter(self) -> float:
@@ -182,7 +172,7 @@ class Track:
         """Mean interval of the grid, s; None if no segment has two stamps."""
         return self.elapsed / self.steps if self.steps else None
 
-    def follow(self, block: NDArray[np.float64]) -> NDArray[np.int64]:
+    def follow(self, block: Array) -> NDArray[np.int64]:
         """Return the grid point of each record of a block; -1 for a repeated stamp."""
         points = np.empty(len(block), dtype=np.int64)
         breaks = np.empty(len(block), dtype=np.int64)
@@ -219,22 +209,12 @@ def tracked(stamps: Stamps, interval: float, longest_hole: float) -> Track:
 
 
 @njit(cache=True, nogil=True)
-def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: float) -> bool:
+def is_set_back(stamps: Array, i: int, step: float, interval: float) -> bool:
     """Return whether the clock was set back before a record.
 
     In that case the stamps on both sides increase, but their median decreases. Scattered stamps and
-    late records do not behave so.
-
-    Parameters
-    ----------
-    stamps : ndarray
-        s, shape (n,); NaN where missing.
-    i : int
-        Index of the record.
-    step : float
-        From the previous stamp to this one, s.
-    interval : float
-        Sampling interval, s.
+    late records do not behave so. ``stamps``: s, shape (n,); NaN where missing. ``i``: index of the
+    record. ``step``: from the previous stamp to this one, s. ``interval``: sampling interval, s.
     """
     if not step < -max(MIN_SET_BACK, 1.5 * interval):
         return False
@@ -250,13 +230,13 @@ def is_set_back(stamps: NDArray[np.float64], i: int, step: float, interval: floa
 
 @njit(cache=True, nogil=True)
 def _assign_grid_points(
-    block: NDArray[np.float64],
+    block: Array,
     longest_hole: float,
     grid: int,
-    state: NDArray[np.float64],
+    state: Array,
     points: NDArray[np.int64],
     breaks: NDArray[np.int64],
-    jumps: NDArray[np.float64],
+    jumps: Array,
     counts: NDArray[np.int64],
 ) -> float:
     """Assign a grid point to each stamp; return the time between stamps within segments, s.
@@ -301,11 +281,8 @@ def _assign_grid_points(
             error = stamp - origin - whole * interval
             # A series of records that was written twice advances at the normal interval.
             twice = whole < 1 and i > 0 and abs(stamp - block[i - 1] - interval) < 0.1 * interval
-            if (
-                step != 0.0
-                and not twice
-                and (abs(error) > _MAX_GRID_DISTANCE * interval or whole < 1)
-            ):
+            off_grid = abs(error) > _MAX_GRID_DISTANCE * interval or whole < 1
+            if step != 0.0 and not twice and off_grid:
                 counts[1] += 1
             if whole == 0 and ((step > 0.0 and late) or (step == 0.0 and after_hole)):
                 # The previous sample was late by half an interval, or its stamp was rounded up to

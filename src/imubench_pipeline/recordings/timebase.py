@@ -29,6 +29,7 @@ from imubench_pipeline.recordings.stamps import (
 )
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.typing import Array
 
 _MAX_INTERVAL_ERROR = 1e-5
 """Largest relative error of the interval at which stamps get the same grid points."""
@@ -58,33 +59,25 @@ _MIN_GROUP_SIZE, _MIN_GROUPS, _MIN_REGULAR_GROUPS = 5, 5, 0.8
 """Least samples per stamp, number of stamps, and share of equal groups, for which the rate is taken
 from the equal groups alone."""
 
-_MAX_SEGMENTS = 10_000
-"""Largest number of segments; each takes 0.1 ms in a step of the pipeline."""
+_MAX_SEGMENTS = 10_000  # largest number of segments; each takes 0.1 ms in a step of the pipeline
 
 
 @dataclass(frozen=True)
 class TimeBase:
     """The uniform grid of the samples of a file."""
 
-    rate: float
-    """Hz."""
-    source: str
-    """Source of the rate: ``stated`` or ``stamps``."""
-    rows: int
-    """Records in the file."""
-    grid: int
-    """Grid points from the first to the last sample, all segments together."""
+    rate: float  # Hz
+    source: str  # source of the rate: ``stated`` or ``stamps``
+    rows: int  # records in the file
+    grid: int  # grid points from the first to the last sample, all segments together
     segments: tuple[tuple[int, int], ...]
     """First and one-past-last grid point of each; differences must not span two segments."""
-    uniform: bool
-    """Every grid point has one sample, so that stamps need not be stored."""
-    stamped: bool
-    """The stamps give the grid point of each sample."""
+    uniform: bool  # every grid point has one sample, so that stamps need not be stored
+    stamped: bool  # the stamps give the grid point of each sample
     findings: tuple[Finding, ...] = ()
     tracking_interval: float | None = None
     """Initial interval of the grid that follows the stamps, s."""
-    repeated: int = 0
-    """Records left out because an earlier one has the same grid point."""
+    repeated: int = 0  # records left out because an earlier one has the same grid point
     rate_error: float | None = None
     """Standard deviation of the rate from the scatter of the stamps, Hz; None for a stated rate."""
 
@@ -105,28 +98,14 @@ def without_stamps(rows: int, rate: float) -> TimeBase:
 
 
 def from_stamps(
-    stamps: Stamps,
-    stated: float | None,
-    settings: QualitySettings,
-    *,
-    known: float | None = None,
+    stamps: Stamps, stated: float | None, settings: QualitySettings, *, known: float | None = None
 ) -> TimeBase:
-    """Return the time base of a file from its stamps.
+    """Return the time base of a file from its stamps, which are read several times.
 
-    Parameters
-    ----------
-    stamps : callable
-        Yields the stamps in s, in blocks; called several times.
-    stated : float or None
-        The rate in the sensor file, Hz.
-    settings : QualitySettings
-    known : float or None
-        The sampling interval, s, if known; needed if most samples are missing.
+    ``stated``: rate in the sensor file, Hz. ``known``: sampling interval, s, if known; needed if
+    most samples are missing.
 
-    Raises
-    ------
-    RecordingError
-        If the stamps do not advance, or jump or stop too often.
+    Raises RecordingError if the stamps do not advance, or jump or stop too often.
     """
     typical = typical_interval(stamps) if known is None else Interval(known)
     if typical is None:
@@ -158,12 +137,10 @@ def from_stamps(
     shared = track.duplicates > MIN_SHARED_STAMPS * track.rows
     if typical.has_repeats and interval == typical.mean:
         base = _assume_consecutive(stamps, track, stated, settings)
-        coarse = (
-            []
-            if stated
-            else [_describe_coarse_stamps(base.rate, 1.0 / (typical.other or interval))]
-        )
-        return replace(base, findings=(*base.findings, *coarse))
+        if stated:
+            return base
+        coarse = _describe_coarse_stamps(base.rate, 1.0 / (typical.other or interval))
+        return replace(base, findings=(*base.findings, coarse))
     if track.off_grid > settings.jitter * track.rows or bursts or shared:
         if stated and known is None and not complete:  # many samples may be missing
             of_stated = from_stamps(stamps, stated, settings, known=1.0 / stated)
@@ -219,14 +196,8 @@ def rate_changes(
 ) -> list[Finding]:
     """Return a finding if a part of a log has every second (third, ...) sample only.
 
-    Random losses do not give 32 equal steps in a row.
-
-    Parameters
-    ----------
-    points : iterator of ndarray
-        Grid points of the samples, in blocks; below 0 for those left out.
-    rate : float
-        Rate of the grid, Hz.
+    Random losses do not give 32 equal steps in a row. ``points``: grid points of the samples, in
+    blocks; below 0 for those left out. ``rate``: of the grid, Hz.
     """
     samples: Counter[int] = Counter()
     begin: dict[int, int] = {}
@@ -260,9 +231,8 @@ def rate_changes(
             f"if the sensor was set to the lower rate, their N is {percent:.0f} % low. Analyse the "
             "parts separately, with 'use' in the notes"
         )
-        findings.append(
-            Finding("rate_changes", "warning", detail, rate / step, channel, first, last)
-        )
+        slower = rate / step
+        findings.append(Finding("rate_changes", "warning", detail, slower, channel, first, last))
     return findings
 
 
@@ -276,11 +246,9 @@ def _describe_coarse_stamps(rate: float, other: float) -> Finding:
 
     ``other``: rate, Hz, if double steps are lost samples and zero steps are copies, not rounding.
     """
-    steps, instead, change = (
-        ("double steps", "samples are lost so regularly", "less")
-        if other > rate
-        else ("repeated stamps", "records are written twice so regularly", "more")
-    )
+    steps, instead, change = "repeated stamps", "records are written twice so regularly", "more"
+    if other > rate:
+        steps, instead, change = "double steps", "samples are lost so regularly", "less"
     percent = 100.0 * abs(1.0 - math.sqrt(rate / other))
     return Finding(
         "coarse_stamps",
@@ -427,25 +395,27 @@ def _assume_consecutive(
         raise RecordingError("the time stamps do not advance; is the right column named?")
     _check_segments(len(starts))
     rate, others = groups.rate()
-    findings = [_describe_jitter(track, rate, worst, worst_at / rate)]
+    at_worst = worst_at / rate
+    detail = (
+        f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
+        f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at {at_worst:.5g} s);"
+        f" the samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost samples "
+        "cannot be seen"
+    )
+    findings = [Finding("jittered_stamps", "warning", detail, worst, start=at_worst, end=at_worst)]
     if others:
-        findings.append(_describe_irregular_groups(others, rate))
+        detail = (
+            f"{others} stamps have more or fewer samples than the others: the clock was set, "
+            f"or samples are lost; the rate of {rate:.6g} Hz is taken from the others"
+        )
+        findings.append(Finding("irregular_stamps", "warning", detail, others))
     findings += _compare_rates(rate, stated, settings)
     segments = tuple(zip(starts, [*starts[1:], rows], strict=True))
     if len(segments) > 1:
         times = [start / rate for start in starts[1:]]
         findings.append(_describe_segments("the stamps stop or run backwards", times, jumps))
-    return TimeBase(
-        rate,
-        "stamps",
-        rows,
-        rows,
-        segments,
-        False,
-        False,
-        tuple(findings),
-        rate_error=rate * worst / groups.elapsed,
-    )
+    found, error = tuple(findings), rate * worst / groups.elapsed
+    return TimeBase(rate, "stamps", rows, rows, segments, False, False, found, rate_error=error)
 
 
 class Groups:
@@ -456,7 +426,7 @@ class Groups:
         # Number of groups by size and duration in ns; None: no regular groups.
         self._pairs: Counter[tuple[int, int]] | None = Counter()
 
-    def add(self, samples: NDArray[np.int64], times: NDArray[np.float64]) -> None:
+    def add(self, samples: NDArray[np.int64], times: Array) -> None:
         """Add consecutive groups: their sizes, and their durations in s; shape (n,) each."""
         self.samples += int(samples.sum())
         self.elapsed += float(times.sum())
@@ -494,26 +464,6 @@ class Groups:
         counted = sum(pair[0] * number_of for pair, number_of in regular.items())
         duration = sum(pair[1] * number_of for pair, number_of in regular.items())
         return 1e9 * counted / duration, self._number - number
-
-
-def _describe_irregular_groups(groups: int, rate: float) -> Finding:
-    """Return the finding about stamps with more or fewer samples than the others."""
-    detail = (
-        f"{groups} stamps have more or fewer samples than the others: the clock was set, "
-        f"or samples are lost; the rate of {rate:.6g} Hz is taken from the others"
-    )
-    return Finding("irregular_stamps", "warning", detail, groups)
-
-
-def _describe_jitter(track: Track, rate: float, worst: float, at: float) -> Finding:
-    """Return the finding about stamps on no grid; ``worst``: the longest interval, s."""
-    detail = (
-        f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
-        f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at {at:.5g} s); the "
-        f"samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost samples "
-        "cannot be seen"
-    )
-    return Finding("jittered_stamps", "warning", detail, worst, start=at, end=at)
 
 
 def _measure_span(stamps: Stamps) -> float:

@@ -25,9 +25,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.typing import Array
 
-_QUADRATURE_NODES = 14
-"""Quadrature nodes of a step that is short compared with all time constants."""
-
+_QUADRATURE_NODES = 14  # quadrature nodes of a step that is short compared with all time constants
 _SERIES_TERMS = 20
 """Terms of the power series of the exponential over such a step; the remainder is 1 / 21!."""
 

@@ -34,10 +34,7 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     The variances are fitted by non-negative least squares of the relative error. B is the bias
     instability, rad/s or m/s^2, whose plateau is 0.664 B; the band is in Hz.
 
-    Raises
-    ------
-    ValueError
-        If the band is empty.
+    Raises ValueError if the band is empty.
     """
     if not 0 < lowest < highest:
         raise ValueError(f"the band from {lowest} to {highest} Hz is empty")
@@ -48,26 +45,6 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
             density = 2.0 * B**2 * variance / time  # of the driving noise
             processes.append(GaussMarkov(bias_instability(density, time), time))
     return processes
-
-
-def ripple(lowest: float, highest: float) -> float:
-    """Return the max. relative error of the density of a bank in its band, Hz, for any B."""
-    terms = bank(1.0, lowest, highest)
-    decades = math.log10(highest / lowest)
-    f = np.geomspace(lowest, highest, 2 + math.ceil(decades * 10 * _POINTS_PER_DECADE))
-    density = np.sum([term.psd(f) for term in terms], axis=0)
-    return float(np.max(np.abs(density * 2.0 * np.pi * f - 1.0)))
-
-
-def mixture(shortest: float, longest: float) -> tuple[Array, float]:
-    """Return correlation times and common variance of processes that sum to flicker noise, B = 1.
-
-    The times are log-spaced from the shortest to the longest, s, five per decade; the ripple is
-    below 1e-8. Both ends must lie well outside the band in which the sum is used.
-    """
-    count = 2 + math.ceil(5.0 * math.log10(longest / shortest))
-    times = np.geomspace(shortest, longest, count)
-    return times, math.log(times[1] / times[0]) / math.pi
 
 
 @lru_cache(maxsize=16)

@@ -18,8 +18,7 @@ from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
 from imubench_pipeline.units import dimension_of, quantity_to_si, to_si
 
-_STEPS_PER_SIDE = 1 << 15
-"""Steps on each side of 0 of a 16-bit register."""
+_STEPS_PER_SIDE = 1 << 15  # steps on each side of 0 of a 16-bit register
 
 
 def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
@@ -43,9 +42,8 @@ def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
             origin.figures.pop(channel)
             origin.assume("noise", f"{channel} is left out: no noise is printed of it")
             continue
-        drawn = channel_rng(seed, name, channel, "signs").choice([-1.0, 1.0], 2)
-        signs = (float(drawn[0]), float(drawn[1]))
-        axes[channel] = axis.model(noise, signs)
+        signs = channel_rng(seed, name, channel, "signs").choice([-1.0, 1.0], 2)
+        axes[channel] = axis.model(noise, [float(sign) for sign in signs])
     if not axes:
         raise ConfigError(
             f"{name}: the datasheet prints no noise density, random walk or rms noise of any "
@@ -64,7 +62,7 @@ class _Printed:
         sheet: QuantityDatasheet | None = getattr(sensor.datasheet, self._quantity)
         self._sheet = sheet or QuantityDatasheet()
         self._remarks = origin.figures.setdefault(channel, [])
-        self._assume = origin.assume
+        self._origin = origin
 
     def noise(self) -> NoiseModel | None:
         rows = [row for row in comparables(self._sensor.datasheet, self._channel) if row.value]
@@ -73,10 +71,7 @@ class _Printed:
             return None
         self._note("N", density)
         if density.figure and density.quantity == "N" and "assumed" in (density.reason or ""):
-            self._assume(
-                "noise",
-                f"{self._quantity}: the printed noise density is one-sided (N is it / sqrt(2))",
-            )
+            self._assume("noise", "the printed noise density is one-sided (N is it / sqrt(2))")
         B = T_B = K = None
         floor = _select_best([row for row in rows if row.statistic == "adev_minimum"])
         time = _select_best([row for row in rows if row.statistic == "T_B"])
@@ -84,71 +79,48 @@ class _Printed:
         if floor is not None and floor.value:
             self._note("bias instability", floor)
             B, T_B = floor.value / FLOOR, time.value if time else None
-            self._assume(
-                "noise",
-                f"{self._quantity}: B is the printed bias instability / {FLOOR:.3f}"
-                + ("" if T_B else ", as flicker noise: no correlation time is printed"),
-            )
+            text = "" if T_B else ", as flicker noise: no correlation time is printed"
+            self._assume("noise", f"B is the printed bias instability / {FLOOR:.3f}{text}")
         else:
-            self._assume("noise", f"{self._quantity}: no bias instability, it is not printed")
+            self._assume("noise", "no bias instability, it is not printed")
         if walk is not None and walk.value:
             self._note("K", walk)
             K = walk.value
         else:
-            self._assume("noise", f"{self._quantity}: no random walk K, it is not printed")
+            self._assume("noise", "no random walk K, it is not printed")
         return NoiseModel(N=density.value, B=B or 0.0, T_B=T_B, K=K or 0.0)
 
     def model(self, noise: NoiseModel, signs: Sequence[float]) -> SensorModel:
         bias = self._single("offset", "bias", "bias")
         if bias is not None:
-            self._assume("bias", f"{self._quantity}: the sign of the bias is drawn")
+            self._assume("bias", "the sign of the bias is drawn")
         slope = self._single("temperature_coefficient", "drift", "temperature sensitivity")
         drift = None
         if slope is not None:
             drift = TemperatureDrift(sensitivity=signs[1] * slope)
-            self._assume(
-                "drift",
-                f"{self._quantity}: no drift at 25 degC, and no thermal lag; its sign is drawn",
-            )
+            self._assume("drift", "no drift at 25 degC, and no thermal lag; its sign is drawn")
         else:
-            self._assume(
-                "drift", f"{self._quantity}: no drift with temperature, no coefficient is printed"
-            )
-        step = self._step()
+            self._assume("drift", "no drift with temperature, no coefficient is printed")
+        steps = (self._single(name, "register", name) for name in ("sensitivity", "resolution"))
+        step = next((each for each in steps if each is not None), None)
+        if step is None:
+            self._assume("register", "not rounded, no sensitivity is printed")
+        stated = self._sensor.log.bandwidth
+        if stated is not None:
+            self._remarks.append(Remark("low-pass", f"cut-off {stated}: of the log format"))
+            cutoff: float | None = quantity_to_si(stated, "frequency")
+        else:
+            cutoff = self._single("bandwidth", "low-pass", "cut-off")
+        text = "no low-pass, its cut-off is not known"
+        self._assume("low-pass", text if cutoff is None else "the low-pass is of first order")
         return SensorModel(
             noise=noise,
             bias=signs[0] * bias if bias else 0.0,
             drift=drift,
-            low_pass=self._low_pass(),
+            low_pass=None if cutoff is None else LowPass(cutoff),
             resolution=step or 0.0,
             full_scale=self._full_scale(step),
         )
-
-    def _low_pass(self) -> LowPass | None:
-        stated = self._sensor.log.bandwidth
-        printed = self._single("bandwidth", "low-pass", "cut-off") if stated is None else None
-        if stated is not None:
-            self._remarks.append(Remark("low-pass", f"cut-off {stated}: of the log format"))
-            printed = quantity_to_si(stated, "frequency")
-        if printed is None:
-            self._assume("low-pass", f"{self._quantity}: no low-pass, its cut-off is not known")
-            return None
-        self._assume("low-pass", f"{self._quantity}: the low-pass is of first order")
-        return LowPass(printed)
-
-    def _step(self) -> float | None:
-        for name in ("sensitivity", "resolution"):
-            for figure in self._typical(name):
-                value = figure.on_axis(self._axis)
-                if not isinstance(value, float) or figure.unit is None:
-                    continue
-                dimension = dimension_of(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
-                step = to_si(value, figure.unit, dimension)
-                text = f"{name} {value:g} {figure.unit}: {figure.kind}, datasheet"
-                self._remarks.append(Remark("register", text))
-                return 1.0 / step if dimension.endswith("sensitivity") else step
-        self._assume("register", f"{self._quantity}: not rounded, no sensitivity is printed")
-        return None
 
     def _full_scale(self, step: float | None) -> float | None:
         (dimension,) = FIGURE_DIMENSIONS[self._quantity]["full_scale"]
@@ -165,32 +137,36 @@ class _Printed:
             text = f"full scale {values[chosen]:g} {figure.unit}: datasheet"
             self._remarks.append(Remark("register", text))
             if len(ranges) > 1:
-                self._assume(
-                    "register", f"{self._quantity}: range {values[chosen]:g} {figure.unit}"
-                )
+                self._assume("register", f"range {values[chosen]:g} {figure.unit}")
             return ranges[chosen]
-        self._assume("register", f"{self._quantity}: no saturation, no full scale is printed")
+        self._assume("register", "no saturation, no full scale is printed")
         return None
 
+    def _assume(self, topic: Topic, text: str) -> None:
+        self._origin.assume(topic, f"{self._quantity}: {text}")
+
     def _single(self, name: str, topic: Topic, label: str) -> float | None:
-        """Return a figure with a single value, in SI; None if none is printed."""
-        (dimension,) = FIGURE_DIMENSIONS[self._quantity][name]
+        """Return a figure with a single value, in SI; None if none is printed.
+
+        The inverse of a figure in steps a unit is returned: the step.
+        """
         for figure in self._typical(name):
             value = figure.on_axis(self._axis)
             if isinstance(value, float) and figure.unit is not None:
                 text = f"{label} {value:g} {figure.unit}: {figure.kind}, datasheet"
                 self._remarks.append(Remark(topic, text))
-                return to_si(value, figure.unit, dimension)
+                dimension = dimension_of(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
+                in_si = to_si(value, figure.unit, dimension)
+                return 1.0 / in_si if dimension.endswith("sensitivity") else in_si
         return None
 
     def _typical(self, name: str, *, choices: bool = False) -> list[PrintedFigure]:
         """Return the figures of a name for the logged options, typical ones first."""
         options = self._sensor.datasheet.options
         printed = self._sheet.printed(name)
-        logged = [
-            figure for figure in printed if figure.option is None or figure.option in options
-        ] or printed
-        usable = [figure for figure in logged if choices or figure.kind not in ("choices", "range")]
+        logged = [each for each in printed if each.option is None or each.option in options]
+        several = ("choices", "range")
+        usable = [each for each in logged or printed if choices or each.kind not in several]
         return sorted(usable, key=lambda figure: figure.kind not in ("typ", "1sigma"))
 
     def _note(self, name: str, row: Comparable) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -45,28 +45,24 @@ def with_estimates(
         raise ConfigError(str(error)) from error
     recorded = _select_recording(tables["recordings"], folder, name, recording)
     chosen = recorded.recording
-    of_log = {
-        table: tables[table].filter(
-            (pc.field("sensor") == name) & (pc.field("recording") == chosen)
-        )
-        for table in _NEEDED_TABLES[1:]
-    }
+    here = (pc.field("sensor") == name) & (pc.field("recording") == chosen)
+    of_log = {table: tables[table].filter(here) for table in _NEEDED_TABLES[1:]}
     axes: dict[str, SensorModel] = {}
     figures: dict[str, list[Remark]] = {}
     topics: list[set[Topic]] = []
     for channel in CHANNELS:
-        of_channel = _Estimated.of(
-            {table: rows.filter(pc.field("channel") == channel) for table, rows in of_log.items()}
-        )
-        if of_channel.parameters:
-            axis = _Axis(printed, channel, of_channel, f"{name}/{chosen}")
-            axes[channel] = axis.model(_require_rate(recorded))
-            topics.append({remark.topic for remark in axis.remarks})
-            of_datasheet = printed.figures.get(channel, [])
-            figures[channel] = [
-                *axis.remarks,
-                *(remark for remark in of_datasheet if remark.topic not in topics[-1]),
-            ]
+        of_channel = {
+            table: rows.filter(pc.field("channel") == channel) for table, rows in of_log.items()
+        }
+        if len(of_channel["parameters"]):
+            if recorded.rate is None:
+                raise ConfigError(f"{name}/{chosen}: its rate is not known")
+            of_datasheet = printed.imu.axes.get(channel) or SensorModel()
+            log, rate = f"{name}/{chosen}", recorded.rate
+            axes[channel], remarks = _estimate_axis(of_datasheet, channel, of_channel, log, rate)
+            topics.append({remark.topic for remark in remarks})
+            others = printed.figures.get(channel, [])
+            figures[channel] = remarks + [each for each in others if each.topic not in topics[-1]]
     if not axes:
         raise ConfigError(f"{folder}: no estimate of {name}/{chosen}")
     estimated = set[Topic].intersection(*topics)
@@ -102,104 +98,53 @@ def _select_recording(
     return usable[asked or longest]
 
 
-def _require_rate(recording: RecordingRow) -> float:
-    if recording.rate is None:
-        raise ConfigError(f"{recording.sensor}/{recording.recording}: its rate is not known")
-    return recording.rate
-
-
-@dataclass(frozen=True)
-class _Estimated:
-    """Rows of one channel in the tables of a run."""
-
-    parameters: Sequence[ParameterRow]
-    fixed_bias: Sequence[FixedBiasRow]
-    temperature: Mapping[str, TemperatureRow]
-    """By parameter."""
-    low_pass: Mapping[str, LowPassRow]
-    """By parameter."""
-
-    @classmethod
-    def of(cls, tables: Mapping[str, pa.Table]) -> _Estimated:
-        temperature = TemperatureRow.rows_of(tables["temperature"])
-        low_pass = LowPassRow.rows_of(tables["low_pass"])
-        return cls(
-            ParameterRow.rows_of(tables["parameters"]),
-            FixedBiasRow.rows_of(tables["fixed_bias"]),
-            {row.parameter: row for row in temperature},
-            {row.parameter: row for row in low_pass},
-        )
-
-
-class _Axis:
-    """Model of one channel from the estimates of a run."""
-
-    def __init__(self, printed: Origin, channel: str, found: _Estimated, log: str) -> None:
-        self._printed = printed.imu.axes.get(channel) or SensorModel()
-        self._gravity = quantity_of(channel) == "accel"
-        self._found, self._log = found, log
-        self._temperature, self._low_pass = found.temperature, found.low_pass
-        self.remarks: list[Remark] = []
-
-    def model(self, rate: float) -> SensorModel:
-        """Return the model, and add the sources of its figures to ``remarks``; rate in Hz."""
-        printed = replace(self._printed, low_pass=self._filter(), drift=self._drift())
-        method = "compensated" if self._compensated else None
-        rows = [
-            row
-            for row in self._found.parameters
-            if (row.method == method if method else row.recommended)
-        ]
-        estimate = estimate_of(rows[0].method, rows)
-        self._note(
-            "noise",
-            f"noise {estimate.model.name}: estimated by {estimate.method} from {self._log}, N "
-            "taken back to before low-pass and rounding",
-        )
-        noise = before_the_filter(printed, estimate.model, rate)
-        return replace(printed, noise=noise, bias=self._bias())
-
-    @property
-    def _compensated(self) -> bool:
-        return any(row.compensated for row in self._temperature.values())
-
-    def _note(self, topic: Topic, text: str) -> None:
-        self.remarks.append(Remark(topic, text))
-
-    def _filter(self) -> LowPass | None:
-        cutoff = self._low_pass.get("cutoff")
-        if cutoff is None or cutoff.value is None or cutoff.order is None:
-            return self._printed.low_pass
-        self._note("low-pass", f"cut-off {cutoff.value:.4g} Hz: estimated from {self._log}")
-        return LowPass(cutoff.value, cutoff.order)
-
-    def _drift(self) -> TemperatureDrift | None:
-        reference = self._temperature["T_0"].value if self._compensated else None
-        if reference is None:
-            return self._printed.drift
+def _estimate_axis(
+    printed: SensorModel, channel: str, tables: Mapping[str, pa.Table], log: str, rate: float
+) -> tuple[SensorModel, list[Remark]]:
+    """Return the model of a channel from its rows in the tables of a run, and the sources."""
+    remarks: list[Remark] = []
+    cutoffs = [row for row in LowPassRow.rows_of(tables["low_pass"]) if row.parameter == "cutoff"]
+    low_pass, drift, bias = printed.low_pass, printed.drift, printed.bias
+    if cutoffs and cutoffs[-1].value is not None and cutoffs[-1].order is not None:
+        low_pass = LowPass(cutoffs[-1].value, cutoffs[-1].order)
+        text = f"cut-off {low_pass.cutoff:.4g} Hz: estimated from {log}"
+        remarks.append(Remark("low-pass", text))
+    effect = {row.parameter: row for row in TemperatureRow.rows_of(tables["temperature"])}
+    compensated = any(row.compensated for row in effect.values())
+    reference = effect["T_0"].value if compensated else None
+    if reference is not None:
         values = {
-            name: row.value if row.value is not None else row.fitted
-            for name, row in self._temperature.items()
+            name: (row.value if row.value is not None else row.fitted) or 0.0
+            for name, row in effect.items()
         }
-        slope, unit = values["sensitivity"] or 0.0, self._temperature["sensitivity"].unit
-        self._note(
-            "drift", f"temperature sensitivity {slope:.4g} {unit}: estimated from {self._log}"
-        )
-        return TemperatureDrift(
-            sensitivity=slope,
+        drift = TemperatureDrift(
+            sensitivity=values["sensitivity"],
             reference=reference,
-            quadratic=values["quadratic"] or 0.0,
-            lag=values["lag"] or 0.0,
+            quadratic=values["quadratic"],
+            lag=values["lag"],
         )
-
-    def _bias(self) -> float:
-        if self._gravity:
-            return self._printed.bias
-        bias = self._temperature["bias"].value if self._compensated else None
-        if bias is not None:
-            self._note("bias", f"bias {bias:g} rad/s at T_0: estimated from {self._log}")
-            return bias
-        for row in self._found.fixed_bias:
-            self._note("bias", f"bias {row.value:g} rad/s: mean of {self._log}")
-            return row.value
-        return self._printed.bias
+        figure = f"{drift.sensitivity:.4g} {effect['sensitivity'].unit}"
+        remarks.append(Remark("drift", f"temperature sensitivity {figure}: estimated from {log}"))
+    rows = [
+        row
+        for row in ParameterRow.rows_of(tables["parameters"])
+        if (row.method == "compensated" if compensated else row.recommended)
+    ]
+    estimate = estimate_of(rows[0].method, rows)
+    text = (
+        f"noise {estimate.model.name}: estimated by {estimate.method} from {log}, N taken back to "
+        "before low-pass and rounding"
+    )
+    remarks.append(Remark("noise", text))
+    # The mean of an accelerometer is mostly gravity.
+    if quantity_of(channel) != "accel":
+        fixed = FixedBiasRow.rows_of(tables["fixed_bias"])
+        at_reference = effect["bias"].value if compensated else None
+        if at_reference is not None:
+            bias = at_reference
+            remarks.append(Remark("bias", f"bias {bias:g} rad/s at T_0: estimated from {log}"))
+        elif fixed:
+            bias = fixed[0].value
+            remarks.append(Remark("bias", f"bias {bias:g} rad/s: mean of {log}"))
+    model = replace(printed, low_pass=low_pass, drift=drift, bias=bias)
+    return replace(model, noise=before_the_filter(model, estimate.model, rate)), remarks

@@ -85,10 +85,9 @@ def simulate_imu(
         Hz.
     samples : int
     seed : int
-        Seed and names determine all samples. An axis does not depend on the other simulated axes
-        or on the number of threads.
     names : tuple of str
-        Such as sensor and recording.
+        Such as sensor and recording; seed and names determine all samples. An axis does not depend
+        on the other simulated axes or on the number of threads.
     motion : mapping of str to Profile, optional
         True rate, rad/s, and specific force, m/s², by channel; 0 where there is none.
     temperature : Profile, optional
@@ -96,70 +95,42 @@ def simulate_imu(
     threads : int
         Number of axes that are simulated in parallel.
     """
-    shared = _Shared(rate, motion or {}, temperature)
+    profiles = dict(motion or {})
+    if temperature is not None:
+        profiles[TEMPERATURE] = temperature
+    start = 0
+    present: dict[str, Array] = {}  # the profiles in the block that begins at `start`
+
+    def signal(sensed: Mapping[str, float]) -> Signal | None:
+        """Return the sum of the profiles that an axis senses; None without any."""
+        parts = {name: part for name, part in sensed.items() if name in profiles}
+
+        def at(first: int, last: int) -> Array:
+            total = np.zeros(last - first)
+            for name, part in parts.items():
+                total += part * present[name][first - start : last - start]
+            return total
+
+        return at if parts else None
+
     streams = {
         channel: simulate_blocks(
             model,
             rate,
             samples,
             channel_rng(seed, *names, channel),
-            true=shared.along(imu.sensed(channel)),
-            temperature=shared.temperature_signal,
+            true=signal(imu.sensed(channel)),
+            temperature=signal({TEMPERATURE: 1.0}),
             block=SAMPLES_PER_BLOCK,
         )
         for channel, model in imu.axes.items()
     }
     with ThreadPoolExecutor(max(1, threads)) as pool:
         for start in range(0, samples, SAMPLES_PER_BLOCK):
-            shared.advance(start, min(start + SAMPLES_PER_BLOCK, samples))
+            times = np.arange(start, min(start + SAMPLES_PER_BLOCK, samples)) / rate
+            present = {name: profile.at(times) for name, profile in profiles.items()}
             blocks = dict(zip(streams, pool.map(next, streams.values()), strict=True))
-            if shared.temperature is not None:
-                block, step = shared.temperature, imu.temperature_step
+            if temperature is not None:
+                block, step = present[TEMPERATURE], imu.temperature_step
                 blocks[TEMPERATURE] = np.rint(block / step) * step if step else block
             yield blocks
-
-
-class _Shared:
-    """Motion and temperature of the block that is being simulated."""
-
-    def __init__(
-        self, rate: float, motion: Mapping[str, Profile], temperature: Profile | None
-    ) -> None:
-        self._rate, self._profiles, self._temperature = rate, motion, temperature
-        self._start = 0
-        self._motion: dict[str, Array] = {}
-        self.temperature: Array | None = None
-
-    def advance(self, start: int, stop: int) -> None:
-        """Go to the block of samples ``start`` to ``stop``."""
-        times = np.arange(start, stop) / self._rate
-        self._start = start
-        self._motion = {name: profile.at(times) for name, profile in self._profiles.items()}
-        self.temperature = None if self._temperature is None else self._temperature.at(times)
-
-    def along(self, sensed: Mapping[str, float]) -> Signal | None:
-        """Return the signal along an axis; None where it senses no motion."""
-        parts = {name: part for name, part in sensed.items() if name in self._profiles}
-        if not parts:
-            return None
-
-        def true(start: int, stop: int) -> Array:
-            within_block = slice(start - self._start, stop - self._start)
-            signal = np.zeros(stop - start)
-            for name, part in parts.items():
-                signal += part * self._motion[name][within_block]
-            return signal
-
-        return true
-
-    @property
-    def temperature_signal(self) -> Signal | None:
-        """The temperature as a signal; None where none is given."""
-        if self._temperature is None:
-            return None
-
-        def temperature(start: int, stop: int) -> Array:
-            assert self.temperature is not None  # `advance` has been called
-            return self.temperature[start - self._start : stop - self._start]
-
-        return temperature

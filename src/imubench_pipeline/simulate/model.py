@@ -32,8 +32,7 @@ from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.simulate import flicker_band, spectra
 from imubench_pipeline.typing import Array
 
-_LOW_FREQUENCY = 1e-4
-"""Frequency far below any cut-off, rad/sample."""
+_LOW_FREQUENCY = 1e-4  # frequency far below any cut-off, rad/sample
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,11 +142,11 @@ class SensorModel:
         rounding = self.resolution**2 / 12.0
         if self.low_pass is None:
             return self.noise.sampled_spectrum(w, rate) + rounding
-        behind = [term for term in self.noise.terms if term.drive is None]
-        spectrum = (
-            np.sum([term.sampled_spectrum(w, 1.0 / rate) for term in behind], axis=0) + rounding
-        )
-        return np.asarray(spectrum + spectra.sampled_spectrum(self.sources, self.low_pass, w, rate))
+        behind = [
+            term.sampled_spectrum(w, 1.0 / rate) for term in self.noise.terms if term.drive is None
+        ]
+        before = spectra.sampled_spectrum(self.sources, self.low_pass, w, rate)
+        return np.asarray(np.sum(behind, axis=0) + rounding + before)
 
     def allan_variance(self, tau: ArrayLike, rate: float) -> Array:
         """Return the exact Allan variance of the samples, (rad/s)² or (m/s²)², in the shape of tau.
@@ -201,9 +200,8 @@ def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMark
 
 def in_the_log(model: SensorModel, rate: float) -> float:
     """Return N at the low frequencies of a log, SI, with aliasing and rounding; rate in Hz."""
-    return math.sqrt(
-        model.noise.N**2 * folding(model, rate) + _compute_rounding_density(model, rate)
-    )
+    rounding = model.resolution**2 / (12.0 * rate)
+    return math.sqrt(model.noise.N**2 * folding(model, rate) + rounding)
 
 
 def before_the_filter(model: SensorModel, noise: NoiseModel, rate: float) -> NoiseModel:
@@ -211,7 +209,7 @@ def before_the_filter(model: SensorModel, noise: NoiseModel, rate: float) -> Noi
 
     Only filter and resolution of the model are used; the rate is the rate of the log, Hz.
     """
-    left = max(noise.N**2 - _compute_rounding_density(model, rate), 0.0)
+    left = max(noise.N**2 - model.resolution**2 / (12.0 * rate), 0.0)
     return replace(noise, N=math.sqrt(left / folding(model, rate)))
 
 
@@ -219,7 +217,3 @@ def folding(model: SensorModel, rate: float) -> float:
     """Return the density of the samples at low frequencies over N^2 (aliasing factor)."""
     unit = replace(model, noise=NoiseModel(N=1.0), resolution=0.0)
     return float(unit.sampled_spectrum(np.array([_LOW_FREQUENCY]), rate)[0]) / rate
-
-
-def _compute_rounding_density(model: SensorModel, rate: float) -> float:
-    return model.resolution**2 / (12.0 * rate)

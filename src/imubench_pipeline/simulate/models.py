@@ -22,12 +22,8 @@ _NOISE_PARAMETERS = ("N", "B", "T_B", "K", "R", "Q")
 def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
     """Return the model of an axis, ``gyro_x`` to ``accel_z``, in SI.
 
-    Raises
-    ------
-    UnitError
-        If a unit has another dimension than its figure.
-    ValueError
-        If a figure is out of its range.
+    Raises UnitError if a unit has another dimension than its figure. Raises ValueError if a figure
+    is out of its range.
     """
     quantity, figures = quantity_of(channel), settings.si(channel)
     drift, low_pass = settings.drift, settings.low_pass
@@ -39,9 +35,9 @@ def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
         ),
         bias=figures.get("bias", 0.0),
         drift=None if drift is None else TemperatureDrift(**drift.si(quantity)),
-        low_pass=None
-        if low_pass is None
-        else LowPass(quantity_to_si(low_pass.cutoff, "frequency"), low_pass.order),
+        low_pass=LowPass(quantity_to_si(low_pass.cutoff, "frequency"), low_pass.order)
+        if low_pass
+        else None,
         scale_error=settings.scale_error,
         resolution=figures.get("resolution", 0.0),
         full_scale=figures.get("full_scale"),
@@ -51,10 +47,7 @@ def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
 def imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> ImuModel:
     """Return the model of a sensor, in SI, from its axes by channel and their common settings.
 
-    Raises
-    ------
-    ValueError
-        As `axis_model`, with the name of the channel.
+    Raises ValueError as `axis_model`, with the name of the channel.
     """
     models = {}
     for channel, axis in axes.items():
@@ -90,7 +83,8 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Tr
     quantity = quantity_of(channel)
     units, plain = SI_UNITS[quantity], SI_UNITS[quantity]["B"]
     model = axis_model(settings, channel)
-    for name, value in settings.si(channel).items():
+    figures = settings.si(channel)
+    for name, value in figures.items():
         if name == "N":
             yield TrueFigure(name, in_the_log(model, rate), units[name], name)
             if model.low_pass is not None:
@@ -99,30 +93,21 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Tr
             yield TrueFigure(name, value, units[name], name)
         elif name == "bias":
             yield TrueFigure(name, value, plain, name)
-    for number, (figures, setting) in enumerate(_sort_processes(settings, channel), start=1):
-        for name, value in figures.items():
+    # The order of estimates: flicker noise, then by T_B.
+    processes = [(process.si(quantity), "further") for process in settings.further]
+    if "B" in figures:
+        processes.append(({name: figures[name] for name in ("B", "T_B") if name in figures}, "B"))
+    processes.sort(key=lambda process: process[0].get("T_B", 0.0))
+    for number, (values, setting) in enumerate(processes, start=1):
+        for name, value in values.items():
             yield TrueFigure(name, value, units[name], setting, number)
     lines = sorted((line.si(quantity) for line in settings.sinusoids), key=lambda f: f["frequency"])
     for number, line in enumerate(lines, start=1):
         for name, value in line.items():
             yield TrueFigure(name, value, units[name], "sinusoids", number)
     if settings.drift is not None:
-        of_drift = {
-            "sensitivity": f"{plain}/K",
-            "reference": "degC",
-            "quadratic": f"{plain}/K^2",
-            "lag": "s",
-        }
+        of_drift = {"sensitivity": f"{plain}/K", "quadratic": f"{plain}/K^2", "lag": "s"}
         for name, value in settings.drift.si(quantity).items():
-            yield TrueFigure(name, value, of_drift[name], "drift")
+            yield TrueFigure(name, value, of_drift.get(name, "degC"), "drift")
     if model.low_pass is not None:
         yield TrueFigure("cutoff", model.low_pass.cutoff, "Hz", "low_pass")
-
-
-def _sort_processes(settings: AxisSettings, channel: str) -> list[tuple[dict[str, float], str]]:
-    """Return B and T_B of the processes in the order of estimates: flicker noise, then by T_B."""
-    own = settings.si(channel)
-    processes = [(process.si(quantity_of(channel)), "further") for process in settings.further]
-    if "B" in own:
-        processes.append(({name: own[name] for name in ("B", "T_B") if name in own}, "B"))
-    return sorted(processes, key=lambda process: process[0].get("T_B", 0.0))

@@ -8,7 +8,8 @@ the requested times are in memory.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -106,24 +107,16 @@ class FileSeries:
         """
         if not len(times):
             return np.empty(0)
-        self._reach(float(times[0]), float(times[-1]))
-        return np.interp(times, self._window[_TIME_COLUMN], self._window[name])
-
-    def _reach(self, first: float, last: float) -> None:
-        """Load the rows from the last one before ``first`` to the first one after ``last``."""
+        first, last = float(times[0]), float(times[-1])
+        # Load the rows from the last one before `first` to the first one after `last`.
         if self._batches is None or (self._trimmed and first < self._window[_TIME_COLUMN][0]):
             self._batches = self._read()
             self._window = {name: np.empty(0) for name in self._asked}
             self._trimmed = False
-        parts = [self._window]
-        reached = (
-            float(self._window[_TIME_COLUMN][-1]) if len(self._window[_TIME_COLUMN]) else -np.inf
-        )
-        while not reached >= last:
-            row_and_batch = next(self._batches, None)
-            if row_and_batch is None:
-                break
-            row, batch = row_and_batch
+        parts, loaded = [self._window], self._window[_TIME_COLUMN]
+        reached = float(loaded[-1]) if len(loaded) else -np.inf
+        while not reached >= last and (numbered := next(self._batches, None)) is not None:
+            row, batch = numbered
             columns = self._columns(batch, row, reached)
             if len(columns[_TIME_COLUMN]):
                 parts.append(self._from(columns, first))
@@ -132,6 +125,7 @@ class FileSeries:
         if not len(joined[_TIME_COLUMN]):
             raise ConfigError(f"{self.path}: has no rows")
         self._window = self._from(joined, first)
+        return np.interp(times, self._window[_TIME_COLUMN], self._window[name])
 
     def _from(self, columns: dict[str, Array], first: float) -> dict[str, Array]:
         """Return the columns without the rows that are no longer needed."""
@@ -168,8 +162,24 @@ class FileSeries:
         return columns
 
     def _read_headings(self) -> dict[str, tuple[str, str | None]]:
+        """Return heading and unit of the columns by name; Parquet may state a unit in metadata."""
+        try:
+            if self.path.suffix == ".parquet":
+                schema = pq.read_schema(self.path)
+            else:
+                with pacsv.open_csv(self.path) as reader:
+                    schema = reader.schema
+        except FileNotFoundError:
+            raise ConfigError(
+                f"{self.path}: no such file; expected a CSV or Parquet file with columns such as "
+                "'time [s]': mend its name"
+            ) from None
+        except (OSError, pa.ArrowException) as error:
+            raise self._unreadable(error) from error
         headings = {}
-        for heading, unit in self._schema():
+        for field in schema:
+            heading, stated = field.name, (field.metadata or {}).get(b"unit")
+            unit = None if stated is None else stated.decode("utf-8", "replace")
             if self.path.suffix != ".parquet" and (";" in heading or "\t" in heading):
                 raise ConfigError(
                     f"{self.path}: found the line of names {heading!r}; expected {_EXPECTED_CSV}"
@@ -184,25 +194,6 @@ class FileSeries:
             )
         return headings
 
-    def _schema(self) -> list[tuple[str, str | None]]:
-        """Return headings, and the units in the metadata of Parquet columns."""
-        try:
-            if self.path.suffix == ".parquet":
-                schema = pq.read_schema(self.path)
-            else:
-                with pacsv.open_csv(self.path) as reader:
-                    schema = reader.schema
-        except FileNotFoundError:
-            raise ConfigError(
-                f"{self.path}: no such file; expected a CSV or Parquet file with columns such as "
-                "'time [s]': mend its name"
-            ) from None
-        except (OSError, pa.ArrowException) as error:
-            raise self._unreadable(error) from error
-        stated = [(field.metadata or {}).get(b"unit") for field in schema]
-        units = [None if unit is None else unit.decode("utf-8", "replace") for unit in stated]
-        return list(zip(schema.names, units, strict=True))
-
     def _unreadable(self, error: Exception) -> ConfigError:
         text = self.path.suffix != ".parquet" and isinstance(error, pa.ArrowException)
         expected = f"; expected {_EXPECTED_CSV}" if text else ""
@@ -210,24 +201,24 @@ class FileSeries:
 
     def _read(self) -> Iterator[tuple[int, pa.RecordBatch]]:
         """Yield the number of the first row, from 1 below the line of names, and the batch."""
-        row = 1
-        for batch in self._batches_of_file():
-            yield row, batch
-            row += len(batch)
-
-    def _batches_of_file(self) -> Iterator[pa.RecordBatch]:
         headings = [heading for heading, _, _ in self._asked.values()]
-        try:
-            if self.path.suffix == ".parquet":
-                with pq.ParquetFile(self.path) as file:
-                    yield from file.iter_batches(
+        row = 1
+        with ExitStack() as opened:
+            try:
+                batches: Iterable[pa.RecordBatch]
+                if self.path.suffix == ".parquet":
+                    file = opened.enter_context(pq.ParquetFile(self.path))
+                    batches = file.iter_batches(
                         _ROWS_PER_BATCH, columns=headings, use_threads=False
                     )
-            else:
-                chosen = pacsv.ConvertOptions(
-                    include_columns=headings, column_types=dict.fromkeys(headings, pa.float64())
-                )
-                with pacsv.open_csv(self.path, convert_options=chosen) as reader:
-                    yield from reader
-        except (OSError, pa.ArrowException) as error:
-            raise self._unreadable(error) from error
+                else:
+                    types = dict.fromkeys(headings, pa.float64())
+                    chosen = pacsv.ConvertOptions(include_columns=headings, column_types=types)
+                    batches = opened.enter_context(
+                        pacsv.open_csv(self.path, convert_options=chosen)
+                    )
+                for batch in batches:
+                    yield row, batch
+                    row += len(batch)
+            except (OSError, pa.ArrowException) as error:
+                raise self._unreadable(error) from error

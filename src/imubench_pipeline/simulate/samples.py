@@ -93,19 +93,29 @@ def simulate(
     (60000,)
     """
     frequency = in_si(rate, "frequency", "rate")
-    number = _count_samples(samples, duration, frequency)
+    if (samples is None) == (duration is None):
+        raise ValueError(
+            "expected either samples (such as 60000) or duration (such as '10 min'): "
+            + ("neither is given" if samples is None else "both are given")
+        )
+    if duration is not None:
+        samples = round(in_si(duration, "time", "duration") * frequency)
+    if samples is None or isinstance(samples, bool) or int(samples) != samples or samples < 1:
+        raise ValueError(f"{samples} samples; expected a whole number from 1")
+    number = int(samples)
     if rng is not None and seed is not None:
         raise ValueError("rng and seed are both given; expected one of them")
-    if isinstance(model, Mapping):
-        return {
-            name: noise.simulate(_require_model(each), frequency, number, stream)
-            for (name, each), stream in zip(
-                model.items(), _make_streams(model, rng, seed), strict=True
-            )
-        }
-    return noise.simulate(
-        _require_model(model), frequency, number, rng or np.random.default_rng(seed)
-    )
+    stream = rng or np.random.default_rng(seed)
+    if not isinstance(model, Mapping):
+        return noise.simulate(_require_model(model), frequency, number, stream)
+    if seed is None:
+        streams = stream.spawn(len(model))
+    else:
+        streams = [noise.channel_rng(seed, name) for name in model]
+    return {
+        name: noise.simulate(_require_model(each), frequency, number, own)
+        for (name, each), own in zip(model.items(), streams, strict=True)
+    }
 
 
 def _require_model(source: object) -> NoiseModel:
@@ -116,27 +126,3 @@ def _require_model(source: object) -> NoiseModel:
             "or a mapping of channels to these"
         )
     return model
-
-
-def _make_streams(
-    channels: Mapping[str, object], rng: np.random.Generator | None, seed: int | None
-) -> list[np.random.Generator]:
-    if rng is not None:
-        return rng.spawn(len(channels))
-    if seed is None:
-        return np.random.default_rng().spawn(len(channels))
-    return [noise.channel_rng(seed, name) for name in channels]
-
-
-def _count_samples(samples: int | None, duration: float | str | None, rate: float) -> int:
-    if (samples is None) == (duration is None):
-        raise ValueError(
-            "expected either samples (such as 60000) or duration (such as '10 min'): "
-            + ("neither is given" if samples is None else "both are given")
-        )
-    if samples is None:
-        assert duration is not None
-        samples = round(in_si(duration, "time", "duration") * rate)
-    if isinstance(samples, bool) or int(samples) != samples or samples < 1:
-        raise ValueError(f"{samples} samples; expected a whole number from 1")
-    return int(samples)

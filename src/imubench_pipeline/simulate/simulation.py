@@ -15,15 +15,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
-from imubench_pipeline.noise.terms import Sinusoid, Term
+from imubench_pipeline.noise.terms import Term
 from imubench_pipeline.simulate.discretisation import (
-    HeldInput,
-    SlowSources,
     filter_transition,
     held_input,
     slow_sources,
@@ -214,18 +211,6 @@ def simulate_blocks(
         yield np.concatenate(waiting)
 
 
-@dataclass(frozen=True)
-class _Discrete:
-    """The matrices of an axis, over one sampling interval."""
-
-    slow: SlowSources
-    transition: Array
-    factor: Array
-    output: Array
-    white: float
-    input_hold: HeldInput
-
-
 class _Axis:
     """An axis that is being simulated."""
 
@@ -234,48 +219,54 @@ class _Axis:
     ) -> None:
         self._model, self._rate = model, rate
         interval = 1.0 / rate
-        slow_terms = _realise_terms(model, rate, max(samples, 2) * interval)
-        sources = sources_of(slow_terms)
+        duration = max(samples, 2) * interval
+        # Flicker noise is a bank of processes.
+        terms: list[Term] = []
+        banks: list[Term] = list(bank_for(model, rate, duration))
+        for term in model.noise.terms:
+            if term.drive is None or not term.drive.flicker:
+                terms.append(term)
+            elif model.low_pass is None:
+                banks += term.realised(interval, duration)
+        sources = sources_of([*terms, *banks])
         self._times, self._densities = sources.times, sources.densities
         self._white = sources.white
-        begin, self._noise, self._lines, self._counts = rng.spawn(4)
-        self._discrete = self._discretise(interval)
-        slow, hold = self._discrete.slow, self._discrete.input_hold
-        self._coupling = np.ascontiguousarray(slow.coupling.T)
-        self._shared = np.ascontiguousarray(slow.shared.T)
-        self._lag = np.array([hold.lag_decay, hold.lag_step])
+        begin, self._noise, lines, self._counts = rng.spawn(4)
+        self._slow, self._filter = self._discretise(interval)
+        drift = model.drift
+        hold = held_input(model.low_pass, drift.lag if drift else 0.0, interval)
+        lag = np.array([hold.lag_decay, hold.lag_step])
+        figures = (drift.sensitivity, drift.quadratic, drift.reference) if drift else (0.0,) * 3
+        self._input = (hold.step, lag, hold.lag_coupling, hold.lagged_step, np.array(figures))
         self._x, self._e = self._draw_initial_states(begin)
         self._memory = np.zeros(4)
         self._sinusoids = [
-            (line, self._lines.uniform(0.0, 2.0 * math.pi)) for line in model.noise.sinusoids
+            (line, lines.uniform(0.0, 2.0 * math.pi)) for line in model.noise.sinusoids
         ]
-        self._Q = model.noise.Q
-        self._counted = self._counts.standard_normal() if self._Q else 0.0
-        self._drift = np.zeros(3)
-        if model.drift is not None:
-            drift = model.drift
-            self._drift[:] = drift.sensitivity, drift.quadratic, drift.reference
+        self._counted = self._counts.standard_normal() if model.noise.Q else 0.0
 
-    def _discretise(self, interval: float) -> _Discrete:
-        low_pass, lag = self._model.low_pass, self._model.drift.lag if self._model.drift else 0.0
+    def _discretise(
+        self, interval: float
+    ) -> tuple[tuple[Array, Array, Array, Array], tuple[Array, Array, Array, float]]:
+        """Return the arguments of `run` for slow states and filter, over one sampling interval."""
+        low_pass = self._model.low_pass
         slow = slow_sources(self._times, interval, low_pass)
         scale = np.sqrt(self._densities)
         shared = slow.shared * scale[:, None]
-        driven = SlowSources(
-            slow.decay, slow.lost, slow.own * scale, slow.coupling, shared, slow.residual
+        states = (
+            slow.decay,
+            slow.own * scale,
+            np.ascontiguousarray(slow.coupling.T),
+            np.ascontiguousarray(shared.T),
         )
-        hold = held_input(low_pass, lag, interval)
         if low_pass is None:
             none = np.zeros((0, 0))
-            white = math.sqrt(self._white / interval)
-            return _Discrete(driven, none, none, np.zeros(0), white, hold)
+            return states, (none, none, np.zeros(0), math.sqrt(self._white / interval))
         # Noise of the filter that is independent of the noise of the slow states.
-        m = low_pass.order
-        parts = (slow.residual * scale[:, None, None]).reshape(-1, m)
+        parts = (slow.residual * scale[:, None, None]).reshape(-1, low_pass.order)
         white_part = math.sqrt(self._white) * white_factor(low_pass, interval)
         factor = np.asarray(np.linalg.qr(np.concatenate([parts, white_part]), mode="r"))
-        transition = filter_transition(low_pass, interval)
-        return _Discrete(driven, transition, factor, low_pass.output, 0.0, hold)
+        return states, (filter_transition(low_pass, interval), factor, low_pass.output, 0.0)
 
     def _draw_initial_states(self, rng: np.random.Generator) -> tuple[Array, Array]:
         """Draw the states at the first sample."""
@@ -298,75 +289,37 @@ class _Axis:
         self, start: int, stop: int, true: Signal | None, temperature: Signal | None
     ) -> Array:
         """Return the next samples."""
-        model, discrete, hold = self._model, self._discrete, self._discrete.input_hold
+        model, rate = self._model, self._rate
         size = stop - start
         entering = np.full(size, model.bias)
         if true is not None:
             entering += (1.0 + model.scale_error) * _check_signal(true(start, stop), size, "motion")
         if model.noise.R:
-            entering += model.noise.R / self._rate * np.arange(start, stop)
+            entering += model.noise.R / rate * np.arange(start, stop)
         temperatures = np.empty(0)
         if temperature is not None and model.drift is not None:
             temperatures = _check_signal(temperature(start, stop), size, "temperature")
-        own = max(len(self._e), 1)
-        normal = self._noise.standard_normal((size, len(self._x) + own))
+        normal = self._noise.standard_normal((size, len(self._x) + max(len(self._e), 1)))
         log = np.empty(size)
-        run(
-            log,
-            entering,
-            temperatures,
-            normal,
-            self._memory,
-            self._x,
-            self._e,
-            discrete.slow.decay,
-            discrete.slow.own,
-            self._coupling,
-            self._shared,
-            discrete.transition,
-            discrete.factor,
-            discrete.output,
-            discrete.white,
-            hold.step,
-            self._lag,
-            hold.lag_coupling,
-            hold.lagged_step,
-            self._drift,
-        )
+        states = (self._memory, self._x, self._e)
+        run(log, entering, temperatures, normal, *states, *self._slow, *self._filter, *self._input)
         for line, phase in self._sinusoids:
-            log += self._simulate_line(line, phase, start, stop)
-        if self._Q:
+            response = model.low_pass.response(line.frequency) if model.low_pass else 1.0
+            # Remove whole periods first: they would cost precision after 10^9 samples.
+            turns = np.arange(start, stop) * (line.frequency / rate) % 1.0
+            shift = phase + np.angle(response)
+            log += line.amplitude * abs(response) * np.cos(2.0 * math.pi * turns + shift)
+        if model.noise.Q:
             counts = self._counts.standard_normal(size)
-            log += self._Q * self._rate * np.diff(counts, prepend=self._counted)
+            log += model.noise.Q * rate * np.diff(counts, prepend=self._counted)
             self._counted = counts[-1]
-        return _apply_register(log, model)
-
-    def _simulate_line(self, line: Sinusoid, phase: float, start: int, stop: int) -> Array:
-        response = self._model.low_pass.response(line.frequency) if self._model.low_pass else 1.0
-        # Remove whole periods first: they would cost precision after 10^9 samples.
-        turns = np.arange(start, stop) * (line.frequency / self._rate) % 1.0
-        shift = phase + np.angle(response)
-        return np.asarray(line.amplitude * abs(response) * np.cos(2.0 * math.pi * turns + shift))
-
-
-def _apply_register(log: Array, model: SensorModel) -> Array:
-    """Apply the saturation and rounding of a register."""
-    if model.full_scale is not None:
-        np.clip(log, -model.full_scale, model.full_scale, out=log)
-    if model.resolution > 0.0:
-        log /= model.resolution
-        np.rint(log, out=log)
-        log *= model.resolution
-    return log
-
-
-def _realise_terms(model: SensorModel, rate: float, duration: float) -> list[Term]:
-    """Return the terms with flicker noise as a bank of processes."""
-    flicker = [term for term in model.noise.terms if term.drive is not None and term.drive.flicker]
-    others = [term for term in model.noise.terms if term not in flicker]
-    if model.low_pass is not None:
-        return [*others, *bank_for(model, rate, duration)]
-    return [*others, *(part for term in flicker for part in term.realised(1.0 / rate, duration))]
+        if model.full_scale is not None:
+            np.clip(log, -model.full_scale, model.full_scale, out=log)
+        if model.resolution > 0.0:
+            log /= model.resolution
+            np.rint(log, out=log)
+            log *= model.resolution
+        return log
 
 
 def _check_signal(values: Array, size: int, what: str) -> Array:

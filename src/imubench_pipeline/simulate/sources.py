@@ -46,10 +46,7 @@ class Origin:
 def from_file(path: Path) -> Origin:
     """Read a file of models (see `settings`).
 
-    Raises
-    ------
-    ConfigError
-        If the file does not exist, or a figure cannot be used.
+    Raises ConfigError if the file does not exist, or a figure cannot be used.
     """
     settings = read_settings(ModelSettings, path)
     named = f"{path.name}" + (f" ({settings.source})" if settings.source else "")
@@ -65,10 +62,7 @@ def from_file(path: Path) -> Origin:
 def select_channels(origin: Origin, channels: Sequence[str]) -> Origin:
     """Return a model with the given channels only.
 
-    Raises
-    ------
-    ConfigError
-        If it has no such channel.
+    Raises ConfigError if it has no such channel.
     """
     if missing := [name for name in channels if name not in origin.imu.axes]:
         channels_there = ", ".join(origin.imu.axes) or "none"

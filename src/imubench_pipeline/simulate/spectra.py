@@ -18,18 +18,14 @@ from imubench_pipeline.simulate.discretisation import (
     stationary,
     white_factor,
 )
-from imubench_pipeline.simulate.flicker_band import mixture
 from imubench_pipeline.typing import Array
 
-_FREQUENCIES_PER_CHUNK = 2048
-"""Frequencies per block of the computation."""
-
+_FREQUENCIES_PER_CHUNK = 2048  # frequencies per block of the computation
 _MIN_TIME_RATIO = 1e-5
 """Shortest correlation time of flicker noise, over the time constant of the filter or the sampling
 interval, whichever is shorter."""
 
-_MAX_TIME_RATIO = 1e5
-"""Longest correlation time of flicker noise, over the longest requested time."""
+_MAX_TIME_RATIO = 1e5  # longest correlation time of flicker noise, over the longest requested time
 
 
 @dataclass(frozen=True)
@@ -50,8 +46,12 @@ class Sources:
         """
         if self.flicker == 0.0:
             return self.times, self.densities
+        # Log-spaced processes, five per decade, sum to flicker noise with a ripple below 1e-8.
         shortest = _MIN_TIME_RATIO * min(1.0 / low_pass.angular_cutoff, interval)
-        times, variance = mixture(shortest, _MAX_TIME_RATIO * longest)
+        longest *= _MAX_TIME_RATIO
+        count = 2 + math.ceil(5.0 * math.log10(longest / shortest))
+        times = np.geomspace(shortest, longest, count)
+        variance = math.log(times[1] / times[0]) / math.pi
         densities = self.flicker * 2.0 * variance / times
         return np.concatenate([self.times, times]), np.concatenate([self.densities, densities])
 
@@ -178,14 +178,8 @@ def _make_one_sample(
     sums = np.zeros((n + 1, 1 + m))
     sums[:n, 0] = 1.0
     sums[:, 1:] = low_pass.output
-    sample = _Cluster(
-        transition,
-        lost,
-        sums,
-        factor.swapaxes(1, 2) @ factor,
-        np.zeros((n + 1, 1 + m)),
-        np.zeros(n + 1),
-    )
+    state, both = factor.swapaxes(1, 2) @ factor, np.zeros((n + 1, 1 + m))
+    sample = _Cluster(transition, lost, sums, state, both, np.zeros(n + 1))
     start = np.zeros((n + 1, 1 + m, 1 + m))
     for i in range(n):
         # The initial value of a random walk does not matter: it cancels in the difference.

@@ -89,10 +89,7 @@ def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) 
 def check_notes(notes: Path, path: Path) -> None:
     """Check that the notes of a simulated log are the notes of no other recording.
 
-    Parameters
-    ----------
-    notes, path : Path
-        The notes, and the log; they need not exist.
+    ``notes``, ``path``: the notes, and the log; they need not exist.
 
     Raises
     ------
@@ -130,16 +127,20 @@ def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | 
     channels = {name: _make_si_source(name) for name in names if name != TEMPERATURE}
     temperature = _make_si_source(TEMPERATURE) if TEMPERATURE in names else None
     delimiter = ","
-    if text and sensor is not None and _has_names(sensor, channels):
-        channels = {name: sensor.channels[name] for name in channels}  # type: ignore[index]  # the keys are channels, as text
-        temperature = sensor.temperature if temperature and sensor.temperature else temperature
-        delimiter = sensor.delimiter or delimiter
+    if text and sensor is not None and sensor.reader in (None, "csv"):
+        # Are the sensor's logs one text file with a named column for each channel?
+        by_name = {str(name): source for name, source in sensor.channels.items()}
+        sources = [by_name.get(name) for name in channels]
+        if sensor.temperature is not None:
+            sources.append(sensor.temperature)
+        if all(s is not None and isinstance(s.column, str) and not s.file for s in sources):
+            channels = {name: by_name[name] for name in channels}
+            temperature = temperature and (sensor.temperature or temperature)
+            delimiter = sensor.delimiter or delimiter
     keys: dict[str, Any] = {
         "reader": "csv" if text else "arrow",
         "rate": f"{rate:.17g} Hz",
-        "channels": {
-            name: source.model_dump(exclude_unset=True) for name, source in channels.items()
-        },
+        "channels": {name: each.model_dump(exclude_unset=True) for name, each in channels.items()},
     }
     if temperature is not None:
         keys["temperature"] = temperature.model_dump(exclude_unset=True)
@@ -148,16 +149,6 @@ def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | 
     if sensor is not None and sensor.bandwidth is not None:
         keys["bandwidth"] = sensor.bandwidth
     return LogFormat.model_validate(keys)
-
-
-def _has_names(sensor: LogFormat, channels: Mapping[str, ColumnSource]) -> bool:
-    """Return whether the sensor's logs are one text file with a named column for each channel."""
-    by_name = {str(name): source for name, source in sensor.channels.items()}
-    sources = [by_name.get(name) for name in channels]
-    if sensor.temperature is not None:
-        sources.append(sensor.temperature)
-    named = all(s is not None and isinstance(s.column, str) and not s.file for s in sources)
-    return named and sensor.reader in (None, "csv")
 
 
 def _make_si_source(name: str) -> ColumnSource:

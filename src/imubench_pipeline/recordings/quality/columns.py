@@ -13,25 +13,17 @@ from imubench_pipeline.model.states import Severity
 from imubench_pipeline.recordings.quality import copies, held, joined, levels, stationarity
 from imubench_pipeline.recordings.quality.copies import shared_noise
 from imubench_pipeline.recordings.quality.summary import MAX_MEASUREMENT, ColumnSummary
+from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.sensor import (
-    POSITION,
-    QUANTITIES,
-    TABLE_RATE,
-    TEMPERATURE,
-    quantity_of,
-)
+from imubench_pipeline.settings.sensor import QUANTITIES, TEMPERATURE, quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import SI_UNITS, from_si
 
-_COUNT_SIGMAS = 4.0
-"""Upper confidence bound of a count, in standard errors."""
-
+_COUNT_SIGMAS = 4.0  # upper confidence bound of a count, in standard errors
 _MIN_DIFFERENCE_SD, _MAX_DIFFERENCE_SD = 0.6, 300.0
 """Range of the standard deviation of the difference between neighbours, in steps of the register,
 that the share of one-step changes determines. Below it all changes are by one step, and the share
 depends on the position of the mean between two steps."""
-
 
 _DISPLAY_UNITS = {"gyro": ("deg/s", "°/s"), "accel": ("mg", "mg")}
 """Unit in which the values of each quantity are shown, and its symbol."""
@@ -50,12 +42,8 @@ def repeats_beyond_chance(column: ColumnSummary) -> tuple[float, float]:
     changes like independent samples. Samples also repeat by chance, for two reasons, and the larger
     of the two shares is subtracted. Coarse steps: the share of samples that equal the sample
     `summary.FAR_LAG` before. Low-passed noise, whose neighbours are alike: the share of repeats in
-    rounded normal noise with the same share of one-step changes.
-
-    Returns
-    -------
-    (beyond, chance) : float
-        Share of all samples that repeat beyond chance, and share of pairs that repeat by chance.
+    rounded normal noise with the same share of one-step changes. The result is the share of all
+    samples that repeat beyond chance, and the share of pairs that repeat by chance.
     """
     pairs, far_pairs = column.pairs, column.far_pairs
     if pairs == 0 or far_pairs == 0:
@@ -118,22 +106,20 @@ def column_findings(
 ) -> list[Finding]:
     """Return the findings about the columns of one file; an unusable channel is fatal.
 
-    Parameters
-    ----------
-    columns : mapping of str to ColumnSummary
-        Channels and, where the log has one, the temperature.
-    rate : float
-        Hz; converts records to the times of the findings.
-    static : bool
-        The sensor was at rest. If it was turned on purpose, changes are not reported.
+    ``rate``: Hz. ``static``: the sensor was at rest. If it was turned on purpose, changes are not
+    reported.
     """
     findings: list[Finding] = []
     usable: dict[str, ColumnSummary] = {}
     for channel, column in columns.items():
-        if channel == TEMPERATURE:
-            findings += _find_temperature_steps(column)
-            continue
-        if channel in (POSITION, TABLE_RATE):
+        span = column.high - column.low
+        if channel == TEMPERATURE and 0.0 < column.step < math.inf and span <= 2000.0 * column.step:
+            detail = (
+                f"the temperature has steps of {column.step:.3g} °C, from {column.low:.4g} to "
+                f"{column.high:.4g} °C"
+            )
+            findings.append(Finding("quantised", "note", detail, column.step, TEMPERATURE))
+        if channel in BESIDE:
             continue
         fatal = _find_unusable(channel, column, settings)
         findings += [fatal] if fatal else []
@@ -148,7 +134,18 @@ def column_findings(
             if not _has_only_rounding(steps[channel], settings):
                 findings += joined.joined(channel, column, rate)
                 findings += joined.interleaved(channel, column)
-        findings += _find_repeats(channel, column, steps[channel], settings)
+        regularly = list(held.held_samples(channel, column))
+        findings += regularly
+        rounded = _is_rounding_dominant(steps[channel]) or _has_few_levels(steps[channel], settings)
+        beyond, chance = repeats_beyond_chance(column)
+        if beyond > settings.repeated and not (regularly or rounded):
+            share = column.repeats / max(column.present - 1, 1)
+            detail = (
+                f"{channel} repeats the sample before in {100 * share:.0f} % of the records, of "
+                f"which rounding explains {100 * chance:.2g} %: it is read faster than it samples; "
+                "state its own rate, and record each sample once"
+            )
+            findings.append(Finding("repeated_samples", "warning", detail, share, channel))
     findings += copies.repeated_stretches(usable, steps, rate)
     if static:
         findings += shared_noise(usable)
@@ -158,8 +155,7 @@ def column_findings(
 def _format_value(channel: str, value: float) -> str:
     """Return a value of a channel in SI and in its usual unit."""
     quantity = quantity_of(channel)
-    usual, sign = _DISPLAY_UNITS[quantity]
-    dimension = QUANTITIES[quantity]
+    (usual, sign), dimension = _DISPLAY_UNITS[quantity], QUANTITIES[quantity]
     written = from_si(value, usual, dimension)
     return f"{value:.4g} {SI_UNITS[dimension]} ({written:.4g} {sign})"
 
@@ -176,11 +172,8 @@ def _find_unusable(
         )
         return Finding("too_short", "fatal", detail, column.present, channel)
     if column.low == column.high:
-        stays = (
-            "is exactly 0"
-            if column.low == 0.0
-            else f"stays at {_format_value(channel, column.low)}"
-        )
+        value = _format_value(channel, column.low)
+        stays = "is exactly 0" if column.low == 0.0 else f"stays at {value}"
         detail = (
             f"{channel} never changes (it {stays} in all {column.present} samples); the axis is "
             "dead or was not read, or the column is not the one meant"
@@ -205,16 +198,6 @@ def _find_missing_cells(channel: str, column: ColumnSummary, rate: float) -> Ite
             f"{MAX_MEASUREMENT:g}{most}; treated as missing samples"
         )
         yield Finding("not_finite", "warning", detail, column.not_finite, channel, begin, end)
-
-
-def _find_temperature_steps(column: ColumnSummary) -> Iterator[Finding]:
-    if not (0.0 < column.step < math.inf) or column.high - column.low > 2000.0 * column.step:
-        return
-    detail = (
-        f"the temperature has steps of {column.step:.3g} °C, from {column.low:.4g} to "
-        f"{column.high:.4g} °C"
-    )
-    yield Finding("quantised", "note", detail, column.step, TEMPERATURE)
 
 
 def _find_bad_values(
@@ -243,16 +226,9 @@ def _find_bad_values(
     stuck = length > max(3.0 * levels.longest_by_chance(column), settings.longest_stuck * rate)
     # A level midway between two edges of a register can stay at one value for any time.
     if stuck and not _has_only_rounding(steps, settings):
-        detail = f"{channel} stays at one value for {length / rate:.4g} s ({length} samples)"
-        yield Finding(
-            "stuck_for_a_while",
-            "warning",
-            detail,
-            length / rate,
-            channel,
-            (end - length) / rate,
-            end / rate,
-        )
+        seconds, start = length / rate, (end - length) / rate
+        detail = f"{channel} stays at one value for {seconds:.4g} s ({length} samples)"
+        yield Finding("stuck_for_a_while", "warning", detail, seconds, channel, start, end / rate)
     at_end = levels.saturated(column, steps, settings.saturated)
     if at_end is not None:
         side, number = at_end
@@ -290,13 +266,12 @@ def _find_changes(
     for first, last in stationarity.motions(blocks, settings.motion, 0.75 * step_size):
         if any(first - step.window <= step.sample <= last + step.window for step in moves):
             continue  # the spread is large because of the step
+        begin, end, length = first / rate, last / rate, (last - first) / rate
         detail = (
-            f"{channel} is shaken from {first / rate:.5g} s to {last / rate:.5g} s; use a part "
-            "without it ('use:' beside the log)"
+            f"{channel} is shaken from {begin:.5g} s to {end:.5g} s; use a part without it ('use:' "
+            "beside the log)"
         )
-        yield Finding(
-            "motion", "warning", detail, (last - first) / rate, channel, first / rate, last / rate
-        )
+        yield Finding("motion", "warning", detail, length, channel, begin, end)
     for step in moves:
         if abs(step.size) < 1.5 * step_size:
             continue
@@ -320,19 +295,15 @@ def _find_changes(
         )
         yield Finding("warm_up", "warning", detail, warm.drift, channel, 0.0, warm.end / rate)
     change = stationarity.variance_change(blocks)
-    if (
-        change is not None
-        and not _is_rounding_dominant(steps)
-        and change[0] > settings.variance_ratio
-    ):
-        ratio, first, last = change
+    if change is None or _is_rounding_dominant(steps):
+        return
+    ratio, begin, end = change[0], change[1] / rate, change[2] / rate
+    if ratio > settings.variance_ratio:
         detail = (
-            f"the noise of {channel} is {ratio:.3g} times as large from {first / rate:.5g} s to "
-            f"{last / rate:.5g} s as where it is calmest: it is not stationary"
+            f"the noise of {channel} is {ratio:.3g} times as large from {begin:.5g} s to "
+            f"{end:.5g} s as where it is calmest: it is not stationary"
         )
-        yield Finding(
-            "not_stationary", "warning", detail, ratio, channel, first / rate, last / rate
-        )
+        yield Finding("not_stationary", "warning", detail, ratio, channel, begin, end)
 
 
 def _is_rounding_dominant(steps: levels.Quantisation | None) -> bool:
@@ -348,25 +319,3 @@ def _has_few_levels(steps: levels.Quantisation | None, settings: QualitySettings
 def _has_only_rounding(steps: levels.Quantisation | None, settings: QualitySettings) -> bool:
     """Return whether a channel shows rounding noise only; then the finding ``coarse`` suffices."""
     return _is_rounding_dominant(steps) and _has_few_levels(steps, settings)
-
-
-def _find_repeats(
-    channel: str,
-    column: ColumnSummary,
-    steps: levels.Quantisation | None,
-    settings: QualitySettings,
-) -> Iterator[Finding]:
-    """Yield a finding if samples repeat regularly, or more often than rounding explains."""
-    regularly = list(held.held_samples(channel, column))
-    yield from regularly
-    if regularly or _is_rounding_dominant(steps) or _has_few_levels(steps, settings):
-        return
-    beyond, chance = repeats_beyond_chance(column)
-    if beyond > settings.repeated:
-        share = column.repeats / max(column.present - 1, 1)
-        detail = (
-            f"{channel} repeats the sample before in {100 * share:.0f} % of the records, of "
-            f"which rounding explains {100 * chance:.2g} %: it is read faster than it samples; "
-            "state its own rate, and record each sample once"
-        )
-        yield Finding("repeated_samples", "warning", detail, share, channel)

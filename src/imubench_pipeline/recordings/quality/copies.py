@@ -1,19 +1,15 @@
-"""Find copied samples and noise that two axes share.
+"""Find copied samples, copied recordings, and noise that two axes share.
 
-A channel may be a copy of another channel, and a stretch of a log a copy of an earlier stretch.
-
-A log may also be in the folder of its sensor twice. The copy would count as another unit, with no
-spread between the two. Copies are found by the log-likelihood and the mean of each channel: no two
-different logs agree in nine digits of both.
+A copy of a recording would count as another unit, with no spread between the two. It is found by
+the log-likelihood and the mean of each channel: no two logs agree in nine digits of both.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import chain
+from itertools import chain, combinations
 from typing import Any
 
 import numpy as np
@@ -27,9 +23,7 @@ from imubench_pipeline.recordings.quality.summary import ColumnSummary, Excerpt,
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-_MIN_NONZERO_INCREMENTS = 64
-"""Least number of increments of a piece that are not 0."""
-
+_MIN_NONZERO_INCREMENTS = 64  # least number of increments of a piece that are not 0
 _MIN_COPY_CORRELATION = 1.0 - 1e-6
 """Least correlation of the increments of a copy. A vibration that both axes measure reaches it only
 if it is 1000 times the noise."""
@@ -48,8 +42,7 @@ _MIN_SHARE_LOG_TWICE = 0.1
 """Least share of repeated samples for which the whole log counts as copied."""
 
 
-_FINGERPRINT_FORMAT = ".8e"
-"""Nine digits, to find copies of a log."""
+_FINGERPRINT_FORMAT = ".8e"  # nine digits, to find copies of a log
 
 
 def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
@@ -89,8 +82,12 @@ def _find_copy_factor(first: list[Excerpt], other: list[Excerpt]) -> float | Non
         xx, yy, xy = float(dx @ dx), float(dy @ dy), float(dx @ dy)
         correlation = abs(xy) / (np.sqrt(xx) * np.sqrt(yy))
         slopes.append(xy / xx)
-        rounded = correlation > _MIN_ROUNDED_COPY_CORRELATION and _is_within_rounding(x, y, xy / xx)
-        alike.append(correlation > _MIN_COPY_CORRELATION or rounded)
+        copied = correlation > _MIN_COPY_CORRELATION
+        if not copied and correlation > _MIN_ROUNDED_COPY_CORRELATION:
+            # The columns differ by no more than the steps of both.
+            steps = _find_step(y) + abs(slopes[-1]) * _find_step(x)
+            copied = np.ptp(y - slopes[-1] * x) <= 1.02 * steps
+        alike.append(bool(copied))
     if not alike or 2 * sum(alike) <= len(alike):
         return None
     return float(np.median(slopes))
@@ -106,13 +103,6 @@ def _pair_increments(
             yield x, y, dx, dy
 
 
-def _is_within_rounding(x: Array, y: Array, slope: float) -> bool:
-    """Return whether two columns differ by no more than the steps of both."""
-    left = y - slope * x
-    steps = _find_step(y) + abs(slope) * _find_step(x)
-    return bool(np.ptp(left) <= 1.02 * steps)
-
-
 def _find_step(values: Array) -> float:
     """Return the least difference between values, beyond rounding errors of the arithmetic."""
     gaps = np.diff(np.unique(values))
@@ -126,18 +116,14 @@ def repeated_stretches(
 ) -> Iterator[Finding]:
     """Yield findings about stretches of a log that repeat an earlier stretch bit for bit.
 
-    Parameters
-    ----------
-    columns : mapping of str to ColumnSummary
-        Usable channels of one file.
-    steps : mapping of str to Quantisation or None
-        Quantisation of each of them.
-    rate : float
-        Hz.
+    ``columns`` and ``steps``: usable channels of one file, and their quantisation. ``rate``: Hz.
     """
-    stretches_of = {
-        name: _select_significant(column, steps[name]) for name, column in columns.items()
-    }
+    stretches_of = {}
+    for name, column in columns.items():
+        quantisation = steps[name]
+        few = quantisation is not None and quantisation.levels < _MAX_LEVELS_LOW_ENTROPY
+        fewest = _MIN_CHANGES_LOW_ENTROPY if few else WINDOW  # fewer may repeat by chance
+        stretches_of[name] = [s for s in column.repeated.stretches() if s.changes >= fewest]
     lags = {name: {s.lag for s in stretches} for name, stretches in stretches_of.items()}
     channels = Counter(chain.from_iterable(lags.values()))
     # A lag that most channels have: whole records are copied. Not all channels need to show it,
@@ -145,24 +131,12 @@ def repeated_stretches(
     common = {lag for lag, count in channels.items() if 2 * count > len(stretches_of) > 1}
     shared = {lag: next(name for name in lags if lag in lags[name]) for lag in sorted(common)}
     if shared:
-        stretches = [
-            stretch
-            for lag, name in shared.items()
-            for stretch in stretches_of[name]
-            if stretch.lag == lag
-        ]
+        stretches = [s for lag, name in shared.items() for s in stretches_of[name] if s.lag == lag]
         yield _describe_repeats(None, stretches, max(c.present for c in columns.values()), rate)
     for name, of_channel in stretches_of.items():
         alone = [stretch for stretch in of_channel if stretch.lag not in common]
         if alone:
             yield _describe_repeats(name, alone, columns[name].present, rate)
-
-
-def _select_significant(column: ColumnSummary, steps: levels.Quantisation | None) -> list[Stretch]:
-    """Return the stretches with enough changes not to repeat by chance."""
-    few = steps is not None and steps.levels < _MAX_LEVELS_LOW_ENTROPY
-    fewest = _MIN_CHANGES_LOW_ENTROPY if few else WINDOW
-    return [stretch for stretch in column.repeated.stretches() if stretch.changes >= fewest]
 
 
 def _describe_repeats(
@@ -202,9 +176,8 @@ def recorded_twice(
         mean = means.get(_get_channel_key(row))
         if not row.chosen or mean is None:
             continue
-        samples = (
-            format(row.log_likelihood, _FINGERPRINT_FORMAT),
-            format(mean, _FINGERPRINT_FORMAT),
+        samples = tuple(
+            format(figure, _FINGERPRINT_FORMAT) for figure in (row.log_likelihood, mean)
         )
         sensor, recording, channel = _get_channel_key(row)
         of = first.setdefault((sensor, channel, *samples), recording)
@@ -224,8 +197,6 @@ def _get_channel_key(row: ChannelRow) -> tuple[str, str, str]:
     return row.sensor, row.recording, row.channel
 
 
-# ---------------------------------------------------------------------------------- noise in common
-
 _MIN_SHARED_CORRELATION = 0.45
 """Least correlation that is reported. Two axes with as much noise of their own as in common reach
 0.5, an axis and the sum of three 0.58. The accelerometers of an ADIS16405 have 0.36 between y and
@@ -238,16 +209,28 @@ _CORRELATION_SIGMAS = 4.0
 def shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
     """Yield findings about axes of one sensor with correlated increments.
 
-    Increments suppress slow signals, such as a temperature effect on all axes.
+    Increments suppress slow signals, such as a temperature effect on all axes. The standard error
+    of a correlation of noise with the autocorrelations a_k and b_k is sqrt(sum a_k b_k / n)
+    (M. S. Bartlett, "Some Aspects of the Time-Correlation Problem", J. R. Stat. Soc. 98, 1935).
 
     ``columns``: usable channels of one file.
     """
     pieces = {name: column.excerpts() for name, column in columns.items()}
     strongest: dict[str, tuple[float, str]] = {}
-    for first, other in itertools.combinations(pieces, 2):
+    for first, other in combinations(pieces, 2):
         if first.partition("_")[0] != other.partition("_")[0]:
             continue
-        correlation, error = _correlate_increments(pieces[first], pieces[other])
+        correlations, variances = [], []
+        for _, _, dx, dy in _pair_increments(pieces[first], pieces[other]):
+            dx, dy = dx / math.sqrt(dx @ dx), dy / math.sqrt(dy @ dy)
+            correlations.append(float(dx @ dy))
+            variances.append(float(_autocorrelate(dx) @ _autocorrelate(dy)) / len(dx))
+        if not correlations:
+            continue
+        correlation = float(np.median(correlations))
+        error = math.sqrt(sum(variances)) / len(variances)
+        if len(variances) > 1:  # the standard error of a median is 1.25 times that of a mean
+            error *= 1.25
         if abs(correlation) < _MIN_SHARED_CORRELATION + _CORRELATION_SIGMAS * error:
             continue
         for channel, beside in ((first, other), (other, first)):
@@ -260,24 +243,6 @@ def shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
             "axes; axes are fused and pooled as independent"
         )
         yield Finding("shared_noise", "warning", detail, correlation, channel)
-
-
-def _correlate_increments(first: list[Excerpt], other: list[Excerpt]) -> tuple[float, float]:
-    """Return the median correlation of the increments over pieces, and its standard error.
-
-    The standard error for noise with the autocorrelations a_k and b_k is sqrt(sum a_k b_k / n)
-    (M. S. Bartlett, "Some Aspects of the Time-Correlation Problem", J. R. Stat. Soc. 98, 1935). The
-    standard error of a median of pieces is 1.25 times that of a mean.
-    """
-    correlations, variances = [], []
-    for _, _, dx, dy in _pair_increments(first, other):
-        dx, dy = dx / math.sqrt(dx @ dx), dy / math.sqrt(dy @ dy)
-        correlations.append(float(dx @ dy))
-        variances.append(float(_autocorrelate(dx) @ _autocorrelate(dy)) / len(dx))
-    if not correlations:
-        return 0.0, math.inf
-    error = math.sqrt(sum(variances)) / len(variances)
-    return float(np.median(correlations)), 1.25 * error if len(variances) > 1 else error
 
 
 def _autocorrelate(values: Array) -> Array:

@@ -12,18 +12,10 @@ from numpy.typing import NDArray
 from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding
 
-_MAX_PERIOD = 256
-"""Longest period of repeats that is tested, records."""
-
-_MAX_PIECES = 8
-"""Pieces that are tested; each is tested for every period."""
-
-_MIN_REPEATS_OF_PHASE = 0.98
-"""Least share of repeats in the fullest phase of a period."""
-
-_MAX_REPEATS_OF_OTHERS = 0.9
-"""Largest share of repeats in any other phase."""
-
+_MAX_PERIOD = 256  # longest period of repeats that is tested, records
+_MAX_PIECES = 8  # pieces that are tested; each is tested for every period
+_MIN_REPEATS_OF_PHASE = 0.98  # least share of repeats in the fullest phase of a period
+_MAX_REPEATS_OF_OTHERS = 0.9  # largest share of repeats in any other phase
 _MAX_LOG10_CHANCE = -12.0
 """Largest decimal logarithm of the probability that the repeats are random."""
 
@@ -32,46 +24,37 @@ _MAX_LOG10_CHANCE = -12.0
 class Held:
     """Samples that repeat periodically."""
 
-    every: int
-    """Period, records."""
-    share: float
-    """Share of repeats among the other samples."""
+    every: int  # period, records
+    share: float  # share of repeats among the other samples
 
 
 def regular_repeats(pieces: list[Excerpt]) -> Held | None:
     """Return the period at which samples repeat their predecessor; None if there is none."""
     whole = [piece.values for piece in pieces if len(piece.values) >= PIECE_SIZE // 4]
     whole = whole[:: max(1, len(whole) // _MAX_PIECES)][:_MAX_PIECES]
+    periods = np.arange(3, _MAX_PERIOD + 1)
     regular: list[Held] = []
     for values in whole:
-        repeats = np.flatnonzero(values[1:] == values[:-1])
-        of_piece = _find_period(repeats, len(values) - 1)
-        if of_piece is not None:
-            regular.append(of_piece)
+        repeats, records = np.flatnonzero(values[1:] == values[:-1]), len(values) - 1
+        counts = np.zeros((_MAX_PERIOD + 1, 2), dtype=np.int64)
+        _count_phases(repeats, counts)
+        most, second = counts[3:].T
+        turns = records // periods
+        share = (len(repeats) - most) / (records - turns)
+        # Corrected for the number of phases and periods that are tested.
+        chance = most * np.log10(share + 1.0 / records) + np.log10(periods * _MAX_PERIOD)
+        is_regular = (
+            (most >= _MIN_REPEATS_OF_PHASE * turns)
+            & (second <= _MAX_REPEATS_OF_OTHERS * turns)
+            & (chance < _MAX_LOG10_CHANCE)
+        )
+        if is_regular.any():
+            first = int(np.argmax(is_regular))
+            regular.append(Held(int(periods[first]), float(share[first])))
     if not regular or 2 * len(regular) <= len(whole):
         return None
     every = int(np.median([of_piece.every for of_piece in regular]))
     return Held(every, float(np.median([of_piece.share for of_piece in regular])))
-
-
-def _find_period(repeats: NDArray[np.int64], records: int) -> Held | None:
-    counts = np.zeros((_MAX_PERIOD + 1, 2), dtype=np.int64)
-    _count_phases(repeats, counts)
-    every = np.arange(3, _MAX_PERIOD + 1)
-    turns = records // every
-    most, second = counts[3:].T
-    share = (len(repeats) - most) / (records - turns)
-    # Corrected for the number of phases and periods that are tested.
-    chance = most * np.log10(share + 1.0 / records) + np.log10(every * _MAX_PERIOD)
-    regular = (
-        (most >= _MIN_REPEATS_OF_PHASE * turns)
-        & (second <= _MAX_REPEATS_OF_OTHERS * turns)
-        & (chance < _MAX_LOG10_CHANCE)
-    )
-    if not regular.any():
-        return None
-    first = int(np.argmax(regular))
-    return Held(int(every[first]), float(share[first]))
 
 
 @njit(cache=True, nogil=True)

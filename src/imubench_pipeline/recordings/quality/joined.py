@@ -18,9 +18,7 @@ from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSumma
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-_CHANGE_SIGMAS = 8.0
-"""Least change of level or noise, in standard deviations."""
-
+_CHANGE_SIGMAS = 8.0  # least change of level or noise, in standard deviations
 _MIN_LOG_NOISE_CHANGE = math.log(1.2)
 """Least change of the log of the noise: one log of one sensor has a ratio of 1.12 with a small step
 of its level."""
@@ -32,24 +30,17 @@ noise of one sensor alternate."""
 _MIN_NOISE_WIDTH, _MAX_NOISE_WIDTH = 8, 64
 """Range of the number of blocks on either side whose noise is compared."""
 
-_LEVEL_WIDTH = 4
-"""Number of blocks on either side whose mean is compared."""
-
-_MIN_STEP_RATIO = 1.2
-"""Least ratio of the steps of two different registers."""
-
+_LEVEL_WIDTH = 4  # number of blocks on either side whose mean is compared
+_MIN_STEP_RATIO = 1.2  # least ratio of the steps of two different registers
 _MIN_LEVEL_ALTERNATION = 5.0
 """Least difference of alternating levels, in standard deviations of the noise, if nothing else
 alternates."""
 
-_PAIRS_PER_PART = 128
-"""Pairs of samples in a part."""
-
+_PAIRS_PER_PART = 128  # pairs of samples in a part
 _MEDIAN_SD_OVER_MEAN_SD = 1.2533
 """Standard deviation of a median over the standard deviation of a mean, for normal noise."""
 
-_SD_OVER_MAD = 1.4826
-"""Standard deviation over the median absolute deviation, of normal noise."""
+_SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise
 
 
 def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
@@ -66,9 +57,8 @@ def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding
     for place in dict.fromkeys(int(np.argmax(np.abs(series))) for series in (noise, level)):
         near = slice(max(0, place - 2), place + 3)
         if np.abs(level[near]).max() > _CHANGE_SIGMAS:
-            around = np.arange(
-                max(1, place - _LEVEL_WIDTH), min(len(mean) - 1, place + _LEVEL_WIDTH + 1)
-            )
+            last = min(len(mean) - 1, place + _LEVEL_WIDTH + 1)
+            around = np.arange(max(1, place - _LEVEL_WIDTH), last)
             place = int(around[np.argmax(np.abs(mean[around + 1] - mean[around - 1]))])
         record = int(filled[place]) * blocks.size + blocks.size // 2
         changes = {
@@ -78,9 +68,13 @@ def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding
             and abs(np.median(logs[place:]) - np.median(logs[:place])) > _MIN_LOG_NOISE_CHANGE,
         }
         if any(changes.values()):
-            changes["steps"] = _has_different_steps(
-                *_find_registers(column.excerpts(), record, 3 * blocks.size)
-            )
+            # The margin allows for the unknown record of the change.
+            before, after, margin = [], [], 3 * blocks.size
+            for piece in column.excerpts():
+                begin, end = (max(record - piece.first + m, 0) for m in (-margin, margin))
+                before.append(Excerpt(piece.first, piece.values[:begin]))
+                after.append(Excerpt(piece.first, piece.values[end:]))
+            changes["steps"] = _has_different_steps(register_of(before), register_of(after))
         changed = [name for name, differs in changes.items() if differs]
         if len(changed) < 2:
             continue
@@ -134,26 +128,10 @@ def _is_lasting(logs: Array, place: int) -> bool:
     )
 
 
-def _find_registers(
-    pieces: Sequence[Excerpt], record: int, margin: int
-) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
-    """Return the results of `register_of` before and after a record."""
-    before, after = [], []
-    for piece in pieces:
-        inside = record - piece.first
-        # The margin allows for the unknown record of the change.
-        before.append(Excerpt(piece.first, piece.values[: max(inside - margin, 0)]))
-        after.append(Excerpt(piece.first, piece.values[max(inside + margin, 0) :]))
-    return register_of(before), register_of(after)
-
-
 def register_of(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
-    """Return the step of a register and the finest detectable step; None if there are no data.
+    """Return the step of a register, and the finest detectable step, SI; None without data.
 
-    Returns
-    -------
-    (step, seen) or None
-        SI. ``step`` is infinite where no step is detected; ``seen`` is the finest detectable step.
+    The step is infinite if none is detected.
     """
     whole = [piece for piece in pieces if len(piece.values) >= PIECE_SIZE // 4]
     values = [piece.present for piece in whole if len(piece.present) >= PIECE_SIZE // 8]
@@ -206,9 +184,11 @@ def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
         "noise": noise > max(_CHANGE_SIGMAS * float(np.median(sizes)), _MIN_LOG_NOISE_ALTERNATION),
     }
     if any(changes.values()):
-        changes["steps"] = _has_different_steps(
-            *(register_of(_take_every_other(pieces, first)) for first in (0, 1))
+        even, odd = (
+            register_of([Excerpt(piece.first, piece.values[first::2]) for piece in pieces])
+            for first in (0, 1)
         )
+        changes["steps"] = _has_different_steps(even, odd)
     changed = [name for name, differs in changes.items() if differs]
     if len(changed) < 2 and not (changed == ["level"] and level > _MIN_LEVEL_ALTERNATION):
         return
@@ -244,7 +224,3 @@ def _compare_even_and_odd(values: Array) -> tuple[float, float, int] | None:
     level = float(np.median(apart.sum(axis=1) / present.sum(axis=1)))
     noise = float(np.median(np.log(scatter[:, 0] / scatter[:, 1])))
     return abs(level) / usual, abs(noise), 2 * int(present.sum())
-
-
-def _take_every_other(pieces: Sequence[Excerpt], first: int) -> list[Excerpt]:
-    return [Excerpt(piece.first, piece.values[first::2]) for piece in pieces]

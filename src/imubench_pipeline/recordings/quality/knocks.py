@@ -14,22 +14,17 @@ from imubench_pipeline.typing import Array
 _BLOCKS_ON_EACH_SIDE = 16
 """Blocks on either side whose median is the reference for a block without a knock."""
 
-_MIN_BLOCKS_AROUND = 2
-"""Least number of blocks with samples for the comparison."""
-
+_MIN_BLOCKS_AROUND = 2  # least number of blocks with samples for the comparison
 _SETTLED_SIGMAS = 4.0
 """Standard deviations from the level within which the sensor has settled after a knock."""
 
-_SETTLED_SAMPLES = 5
-"""Consecutive settled samples that end a knock."""
-
+_SETTLED_SAMPLES = 5  # consecutive settled samples that end a knock
 _MIN_OUTLIER_STEPS = 2.0
 """Least distance of an outlier from the level, in steps of the register. Clean samples can be one
 step away, and a drifting level lies between two steps. With 1.5, one knock was found in 60 clean
 logs with steps of up to 6 sigma."""
 
-_MARGIN_SAMPLES = 5
-"""Samples on either side that are left out with a knock."""
+_MARGIN_SAMPLES = 5  # samples on either side that are left out with a knock
 
 
 @dataclass(frozen=True)
@@ -39,8 +34,7 @@ class Knock:
     first: int
     last: int
     """First and one-past-last record to leave out."""
-    size: float
-    """Largest distance from the level, in units of the noise that `suspects` returns."""
+    size: float  # largest distance from the level, in units of the noise that `suspects` returns
 
 
 def suspects(
@@ -48,12 +42,8 @@ def suspects(
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Return the blocks with an outlier, and the level and the noise around them.
 
-    Parameters
-    ----------
-    sigmas : float
-        Least distance of an outlier from the level, in standard deviations of the samples.
-    step : float or None
-        Least significant bit, SI; a change by one is no outlier. None: not quantised.
+    ``sigmas``: least distance of an outlier from the level, in standard deviations of the samples.
+    ``step``: least significant bit, SI; a change by one is no outlier. None: not quantised.
 
     Returns
     -------
@@ -94,18 +84,8 @@ def knocks(
 ) -> Iterator[Knock]:
     """Yield the knocks of a column.
 
-    Parameters
-    ----------
-    pieces : iterable of ndarray
-        The column in order, SI; NaN where a sample is missing.
-    blocks : BlockStatistics
-        Statistics of the same column.
-    sigmas : float
-        As `suspects` takes it.
-    longest : int
-        Longest knock, records; a longer event is motion.
-    step : float or None
-        As `suspects` takes it.
+    ``pieces``: the column in order, SI; NaN where a sample is missing. ``longest``: longest knock,
+    records; a longer event is motion. For the other parameters see `suspects`.
     """
     number, level, noise = suspects(blocks, sigmas, step)
     if len(number) == 0:
@@ -118,10 +98,8 @@ def knocks(
             away = np.abs(values - level[i]) / noise[i]
             for first, last in _find_events(away, sigmas):
                 if last - first <= longest:
-                    size = float(np.nanmax(away[first:last]))
-                    yield Knock(
-                        reached + first - _MARGIN_SAMPLES, reached + last + _MARGIN_SAMPLES, size
-                    )
+                    begin, end = reached + first - _MARGIN_SAMPLES, reached + last + _MARGIN_SAMPLES
+                    yield Knock(begin, end, float(np.nanmax(away[first:last])))
         reached += len(values)
 
 

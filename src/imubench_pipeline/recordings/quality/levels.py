@@ -13,30 +13,21 @@ from imubench_pipeline.recordings.quality.register import hidden_step
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, present_median
 from imubench_pipeline.typing import Array
 
-_MAX_RUN_PROBABILITY = 1e-9
-"""Probability that a longer run of one value occurs by chance."""
-
+_MAX_RUN_PROBABILITY = 1e-9  # probability that a longer run of one value occurs by chance
 _MIN_BLOCK_STEPS = 8
 """Least number of steps between block means; they determine an Allan deviation to a third."""
 
-_NORMAL_MEDIAN = 0.4549
-"""Median of the square of a standard normal variable."""
-
-
+_NORMAL_MEDIAN = 0.4549  # median of the square of a standard normal variable
 _MAX_STEP_FOR_PILING = 1.0
 """Largest ratio of step to noise at which neighbouring levels are about equally frequent: a level
 at the mean has 1.65 times the samples of the next one."""
 
-_COMPARED_LEVELS = 4
-"""Number of levels on either side that a level is compared with."""
-
+_COMPARED_LEVELS = 4  # number of levels on either side that a level is compared with
 _MIN_PILING_RATIO = 2.5
 """Least ratio to the most frequent of the compared levels. A ratio of 2 is normal if values are
 rounded to digits somewhat coarser than the register: some digits then have two of its steps."""
 
-_MIN_PILED_SHARE = 0.005
-"""Least share of the samples at a piled-up level."""
-
+_MIN_PILED_SHARE = 0.005  # least share of the samples at a piled-up level
 _MIN_COMPARED_COUNT = 10
 """Least count that a level is compared with, so that few samples do not pile up by chance."""
 
@@ -49,10 +40,8 @@ of them with a probability of exp(-12)."""
 class Quantisation:
     """Quantisation of a column."""
 
-    step: float
-    """Least significant bit, SI."""
-    levels: float
-    """Number of levels from the lowest to the highest sample."""
+    step: float  # least significant bit, SI
+    levels: float  # number of levels from the lowest to the highest sample
     over_noise: float
     """Ratio of the step to the standard deviation; infinite if most blocks have one value."""
     hidden: bool = False
@@ -70,9 +59,8 @@ def quantisation(column: ColumnSummary) -> Quantisation | None:
     if step < 20.0 * spread / column.present:
         return None
     over_noise = step / spread if spread > 0.0 else math.inf  # most blocks have one value
-    return Quantisation(
-        step, (column.high - column.low) / step + 1.0, over_noise, hidden is not None
-    )
+    levels = (column.high - column.low) / step + 1.0
+    return Quantisation(step, levels, over_noise, hidden is not None)
 
 
 def noise_of(column: ColumnSummary) -> float:
@@ -84,17 +72,8 @@ def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, flo
     """Return a value that is far more frequent than its neighbours; None if there is none.
 
     Neighbouring levels of a fine register are about equally frequent. A constant that replaces lost
-    samples, or the 0 of a dead band, is more frequent. Coarse registers are not tested.
-
-    Parameters
-    ----------
-    steps : Quantisation or None
-        Quantisation of the column.
-
-    Returns
-    -------
-    (value, share) or None
-        Value, SI, and its share of the samples in the excerpts.
+    samples, or the 0 of a dead band, is more frequent. Coarse registers are not tested. The result
+    is the value, SI, and its share of the samples in the excerpts.
     """
     if steps is not None and steps.over_noise > _MAX_STEP_FOR_PILING:
         return None
@@ -102,16 +81,13 @@ def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, flo
     if len(at) == 0:
         return None
     most = int(np.argmax(counts))
-    around = np.delete(
-        counts[max(0, most - _COMPARED_LEVELS) : most + _COMPARED_LEVELS + 1],
-        min(most, _COMPARED_LEVELS),
-    )
+    near = counts[max(0, most - _COMPARED_LEVELS) : most + _COMPARED_LEVELS + 1]
+    around = np.delete(near, min(most, _COMPARED_LEVELS))
     if at[most] in (column.low, column.high) or len(around) < 2 * _COMPARED_LEVELS:
         return None  # saturated, or too few levels
     share = counts[most] / counts.sum()
-    if share < _MIN_PILED_SHARE or counts[most] < _MIN_PILING_RATIO * max(
-        around.max(), _MIN_COMPARED_COUNT
-    ):
+    least = _MIN_PILING_RATIO * max(around.max(), _MIN_COMPARED_COUNT)
+    if share < _MIN_PILED_SHARE or counts[most] < least:
         return None
     return float(at[most]), float(share)
 
@@ -127,20 +103,9 @@ def kept_level(
 ) -> dict[str, Any]:
     """Return the level and noise of a channel, to be compared with its datasheet.
 
-    Parameters
-    ----------
-    rate : float
-        Hz.
-    unit : str
-        Unit of the channel, as stated in the sensor file.
-    timed : bool
-        The log has stamps; otherwise the rate is the stated one.
-
-    Returns
-    -------
-    dict
-        ``mean``, SI, the median of the block means, which is robust to knocks; ``density``, see
-        `density_of`; ``unit``; ``rate``; ``timed``.
+    ``mean`` is the median of the block means, SI, which is robust to knocks; for ``density`` see
+    `density_of`. ``unit``: as stated in the sensor file. ``timed``: the log has stamps; otherwise
+    the rate, Hz, is the stated one.
     """
     level, density = present_median(column.blocks().mean), density_of(column, rate)
     return {"mean": level, "density": density, "unit": unit, "rate": rate, "timed": timed}
@@ -151,14 +116,8 @@ def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]
 
     Two estimates are used. The standard deviation within blocks over √rate is too small behind a
     low-pass. The Allan deviation of the block means times √τ is too large if slow noise dominates
-    at τ. The upper bound is at least the quantisation noise of the register.
-
-    ``column``, ``rate``: see `kept_level`.
-
-    Returns
-    -------
-    (least, most) : float, float or None
-        Bounds of N, SI/√Hz, two-sided. ``most`` is None if there are too few blocks.
+    at τ. The upper bound is at least the quantisation noise of the register; it is None if there
+    are too few blocks. The bounds are of N, SI/√Hz, two-sided; the rate is in Hz.
     """
     blocks = column.blocks()
     spread = noise_of(column) / math.sqrt(rate)
@@ -185,17 +144,8 @@ def saturated(
 ) -> tuple[str, int] | None:
     """Return the extreme where a column is saturated; None if it is not.
 
-    Parameters
-    ----------
-    steps : Quantisation or None
-        Quantisation of the column.
-    share : float
-        Least share of the samples at a saturated extreme.
-
-    Returns
-    -------
-    (side, number) or None
-        ``lowest`` or ``highest``, and the number of samples there.
+    The result is ``lowest`` or ``highest``, and the number of samples there. ``share``: least share
+    of the samples at a saturated extreme.
     """
     if steps is not None and steps.levels < 10:
         return None  # with so few levels an extreme is frequent in any case

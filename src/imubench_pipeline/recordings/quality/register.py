@@ -22,12 +22,8 @@ from numpy.typing import NDArray
 from imubench_pipeline.recordings.quality.summary import Excerpt
 from imubench_pipeline.typing import Array
 
-_MAX_PIECES = 4
-"""Pieces of a column that are examined."""
-
-_MIN_SAMPLES = 1000
-"""Least number of samples of a piece."""
-
+_MAX_PIECES = 4  # pieces of a column that are examined
+_MIN_SAMPLES = 1000  # least number of samples of a piece
 _HISTOGRAM_BINS = 4096
 _MIN_STEP_OVER_NOISE = 0.02
 _MAX_STEP_OVER_NOISE = 2.0
@@ -41,12 +37,8 @@ exp(-n A^2): 1e-27 for 1000 samples at each frequency."""
 _MIN_PERIODS = 2.0
 """Least number of steps between the 5 % and the 95 % quantile: two levels are no register."""
 
-_HEIGHT_TOLERANCE = 0.1
-"""Largest difference of a peak from its expected height sinc(d / q)."""
-
-_MAX_DIGIT_OVER_STEP = 0.65
-"""Largest ratio of digit to step; above it the rounding hides the step."""
-
+_HEIGHT_TOLERANCE = 0.1  # largest difference of a peak from its expected height sinc(d / q)
+_MAX_DIGIT_OVER_STEP = 0.65  # largest ratio of digit to step; above it the rounding hides the step
 _MAX_MEAN_OVER_LEAST_GAP = 1.01
 """Ratio of mean to least difference of neighbouring levels, below which the least difference is the
 step: nothing was rounded again."""
@@ -57,12 +49,9 @@ all levels are used."""
 
 
 def hidden_step(pieces: Sequence[Excerpt]) -> float | None:
-    """Return the least significant bit of a register whose values were rounded again.
+    """Return the least significant bit, SI, of a register whose values were rounded again.
 
-    Returns
-    -------
-    float or None
-        SI. None if the least difference of values is the step, or if there is no step.
+    None: the least difference of values is the step, or there is no step.
     """
     chosen = [piece.present for piece in pieces if len(piece.present) >= _MIN_SAMPLES]
     chosen = chosen[:: max(1, len(chosen) // _MAX_PIECES)][:_MAX_PIECES]
@@ -93,31 +82,22 @@ def _find_hidden_step(values: Array) -> float | None:
         return None
     lengths = np.unique(gaps)
     apart = np.concatenate((lengths[:1], np.diff(lengths)))
-    return _resolve_mirror_frequency(
-        levels, counts, float(apart[apart > least_sure].min()), frequency
-    )
+    digit = float(apart[apart > least_sure].min())
+    return _resolve_mirror_frequency(levels, counts, digit, frequency)
 
 
 def _find_peak(levels: Array, counts: NDArray[np.int64], sigma: float) -> float | None:
     """Return the lowest frequency at which A has a peak, 1 / SI."""
     span = float(np.ptp(levels)) * (1.0 + 1.0 / _HISTOGRAM_BINS)
-    histogram = np.bincount(
-        ((levels - levels[0]) / span * _HISTOGRAM_BINS).astype(np.int64),
-        weights=counts,
-        minlength=_HISTOGRAM_BINS,
-    )
+    bins = ((levels - levels[0]) / span * _HISTOGRAM_BINS).astype(np.int64)
+    histogram = np.bincount(bins, weights=counts, minlength=_HISTOGRAM_BINS)
     # Zero-padded to twice the length, so that no peak between two frequencies is missed.
     height = np.abs(np.fft.rfft(histogram, 2 * _HISTOGRAM_BINS)) / counts.sum()
     frequencies = np.arange(len(height)) / (2.0 * span)
-    inner = slice(1, -1)
-    peaks = (
-        (height[inner] >= height[:-2])
-        & (height[inner] >= height[2:])
-        & (height[inner] > _MIN_PEAK_HEIGHT)
-    )
-    peaks &= (frequencies[inner] > 1.0 / (_MAX_STEP_OVER_NOISE * sigma)) & (
-        frequencies[inner] < 1.0 / (_MIN_STEP_OVER_NOISE * sigma)
-    )
+    inner, f = height[1:-1], frequencies[1:-1]
+    peaks = (inner >= height[:-2]) & (inner >= height[2:]) & (inner > _MIN_PEAK_HEIGHT)
+    peaks &= f > 1.0 / (_MAX_STEP_OVER_NOISE * sigma)
+    peaks &= f < 1.0 / (_MIN_STEP_OVER_NOISE * sigma)
     places = np.flatnonzero(peaks)
     if len(places) == 0:
         return None

@@ -17,7 +17,7 @@ splittable pseudorandom number generators", OOPSLA 2014 (SplitMix64, the mixing 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -35,9 +35,7 @@ _SLOTS = 1 << 16
 _MAX_WINDOWS = _SLOTS // 2
 """Largest number of stored windows; beyond it, the half with the lowest hashes is kept."""
 
-_MAX_STRETCHES = 64
-"""Largest number of stretches that are listed."""
-
+_MAX_STRETCHES = 64  # largest number of stretches that are listed
 _MAX_MISSED_WINDOWS = 12
 """Longest interruption of a stretch, in mean distances between stored windows."""
 
@@ -63,56 +61,31 @@ class Stretch:
     last: int
     """First and one-past-last record of the copy, to the resolution of the windows: it may begin a
     little earlier and end a little later."""
-    lag: int
-    """Records from the original to the copy."""
-    changes: int
-    """Changes of value within it."""
+    lag: int  # records from the original to the copy
+    changes: int  # changes of value within it
 
 
-def _create_words() -> Words:
-    state = np.zeros(3, dtype=np.uint64)
-    state[_HASH_LIMIT] = np.uint64(0xFFFFFFFFFFFFFFFF)
-    return state
-
-
-@dataclass
 class Repeats:
     """Stored windows of a column, and the stretches that repeat."""
 
-    _words: Words = field(default_factory=_create_words)
-    _numbers: Numbers = field(default_factory=lambda: np.zeros(6, dtype=np.int64))
-    _tokens: Words = field(default_factory=lambda: np.zeros(WINDOW, dtype=np.uint64))
-    _begins: Numbers = field(default_factory=lambda: np.zeros(WINDOW, dtype=np.int64))
-    _keys: Words = field(default_factory=lambda: np.zeros(_SLOTS, dtype=np.uint64))
-    _places: Numbers = field(default_factory=lambda: np.zeros((_SLOTS, 2), dtype=np.int64))
-    _stretches: Numbers = field(
-        default_factory=lambda: np.zeros((_MAX_STRETCHES, 5), dtype=np.int64)
-    )
+    def __init__(self) -> None:
+        words, numbers = np.zeros(3, dtype=np.uint64), np.zeros(6, dtype=np.int64)
+        words[_HASH_LIMIT] = np.uint64(0xFFFFFFFFFFFFFFFF)
+        tokens, begins = np.zeros(WINDOW, dtype=np.uint64), np.zeros(WINDOW, dtype=np.int64)
+        keys, places = np.zeros(_SLOTS, dtype=np.uint64), np.zeros((_SLOTS, 2), dtype=np.int64)
+        stretches = np.zeros((_MAX_STRETCHES, 5), dtype=np.int64)
+        self._state = (words, numbers, tokens, begins, keys, places, stretches)
 
     def add(self, values: Array) -> None:
         """Add the next records of the column; NaN is a missing sample."""
-        _add_samples(
-            np.ascontiguousarray(values).view(np.uint64),
-            self._words,
-            self._numbers,
-            self._tokens,
-            self._begins,
-            self._keys,
-            self._places,
-            self._stretches,
-        )
+        _add_samples(np.ascontiguousarray(values).view(np.uint64), *self._state)
 
     def stretches(self) -> list[Stretch]:
         """Return the repeated stretches in the order of the column, at most 64 of them."""
-        rows = self._stretches[: self._numbers[_STRETCH_COUNT]]
+        _, numbers, *_, stretches = self._state
+        rows = stretches[: numbers[_STRETCH_COUNT]].tolist()
         return [
-            Stretch(
-                int(row[_COPY_BEGIN]),
-                int(row[_COPY_END]),
-                int(row[_LAG]),
-                int(row[_LAST_CHANGE] - row[_FIRST_CHANGE]) + WINDOW,
-            )
-            for row in rows
+            Stretch(begin, end, lag, last - first + WINDOW) for lag, begin, end, first, last in rows
         ]
 
 
@@ -163,11 +136,8 @@ def _add_samples(
                 limit = limit >> np.uint64(1)
                 _drop_windows(limit, keys, places, numbers)
     words[_LAST_BITS], words[_ROLLING_HASH], words[_HASH_LIMIT] = bits, rolled, limit
-    numbers[_RECORDS], numbers[_RUN_BEGIN], numbers[_CHANGE_COUNT] = (
-        position + values.size,
-        begun,
-        changes,
-    )
+    numbers[_RECORDS] = position + values.size
+    numbers[_RUN_BEGIN], numbers[_CHANGE_COUNT] = begun, changes
 
 
 @njit(cache=True, nogil=True)

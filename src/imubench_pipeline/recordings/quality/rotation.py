@@ -12,15 +12,11 @@ from imubench_pipeline.recordings.quality.summary import BlockStatistics
 from imubench_pipeline.typing import Array
 
 _QUARTERS = 4
-_MIN_BLOCKS = 8
-"""Least number of steps between block means: two in a quarter of the log."""
-
+_MIN_BLOCKS = 8  # least number of steps between block means: two in a quarter of the log
 _MIN_RATE_SHARE = 0.5
 """Least rotation rate in every quarter of the log, as a share of the mean rate."""
 
-_MAX_MISFIT = 0.1
-"""Largest median misfit of the steps between block means, as a share of gravity."""
-
+_MAX_MISFIT = 0.1  # largest median misfit of the steps between block means, as a share of gravity
 _MIN_OBSERVABLE_SINE_SQUARED = 0.01
 """Least square of the sine of the angle between gravity and an observable axis of rotation."""
 
@@ -31,8 +27,7 @@ class GravityTurn:
 
     rate: tuple[float, float, float]
     """Rate of the sensor about x, y and z, rad/s; rotation about the vertical is not observable."""
-    swept: float
-    """Angle of rotation over the log, rad."""
+    swept: float  # angle of rotation over the log, rad
 
 
 def gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> GravityTurn | None:

@@ -1,8 +1,7 @@
 """Test the stationarity of a column: steps of the mean, warm-up, changing variance, motion.
 
-All tests use block means and standard deviations. The bias of a static sensor has random walk and
-flicker noise, which the benchmark measures. Only clear deviations from it are reported: a step far
-larger than the other steps of the log, or a drift at the beginning far above any later drift.
+All tests use block means and standard deviations. Random walk and flicker noise are no findings:
+only a step far larger than the others, or a first drift far above any later drift, is reported.
 """
 
 from __future__ import annotations
@@ -12,44 +11,33 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.recordings.quality.summary import BlockStatistics, present_median
-from imubench_pipeline.typing import Array
 
 _NUMBER_OF_PARTS = 20
-_MIN_BLOCKS_PER_PART = 8
-"""Least number of blocks in a part; a shorter recording is not tested."""
-
+_MIN_BLOCKS_PER_PART = 8  # least number of blocks in a part; a shorter recording is not tested
 _MAX_MOTION_CREST_FACTOR = 6.0
 """Largest crest factor of motion: distance of the extremes from the mean, in standard deviations of
 the block. A knock exceeds it."""
 
-_SD_OVER_MAD = 1.4826
-"""Standard deviation over the median absolute deviation, of normal noise."""
+_SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise
 
 
 @dataclass(frozen=True)
 class Step:
     """A sudden change of the mean."""
 
-    sample: int
-    """Record of the step, to half a window."""
-    size: float
-    """SI."""
-    sigmas: float
-    """Size over the robust standard deviation of all steps."""
-    window: int
-    """Records of a window."""
+    sample: int  # record of the step, to half a window
+    size: float  # SI
+    sigmas: float  # size over the robust standard deviation of all steps
+    window: int  # records of a window
 
 
 @dataclass(frozen=True)
 class WarmUp:
     """A beginning that drifts."""
 
-    end: int
-    """Record from which the drift is as small as in the rest."""
-    drift: float
-    """Change of the mean during the warm-up, SI."""
-    usual: float
-    """Median change over a part of the rest, SI."""
+    end: int  # record from which the drift is as small as in the rest
+    drift: float  # change of the mean during the warm-up, SI
+    usual: float  # median change over a part of the rest, SI
 
 
 def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
@@ -58,7 +46,10 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     ``sigmas``: least size of a step, in robust standard deviations of all steps.
     """
     size = max(1, len(blocks.mean) // 400)
-    means = _take_median_means(blocks, size)
+    # Medians are robust to knocks. The means of blocks with few samples scatter too much.
+    mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)
+    grouped = mean[: len(mean) // size * size].reshape(-1, size)
+    means = np.array([present_median(group) for group in grouped])
     if len(means) < 16:
         return []
     # Difference over two windows, so that a step inside a window counts in full.
@@ -108,47 +99,28 @@ def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
 
 
 def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
-    """Return the ratio of the largest to the smallest noise of a part, and the noisiest part.
+    """Return the ratio of the largest to the smallest noise of a part; None if it is too short.
 
-    Returns
-    -------
-    (ratio, first, last) or None
-        ``first`` and ``last`` record of the noisiest part; None for a short recording.
+    The ratio is followed by the first and one-past-last record of the noisiest part.
     """
     size = len(blocks.spread) // _NUMBER_OF_PARTS
     if size < _MIN_BLOCKS_PER_PART:
         return None
-    spreads = np.array(
-        [
-            present_median(part)
-            for part in blocks.spread[: size * _NUMBER_OF_PARTS].reshape(_NUMBER_OF_PARTS, size)
-        ]
-    )
+    parts = blocks.spread[: size * _NUMBER_OF_PARTS].reshape(_NUMBER_OF_PARTS, size)
+    spreads = np.array([present_median(part) for part in parts])
     calm = float(np.min(spreads[spreads > 0.0], initial=np.inf))
     noisy = int(np.argmax(np.nan_to_num(spreads)))
     if not np.isfinite(calm):
         return None
-    return (
-        float(spreads[noisy]) / calm,
-        noisy * size * blocks.size,
-        (noisy + 1) * size * blocks.size,
-    )
+    records = size * blocks.size
+    return float(spreads[noisy]) / calm, noisy * records, (noisy + 1) * records
 
 
 def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[tuple[int, int]]:
     """Return the parts with motion: a large standard deviation that no knock explains.
 
-    Parameters
-    ----------
-    times : float
-        Least ratio of the standard deviation to its median during motion.
-    least : float
-        Least standard deviation during motion, SI.
-
-    Returns
-    -------
-    list of (int, int)
-        First and one-past-last record of each.
+    ``times``, ``least``: lower limits of the standard deviation, over its median and in SI. A part
+    is its first and one-past-last record.
     """
     usual = present_median(blocks.spread)
     if not usual > 0.0:
@@ -162,16 +134,3 @@ def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[t
         return []
     groups = np.split(shaken, np.flatnonzero(np.diff(shaken) > 2) + 1)
     return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
-
-
-def _take_median_means(blocks: BlockStatistics, size: int) -> Array:
-    """Return medians of the means of ``size`` blocks, which are robust to knocks.
-
-    Blocks with few samples, such as the last one, are left out: their means scatter too much.
-    """
-    whole = len(blocks.mean) // size
-    mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)
-    grouped = mean[: whole * size].reshape(whole, size)
-    if np.isfinite(grouped).all():
-        return np.median(grouped, axis=1)
-    return np.array([present_median(group) for group in grouped])

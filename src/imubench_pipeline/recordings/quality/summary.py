@@ -17,28 +17,21 @@ from imubench_pipeline.typing import Array
 MIN_BLOCK_SIZE = 256
 """Records of a block, until there are `2 * _MAX_BLOCKS` blocks."""
 
-_MAX_BLOCKS = 1 << 15
-"""Pairs of blocks are merged when there are twice this number."""
+_MAX_BLOCKS = 1 << 15  # pairs of blocks are merged when there are twice this number
 
 
 @dataclass(frozen=True)
 class BlockStatistics:
     """Statistics of consecutive blocks of records."""
 
-    size: int
-    """Records of a block; the last one may have fewer."""
-    count: Array
-    """Number of samples present, shape (b,)."""
+    size: int  # records of a block; the last one may have fewer
+    count: Array  # number of samples present, shape (b,)
     mean: Array
     spread: Array
     low: Array
     high: Array
     """Mean, standard deviation and extremes of the samples present, SI, shape (b,); NaN where there
     are none."""
-
-
-def _create_empty_rows() -> Array:
-    return np.empty((0, 5))
 
 
 @dataclass
@@ -48,7 +41,7 @@ class BlockAccumulator:
     _size: int = MIN_BLOCK_SIZE
     _rows: list[Array] = field(default_factory=list)
     _number: int = 0
-    _waiting: Array = field(default_factory=_create_empty_rows)
+    _waiting: Array = field(default_factory=lambda: np.empty((0, 5)))
 
     def add(self, rows: Array) -> None:
         """Add consecutive blocks of `MIN_BLOCK_SIZE` records, shape (n, 5)."""
@@ -86,15 +79,10 @@ def _merge_blocks(rows: Array, together: int) -> Array:
     away = mean - np.repeat(united, together)[: len(rows)]
     squares = np.add.reduceat(np.where(present, count * (spread**2 + away**2), 0.0), begins)
     empty = total == 0
-    return np.column_stack(
-        [
-            total,
-            np.where(empty, np.nan, united),
-            np.where(empty, np.nan, np.sqrt(squares / weight)),
-            np.fmin.reduceat(low, begins),
-            np.fmax.reduceat(high, begins),
-        ]
-    )
+    united[empty] = np.nan
+    deviation = np.where(empty, np.nan, np.sqrt(squares / weight))
+    extremes = np.fmin.reduceat(low, begins), np.fmax.reduceat(high, begins)
+    return np.column_stack([total, united, deviation, *extremes])
 
 
 def present_median(values: Array) -> float:
@@ -114,10 +102,8 @@ MAX_PIECES = 16
 class Excerpt:
     """Consecutive records of a column."""
 
-    first: int
-    """Number of the first record."""
-    values: Array
-    """SI, shape (n,); NaN where the sample is missing."""
+    first: int  # number of the first record
+    values: Array  # SI, shape (n,); NaN where the sample is missing
 
     @property
     def present(self) -> Array:
@@ -162,17 +148,9 @@ class Excerpts:
 
 
 def common_samples(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
-    """Return the samples of two columns at the same records, those present in both.
+    """Return the samples of two columns of one table that are present in both.
 
-    Parameters
-    ----------
-    first, other : list of Excerpt
-        Excerpts of columns of the same table.
-
-    Returns
-    -------
-    list of (ndarray, ndarray)
-        Two arrays of equal shape for each piece that both columns have.
+    There are two arrays of equal shape for each excerpt that both columns have.
     """
     places = {piece.first: piece.values for piece in other}
     pairs = []
@@ -189,34 +167,13 @@ MAX_MEASUREMENT = 1e30
 
 # Indices of the state of a column
 
-(
-    _PRESENT_SAMPLES,
-    _MISSING_SAMPLES,
-    _INFINITE_SAMPLES,
-    _LOWEST_SAMPLE,
-    _HIGHEST_SAMPLE,
-    _COUNT_AT_LOWEST,
-    _COUNT_AT_HIGHEST,
-) = range(7)
-(
-    _LAST_SAMPLE,
-    _RUN_LENGTH,
-    _LONGEST_RUN,
-    _LONGEST_RUN_END,
-    _REPEAT_COUNT,
-    _SMALLEST_STEP,
-    _RECORDS,
-) = range(7, 14)
-(
-    _BLOCK_RECORDS,
-    _BLOCK_COUNT,
-    _BLOCK_SUM,
-    _BLOCK_SQUARES,
-    _BLOCK_LOWEST,
-    _BLOCK_HIGHEST,
-    _BLOCK_SHIFT,
-) = range(14, 21)
-_PAIR_COUNT, _FAR_PAIRS, _FAR_REPEATS, _CHANGE_COUNT, _SINGLE_STEPS = range(21, 26)
+_PRESENT_SAMPLES, _MISSING_SAMPLES, _INFINITE_SAMPLES, _RECORDS = range(4)
+_LOWEST_SAMPLE, _HIGHEST_SAMPLE, _COUNT_AT_LOWEST, _COUNT_AT_HIGHEST = range(4, 8)
+_LAST_SAMPLE, _RUN_LENGTH, _LONGEST_RUN, _LONGEST_RUN_END = range(8, 12)
+_REPEAT_COUNT, _SMALLEST_STEP, _CHANGE_COUNT, _SINGLE_STEPS = range(12, 16)
+_PAIR_COUNT, _FAR_PAIRS, _FAR_REPEATS = range(16, 19)
+_BLOCK_RECORDS, _BLOCK_COUNT, _BLOCK_SUM, _BLOCK_SQUARES = range(19, 23)
+_BLOCK_LOWEST, _BLOCK_HIGHEST, _BLOCK_SHIFT = range(23, 26)
 _GAP_LENGTH, _LONGEST_GAP, _GAP_END = range(26, 29)
 _STATE_SIZE = 29
 
@@ -255,20 +212,15 @@ class ColumnSummary:
     _excerpts: Excerpts = field(default_factory=Excerpts)
     repeated: Repeats = field(default_factory=Repeats)
 
-    present = _StateCount(_PRESENT_SAMPLES)
-    """Samples that are finite numbers."""
-    missing = _StateCount(_MISSING_SAMPLES)
-    """Records without a number."""
-    not_finite = _StateCount(_INFINITE_SAMPLES)
-    """Infinities, and values beyond `MAX_MEASUREMENT`."""
-    repeats = _StateCount(_REPEAT_COUNT)
-    """Samples that equal their predecessor."""
+    present = _StateCount(_PRESENT_SAMPLES)  # samples that are finite numbers
+    missing = _StateCount(_MISSING_SAMPLES)  # records without a number
+    not_finite = _StateCount(_INFINITE_SAMPLES)  # infinities, and values beyond `MAX_MEASUREMENT`
+    repeats = _StateCount(_REPEAT_COUNT)  # samples that equal their predecessor
     pairs = _StateCount(_PAIR_COUNT)
     """Pairs of neighbours that were compared. Pieces without equal neighbours may be left out."""
     far_pairs = _StateCount(_FAR_PAIRS)
     """Pairs at the distance `FAR_LAG` in the pieces where neighbours were compared."""
-    far_repeats = _StateCount(_FAR_REPEATS)
-    """Pairs among them of equal samples."""
+    far_repeats = _StateCount(_FAR_REPEATS)  # pairs among them of equal samples
     steps = _StateCount(_CHANGE_COUNT)
     """Unequal neighbours that were compared since the smallest step was found."""
     single_steps = _StateCount(_SINGLE_STEPS)
@@ -321,15 +273,10 @@ class ColumnSummary:
 
     def blocks(self) -> BlockStatistics:
         """Return the statistics of the blocks; the last one may be incomplete."""
-        return self._blocks.blocks(_close_open_block(self._state))
-
-
-def _close_open_block(state: Array) -> Array:
-    """Return the incomplete block as a row, or no row, shape (n, 5)."""
-    rows = np.empty((int(state[_BLOCK_RECORDS] > 0), 5))
-    for row in rows:
-        _close_block(state.copy(), row)
-    return rows
+        incomplete = np.empty((int(self._state[_BLOCK_RECORDS] > 0), 5))
+        for row in incomplete:
+            _close_block(self._state.copy(), row)
+        return self._blocks.blocks(incomplete)
 
 
 @njit(cache=True, nogil=True)
@@ -437,12 +384,8 @@ def _find_extremes(piece: Array, last: float) -> tuple[float, float, float]:
 def _count_each_sample(piece: Array, state: Array) -> None:
     """Add samples one by one."""
     last, run, step = state[_LAST_SAMPLE], state[_RUN_LENGTH], state[_SMALLEST_STEP]
-    low, high, at_low, at_high = (
-        state[_LOWEST_SAMPLE],
-        state[_HIGHEST_SAMPLE],
-        state[_COUNT_AT_LOWEST],
-        state[_COUNT_AT_HIGHEST],
-    )
+    low, high = state[_LOWEST_SAMPLE], state[_HIGHEST_SAMPLE]
+    at_low, at_high = state[_COUNT_AT_LOWEST], state[_COUNT_AT_HIGHEST]
     shift, total, squares = state[_BLOCK_SHIFT], state[_BLOCK_SUM], state[_BLOCK_SQUARES]
     least, most = state[_BLOCK_LOWEST], state[_BLOCK_HIGHEST]
     changes, single = state[_CHANGE_COUNT], state[_SINGLE_STEPS]
@@ -500,12 +443,8 @@ def _count_each_sample(piece: Array, state: Array) -> None:
     state[_PAIR_COUNT] += count
     state[_CHANGE_COUNT], state[_SINGLE_STEPS] = changes, single
     state[_LAST_SAMPLE], state[_RUN_LENGTH], state[_SMALLEST_STEP] = last, run, step
-    (
-        state[_LOWEST_SAMPLE],
-        state[_HIGHEST_SAMPLE],
-        state[_COUNT_AT_LOWEST],
-        state[_COUNT_AT_HIGHEST],
-    ) = low, high, at_low, at_high
+    state[_LOWEST_SAMPLE], state[_HIGHEST_SAMPLE] = low, high
+    state[_COUNT_AT_LOWEST], state[_COUNT_AT_HIGHEST] = at_low, at_high
     state[_BLOCK_SHIFT], state[_BLOCK_SUM], state[_BLOCK_SQUARES] = shift, total, squares
     state[_BLOCK_LOWEST], state[_BLOCK_HIGHEST] = least, most
     state[_GAP_LENGTH] = gap
