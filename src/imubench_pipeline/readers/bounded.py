@@ -105,8 +105,17 @@ class Bounded(Generic[T]):
             if self._process:
                 os.close(theirs)
         if self._process == 0:
-            os.close(self._pipe)
-            _send_result(theirs, memory, lambda: function(*arguments, **named))
+            try:
+                os.close(self._pipe)
+                limit_memory(memory)
+                try:
+                    answer: tuple[bool, Any] = True, function(*arguments, **named)
+                except Exception as error:
+                    answer = False, error
+                with os.fdopen(theirs, "wb") as stream:
+                    pickle.dump(answer, stream)
+            finally:
+                os._exit(0)
 
     @property
     def answered(self) -> bool:
@@ -150,20 +159,6 @@ class Bounded(Generic[T]):
         if isinstance(value, MemoryError):
             raise BoundError(f"took more than {self._memory >> 20} MiB of memory")
         raise value
-
-
-def _send_result(pipe: int, memory: int, called: Callable[[], Any]) -> None:
-    """Send the result or the exception of a function, and end this process."""
-    try:
-        limit_memory(memory)
-        try:
-            answer = True, called()
-        except Exception as error:
-            answer = False, error
-        with os.fdopen(pipe, "wb") as stream:
-            pickle.dump(answer, stream)
-    finally:
-        os._exit(0)
 
 
 def _receive(pipe: int, seconds: float, sender: psutil.Process) -> bytes | None:

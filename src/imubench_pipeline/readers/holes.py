@@ -33,28 +33,6 @@ def next_data(descriptor: int, offset: int) -> int | None:
         return None if error.errno == errno.ENXIO else offset
 
 
-def end_of_data(path: Path) -> int:
-    """Return the size of a file without the hole at its end, in bytes.
-
-    All bytes after it read as zeros. The search takes about 40 system calls for any size, and reads
-    no data. Returns 0 for a file that is one hole. Zeros that are stored count as data.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be opened.
-    """
-    with path.open("rb", buffering=0) as file:
-        stored, end = 0, os.fstat(file.fileno()).st_size
-        while stored < end:
-            middle = (stored + end) // 2
-            if next_data(file.fileno(), middle) is None:
-                end = middle
-            else:
-                stored = middle + 1
-        return end
-
-
 class FileWithoutHoles:
     """A file that is read sequentially; a long hole is replaced by a few zeros.
 

@@ -29,57 +29,44 @@ class _Text:
     """The decompressed bytes of a text log, in an encoding that contains ASCII.
 
     Carriage returns alone at the ends of lines become line feeds. A byte order mark is removed, and
-    each run of zero bytes is reduced to one.
+    each run of zero bytes is reduced to one. ``letter``: bytes of a letter in the file.
     """
 
     def __init__(self, path: Path, skipped: int, most: int | None) -> None:
-        self._bytes = open_bytes(path)
+        self.bytes = open_bytes(path)
         self._most = most
-        self._zeros = ZeroRuns()
+        self.zeros = ZeroRuns()
         self._returns = False
         try:
-            self._prepare(skipped)
+            begin = self.bytes.filled(_READ_BLOCK)
+            mark = next((mark for mark in _BYTE_ORDER_MARKS if begin.startswith(mark)), b"")
+            encoding = _BYTE_ORDER_MARKS.get(mark)
+            self._decoder = (
+                codecs.getincrementaldecoder(encoding)(errors="replace") if encoding else None
+            )
+            self.letter = len("\0".encode(encoding)) if encoding else 1
+            text = self._utf_8(begin.removeprefix(mark))
+            self._returns = b"\n" not in text and b"\r" in text[:-1]
+            self._begin = self._taken(text)
+            while skipped > 0 and (block := self.read(skipped)):
+                self._begin = block[skipped:]
+                skipped -= len(block)
         except BaseException:
             self.close()
             raise
 
-    def _prepare(self, skipped: int) -> None:
-        begin = self._bytes.filled(_READ_BLOCK)
-        mark = next((mark for mark in _BYTE_ORDER_MARKS if begin.startswith(mark)), b"")
-        encoding = _BYTE_ORDER_MARKS.get(mark)
-        self._decoder = (
-            codecs.getincrementaldecoder(encoding)(errors="replace") if encoding else None
-        )
-        self._letter = len("\0".encode(encoding)) if encoding else 1
-        text = self._utf_8(begin.removeprefix(mark))
-        self._returns = b"\n" not in text and b"\r" in text[:-1]
-        self._begin = self._taken(text)
-        while skipped > 0 and (block := self.read(skipped)):
-            self._begin = block[skipped:]
-            skipped -= len(block)
-
-    @property
-    def ended_early(self) -> bool:
-        """Whether the compressed data are truncated."""
-        return self._bytes.ended_early
-
     def read(self, size: int) -> bytes:
         """Return the next bytes, about ``size``; none at the end."""
         block, self._begin = self._begin, b""
-        while not block and (self._most is None or self._zeros.read <= self._most):
-            read = self._bytes.read(size)
+        while not block and (self._most is None or self.zeros.read <= self._most):
+            read = self.bytes.read(size)
             if not read:
                 return b""
             block = self._taken(self._utf_8(read))
         return block
 
-    def zeros(self, name: str, fate: str) -> Finding | None:
-        """Return the finding about zero bytes so far (see `ZeroRuns.finding`)."""
-        total = self._zeros.count * self._letter + self._bytes.omitted
-        return self._zeros.finding(name, f"line {self._zeros.first[1]}", total, fate)
-
     def close(self) -> None:
-        self._bytes.close()
+        self.bytes.close()
 
     def _utf_8(self, block: bytes) -> bytes:
         return self._decoder.decode(block).encode() if self._decoder else block
@@ -87,8 +74,8 @@ class _Text:
     def _taken(self, block: bytes) -> bytes:
         if self._returns:
             block = block.replace(b"\r", b"\n")
-        goes_on = self._zeros.at_end
-        self._zeros.add(block)
+        goes_on = self.zeros.at_end
+        self.zeros.add(block)
         if b"\0" not in block:
             return block
         if block == bytes(len(block)):
@@ -192,7 +179,9 @@ class CompleteLines:
 
         ``fate``: text about the lines with zero bytes.
         """
-        return self._text.zeros(self._path.name, fate)
+        zeros = self._text.zeros
+        total = zeros.count * self._text.letter + self._text.bytes.omitted
+        return zeros.finding(self._path.name, f"line {zeros.first[1]}", total, fate)
 
     def _end(self) -> bytes:
         """Return the lines after the last line feed that end in carriage returns."""
@@ -201,7 +190,7 @@ class CompleteLines:
         if cut and self.rest.endswith(b"\r"):
             cut = len(self.rest)
         lines, self.rest = self.rest[:cut].replace(b"\r", b"\n"), self.rest[cut:]
-        if self._text.ended_early:
+        if self._text.bytes.ended_early:
             self._findings.append(ended_early(self._path))
         if self.rest.strip(b"\0\r\n\t "):
             shown = self.rest.strip(b"\0")[:60].decode("utf-8", "replace")

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from imubench_pipeline.readers import bounds
@@ -22,7 +23,7 @@ from imubench_pipeline.readers.text.cells import (
 )
 from imubench_pipeline.readers.text.complete_lines import describe_missing_text, first_lines
 from imubench_pipeline.readers.text.header import are_units, completed, is_heading, likely_header
-from imubench_pipeline.readers.text.records import Records, are_apart
+from imubench_pipeline.readers.text.records import Records
 from imubench_pipeline.readers.text.refusals import (
     refuse_binary,
     refuse_control_characters,
@@ -195,7 +196,7 @@ class _Search:
             ),
             passed_over=tuple((line.number, line.text) for line in passed_over),
             blank_is_missing=len(names) == 1
-            and not are_apart([line.number for line in lines[first:]]),
+            and any(after.number == line.number + 1 for line, after in pairwise(lines[first:])),
         )
 
     # --------------------------------------------------------------------- the first lines
@@ -327,11 +328,20 @@ class _Search:
         if not self._wanted:
             return self._likely_header(split, comments, lines[: first + 1] if alike else []), first
         if self._names:
-            header = self._named(split, [*lines, *reversed(comments)], width)
+            wanted = set(self._names)
+            candidates = [*lines, *reversed(comments)]
+            named = (x for x in candidates if wanted.issubset(self._names_in(split, x, width)))
+            header = next(named, None)
             if header is not None and header in comments:
                 return header, 0
             if header is not None:
-                first = self._after_units(split, header, rows, lines.index(header) + 1)
+                first = end = lines.index(header) + 1
+                names = self._names_in(split, header, len(rows[first])) if first < len(rows) else []
+                places = self._places(names)
+                while first < min(end + _MAX_UNIT_LINES, len(rows)) and are_units(
+                    rows[first], places
+                ):
+                    first += 1
         else:
             header = None
         if self._log.header and header is None and first == 0:
@@ -359,27 +369,12 @@ class _Search:
         place = likely_header(named)
         return None if place is None else near[place]
 
-    def _named(self, split: Split, lines: list[_Line], width: int) -> _Line | None:
-        """Return the first line with all required names."""
-        return next(
-            (x for x in lines if set(self._names).issubset(self._names_in(split, x, width))), None
-        )
-
     def _is_record(self, row: list[str]) -> bool:
         """Return whether a line may be a record: numbers in the required columns, or in most."""
         if self._names or not self._wanted:
             return 2 * sum(map(is_datum, row)) >= len(row)
         cells = [row[int(column) - 1] for column in self._figures if int(column) <= len(row)]
         return len(row) >= self._last and are_figures(cells)
-
-    def _after_units(self, split: Split, header: _Line, rows: list[list[str]], index: int) -> int:
-        """Return the index of the first line below the header that is no line of units."""
-        if index < len(rows):
-            places = self._places(self._names_in(split, header, len(rows[index])))
-            end = index + _MAX_UNIT_LINES
-            while index < min(end, len(rows)) and are_units(rows[index], places):
-                index += 1
-        return index
 
     def _passed_over(self, split: Split, header: _Line | None, before: list[_Line]) -> list[_Line]:
         """Return the lines directly before the first record that are neither names nor units."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -124,14 +122,6 @@ class Records:
         return b"".join(records)
 
 
-def are_apart(numbers: Sequence[int]) -> bool:
-    """Return whether blank lines separate all records.
-
-    ``numbers``: line numbers of the first records.
-    """
-    return all(later > sooner + 1 for sooner, later in pairwise(numbers))
-
-
 def _merge_spaces(lines: bytes) -> bytes:
     if not lines:
         return lines
@@ -139,15 +129,9 @@ def _merge_spaces(lines: bytes) -> bytes:
         lines = lines.translate(_TAB_TO_SPACE)
     signs = np.frombuffer(lines, np.uint8)
     is_space = signs == ord(" ")
-    signs = signs[~(is_space & _shift_by_one(is_space | (signs == ord("\n"))))]
+    before = np.concatenate(([True], (is_space | (signs == ord("\n")))[:-1]))
+    signs = signs[~(is_space & before)]
     at_end = (signs[1:] == ord("\n")) | (signs[1:] == ord("\r"))
     keep = np.ones(len(signs), bool)
     keep[:-1] = ~((signs[:-1] == ord(" ")) & at_end)
     return signs[keep].tobytes()
-
-
-def _shift_by_one(here: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return a mask shifted by one character; the block begins after a line break."""
-    before = np.empty_like(here)
-    before[0], before[1:] = True, here[:-1]
-    return before

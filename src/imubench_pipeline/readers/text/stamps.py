@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from itertools import chain, product
 from typing import Any
 
@@ -54,18 +55,6 @@ class StampError(Exception):
         super().__init__(text)
         self.row = row
         self.text = text
-
-
-def arrow_type(texts: Collection[str]) -> pa.DataType | None:
-    """Return the type of ISO 8601 stamps that pyarrow itself reads, which is much faster.
-
-    None if pyarrow cannot read them: decimal commas, spaces around the stamp or before the zone.
-    """
-    stamps = [_ISO_STAMP.fullmatch(text) for text in texts]
-    zones = {bool(stamp["zone"]) for stamp in stamps if stamp}
-    if not all(stamps) or len(zones) != 1:
-        return None
-    return pa.timestamp("ns", "UTC" if zones.pop() else None)
 
 
 class TextStamps:
@@ -248,24 +237,19 @@ def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
     if ":" in stamps[0]:
         forms = ["iso8601", *forms]
     written = pa.array(stamps)
-    fitting = {form: times for form in forms if (times := _try_form(form, written)) is not None}
-    spans = {form: np.ptp(times) for form, times in fitting.items()}
-    return tuple(form for form in fitting if spans[form] == min(spans.values()))
+    spans = {}
+    for form in forms:
+        with suppress(StampError):
+            times, present = TextStamps(form).nanoseconds(written)
+            if present.all():
+                spans[form] = np.ptp(times)
+    return tuple(form for form, span in spans.items() if span == min(spans.values()))
 
 
 def stamps_of(form: str, texts: Sequence[str]) -> NDArray[np.float64]:
     """Return stamps in a pattern as ns since 1970 or since midnight; NaN where missing."""
     times, present = TextStamps(form).nanoseconds(pa.array(texts))
     return np.where(present, times, np.nan)
-
-
-def _try_form(form: str, texts: pa.Array) -> NDArray[np.int64] | None:
-    """Return stamps in a pattern, ns; None if one does not match it."""
-    try:
-        times, present = TextStamps(form).nanoseconds(texts)
-    except StampError:
-        return None
-    return times if present.all() else None
 
 
 # ----------------------------------------------------------------------------------------- of a log
@@ -304,9 +288,12 @@ class TextTime:
             whole = self._source.unit == "ns" and all(_INTEGER.fullmatch(s.strip()) for s in stamps)
             return pa.int64() if whole else pa.float64()
         if self._source.format == "iso8601" and self._source.date is None and not as_text:
-            kind = arrow_type(stamps)
-            if kind is not None:
-                return kind
+            # pyarrow itself is much faster, but reads no decimal commas, and no spaces around the
+            # stamp or before the zone.
+            matches = [_ISO_STAMP.fullmatch(text) for text in stamps]
+            zones = {bool(match["zone"]) for match in matches if match}
+            if all(matches) and len(zones) == 1:
+                return pa.timestamp("ns", "UTC" if zones.pop() else None)
         self._text = TextStamps(self._source.format)
         return pa.string()
 
@@ -326,13 +313,9 @@ class TextTime:
             If the first records have no stamp.
         """
         columns = [part.column(str(position)) for position in self.types]
-        return self._clock.seconds(*self._stamps(columns))
-
-    def _stamps(self, columns: list[pa.Array]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Return the stamps as numbers, and a mask of the stamps that are present."""
         if self._text is not None:
             texts = columns[0] if len(columns) == 1 else pc.binary_join_element_wise(*columns, " ")
-            return self._text.nanoseconds(texts)
+            return self._clock.seconds(*self._text.nanoseconds(texts))
         (column,) = columns
         present = np.asarray(column.is_valid())
         if pa.types.is_timestamp(column.type):
@@ -340,7 +323,7 @@ class TextTime:
         stamps = np.asarray(column.fill_null(0) if column.null_count else column)
         if stamps.dtype.kind == "f":
             present &= np.isfinite(stamps)
-        return stamps, present
+        return self._clock.seconds(stamps, present)
 
     def _started(self, first: Any) -> str | None:
         if self._source.format is not None:
