@@ -84,10 +84,7 @@ class LogFile(ABC):
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file.
 
-        Raises
-        ------
-        RecordingError
-            If the file does not match its sensor file, or is corrupt.
+        Raise `RecordingError` if the file does not match its sensor file, or is corrupt.
         """
 
     def note(self, finding: str, text: str, value: float, severity: Severity = "warning") -> None:

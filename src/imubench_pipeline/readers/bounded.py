@@ -133,11 +133,9 @@ class Bounded(Generic[T]):
     def result(self, seconds: float) -> T:
         """Return the result of the function, or raise its exception; to be called once.
 
-        Raises
-        ------
-        BoundError
-            If the result takes more than ``seconds`` from now, counted as in `bounded` on a busy
-            machine, if the memory limit is exceeded, or if the system ends the process.
+        Raise `BoundError` if the result takes more than ``seconds`` from now, counted as in
+        `bounded` on a busy machine, if the memory limit is exceeded, or if the system ends the
+        process.
         """
         process = psutil.Process(self._process)
         try:

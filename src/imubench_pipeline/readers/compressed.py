@@ -52,10 +52,8 @@ class Bytes:
     def read(self, size: int) -> bytes:
         """Return the next bytes, at most ``size``; none at the end.
 
-        Raises
-        ------
-        RecordingError
-            If the compressed data are corrupt or encrypted, or expand beyond the limit.
+        Raise `RecordingError` if the compressed data are corrupt or encrypted, or expand beyond the
+        limit.
         """
         try:
             # Not `read`, which discards the data before an early end.
@@ -165,11 +163,7 @@ def open_bytes(path: Path) -> Bytes:
 
     ``path``: a file, compressed or not, or a member of a zip archive, as the path of the archive
     followed by the name in it.
-
-    Raises
-    ------
-    RecordingError
-        If it cannot be opened, or its compression is not supported.
+    Raise `RecordingError` if it cannot be opened, or its compression is not supported.
     """
     archive = None if path.is_file() else _find_archive(path)
     try:
@@ -220,10 +214,7 @@ def is_member(path: Path) -> bool:
 def members(archive: Path) -> list[Path]:
     """Return the visible files of a zip archive, sorted, as its path followed by their names.
 
-    Raises
-    ------
-    RecordingError
-        If the archive cannot be read.
+    Raise `RecordingError` if the archive cannot be read.
     """
     return sorted(archive / name for name in _list_directory(archive) if visible(Path(name)))
 
@@ -290,10 +281,7 @@ def _describe_member(info: zipfile.ZipInfo) -> str:
 def opened_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a zip archive with a directory within `MAX_DIRECTORY`.
 
-    Raises
-    ------
-    RecordingError
-        If its directory is larger.
+    Raise `RecordingError` if its directory is larger.
     """
     with _Archive(path) as file, zipfile.ZipFile(file) as archive:
         file.most = None
@@ -419,11 +407,7 @@ def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[by
 
     ``findings`` receives findings about truncated compressed data, and about runs of at least
     ``least_zeros`` zero bytes, which no logger writes.
-
-    Raises
-    ------
-    RecordingError
-        If the file cannot be opened, or compressed data are corrupt.
+    Raise `RecordingError` if the file cannot be opened, or compressed data are corrupt.
     """
     zeros = ZeroRuns(least_zeros)
     with closing(open_bytes(path)) as stream:

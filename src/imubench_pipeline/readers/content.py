@@ -53,12 +53,8 @@ def content_of(path: Path) -> tuple[FileFormat, str]:
     For a zip archive with several files the format is text.
 
     ``path``: a log file, the folder of a ROS 2 bag, or a member of a zip archive.
-
-    Raises
-    ------
-    RecordingError
-        If it cannot be opened, is compressed twice, or is compressed and its format does not allow
-        that.
+    Raise `RecordingError` if it cannot be opened, is compressed twice, or is compressed and its
+    format does not allow that.
     """
     if (of_folder := format_of_folder(path)) is not None:
         return of_folder, ""

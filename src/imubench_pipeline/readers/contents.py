@@ -39,15 +39,8 @@ class Contents:
 def contents(path: Path) -> Contents:
     """Return the contents of a recording, from the beginning of each of its files.
 
-    Parameters
-    ----------
-    path : Path
-        A log file, or the folder, zip archive or ROS 2 bag of a recording.
-
-    Raises
-    ------
-    RecordingError
-        If it cannot be read, or has no data.
+    ``path``: A log file, or the folder, zip archive or ROS 2 bag of a recording.
+    Raise `RecordingError` if it cannot be read, or has no data.
     """
     if not path.exists():
         raise RecordingError(f"{path.name}: no such file or folder; expected a log")

@@ -109,11 +109,7 @@ def unpacked_zstd(data: bytes, most: int) -> bytes:
     """Return the first decompressed bytes of a frame of zstd.
 
     ``most``: largest number of bytes to decompress.
-
-    Raises
-    ------
-    ValueError
-        If the data are corrupt.
+    Raise `ValueError` if the data are corrupt.
     """
     try:
         return _create_zstd().decompress(data, most)

@@ -87,10 +87,7 @@ class FileFormat:
     def load(self) -> Code:
         """Return the code.
 
-        Raises
-        ------
-        RecordingError
-            If the library that the code needs is not installed.
+        Raise `RecordingError` if the library that the code needs is not installed.
         """
         if self.extra is None:
             return self.code()
@@ -104,11 +101,7 @@ class FileFormat:
         """Return the tables of a log, from its beginning.
 
         ``path``: a file, or a member of a zip archive if the format is streamed.
-
-        Raises
-        ------
-        RecordingError
-            If it cannot be read, or has no data.
+        Raise `RecordingError` if it cannot be read, or has no data.
         """
         return self.load().tables(path, self)
 

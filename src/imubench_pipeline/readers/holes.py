@@ -75,10 +75,7 @@ class FileWithoutHoles:
 class ZeroRuns:
     """Counts runs of zero bytes in a stream.
 
-    Parameters
-    ----------
-    least : int
-        Least length of a run that is counted.
+    ``least``: Least length of a run that is counted.
     """
 
     def __init__(self, least: int = 1) -> None:

@@ -21,14 +21,9 @@ _YEAR_2100 = 4_102_444_800 * 10**9
 class Clock:
     """Converts the stamps of a file to s since the first one.
 
-    Parameters
-    ----------
-    file : LogFile
-        Its ``started`` is set with the first stamp.
-    wraps : float or None
-        Value at which stamps wrap to 0, in their unit; None: they do not wrap.
-    started : callable
-        Returns ISO 8601 date and time of the first stamp; None if the stamp is no date.
+    ``file``: Its ``started`` is set with the first stamp.
+    ``wraps``: Value at which stamps wrap to 0, in their unit; None: they do not wrap.
+    ``started``: Returns ISO 8601 date and time of the first stamp; None if the stamp is no date.
     """
 
     def __init__(
@@ -43,10 +38,7 @@ class Clock:
     def seconds(self, stamps: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return s since the first stamp, shape (n,); NaN where the stamp is not present.
 
-        Raises
-        ------
-        RecordingError
-            If the first records have no stamp.
+        Raise `RecordingError` if the first records have no stamp.
         """
         if self._wraps is not None:
             stamps = stamps.copy()

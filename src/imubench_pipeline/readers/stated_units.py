@@ -140,14 +140,9 @@ class StatedUnit:
 def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit | None:
     """Return the unit that a log states for a channel; None if there is no known unit.
 
-    Parameters
-    ----------
-    channel : str
-        Channel or additional column; the result is None for the latter.
-    text, where : str
-        Text in the place of the unit, and a description of this place.
-    label : str
-        Name of the column, which may contain the unit.
+    ``channel``: Channel or additional column; the result is None for the latter.
+    ``text``, ``where``: Text in the place of the unit, and a description of this place.
+    ``label``: Name of the column, which may contain the unit.
     """
     if channel not in CHANNELS:
         return None
@@ -164,14 +159,9 @@ def contradictions(
 ) -> list[Finding]:
     """Return findings on channels for which log and sensor file state different units.
 
-    Parameters
-    ----------
-    file : str
-        Name of the log.
-    sources : mapping of str to ColumnSource
-        Columns of the sensor file.
-    units : mapping of str to StatedUnit
-        Units that the log states.
+    ``file``: Name of the log.
+    ``sources``: Columns of the sensor file.
+    ``units``: Units that the log states.
     """
     findings = []
     for channel, in_log in units.items():

@@ -418,10 +418,7 @@ _MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 22, 1 << 26
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each kind of message with inertial data.
 
-    Raises
-    ------
-    RecordingError
-        If there is no such message.
+    Raise `RecordingError` if there is no such message.
     """
     names = list(COLUMNS)
     words = {kind: Words(kind, names) for kind in KINDS}

@@ -486,10 +486,7 @@ _MAX_DESCRIBED_BYTES = 1 << 21  # bytes
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each kind of sentence with inertial data.
 
-    Raises
-    ------
-    RecordingError
-        If there is no such sentence with a right checksum.
+    Raise `RecordingError` if there is no such sentence with a right checksum.
     """
     sentences = {kind: Sentences(kind, stamped=True) for kind in FIELDS}
     rows: dict[str, list[Row]] = {kind: [] for kind in FIELDS}

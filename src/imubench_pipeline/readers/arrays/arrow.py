@@ -194,11 +194,7 @@ def check_batches(path: Path, in_file: bool) -> None:
     """Raise if a compressed batch is too large to be unpacked as a whole.
 
     ``in_file``: the format is the file format, not the stream format.
-
-    Raises
-    ------
-    UnusableError
-        If a batch is too large.
+    Raise `UnusableError` if a batch is too large.
     """
     with pa.memory_map(str(path)) as source:
         source.seek(_FILE_PREFIX_BYTES if in_file else 0)

@@ -202,11 +202,7 @@ def rows_of_block(row_bytes: int, most: int) -> int:
 
     ``row_bytes``: memory per record, bytes.
     ``most``: largest memory of a block, bytes.
-
-    Raises
-    ------
-    UnusableError
-        If a single record exceeds the limit.
+    Raise `UnusableError` if a single record exceeds the limit.
     """
     if row_bytes > most:
         raise UnusableError(
@@ -255,10 +251,7 @@ def _find_column(
 ) -> _Place:
     """Return the table and the position of a column.
 
-    Raises
-    ------
-    UnusableError
-        If the column does not exist, or several columns match.
+    Raise `UnusableError` if the column does not exist, or several columns match.
     """
     if isinstance(column, int):
         return _take_numbered(_find_table(tables, variable, key), column, key)
@@ -432,10 +425,7 @@ _MAX_RATE = 1e6
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return the tables of a file, at most a thousand.
 
-    Raises
-    ------
-    RecordingError
-        If it cannot be read.
+    Raise `RecordingError` if it cannot be read.
     """
     check_not_empty(path)
     file = file_format.load().log_file(path, NOTHING_STATED, {})
@@ -573,12 +563,8 @@ class ArrayTime:
     def seconds(self, raw: NDArray[Any]) -> NDArray[np.float64]:
         """Return s since the first stamp of the file; NaN where the stamp is missing.
 
-        Raises
-        ------
-        UnusableError
-            If dates do not fit into nanoseconds.
-        RecordingError
-            If the first records have no stamp.
+        Raise `UnusableError` if dates do not fit into nanoseconds.
+        Raise `RecordingError` if the first records have no stamp.
         """
         missing = np.ma.getmaskarray(raw).copy()
         values = np.ma.getdata(raw)

@@ -59,11 +59,7 @@ def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> l
 
     ``time_axis``: axis of time of a square matrix.
     ``passed_over``: prefix of the names in the root group that are not data.
-
-    Raises
-    ------
-    UnusableError
-        If there are too many objects, or groups are nested too deeply.
+    Raise `UnusableError` if there are too many objects, or groups are nested too deeply.
     """
     objects = 0
     seen = {_get_identity(file)}
@@ -113,10 +109,7 @@ def _get_identity(item: h5py.Group | h5py.Dataset) -> tuple[int, int]:
 class DataSet(Array):
     """A data set, read by blocks.
 
-    Parameters
-    ----------
-    time_axis : int
-        See `Array`.
+    ``time_axis``: See `Array`.
     """
 
     def __init__(self, data: h5py.Dataset, name: str, time_axis: int) -> None:

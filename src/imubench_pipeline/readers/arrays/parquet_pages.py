@@ -25,11 +25,7 @@ def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> 
     """Raise if the largest pages of all columns together exceed the memory limit.
 
     ``names``: names of the columns that are read together.
-
-    Raises
-    ------
-    UnusableError
-        If they exceed the limit, or if there are too many small pages.
+    Raise `UnusableError` if they exceed the limit, or if there are too many small pages.
     """
     most = max(MAX_UNCHECKED_PAGES, path.stat().st_size // MIN_MEAN_PAGE)
     paths = [metadata.schema.column(place).path for place in range(metadata.num_columns)]
@@ -91,10 +87,7 @@ _MAX_DEPTH = 8
 def _parse_header(data: bytes) -> tuple[dict[int, int], int]:
     """Return the integers of a structure by field number, and its length.
 
-    Raises
-    ------
-    IndexError
-        If the structure does not end within the data.
+    Raise `IndexError` if the structure does not end within the data.
     """
     numbers: dict[int, int] = {}
     at, field = 0, 0

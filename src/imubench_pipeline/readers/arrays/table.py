@@ -136,10 +136,7 @@ class Array(Table):
     A field that is a vector of three is the columns ``gyro[1]``, ``gyro[2]`` and ``gyro[3]``; a
     field of a field is ``imu.gyro``.
 
-    Parameters
-    ----------
-    time_axis : int
-        Axis of time of a square matrix.
+    ``time_axis``: Axis of time of a square matrix.
     """
 
     def __init__(
@@ -239,18 +236,11 @@ class StreamedArray(Array):
     If a matrix is stored column by column, each column is read by a stream of its own, so that only
     one block of each is in memory.
 
-    Parameters
-    ----------
-    name, shape, dtype, time_axis
-        See `Array`.
-    fortran : bool
-        The first index varies fastest.
-    opened : callable
-        Opens a new stream of the bytes, which its caller closes.
-    offset : int
-        Bytes before the first element.
-    checked : bool
-        The bytes have a checksum, which is verified at their end.
+    ``name``, ``shape``, ``dtype``, ``time_axis``: See `Array`.
+    ``fortran``: The first index varies fastest.
+    ``opened``: Opens a new stream of the bytes, which its caller closes.
+    ``offset``: Bytes before the first element.
+    ``checked``: The bytes have a checksum, which is verified at their end.
     """
 
     def __init__(
@@ -321,10 +311,7 @@ def skip(stream: IO[bytes], size: int, *, seek: bool = True) -> None:
 def exactly(stream: IO[bytes], size: int) -> bytes:
     """Return the next bytes of a stream.
 
-    Raises
-    ------
-    UnusableError
-        If the stream ends early.
+    Raise `UnusableError` if the stream ends early.
     """
     read = stream.read(size)
     if len(read) < size:

@@ -350,11 +350,7 @@ def opened(path: Path) -> Source:
     """Open a bag; its kind is recognised by its content.
 
     ``path``: a file, or the folder of a ROS 2 bag.
-
-    Raises
-    ------
-    RecordingError
-        If the path cannot be opened, or is no bag.
+    Raise `RecordingError` if the path cannot be opened, or is no bag.
     """
     with explained(path):
         try:
@@ -395,11 +391,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each topic.
 
     ``path``: a file, or the folder of a ROS 2 bag.
-
-    Raises
-    ------
-    RecordingError
-        If it is no bag, or has no topic.
+    Raise `RecordingError` if it is no bag, or has no topic.
     """
     source = opened(path)
     try:

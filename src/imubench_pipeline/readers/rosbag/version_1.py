@@ -50,10 +50,7 @@ class Bag:
     def topics(self) -> dict[str, str]:
         """Return the topics, and the type of message of each.
 
-        Raises
-        ------
-        RecordingError
-            If this is no bag, or it is damaged.
+        Raise `RecordingError` if this is no bag, or it is damaged.
         """
         # The connections are in the index; without an index, the whole bag is read.
         with self._path.open("rb") as file:
@@ -79,10 +76,7 @@ class Bag:
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
         """Yield time of recording (ns) and bytes of the messages of a topic.
 
-        Raises
-        ------
-        RecordingError
-            If this is no bag, or it is damaged.
+        Raise `RecordingError` if this is no bag, or it is damaged.
         """
         with self._path.open("rb") as file:
             at = 0

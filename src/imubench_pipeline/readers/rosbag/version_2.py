@@ -61,10 +61,7 @@ _Reader = Reader | McapReader | Sqlite3Reader
 class Bag2:
     """A ROS 2 bag.
 
-    Parameters
-    ----------
-    reader : Reader, McapReader or Sqlite3Reader
-        Reader of the library, not yet opened.
+    ``reader``: Reader of the library, not yet opened.
     """
 
     ros_1 = False

@@ -90,16 +90,10 @@ class CompleteLines:
     lack digits; it is left out with a finding. A truncated compressed file is read to its end, with
     a finding.
 
-    Parameters
-    ----------
-    findings : list of Finding
-        Receives the findings about omitted text.
-    skipped : int
-        Bytes of the text to skip.
-    records : callable
-        Converts complete lines to the text that is read.
-    most : int or None
-        Bytes of the text after which reading stops; None: the whole file.
+    ``findings``: Receives the findings about omitted text.
+    ``skipped``: Bytes of the text to skip.
+    ``records``: Converts complete lines to the text that is read.
+    ``most``: Bytes of the text after which reading stops; None: the whole file.
     """
 
     closed = False

@@ -310,11 +310,7 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return the only table of a text log, as a list.
 
     ``path``: a file, compressed or not, or a member of a zip archive.
-
-    Raises
-    ------
-    RecordingError
-        If it is no text, or has no records.
+    Raise `RecordingError` if it is no text, or has no records.
     """
     layout = find_layout(path, NOTHING_STATED, [], [])
     before = [line.decode("utf-8", "replace") for line in layout.preamble]

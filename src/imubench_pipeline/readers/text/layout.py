@@ -73,10 +73,7 @@ class TextLayout:
     def position(self, column: Column, key: str) -> int:
         """Return the position, from 0, of a column that the sensor file names.
 
-        Raises
-        ------
-        RecordingError
-            If the file has no such column, or two with this name.
+        Raise `RecordingError` if the file has no such column, or two with this name.
         """
         shown = [name[:_MAX_SHOWN_LENGTH] for name in self.names[:_MAX_SHOWN_NAMES]]
         present = ", ".join(shown) + (", ..." if len(self.names) > _MAX_SHOWN_NAMES else "")
@@ -125,11 +122,7 @@ def find_layout(
     ``log``: the stated format.
     ``figures`` and ``times``: the required columns of numbers and of time stamps, by name or
     position. If there are none, the most plausible layout is returned.
-
-    Raises
-    ------
-    RecordingError
-        If there is no record, or the file is no text.
+    Raise `RecordingError` if there is no record, or the file is no text.
     """
     return _Search(path, log, figures, times).layout()
 

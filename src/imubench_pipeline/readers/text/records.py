@@ -26,18 +26,11 @@ _TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
 class Records:
     """Removes from the lines of a file all that are no records.
 
-    Parameters
-    ----------
-    comments : collection of bytes
-        Prefixes of comment lines.
-    header : bytes
-        The line of names, without its line break; empty if there is none.
-    preamble : sequence of bytes
-        The lines before the first record, which a restarted logger repeats.
-    runs : bool
-        Columns are separated by runs of spaces or tabs, which become one space.
-    blank_is_missing : bool
-        A blank line between two records is a record with one empty cell.
+    ``comments``: Prefixes of comment lines.
+    ``header``: The line of names, without its line break; empty if there is none.
+    ``preamble``: The lines before the first record, which a restarted logger repeats.
+    ``runs``: Columns are separated by runs of spaces or tabs, which become one space.
+    ``blank_is_missing``: A blank line between two records is a record with one empty cell.
     """
 
     def __init__(

@@ -86,14 +86,9 @@ def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequ
     Decimals have no sign and sometimes begin with 0, unlike integers, unless all integers are
     padded with zeros.
 
-    Parameters
-    ----------
-    number : int
-        Line number of the first record.
-    line : str
-        The first record.
-    rows : sequence of sequence of str
-        Cells of the first records, split at commas.
+    ``number``: Line number of the first record.
+    ``line``: The first record.
+    ``rows``: Cells of the first records, split at commas.
     """
     if {len(row) % 2 for row in rows} != {0}:
         return

@@ -60,10 +60,7 @@ class StampError(Exception):
 class TextStamps:
     """Reads stamps in text.
 
-    Parameters
-    ----------
-    form : str
-        ``iso8601`` or a ``strptime`` pattern.
+    ``form``: ``iso8601`` or a ``strptime`` pattern.
     """
 
     def __init__(self, form: str) -> None:
@@ -80,10 +77,7 @@ class TextStamps:
     def nanoseconds(self, texts: pa.Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return ns since 1970 or since midnight, and a mask of the stamps that are present.
 
-        Raises
-        ------
-        StampError
-            If a stamp does not match the pattern and is not missing.
+        Raise `StampError` if a stamp does not match the pattern and is not missing.
         """
         texts = pc.fill_null(texts, "")
         fields = pc.extract_regex(texts, self._expression)
@@ -305,12 +299,8 @@ class TextTime:
     def seconds(self, part: pa.RecordBatch) -> NDArray[np.float64]:
         """Return s since the first stamp of the file; NaN where the stamp is missing.
 
-        Raises
-        ------
-        StampError
-            If a stamp cannot be read.
-        RecordingError
-            If the first records have no stamp.
+        Raise `StampError` if a stamp cannot be read.
+        Raise `RecordingError` if the first records have no stamp.
         """
         columns = [part.column(str(position)) for position in self.types]
         if self._text is not None:
