@@ -9,7 +9,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
@@ -112,7 +112,10 @@ class _DeflatedMember:
                 self._left -= len(packed)
             block = self._inflate.decompress(packed, size)
             if block:
-                self._count(block)
+                self._crc = zlib.crc32(block, self._crc)
+                self._size -= len(block)
+                if self._size < 0:
+                    raise zipfile.BadZipFile("more data than the directory says")
                 return block
             if not packed and not self._inflate.eof:
                 raise EOFError
@@ -123,12 +126,6 @@ class _DeflatedMember:
     def close(self) -> None:
         self._file.close()
 
-    def _count(self, block: bytes) -> None:
-        self._crc = zlib.crc32(block, self._crc)
-        self._size -= len(block)
-        if self._size < 0:
-            raise zipfile.BadZipFile("more data than the directory says")
-
 
 _UNSUPPORTED_COMPRESSIONS: Mapping[bytes, str] = {
     b"7z\xbc\xaf\x27\x1c": "7z",
@@ -138,16 +135,8 @@ _UNSUPPORTED_COMPRESSIONS: Mapping[bytes, str] = {
     _ZIP_LOCAL: "zip in another way",
 }
 
-_CORRUPT_DATA_ERRORS = (
-    OSError,
-    ValueError,
-    zlib.error,
-    lzma.LZMAError,
-    zipfile.BadZipFile,
-    RuntimeError,
-    struct.error,
-    MemoryError,
-)
+_CORRUPT_DATA_ERRORS = (OSError, ValueError, zlib.error, lzma.LZMAError, zipfile.BadZipFile,
+                        RuntimeError, struct.error, MemoryError)  # fmt: skip
 """Exceptions of the libraries for data that violate their format."""
 
 
@@ -167,29 +156,31 @@ def open_bytes(path: Path) -> Bytes:
     """
     archive = None if path.is_file() else _find_archive(path)
     try:
-        if archive is None:
-            return _open_file(path, FileWithoutHoles(path))
-        return _open_member(archive, path.relative_to(archive).as_posix(), archive.open("rb"))
+        with ExitStack() as stack:  # closes the file if it cannot be read
+            if archive is None:
+                log = stack.enter_context(closing(FileWithoutHoles(path)))
+                opened = _open_file(path, log)
+            else:
+                file = stack.enter_context(archive.open("rb"))
+                opened = _open_member(archive, path.relative_to(archive).as_posix(), file)
+            stack.pop_all()
+            return opened
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
 
 
 def _open_file(path: Path, file: FileWithoutHoles) -> Bytes:
-    try:
-        begin = file.read(MAX_MAGIC_LENGTH)
-        file.rewind()
-        for magic, kind in _UNSUPPORTED_COMPRESSIONS.items():
-            if begin.startswith(magic):
-                raise RecordingError(
-                    f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
-                    "zip: unpack it"
-                )
-        if not (how := compression_of(begin)):
-            return Bytes(path.name, file, _UNKNOWN_SIZE)
-        return Bytes(path.name, DECOMPRESSORS[how](file), path.stat().st_size, (file,))
-    except BaseException:
-        file.close()
-        raise
+    begin = file.read(MAX_MAGIC_LENGTH)
+    file.rewind()
+    for magic, kind in _UNSUPPORTED_COMPRESSIONS.items():
+        if begin.startswith(magic):
+            raise RecordingError(
+                f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
+                "zip: unpack it"
+            )
+    if not (how := compression_of(begin)):
+        return Bytes(path.name, file, _UNKNOWN_SIZE)
+    return Bytes(path.name, DECOMPRESSORS[how](file), path.stat().st_size, (file,))
 
 
 # ------------------------------------------------------------------------------ zip archives
@@ -310,25 +301,22 @@ def _scan_for_members(archive: Path) -> list[zipfile.ZipInfo]:
     """Return the members of a truncated archive, whose directory at the end is missing."""
     members: list[zipfile.ZipInfo] = []
     with closing(FileWithoutHoles(archive)) as file:
-        data = b""
-        while block := file.read(_SCAN_BLOCK):
+        data, ended = b"", False
+        while not ended:
+            block = file.read(_SCAN_BLOCK)
+            ended = not block
             data += block
             start = file.tell() - len(data)
             at = data.find(_ZIP_LOCAL)
-            while at >= 0 and at + _MAX_HEADER <= len(data):
+            while at >= 0 and (ended or at + _MAX_HEADER <= len(data)):
                 members += _parse_local_header(data[at : at + _MAX_HEADER], start + at)
                 at = data.find(_ZIP_LOCAL, at + 1)
-            if len(members) > MAX_MEMBERS:
+            if len(members) > MAX_MEMBERS and not ended:
                 raise RecordingError(
                     f"{archive.name}: an archive without its directory, with more than "
                     f"{MAX_MEMBERS} members; expected the log alone: pack it anew"
                 )
             data = data[at if at >= 0 else max(len(data) - 3, 0) :]
-        start = file.tell() - len(data)
-        at = data.find(_ZIP_LOCAL)
-        while at >= 0:
-            members += _parse_local_header(data[at : at + _MAX_HEADER], start + at)
-            at = data.find(_ZIP_LOCAL, at + 1)
     return members
 
 
@@ -362,14 +350,6 @@ def _parse_local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
 
 
 def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
-    try:
-        return _open_stored_member(archive, name, file)
-    except BaseException:
-        file.close()
-        raise
-
-
-def _open_stored_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     shown = f"{archive.name}/{name}"
     info = _list_directory(archive).get(name)
     if info is None:

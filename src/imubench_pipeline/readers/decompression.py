@@ -8,9 +8,11 @@ import re
 import sys
 import zlib
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from functools import partial
+from typing import Any
 
 from imubench_pipeline.readers.bounds import MAX_UNCHECKED_PARTS, MAX_WINDOW, MIN_MEAN_PART
+from imubench_pipeline.readers.holes import FileWithoutHoles
 
 if sys.version_info >= (3, 14):
     from compression import zstd
@@ -18,16 +20,6 @@ else:
     from backports import zstd
 
 _READ_BLOCK = 1 << 16
-
-
-class Source(Protocol):
-    """A source of compressed bytes."""
-
-    def read(self, size: int, /) -> bytes:
-        """Return the next bytes; none at the end."""
-
-    def close(self) -> None:
-        """Close the source."""
 
 
 class _CompressedParts:
@@ -39,7 +31,7 @@ class _CompressedParts:
     ``new`` creates the decompressor of one part. Only zeros may follow a part.
     """
 
-    def __init__(self, file: Source, new: Callable[[], Any]) -> None:
+    def __init__(self, file: FileWithoutHoles, new: Callable[[], Any]) -> None:
         self._file = file
         self._new = new
         self._part = new()
@@ -58,7 +50,12 @@ class _CompressedParts:
                 if not packed:
                     return b""
                 self._part = self._new()
-                self._parts = _count_part(self._parts, self._size)
+                if self._parts >= MAX_UNCHECKED_PARTS and self._size < MIN_MEAN_PART * self._parts:
+                    raise OSError(
+                        f"{self._parts} compressed parts hold {self._size} bytes, expected more "
+                        f"than {MIN_MEAN_PART} a part"
+                    )
+                self._parts += 1
             try:
                 block: bytes = self._part.decompress(packed, size)
             except (OSError, EOFError, lzma.LZMAError, zlib.error, zstd.ZstdError) as error:
@@ -72,15 +69,6 @@ class _CompressedParts:
 
     def close(self) -> None:
         self._file.close()
-
-
-def _count_part(parts: int, size: int) -> int:
-    """Return the number of parts plus one; raise if there are too many nearly empty parts."""
-    if parts >= MAX_UNCHECKED_PARTS and size < MIN_MEAN_PART * parts:
-        raise OSError(
-            f"{parts} compressed parts hold {size} bytes, expected more than {MIN_MEAN_PART} a part"
-        )
-    return parts + 1
 
 
 class _GzipDecompressor:
@@ -124,15 +112,11 @@ def _create_zstd() -> zstd.ZstdDecompressor:
     return zstd.ZstdDecompressor(options=largest)
 
 
-def _create_xz() -> lzma.LZMADecompressor:
-    # The memory for the dictionary that a file requests is allocated before the first byte.
-    return lzma.LZMADecompressor(memlimit=MAX_WINDOW)
-
-
-DECOMPRESSORS: Mapping[str, Callable[[Source], Any]] = {
+DECOMPRESSORS: Mapping[str, Callable[[FileWithoutHoles], Any]] = {
     "gzip": lambda file: _CompressedParts(file, _GzipDecompressor),
     "zstd": lambda file: _CompressedParts(file, _create_zstd),
-    "xz": lambda file: _CompressedParts(file, _create_xz),
+    # The memory for the dictionary that a file requests is allocated before the first byte.
+    "xz": lambda file: _CompressedParts(file, partial(lzma.LZMADecompressor, memlimit=MAX_WINDOW)),
     "bzip2": lambda file: _CompressedParts(file, bz2.BZ2Decompressor),
 }
 """Function that opens a compressed file, by compression."""

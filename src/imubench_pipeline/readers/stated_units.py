@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, ColumnSource, quantity_of
@@ -98,26 +98,19 @@ def divided(label: str, dimension: str) -> tuple[str, str | None]:
         lambda bracket: bracket[0] if bracket[1].strip().isdigit() else " ", label
     )
     if unit is None:
-        for start, tail in _list_tails(name):
-            unit = unit_of(tail, dimension)
-            if unit is not None:
-                return name[:start], unit
+        # The text after each separator, the longest first.
+        text = name.rstrip()
+        begin = max(len(text) - _MAX_UNIT_LENGTH, 0)
+        places = [begin + separator.end() for separator in _SEPARATOR.finditer(text[begin:])]
+        for place in places[-_MAX_TAILS:]:
+            if 0 < place < len(text) and (unit := unit_of(text[place:], dimension)):
+                return name[:place], unit
     return name, unit
 
 
 def bracketed(label: str) -> list[str]:
     """Return the texts in brackets in a name that are no numbers."""
     return [text for text in _BRACKETED.findall(label) if text.strip() and not text.isdigit()]
-
-
-def _list_tails(name: str) -> Iterator[tuple[int, str]]:
-    """Yield position and text after each separator of a name, the longest text first."""
-    text = name.rstrip()
-    begin = max(len(text) - _MAX_UNIT_LENGTH, 0)
-    places = [begin + separator.end() for separator in _SEPARATOR.finditer(text[begin:])]
-    for place in places[-_MAX_TAILS:]:
-        if 0 < place < len(text):
-            yield place, text[place:]
 
 
 _MIN_FACTOR_OF_OTHER_UNIT = 1.5

@@ -39,7 +39,7 @@ from imubench_pipeline.readers.file_format import (
 from imubench_pipeline.readers.stamps import Clock, date_of
 from imubench_pipeline.readers.text.cells import is_number
 from imubench_pipeline.readers.text.stamps import StampError, stamps_of
-from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _APPENDED_FIELDS = re.compile(rb"(?:,S[0-9A-Fa-f]{4})?(?:,T(\d{1,18}))?$")
 """Fields that the device appends on request: a status, and a counter or time."""
@@ -62,10 +62,8 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "VNACC": _make_axis_names("accel"),
     "VNGYR": _make_axis_names("gyro"),
     "VNYBA": (*_ATTITUDE_FIELDS, *_make_axis_names("linear_accel", "gyro")),  # without gravity
-    "VNYIA": (
-        *_ATTITUDE_FIELDS,
-        *_make_axis_names("inertial_accel", "gyro"),
-    ),  # in the frame of the Earth
+    # In the frame of the Earth.
+    "VNYIA": (*_ATTITUDE_FIELDS, *_make_axis_names("inertial_accel", "gyro")),
 }
 """The fields of each sentence with angular rate or acceleration."""
 
@@ -133,9 +131,8 @@ class Sentences:
                 checks.append(check.rstrip() if body else b"")
                 before = b""
         rows: list[Row] = []
-        for good, before, body in zip(
-            right_checksums(bodies, checks), befores, bodies, strict=True
-        ):
+        right = right_checksums(bodies, checks)
+        for good, before, body in zip(right, befores, bodies, strict=True):
             if good and body.startswith(self._head):
                 self.right += 1
                 rows.append(self._row(before, body))
@@ -202,10 +199,8 @@ def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
         yield rest
     elif rest.strip(b"\0\r\t "):
         shown = rest[:60].decode("ascii", "replace")
-        detail = (
-            f"{path.name}: the last line has no line break and no right checksum; left out: "
-            f"{shown!r}"
-        )
+        why = "the last line has no line break and no right checksum"
+        detail = f"{path.name}: {why}; left out: {shown!r}"
         findings.append(Finding("incomplete_last_record", "note", detail, 1))
 
 
@@ -313,7 +308,15 @@ class VectorNavFile(LogFile):
             if self.log.time is not None:
                 stamps, missing = self._stamps(rows)
                 if clock.first is None and missing.all():
-                    raise self._without_stamp(rows)
+                    at_host = self.log.time.column == HOST_TIME
+                    where = "before the '$'" if at_host else "'T' and a count at the end"
+                    before, body = rows[0].before[:40], rows[0].body[-40:]
+                    raise RecordingError(
+                        f"{self.path.name}: no stamp that can be read in the first {len(rows)} "
+                        f"sentences; expected {where}, found {before.decode('ascii', 'replace')!r} "
+                        f"before {body.decode('ascii', 'replace')!r}; mend 'time' in the sensor "
+                        "file, or drop it and state 'rate'"
+                    )
                 time = clock.seconds(stamps, ~missing)
             fields, unread = fields_of(kind, rows, set(positions.values()))
             records.unread += unread
@@ -402,16 +405,6 @@ class VectorNavFile(LogFile):
             missing |= ~np.isfinite(stamps)
         return stamps, missing
 
-    def _without_stamp(self, rows: list[Row]) -> RecordingError:
-        at_host = self.log.time is not None and self.log.time.column == HOST_TIME
-        where = "before the '$'" if at_host else "'T' and a count at the end"
-        return RecordingError(
-            f"{self.path.name}: no stamp that can be read in the first {len(rows)} sentences; "
-            f"expected {where}, found {rows[0].before[:40].decode('ascii', 'replace')!r} "
-            f"before {rows[0].body[-40:].decode('ascii', 'replace')!r}; mend 'time' in the "
-            "sensor file, or drop it and state 'rate'"
-        )
-
     def _started(self, first: Any) -> str | None:
         time = self.log.time
         if time is None or time.column != HOST_TIME or time.unit == "samples":
@@ -430,34 +423,21 @@ class VectorNavFile(LogFile):
                 "sensor file right, and the checksum on (register 30)?"
             )
         fate = "left out" if self.log.time is not None else "missing samples"
-        others = _join_names(records.others)
-        self._count(
-            records.wrong,
-            "wrong_checksum",
-            f"${kind} sentences are cut short or have a wrong checksum; {fate}",
-        )
-        self._count(
-            records.unread,
-            "unreadable_sentence",
-            f"${kind} sentences have a right checksum but not the {len(FIELDS[kind])} numbers "
-            "expected; their figures are missing",
-        )
-        self._count(
-            records.others.total(),
-            "other_sentences",
-            f"other sentences ({others}) passed over",
-            "note",
-        )
-        self._count(
-            records.garbage,
-            "not_sentences",
-            "lines or parts of lines are no sentence; passed over",
-            "note",
-        )
-
-    def _count(self, count: int, name: str, text: str, severity: Severity = "warning") -> None:
-        if count:
-            self.note(name, f"{count} {text}", count, severity)
+        if count := records.wrong:
+            text = f"{count} ${kind} sentences are cut short or have a wrong checksum; {fate}"
+            self.note("wrong_checksum", text, count)
+        if count := records.unread:
+            text = (
+                f"{count} ${kind} sentences have a right checksum but not the "
+                f"{len(FIELDS[kind])} numbers expected; their figures are missing"
+            )
+            self.note("unreadable_sentence", text, count)
+        if count := records.others.total():
+            text = f"{count} other sentences ({_join_names(records.others)}) passed over"
+            self.note("other_sentences", text, count, "note")
+        if count := records.garbage:
+            text = f"{count} lines or parts of lines are no sentence; passed over"
+            self.note("not_sentences", text, count, "note")
 
 
 def _join_names(names: Iterable[str]) -> str:
@@ -504,46 +484,34 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
             f"{path.name}: no sentence of {', '.join(FIELDS)} with a right checksum at its "
             "beginning; set the output of the device (registers 6 and 30)"
         )
-    return [
-        _describe_sentence(file_format, kind, rows[kind], len(present) == 1) for kind in present
-    ]
-
-
-def _describe_sentence(
-    file_format: FileFormat, kind: str, rows: list[Row], alone: bool
-) -> LogTable:
-    fields, _ = fields_of(kind, rows[:MAX_EXAMINED_RECORDS], set(range(len(FIELDS[kind]))))
-    columns = [
-        LogColumn(
-            name if alone else f"{kind}.{name}",
-            name,
-            "number",
-            shown(fields[place]),
-            fields[place],
-            UNITS.get(name),
-        )
-        for place, name in enumerate(FIELDS[kind])
-    ]
-    columns += _describe_time(
-        HOST_TIME, [row.before.strip(STAMP_PADDING) for row in rows[:MAX_EXAMINED_RECORDS]]
-    )
-    columns += _describe_time(COUNTER, [row.counter for row in rows[:MAX_EXAMINED_RECORDS]])
-    about = f"{len(rows)} sentences at the beginning"
-    return LogTable(file_format, kind, tuple(columns), about=about)
+    described = []
+    for kind in present:
+        first = rows[kind][:MAX_EXAMINED_RECORDS]
+        fields, _ = fields_of(kind, first, set(range(len(FIELDS[kind]))))
+        columns = []
+        for place, name in enumerate(FIELDS[kind]):
+            source = name if len(present) == 1 else f"{kind}.{name}"
+            values = fields[place]
+            unit = UNITS.get(name)
+            columns.append(LogColumn(source, name, "number", shown(values), values, unit))
+        columns += _describe_time(HOST_TIME, [row.before.strip(STAMP_PADDING) for row in first])
+        columns += _describe_time(COUNTER, [row.counter for row in first])
+        about = f"{len(rows[kind])} sentences at the beginning"
+        described.append(LogTable(file_format, kind, tuple(columns), about=about))
+    return described
 
 
 def _describe_time(name: str, cells: list[bytes]) -> list[LogColumn]:
     """Return a list with the column of stamps, empty if there are no stamps."""
     texts = [cell.decode("ascii", "replace") for cell in cells]
-    first = tuple(text for text in texts[:MAX_SHOWN_VALUES])
+    first = tuple(texts[:MAX_SHOWN_VALUES])
     if not any(texts):
         return []
     if all(is_number(text, ".") for text in texts if text):
         values = np.array([float(text) if text else np.nan for text in texts])
         return [LogColumn(name, name, "number", first, values)]
     try:
-        return [
-            LogColumn(name, name, "date", first, stamps_of("iso8601", texts), None, ("iso8601",))
-        ]
+        dates = stamps_of("iso8601", texts)
+        return [LogColumn(name, name, "date", first, dates, None, ("iso8601",))]
     except StampError:
         return [LogColumn(name, name, "text", first)]

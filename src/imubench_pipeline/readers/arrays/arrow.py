@@ -11,8 +11,8 @@ from __future__ import annotations
 import json
 import struct
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +29,8 @@ from imubench_pipeline.readers.bounds import MAX_ARROW_BATCH
 METADATA = b"imubench"
 """Metadata key of Parquet files that this package writes; the value is JSON."""
 
-_PARQUET_MAGIC, _ARROW_FILE_MAGIC, _ARROW_STREAM_MAGIC, _FEATHER_1_MAGIC = (
-    b"PAR1",
-    b"ARROW1",
-    b"\xff\xff\xff\xff",
-    b"FEA1",
-)
+_PARQUET_MAGIC, _FEATHER_1_MAGIC = b"PAR1", b"FEA1"
+_ARROW_FILE_MAGIC, _ARROW_STREAM_MAGIC = b"ARROW1", b"\xff\xff\xff\xff"
 
 
 class ArrowFile(ArrayFile):
@@ -117,7 +113,9 @@ class _ParquetTable(_ArrowTable):
         super().__init__(file.schema_arrow)
         self._path, self._file = path, file
         self.rows = file.metadata.num_rows
-        self.simulated = _states_simulated(file.metadata.metadata or {})
+        with suppress(ValueError):
+            about = json.loads((file.metadata.metadata or {}).get(METADATA, b"{}"))
+            self.simulated = isinstance(about, dict) and about.get("simulated") is True
 
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
         check_pages(self._path, self._file.metadata, names)
@@ -142,15 +140,6 @@ class _IpcTable(_ArrowTable):
             return
         for number in range(self._reader.num_record_batches):
             yield self._reader.get_batch(number)
-
-
-def _states_simulated(metadata: Mapping[bytes, bytes]) -> bool:
-    """Return whether the metadata of this package mark a file as simulated."""
-    try:
-        about = json.loads(metadata.get(METADATA, b"{}"))
-    except ValueError:
-        return False
-    return isinstance(about, dict) and about.get("simulated") is True
 
 
 def _find_numpy_kind(kind: pa.DataType) -> str:
@@ -186,8 +175,6 @@ _FIELD_HEADER_TYPE, _FIELD_HEADER = 1, 2
 _TYPE_DICTIONARY_BATCH, _TYPE_RECORD_BATCH = 2, 3
 _FIELD_DICTIONARY_DATA = 1
 _FIELD_BUFFERS, _FIELD_COMPRESSION = 2, 3
-_SIZE_STRUCT = struct.Struct("<q")
-_BUFFER_STRUCT = struct.Struct("<qq")
 
 
 def check_batches(path: Path, in_file: bool) -> None:
@@ -222,11 +209,9 @@ def _read_unpacked_sizes(metadata: bytes, body: pa.Buffer | None) -> Iterator[in
             return
         start, count = header.vector(_FIELD_BUFFERS)
         for number in range(count):
-            offset, length = _BUFFER_STRUCT.unpack_from(
-                metadata, start + number * _BUFFER_STRUCT.size
-            )
-            if length >= _SIZE_STRUCT.size:
-                yield max(0, *_SIZE_STRUCT.unpack(bytes(body[offset : offset + _SIZE_STRUCT.size])))
+            offset, length = struct.unpack_from("<qq", metadata, start + 16 * number)
+            if length >= 8:
+                yield max(0, *struct.unpack("<q", bytes(body[offset : offset + 8])))
     except struct.error:
         raise UnusableError("corrupt data: a damaged message; copy the file again") from None
 

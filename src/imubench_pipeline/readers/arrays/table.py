@@ -23,18 +23,10 @@ DATE_KIND = "M"
 """Kind of the NumPy type of dates (datetime64)."""
 
 _KIND_NAMES = {
-    "f": "numbers",
-    "i": "numbers",
-    "u": "numbers",
-    "M": "dates",
-    "m": "durations",
-    "c": "complex numbers",
-    "b": "truth values",
-    "S": "text",
-    "U": "text",
-    "T": "text",
-    "O": "objects",
-    "V": "raw bytes or arrays",
+    **dict.fromkeys(NUMBER_KINDS, "numbers"),
+    **dict.fromkeys("SUT", "text"),
+    **{"M": "dates", "m": "durations", "c": "complex numbers", "b": "truth values"},
+    **{"O": "objects", "V": "raw bytes or arrays"},
 }
 _MAX_FIELD_ELEMENTS = 1024
 """Largest number of elements of a field that become columns of their own."""

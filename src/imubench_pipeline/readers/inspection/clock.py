@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -70,25 +70,20 @@ class Clock:
     """Sort key; a lower one is more plausible."""
 
 
-def clocks(table: LogTable, columns: Sequence[LogColumn], rate: float | None) -> list[Clock]:
+def clocks(table: LogTable, columns: Sequence[LogColumn]) -> list[Clock]:
     """Return the columns that may be the time, the most plausible first.
 
     ``columns``: columns of the table that are no channel, and vectors of the same length.
-    ``rate``: rate that the file states, Hz.
     """
     likely = []
     for place, column in enumerate(columns):
         if (names := table.file_format.time_columns) and column.label not in names:
             continue
-        clock = (
-            _recognise_date(column, table)
-            if column.kind == "date"
-            else _recognise_number(column, rate)
-        )
-        if clock is not None:
-            counts_alone = clock.counts and rate is None
-            order = (*clock.order, int(counts_alone), place)
-            likely.append(Clock(clock.column, clock.entry, clock.counts, order))
+        is_date = column.kind == "date"
+        recognised = _recognise_date if is_date else _recognise_number
+        if (clock := recognised(column, table)) is not None:
+            counts_alone = clock.counts and table.rate is None
+            likely.append(replace(clock, order=(*clock.order, int(counts_alone), place)))
     return sorted(likely, key=lambda clock: clock.order)
 
 
@@ -108,42 +103,30 @@ def _get_source(column: LogColumn) -> str | int:
 
 def _recognise_date(column: LogColumn, table: LogTable) -> Clock | None:
     form = column.forms[0]
-    has_day = form == "iso8601" or "%d" in form
-    has_hour = form == "iso8601" or "%H" in form or "%I" in form
-    if not has_hour or not advances(column.values, DAY):
+    if not _has_hour(form) or not advances(column.values, DAY):
         return None
     value: dict[str, Any] = {"column": _get_source(column), "format": form}
-    if not has_day:
+    day = column
+    if form != "iso8601" and "%d" not in form:
         days = [c for c in table.columns if c.kind == "date" and not _has_hour(c.forms[0])]
-        if days and days[0].forms:
-            value = {
-                "column": _get_source(column),
-                "date": _get_source(days[0]),
-                "format": f"{days[0].forms[0]} {form}",
-            }
-            return Clock(
-                column, Entry(value, _comment_on_day(days[0])), False, (_rank_resolution(column), 1)
-            )
-    return Clock(
-        column, Entry(value, _comment_on_day(column)), False, (_rank_resolution(column), 1)
-    )
+        if days:
+            day = days[0]
+            form = f"{day.forms[0]} {form}"
+            value = {"column": value["column"], "date": _get_source(day), "format": form}
+    # Day and month may be exchanged.
+    others = [other for other in day.forms[1:] if sorted(other) == sorted(day.forms[0])]
+    comment = f"or {others[0]}? {day.first[0]!r} does not tell" if others else ""
+    return Clock(column, Entry(value, comment), False, (_rank_resolution(column), 1))
 
 
 def _has_hour(form: str) -> bool:
     return form == "iso8601" or any(field in form for field in ("%H", "%I"))
 
 
-def _comment_on_day(column: LogColumn) -> str:
-    """Return a comment if day and month may be exchanged, else an empty text."""
-    form = column.forms[0]
-    others = [other for other in column.forms[1:] if sorted(other) == sorted(form)]
-    return f"or {others[0]}? {column.first[0]!r} does not tell" if others else ""
-
-
 # --------------------------------------------------------------------------------- numbers
 
 
-def _recognise_number(column: LogColumn, rate: float | None) -> Clock | None:
+def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
     """Return a column of numbers as a clock; None if it is none."""
     if column.kind != "number" or not advances(column.values):
         return None
@@ -166,7 +149,7 @@ def _recognise_number(column: LogColumn, rate: float | None) -> Clock | None:
         comment = "'wraps' is guessed from the stamps" if again else ""
         return Clock(column, Entry(value | again, comment), False, (_rank_resolution(column), 0))
     named = bool(_TIME_WORDS.intersection(words))
-    value["unit"], comment = _guess_unit(column.values, rate)
+    value["unit"], comment = _guess_unit(column.values, table.rate)
     if not named:
         grows = "grows evenly" if _is_regular(column.values) else "" if column.label else "grows"
         if value["unit"] == UNKNOWN or not grows or (_take_steps(column.values) < 0).any():
@@ -198,16 +181,12 @@ def _recognise_counter(column: LogColumn, value: dict[str, Any], of_16_bits: boo
 def _recognise_xsens_ticks(column: LogColumn) -> Clock:
     """Return the tick clock of Xsens: 0.1 ms in motion trackers, 1 us in wearables."""
     step = typical_step(column.values)
-    of_microseconds = step is not None and step > 8000
-    value: dict[str, Any] = {
-        "column": _get_source(column),
-        "unit": "us" if of_microseconds else "ms",
-    }
-    if not of_microseconds:
-        value["scale"] = 0.1
+    value: dict[str, Any] = {"column": _get_source(column)}
+    in_microseconds = step is not None and step > 8000
+    value |= {"unit": "us"} if in_microseconds else {"unit": "ms", "scale": 0.1}
     value["wraps"] = 1 << 32
-    rate = "" if step is None else f", {(1e6 if of_microseconds else 1e4) / step:.5g} Hz"
-    tick = "1 us" if of_microseconds else "0.1 ms"
+    rate = "" if step is None else f", {(1e6 if in_microseconds else 1e4) / step:.5g} Hz"
+    tick = "1 us" if in_microseconds else "0.1 ms"
     return Clock(column, Entry(value, f"ticks of {tick}{rate}"), False, (0, 0))
 
 

@@ -134,17 +134,10 @@ def _format_entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[s
 
 def _format_value(value: Any) -> str:
     """Return a value as YAML on one line of printable characters."""
-    written = [
-        yaml.dump(
-            value,
-            Dumper=_Dumper,
-            default_flow_style=True,
-            sort_keys=False,
-            width=_MAX_YAML_WIDTH,
-            allow_unicode=as_it_is,
-        )
-        .removesuffix("...\n")
-        .strip()
-        for as_it_is in (True, False)
-    ]
-    return next((text for text in written if text.isprintable()), written[-1])
+    for as_it_is in (True, False):
+        text = yaml.dump(value, Dumper=_Dumper, default_flow_style=True, sort_keys=False,
+                         width=_MAX_YAML_WIDTH, allow_unicode=as_it_is)  # fmt: skip
+        text = text.removesuffix("...\n").strip()
+        if text.isprintable():
+            break
+    return text

@@ -1,21 +1,178 @@
-"""Convert the chosen columns of a log to the entries of a sensor file."""
+"""Choose the channels, the temperature and the time of a log, and draft its sensor file."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from imubench_pipeline.readers.contents import Contents
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
-from imubench_pipeline.readers.inspection.choice import Choice, chosen
-from imubench_pipeline.readers.inspection.clock import rate_entry
+from imubench_pipeline.readers.inspection.clock import Clock, clocks, rate_entry
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, Entry
-from imubench_pipeline.readers.inspection.groups import Group
-from imubench_pipeline.readers.inspection.names import WITHOUT_GRAVITY
+from imubench_pipeline.readers.inspection.groups import Group, groups
+from imubench_pipeline.readers.inspection.names import DERIVED, PLAIN, WITHOUT_GRAVITY
 from imubench_pipeline.settings.sensor import CHANNELS
+
+_QUANTITY_NAMES = {"gyro": "gyro", "accel": "accelerometer", "temperature": "temperature"}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The columns of a log that are used, and the others."""
+
+    gyro: Group | None
+    accel: Group | None
+    temperature: Group | None
+    clock: Clock | None
+    local: bool
+    """The time column is in the table of the channels, in each file."""
+    anchor: LogTable | None
+    """The table with which all others must share their records or their clock."""
+    other_clocks: list[Clock]
+    left: list[tuple[Group, str]]
+    """Recognised groups that are not used, each with the reason."""
+    unknown: list[LogColumn]
+    """Number columns of the used tables that were not recognised."""
+
+    @property
+    def selected(self) -> list[Group]:
+        """The groups that are used."""
+        return [g for g in (self.gyro, self.accel, self.temperature) if g is not None]
+
+
+def chosen(contents: Contents) -> Choice:
+    """Choose the channels, the temperature and the time of a recording."""
+    recognised = groups(contents)
+    left = [(g, _explain_rejection(g)) for g in recognised if _explain_rejection(g)]
+    able = [group for group in recognised if not _explain_rejection(group)]
+    gyro = _select_best([g for g in able if g.quantity == "gyro"], None, able)
+    accels = [g for g in able if g.quantity == "accel"]
+    first = gyro or _select_best(accels, None, able)
+    anchor = first.table if first else None
+    if anchor is None:
+        anchor = next((table for table in contents.tables if table.columns), None)
+    in_groups = {id(column) for group in recognised for column in group.columns.values()}
+
+    def find_clocks(table: LogTable) -> list[Clock]:
+        """Return the columns that may be the time of a table, the most plausible first."""
+        columns = list(table.columns)
+        if table.file_format.clock_of == "length":
+            for other in contents.tables:
+                if other is not table and other.file == table.file and other.rows == table.rows:
+                    columns += other.columns
+        return clocks(table, [column for column in columns if id(column) not in in_groups])
+
+    ours = [] if anchor is None else find_clocks(anchor)
+    others = {id(g.table): find_clocks(g.table) for g in able}
+    rest = [others[id(g.table)] for g in able if anchor is not g.table]
+
+    def count_shared(clock: Clock) -> int:
+        """Return the number of other groups with the same clock."""
+        return sum(any(_has_equal_entries(clock, other) for other in theirs) for theirs in rest)
+
+    clock = max(ours, key=lambda clock: (not clock.counts, count_shared(clock)), default=None)
+
+    def fits(group: Group) -> bool:
+        table, clock_of = group.table, group.table.file_format.clock_of
+        if anchor is None or anchor is table:
+            return anchor is table
+        if anchor.file == table.file and clock_of != "variable":
+            return clock_of == "length" and anchor.rows == table.rows
+        return clock is None or any(_has_equal_entries(clock, other) for other in others[id(table)])
+
+    fitting = [group for group in able if group is gyro or fits(group)]
+    why = "other records than the channels, or another time"
+    if first is None:
+        why = "there is no channel"
+    left += [(g, why) for g in able if g not in fitting]
+    accel = _select_best([g for g in fitting if g.quantity == "accel"], gyro, able)
+    temperature = _select_best(
+        [g for g in fitting if g.quantity == "temperature"], gyro or accel, able
+    )
+    selected = [group for group in (gyro, accel, temperature) if group is not None]
+    left += [(g, f"another {_QUANTITY_NAMES[g.quantity]}") for g in fitting if g not in selected]
+    spoken = in_groups | {id(other.column) for other in ours}
+    return Choice(
+        gyro,
+        accel,
+        temperature,
+        clock,
+        _is_local(selected, clock),
+        anchor,
+        [other for other in ours if other is not clock],
+        left,
+        [
+            column
+            for table in _collect_tables(selected, anchor)
+            for column in table.columns
+            if id(column) not in spoken and not (clock and column.source == clock.column.source)
+        ],
+    )
+
+
+def _explain_rejection(group: Group) -> str:
+    """Return the reason why a group is never used; empty if it can be used."""
+    if group.rank == DERIVED:
+        return "of a filter or about the measurement, not what the sensor measures"
+    if group.rank == WITHOUT_GRAVITY and group.gravity_unit is None:
+        return "without gravity: not what the accelerometer measures"
+    if group.quantity != "temperature" and len(group.columns) > 1 and group.constant:
+        return "the same in all of the first records: nothing was measured here"
+    return ""
+
+
+def _select_best(
+    likely: Sequence[Group], beside: Group | None, every: Sequence[Group]
+) -> Group | None:
+    """Return the most plausible group, preferring tables with ``beside`` or with other groups."""
+
+    def order(group: Group) -> tuple[Any, ...]:
+        near = beside is not None and (group.table is beside.table)
+        same_file = beside is not None and group.table.file == beside.table.file
+        heavy = group.quantity != "accel" or group.gravity_unit is not None
+        company = {g.quantity for g in every if g.table is group.table}
+        sure = group.rank == PLAIN or (group.rank == WITHOUT_GRAVITY and heavy)
+        return (
+            not sure,
+            -len(group.columns),
+            not heavy,
+            not near,
+            not same_file,
+            -len(company),
+            group.unit is None,
+        )
+
+    return min(likely, key=order, default=None)
+
+
+def _has_equal_entries(clock: Clock, other: Clock) -> bool:
+    """Return whether two clocks have the same entries in a sensor file."""
+    if clock.column.source != other.column.source:
+        return False
+    keys = ("unit", "format", "date", "scale")
+    return all(clock.entry.value.get(key) == other.entry.value.get(key) for key in keys)
+
+
+def _is_local(groups: Sequence[Group], clock: Clock | None) -> bool:
+    if clock is None:
+        return True
+    by_file: dict[str | None, set[int]] = {}
+    for group in groups:
+        by_file.setdefault(group.table.file, set()).add(id(group.table))
+    if any(len(tables) > 1 for tables in by_file.values()):
+        return False
+    tables = _collect_tables(groups, None)
+    return len(tables) > 1 or any(clock.column is c for t in tables for c in t.columns)
+
+
+def _collect_tables(groups: Sequence[Group], anchor: LogTable | None) -> list[LogTable]:
+    tables = [group.table for group in groups] or ([anchor] if anchor else [])
+    return list({id(table): table for table in tables}.values())
+
 
 _GYRO_HINT = "the file does not say: deg/s or rad/s? see the logger's manual"
 _MAX_LISTED_NAMES = 20
@@ -30,8 +187,10 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
     ``model``: name of the sensor; None: the name of the log.
     """
     choice = chosen(contents)
+    usable = (table.file_format for table in contents.tables if table.fault is None)
+    vendor = next((made.vendor for made in usable if made.vendor), "unknown")
     drafted = Draft(
-        Entry(_find_vendor(contents), "who makes the sensor, for the report"),
+        Entry(vendor, "who makes the sensor, for the report"),
         Entry(model or _FILE_SUFFIXES.sub("", contents.path.name) or "sensor", "what it is called"),
     )
     if contents.stated is not None:
@@ -42,7 +201,8 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
             value["column"] = choice.clock.column.source
         drafted.time = Entry(value, choice.clock.entry.comment)
     if choice.clock is None or choice.clock.counts:
-        drafted.rate = rate_entry(choice.anchor or _find_table_with_rate(contents.tables))
+        stating = (table for table in contents.tables if table.rate is not None)
+        drafted.rate = rate_entry(choice.anchor or next(stating, None))
     files = {group.table.file for group in choice.selected}
     alone = len(files) == 1 and files == {contents.only}
     for group in (choice.gyro, choice.accel):
@@ -51,18 +211,12 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
     if choice.temperature is not None:
         _add_temperature(drafted, choice.temperature, alone)
     if not drafted.channels:
-        _add_placeholders(drafted)
+        entry = Entry(
+            {"column": UNKNOWN, "unit": UNKNOWN}, "no name of a column tells: fill in, or remove"
+        )
+        drafted.channels = dict.fromkeys(CHANNELS, entry)
     drafted.left_over += _list_remarks(choice, contents)
     return drafted
-
-
-def _find_vendor(contents: Contents) -> str:
-    usable = (table.file_format for table in contents.tables if table.fault is None)
-    return next((made.vendor for made in usable if made.vendor), "unknown")
-
-
-def _find_table_with_rate(tables: Iterable[LogTable]) -> LogTable | None:
-    return next((table for table in tables if table.rate is not None), None)
 
 
 def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> dict[str, Any]:
@@ -129,13 +283,6 @@ def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
         )
         return
     drafted.temperature = Entry(_describe_source(group.table, column, unit, alone), comment)
-
-
-def _add_placeholders(drafted: Draft) -> None:
-    for name in CHANNELS:
-        drafted.channels[name] = Entry(
-            {"column": UNKNOWN, "unit": UNKNOWN}, "no name of a column tells: fill in, or remove"
-        )
 
 
 def _is_whole(column: LogColumn) -> bool:

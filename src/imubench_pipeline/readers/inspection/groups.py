@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
 import numpy as np
@@ -65,16 +65,15 @@ class Group:
         """Length of the mean vector in the unit of the file; None if an axis is missing."""
         if sorted(self.columns) != list(_AXES):
             return None
-        means = [_average(column) for column in self.columns.values()]
-        return None if None in means else float(np.linalg.norm(np.array(means, np.float64)))
+        axes = [column.values[np.isfinite(column.values)] for column in self.columns.values()]
+        means = [values.mean() for values in axes if len(values)]
+        return float(np.linalg.norm(means)) if len(means) == len(_AXES) else None
 
     @property
     def constant(self) -> bool:
         """Whether all axes are constant in the first records, as unused fields are."""
         axes = [column.values[np.isfinite(column.values)] for column in self.columns.values()]
-        return all(
-            values.size >= _MIN_CONSTANT_RECORDS and np.ptp(values) == 0.0 for values in axes
-        )
+        return all(len(axis) >= _MIN_CONSTANT_RECORDS and np.ptp(axis) == 0.0 for axis in axes)
 
     @property
     def gravity_unit(self) -> str | None:
@@ -84,9 +83,8 @@ class Group:
             return None
         if self.unit is not None:
             in_si = length * conversion(self.unit, DIMENSIONS["accel"])[0]
-            return (
-                self.unit if abs(in_si / STANDARD_GRAVITY - 1) < _STATED_GRAVITY_TOLERANCE else None
-            )
+            is_gravity = abs(in_si / STANDARD_GRAVITY - 1) < _STATED_GRAVITY_TOLERANCE
+            return self.unit if is_gravity else None
         return next(
             (u for u, g in GRAVITY_BY_UNIT.items() if abs(length / g - 1) < _GRAVITY_TOLERANCE),
             None,
@@ -104,7 +102,10 @@ def groups(contents: Contents) -> list[Group]:
 
 def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
     """Return the groups that are recognised by the names of their columns."""
-    context = _find_context(table, contents)
+    # The most specific name of the table or its file that contains a quantity.
+    file = PurePosixPath(table.file or contents.path.name)
+    titles = (table.name.rpartition("/")[2], table.name, file.name.partition(".")[0])
+    context = next((title for title in titles if title and quantity_of_text(title)), "")
     together: dict[tuple[Quantity, str, bool], dict[str, tuple[LogColumn, Meaning]]] = {}
     for column in table.columns:
         if column.kind != "number":
@@ -123,13 +124,6 @@ def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
         if placed:
             result.append(_make_group(quantity, table, placed))
     return result + list(_find_roll_pitch_yaw(table, result))
-
-
-def _find_context(table: LogTable, contents: Contents) -> str:
-    """Return the most specific name of a table or its file that contains a quantity."""
-    file = PurePosixPath(table.file or contents.path.name)
-    names = (table.name.rpartition("/")[2], table.name, file.name.partition(".")[0])
-    return next((name for name in names if name and quantity_of_text(name)), "")
 
 
 def _assign_counted_axes(
@@ -172,9 +166,8 @@ def _find_roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]
         }
         axes = {axis: (column, meant) for axis, (column, meant) in meanings.items() if meant}
         if len(axes) == 3:
-            group = _make_group("gyro", table, axes)
-            yield Group("gyro", table, group.columns, group.unit, group.written, WEAK,
-                        "guessed from the names p, q and r")  # fmt: skip
+            why = "guessed from the names p, q and r"
+            yield replace(_make_group("gyro", table, axes), rank=WEAK, guessed=why)
 
 
 def _group_without_names(table: LogTable) -> list[Group]:
@@ -189,14 +182,11 @@ def _group_without_names(table: LogTable) -> list[Group]:
         for n in range(0, len(columns) - 2, 3)
     ]
     lengths = [group.mean_length for group in threes]
+    gravities = np.array(list(GRAVITY_BY_UNIT.values()))
     heavy = [
         n
         for n, length in enumerate(lengths)
-        if length
-        and any(
-            abs(length / gravity - 1) < _NAMELESS_GRAVITY_TOLERANCE
-            for gravity in GRAVITY_BY_UNIT.values()
-        )
+        if length and (abs(length / gravities - 1) < _NAMELESS_GRAVITY_TOLERANCE).any()
     ]
     if len(threes) not in (1, 2) or len(heavy) != 1:
         return []
@@ -204,12 +194,6 @@ def _group_without_names(table: LogTable) -> list[Group]:
     for n, group in enumerate(threes):
         is_accel = n == heavy[0]
         why = "no names" if is_accel else "no names: guessed by its place"
-        guessed.append(
-            Group("accel" if is_accel else "gyro", table, group.columns, None, "", WEAK, why)
-        )
+        quantity: Quantity = "accel" if is_accel else "gyro"
+        guessed.append(replace(group, quantity=quantity, guessed=why))
     return guessed
-
-
-def _average(column: LogColumn) -> float | None:
-    values = column.values[np.isfinite(column.values)]
-    return float(values.mean()) if len(values) else None

@@ -32,11 +32,7 @@ _GYRO = re.compile(
 )
 _ACCEL = re.compile(r"acc(?!ur)|specificforce|gforce")
 _TEMPERATURE = re.compile(r"temp(?!or|l)")
-_PATTERNS: dict[Quantity, re.Pattern[str]] = {
-    "gyro": _GYRO,
-    "accel": _ACCEL,
-    "temperature": _TEMPERATURE,
-}
+_PATTERNS = dict(zip(DIMENSIONS, (_GYRO, _ACCEL, _TEMPERATURE), strict=True))
 _OTHER_QUANTITIES = re.compile(
     r"ang(?:ular|le)?acc|alpha|quat|euler|orient|attitude|angle|inclin|heading|mag(?!ic)|baro|press"
 )
@@ -88,10 +84,11 @@ def meaning(label: str, context: str = "") -> Meaning | None:
     for quantity, dimension in DIMENSIONS.items():
         name, unit = divided(label, dimension)
         meant = _interpret_name(name)
-        if meant is None and (axis := _find_bare_axis(name)):
+        words = _split_words(name)
+        if meant is None and len(words) == 1 and (words[0] in _AXES or _is_axis_number(words[0])):
             by_context = quantity_of_text(context)
             if by_context is not None:
-                meant = Meaning(by_context[0], axis, "", None, by_context[1])
+                meant = Meaning(by_context[0], words[0], "", None, by_context[1])
         if meant is None and unit is not None:
             meant = _interpret_by_unit(quantity, name, unit)
         if meant is not None and meant.quantity == quantity:
@@ -118,14 +115,6 @@ def _split_words(text: str) -> list[str]:
     return [word.lower() for word in _WORD.findall(text)]
 
 
-def _find_bare_axis(name: str) -> str:
-    """Return the axis of a name that is an axis only; else an empty text."""
-    words = _split_words(name)
-    if len(words) == 1 and (words[0] in _AXES or _is_axis_number(words[0])):
-        return words[0]
-    return ""
-
-
 def _interpret_name(name: str) -> Meaning | None:
     words = _split_words(name)
     joined = "".join(words)
@@ -142,11 +131,10 @@ def _interpret_name(name: str) -> Meaning | None:
         return Meaning("gyro" if is_gyro else "accel", axis, joined, None, _rank_name(rest, joined))
     if is_gyro or not rest or axis.isdigit():
         return None
-    short = _SHORT_NAMES.get(beside)
-    if short is None:
+    if beside not in _SHORT_NAMES:
         return None
-    rank = _rank_name(rest, joined)
-    return Meaning(short[0], axis, joined, None, max(short[1], rank))
+    quantity, rank = _SHORT_NAMES[beside]
+    return Meaning(quantity, axis, joined, None, max(rank, _rank_name(rest, joined)))
 
 
 def _interpret_by_unit(quantity: Quantity, name: str, unit: str) -> Meaning | None:

@@ -60,11 +60,11 @@ def proof(path: Path, draft: Draft) -> Proof:
         files = [_read_first_records(file) for file in read(path, log)]
     except (RecordingError, ConfigError) as error:
         return Proof(False, printable(f"not read so: {error}"))
-    remarks = [
-        _describe_channels(files),
-        _describe_rate(files, draft),
-        *_describe_vectors(files, unfilled),
-    ]
+    names = [name for file in files for name in file.columns]
+    count = sum(name in CHANNELS for name in names)
+    channels = f"{count} channel" + ("s" if count != 1 else "")
+    channels += " and temperature" if len(names) > count else ""
+    remarks = [channels, _describe_rate(files, draft), *_describe_vectors(files, unfilled)]
     started = next((file.started for file in files if file.started), None)
     if started is not None:
         remarks.append(f"from {started[:19]} on")
@@ -105,13 +105,6 @@ def _read_first_records(file: LogFile) -> _FirstRecords:
         None if interval is None else 1 / interval,
         file.started,
     )
-
-
-def _describe_channels(files: list[_FirstRecords]) -> str:
-    names = [name for file in files for name in file.columns]
-    count = sum(name in CHANNELS for name in names)
-    shown = f"{count} channel" + ("s" if count != 1 else "")
-    return shown + (" and temperature" if len(names) > count else "")
 
 
 def _describe_rate(files: list[_FirstRecords], draft: Draft) -> str:

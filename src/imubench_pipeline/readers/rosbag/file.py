@@ -115,26 +115,21 @@ def figures_of(
             continue
         table = np.frombuffer(b"".join(messages[place] for place in places), np.uint8)
         table = table.reshape(len(places), size)
-        seconds, nanoseconds, name_size = _view_integers(table[:, 4:16], f"{order}u4").T
+        header = np.ascontiguousarray(table[:, 4:16]).view(f"{order}u4").astype(np.uint32)
+        seconds, nanoseconds, name_size = header.T
         if not ros_1:
             seconds = seconds.astype(np.uint32).view(np.int32)
-        ends = 16 + name_size.astype(np.int64)
-        begins = (
-            ends if ros_1 else _ENCAPSULATION_BYTES + -(-(ends - _ENCAPSULATION_BYTES) // 8) * 8
-        )
+        begins = 16 + name_size.astype(np.int64)
+        if not ros_1:
+            begins += -(begins - _ENCAPSULATION_BYTES) % 8
         good = (begins == before) & (nanoseconds < _NANOSECONDS_PER_SECOND)
         written = np.ascontiguousarray(table[good, before : before + 8 * layout.figures])
         chosen = np.array(places)[good]
         figures[chosen] = written.view(f"{order}f8")
-        stamps[chosen] = (
-            seconds[good].astype(np.int64) * _NANOSECONDS_PER_SECOND + nanoseconds[good]
-        )
+        whole = seconds[good].astype(np.int64)
+        stamps[chosen] = whole * _NANOSECONDS_PER_SECOND + nanoseconds[good]
         sound[chosen] = True
     return stamps, figures, sound
-
-
-def _view_integers(table: NDArray[np.uint8], kind: str) -> NDArray[np.uint32]:
-    return np.ascontiguousarray(table).view(kind).astype(np.uint32)
 
 
 # -------------------------------------------------------------------------------------- bags
@@ -157,7 +152,17 @@ class RosbagFile(LogFile):
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the bag (see `LogFile.batches`)."""
-        self._check_time()
+        time = self.log.time
+        if time is not None and time.column not in (HEADER_STAMP, LOG_TIME):
+            raise RecordingError(
+                f"{self.path.name}: no time column {time.column!r}; a ROS bag has {HEADER_STAMP!r} "
+                f"and {LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
+            )
+        if time is not None and time.unit != "ns":
+            raise RecordingError(
+                f"{self.path.name}: {time.column} is {time.unit or time.format} in the sensor "
+                "file; a ROS bag gives ns; expected 'unit: ns' of 'time'"
+            )
         source = opened(self.path)
         try:
             topic, kind = self._topic(source)
@@ -182,15 +187,11 @@ class RosbagFile(LogFile):
                 if not len(chosen):
                     continue
                 time = clock.seconds(chosen, np.ones(len(chosen), bool))
-            yield Batch(
-                time,
-                {
-                    name: self.to_si(
-                        name, np.ascontiguousarray(figures[:, layout.columns[str(source.column)]])
-                    )
-                    for name, source in self.sources.items()
-                },
-            )
+            columns = {}
+            for name, wanted in self.sources.items():
+                raw = figures[:, layout.columns[str(wanted.column)]]
+                columns[name] = self.to_si(name, np.ascontiguousarray(raw))
+            yield Batch(time, columns)
         if not sound:
             raise RecordingError(
                 f"{self.path.name}: no message of {topic} can be read, {damaged} are not as their "
@@ -211,8 +212,6 @@ class RosbagFile(LogFile):
             if columns and without.any():
                 figures[np.ix_(without, columns)] = np.nan
                 absent[quantity] += int(without.sum())
-
-    # ---------------------------------------------------------------------------- the bag
 
     def _blocks(
         self, source: Source, topic: str
@@ -236,21 +235,6 @@ class RosbagFile(LogFile):
             yield written, messages
 
     # -------------------------------------------------------------- what the sensor file says
-
-    def _check_time(self) -> None:
-        time = self.log.time
-        if time is None:
-            return
-        if time.column not in (HEADER_STAMP, LOG_TIME):
-            raise RecordingError(
-                f"{self.path.name}: no time column {time.column!r}; a ROS bag has {HEADER_STAMP!r} "
-                f"and {LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
-            )
-        if time.unit != "ns":
-            raise RecordingError(
-                f"{self.path.name}: {time.column} is {time.unit or time.format} in the sensor "
-                "file; a ROS bag gives ns; expected 'unit: ns' of 'time'"
-            )
 
     def _topic(self, source: Source) -> tuple[str, str]:
         """Return the topic with the columns, and its type."""
@@ -310,21 +294,23 @@ class RosbagFile(LogFile):
                 )
         if unclosed:
             self.note("truncated_file", "the bag was not closed; read as far as it goes", 1)
-        for path in _list_unmerged(self.path):
-            self.note(
-                "truncated_file",
-                f"{path.name} holds records that are not yet in the bag and are not read; merge "
-                "them with sqlite3 and 'pragma wal_checkpoint'",
-                1,
-            )
+        # The journals of SQLite have the latest records.
+        beside = [self.path.with_name(f"{self.path.name}-wal")]
+        for journal in self.path.glob("*-wal") if self.path.is_dir() else beside:
+            if journal.is_file() and journal.stat().st_size:
+                self.note(
+                    "truncated_file",
+                    f"{journal.name} holds records that are not yet in the bag and are not read; "
+                    "merge them with sqlite3 and 'pragma wal_checkpoint'",
+                    1,
+                )
 
 
 def _join_names(names: Iterable[str]) -> str:
     """Return the first names as text."""
     every = list(names)
-    return ", ".join(cut(name, str) for name in every[:_MAX_LISTED_NAMES]) + ", ..." * (
-        len(every) > _MAX_LISTED_NAMES
-    )
+    shown = [cut(name, str) for name in every[:_MAX_LISTED_NAMES]]
+    return ", ".join(shown + ["..."] * (len(every) > _MAX_LISTED_NAMES))
 
 
 @contextmanager
@@ -354,33 +340,23 @@ def opened(path: Path) -> Source:
     """
     with explained(path):
         try:
-            return _open_by_content(path)
+            if path.is_dir():
+                for database in sorted(path.glob("*.db3")):
+                    check_database(database)
+                check_folder(path)
+                return Bag2(Reader(path))
+            with path.open("rb") as file:
+                begin = file.read(16)
+            if begin.startswith(b"\x89MCAP"):
+                return Bag2(McapReader(path))
+            if begin.startswith(_SQLITE_MAGIC):
+                check_database(path)
+                return Bag2(Sqlite3Reader(path))
+            return Bag(path)
         except OSError as error:
             raise RecordingError(
                 f"{path.name}: cannot be opened ({error.strerror or error})"
             ) from None
-
-
-def _open_by_content(path: Path) -> Source:
-    if path.is_dir():
-        for database in sorted(path.glob("*.db3")):
-            check_database(database)
-        check_folder(path)
-        return Bag2(Reader(path))
-    with path.open("rb") as file:
-        begin = file.read(16)
-    if begin.startswith(b"\x89MCAP"):
-        return Bag2(McapReader(path))
-    if begin.startswith(_SQLITE_MAGIC):
-        check_database(path)
-        return Bag2(Sqlite3Reader(path))
-    return Bag(path)
-
-
-def _list_unmerged(path: Path) -> list[Path]:
-    """Return the journals of SQLite with the latest records, which are not in the database."""
-    logs = path.glob("*-wal") if path.is_dir() else [path.with_name(f"{path.name}-wal")]
-    return [log for log in logs if log.is_file() and log.stat().st_size]
 
 
 _MAX_SLOW_MESSAGES = 20
@@ -417,30 +393,19 @@ def _describe_topic(
         )
     layout = LAYOUTS[kind]
     count = MAX_EXAMINED_RECORDS if layout.covariances else _MAX_SLOW_MESSAGES
-    columns = () if rows == 0 else _describe_columns(source, topic, layout, count)
-    fault = None if columns else "has no message that can be read"
-    return LogTable(file_format, topic, columns, topic, rows=rows, about=kind, fault=fault)
-
-
-def _describe_columns(
-    source: Source, topic: str, layout: Layout, count: int
-) -> tuple[LogColumn, ...]:
-    messages = list(islice(source.messages(topic), count))
-    if not messages:
-        return ()
+    messages = [] if rows == 0 else list(islice(source.messages(topic), count))
     stamps, figures, sound = figures_of([data for _, data in messages], layout, source.ros_1)
-    if not sound.any():
-        return ()
     columns = []
     for name, place in layout.columns.items():
         values = figures[sound, place]
         covariance = layout.covariances.get(name.partition(".")[0])
-        if covariance is not None and (figures[sound, covariance] == -1).all():
-            continue  # the messages say that it is not measured
-        columns.append(LogColumn(name, name, "number", shown(values), values, layout.units[name]))
+        if covariance is None or (figures[sound, covariance] != -1).any():  # it is measured
+            unit = layout.units[name]
+            columns.append(LogColumn(name, name, "number", shown(values), values, unit))
     logged = np.array([time for time, _ in messages], np.int64)
     for name, times in ((HEADER_STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
-        columns.append(
-            LogColumn(name, name, "number", shown(times), times.astype(np.float64), "ns")
-        )
-    return tuple(columns)
+        values = times.astype(np.float64)
+        columns.append(LogColumn(name, name, "number", shown(times), values, "ns"))
+    fault = None if sound.any() else "has no message that can be read"
+    described = tuple(columns) if sound.any() else ()
+    return LogTable(file_format, topic, described, topic, rows=rows, about=kind, fault=fault)

@@ -80,9 +80,8 @@ class Bag:
         """
         with self._path.open("rb") as file:
             at = 0
-            self._left = max(
-                MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * os.fstat(file.fileno()).st_size
-            )
+            size = os.fstat(file.fileno()).st_size
+            self._left = max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size)
             try:
                 self.unclosed = not self._start(file)
                 while True:
@@ -90,11 +89,8 @@ class Bag:
                     record = _read_record(file)
                     if record is None:
                         break
-                    header, data = record
-                    if header[b"op"] == _OP_CHUNK:
-                        yield from self._chunk(header, data, topic)
-                    else:
-                        yield from self._message(header, data, topic)
+                    is_chunk = record[0][b"op"] == _OP_CHUNK
+                    yield from (self._chunk if is_chunk else self._message)(*record, topic)
             except _TruncatedError:
                 self.unclosed = True
             except (ValueError, KeyError, struct.error, OSError, EOFError, RuntimeError) as error:
@@ -145,8 +141,13 @@ class Bag:
             raise ValueError(f"a chunk is not as long as the {size} bytes that it says")
         at = 0
         while at < len(data):
-            fields, body, at = _parse_record(data, at)
-            yield from self._message(fields, body, topic)
+            middle = at + 4 + _UINT32.unpack_from(data, at)[0]
+            end = middle + 4 + _UINT32.unpack_from(data, middle)[0]
+            if end > len(data):
+                raise ValueError("a record reaches beyond its chunk")
+            fields = _parse_fields(data[at + 4 : middle])
+            yield from self._message(fields, data[middle + 4 : end], topic)
+            at = end
 
     def _message(
         self, header: dict[bytes, bytes], data: bytes, topic: str
@@ -201,15 +202,6 @@ def _read_exactly(file: BinaryIO, size: bytes) -> bytes:
     if count > MAX_BAG_CHUNK:
         raise ValueError(f"a record of {count} bytes, expected at most {MAX_BAG_CHUNK}")
     return file.read(count)
-
-
-def _parse_record(data: bytes, at: int) -> tuple[dict[bytes, bytes], bytes, int]:
-    """Return header and data of the record at a position of a chunk, and the next position."""
-    middle = at + 4 + _UINT32.unpack_from(data, at)[0]
-    end = middle + 4 + _UINT32.unpack_from(data, middle)[0]
-    if end > len(data):
-        raise ValueError("a record reaches beyond its chunk")
-    return _parse_fields(data[at + 4 : middle]), data[middle + 4 : end], end
 
 
 def _parse_fields(header: bytes) -> dict[bytes, bytes]:

@@ -37,14 +37,6 @@ _DATABASE_TABLES = ("messages", "topics", "message_definitions", "schema", "meta
 _READ_BLOCK = 1 << 20
 
 
-def _unpack_lz4(data: bytes, size: int) -> bytes:
-    return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, _check_chunk_size(size) + 1))
-
-
-def _unpack_zstd(data: bytes, size: int) -> bytes:
-    return unpacked_zstd(data, _check_chunk_size(size) + 1)
-
-
 def _check_chunk_size(size: int) -> int:
     if size > MAX_BAG_CHUNK:
         raise ValueError(f"a chunk of {size} bytes, expected at most {MAX_BAG_CHUNK}")
@@ -52,7 +44,14 @@ def _check_chunk_size(size: int) -> int:
 
 
 # The decompressors of the library unpack a chunk before they check its size.
-storage_mcap.DECOMPRESSORS.update({"lz4": _unpack_lz4, "zstd": _unpack_zstd})
+storage_mcap.DECOMPRESSORS.update(
+    {
+        "lz4": lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(
+            data, _check_chunk_size(size) + 1
+        ),
+        "zstd": lambda data, size: unpacked_zstd(data, _check_chunk_size(size) + 1),
+    }
+)
 
 
 _Reader = Reader | McapReader | Sqlite3Reader
@@ -72,23 +71,21 @@ class Bag2:
         reader.open()
         try:
             self._connections: list[Connection] = list(reader.connections)
-            self._check()
+            if len(self._connections) > MAX_TOPICS:
+                raise ValueError(f"more than {MAX_TOPICS} topics, expected those of a vehicle")
+            if any(
+                len(str(c.topic) + str(c.msgtype)) > MAX_TOPIC_LENGTH for c in self._connections
+            ):
+                raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
+            storages = _list_storages(reader)
+            if len({storage.path for storage in storages}) < len(storages):
+                raise ValueError("metadata.yaml names a file twice, expected each once")
+            for storage in storages:
+                if isinstance(storage, McapReader):
+                    _check_index(storage)
         except BaseException:
             self.close()
             raise
-
-    def _check(self) -> None:
-        """Raise if the bag exceeds a resource limit."""
-        if len(self._connections) > MAX_TOPICS:
-            raise ValueError(f"more than {MAX_TOPICS} topics, expected those of a vehicle")
-        if any(len(str(c.topic) + str(c.msgtype)) > MAX_TOPIC_LENGTH for c in self._connections):
-            raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
-        storages = _list_storages(self._reader)
-        if len({storage.path for storage in storages}) < len(storages):
-            raise ValueError("metadata.yaml names a file twice, expected each once")
-        for storage in storages:
-            if isinstance(storage, McapReader):
-                _check_index(storage)
 
     def topics(self) -> dict[str, str]:
         """Return the topics, and the type of message of each."""
@@ -104,19 +101,15 @@ class Bag2:
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
         """Yield time of recording (ns) and bytes of the messages of a topic."""
         packed = isinstance(self._reader, Reader) and self._reader.compression_mode == "message"
-        for time, message in self._stored(topic, packed):
-            # A damaged database may contain any type.
-            data = message if isinstance(message, bytes) else b""
-            if packed:
-                data = unpacked_zstd(data, MAX_MESSAGE + 1)
-            yield time, data if len(data) <= MAX_MESSAGE else b""
-
-    def _stored(self, topic: str, packed: bool) -> Iterator[tuple[int, object]]:
-        """Yield messages as stored: the library would unpack packed ones without a limit."""
+        # The library would unpack packed messages without a limit.
         for reader in _list_storages(self._reader) if packed else [self._reader]:
             wanted = [connection for connection in reader.connections if connection.topic == topic]
             for _, time, message in reader.messages(wanted) if wanted else ():
-                yield time, message
+                # A damaged database may contain any type.
+                data = message if isinstance(message, bytes) else b""
+                if packed:
+                    data = unpacked_zstd(data, MAX_MESSAGE + 1)
+                yield time, data if len(data) <= MAX_MESSAGE else b""
 
     def close(self) -> None:
         """Close the bag."""
@@ -179,7 +172,18 @@ def check_folder(path: Path) -> None:
 
 def check_database(path: Path) -> None:
     """Raise if a database is truncated, or if its tables are views or have computed columns."""
-    _check_whole(path)
+    # SQLite would read the missing part of a truncated file as zeros. Old libraries do not update
+    # the number of pages; then the two counters differ.
+    with path.open("rb") as file:
+        header = file.read(100)
+    page = int.from_bytes(header[16:18], "big")
+    expected = (1 << 16 if page == 1 else page) * int.from_bytes(header[28:32], "big")
+    size = path.stat().st_size
+    if header[24:28] == header[92:96] and size < expected:
+        raise RecordingError(
+            f"{path.name}: cut short: {size} of {expected} bytes; copy it again, or mend it with "
+            "'.recover' of sqlite3"
+        )
     location = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
     with closing(sqlite3.connect(location, uri=True)) as database:
         for name in _DATABASE_TABLES:
@@ -194,19 +198,3 @@ def check_database(path: Path) -> None:
                     f"{path.name}: {name} is computed, not recorded; expected a table of a ROS 2 "
                     "bag: record it again"
                 )
-
-
-def _check_whole(path: Path) -> None:
-    """Raise if a database is truncated: SQLite would read the missing part as zeros."""
-    with path.open("rb") as file:
-        header = file.read(100)
-    size = int.from_bytes(header[16:18], "big")
-    pages = int.from_bytes(header[28:32], "big")
-    # Old libraries do not update the number of pages; then the two counters differ.
-    has_count = header[24:28] == header[92:96]
-    expected = (1 << 16 if size == 1 else size) * pages
-    if has_count and path.stat().st_size < expected:
-        raise RecordingError(
-            f"{path.name}: cut short: {path.stat().st_size} of {expected} bytes; copy it again, or "
-            "mend it with '.recover' of sqlite3"
-        )
