@@ -6,8 +6,13 @@ from contextlib import closing
 from itertools import chain
 from pathlib import Path
 
-from imubench_pipeline.readers.compressed import is_member, members, open_bytes
-from imubench_pipeline.readers.decompression import MAX_MAGIC_LENGTH, compression_of
+from imubench_pipeline.readers.compressed import (
+    MAX_MAGIC_LENGTH,
+    compression_of,
+    is_member,
+    members,
+    open_bytes,
+)
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.settings.sensor import Reader

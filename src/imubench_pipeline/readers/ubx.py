@@ -115,8 +115,6 @@ class UbxFile(LogFile):
             wanted = {name: figures[str(source.column)] for name, source in self.sources.items()}
             yield Batch(time, {name: self.to_si(name, raw) for name, raw in wanted.items()})
 
-    # -------------------------------------------------------------- what the sensor file says
-
     def _columns(self) -> list[str]:
         """Return the required columns, each once."""
         return list(dict.fromkeys(str(source.column) for source in self.sources.values()))
@@ -184,8 +182,6 @@ class UbxFile(LogFile):
             of_kind.drained()
         present = any(of_kind.present for of_kind in words.values())
         return frames.read > _MIN_PROBED_BYTES and present
-
-    # ----------------------------------------------------------------------------- findings
 
     def _report(self, kind: bytes, words: Words, frames: Frames, rows: int) -> None:
         name = KINDS[kind]
@@ -397,8 +393,6 @@ def _group_records(
         row[column] = values[i]
     return count
 
-
-# ------------------------------------------------------------------------- inspection
 
 _MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 22, 1 << 26
 """Bytes that are examined after a first message was found, and bytes searched for it."""

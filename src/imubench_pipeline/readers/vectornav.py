@@ -326,8 +326,6 @@ class VectorNavFile(LogFile):
             yield Batch(time, columns)
         self._report(kind, records)
 
-    # ---------------------------------------------------------------- which sentence it is
-
     def _kind(self) -> str:
         """Return the kind of sentence with the columns."""
         wanted = [source.column for source in self.sources.values()]
@@ -372,8 +370,6 @@ class VectorNavFile(LogFile):
                 break
         return set(names)
 
-    # --------------------------------------------------------------------------- stamps
-
     def _check_time(self) -> None:
         time = self.log.time
         if time is not None and time.column not in (HOST_TIME, COUNTER):
@@ -412,8 +408,6 @@ class VectorNavFile(LogFile):
         stamp = first.item()
         scale = SECONDS[time.unit or "ns"] * 1e9
         return date_of(stamp if isinstance(stamp, int) else round(stamp * scale))
-
-    # ------------------------------------------------------------------------- findings
 
     def _report(self, kind: str, records: Sentences) -> None:
         if not records.right:
@@ -457,8 +451,6 @@ def _parse_dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_
             missing[number] = True
     return stamps, missing
 
-
-# ------------------------------------------------------------------------- inspection
 
 _MAX_DESCRIBED_BYTES = 1 << 21  # bytes
 

@@ -140,8 +140,6 @@ class ArrayFile(LogFile):
         if promised is not None and read != promised:
             raise UnusableError(f"cut short: {read} of {promised} records; copy it again")
 
-    # -------------------------------------------------------------------------- columns
-
     def _places(self, tables: Sequence[Table]) -> dict[str, _Place]:
         by_name: dict[str, Table] = {}
         if len(tables) > MAX_ARRAYS:
@@ -154,13 +152,13 @@ class ArrayFile(LogFile):
         for key, source in self.sources.items():
             places[key] = _find_column(by_name, source.column, source.variable, key)
             _check_kind(places[key], key, NUMBER_KINDS)
-        if self.log.time is not None:
-            places[_TIME_KEY] = self._time_place(by_name)
             table, position = places[key]
             label = table.column(position).label or table.name.rpartition("/")[2]
             where = f"an attribute of {table.shown}"
             if unit := stated(key, table.unit(position), where, label):
                 self.units[key] = unit
+        if self.log.time is not None:
+            places[_TIME_KEY] = self._time_place(by_name)
         self.simulated = any(table.simulated for table, _ in places.values())
         return places
 
@@ -396,8 +394,6 @@ def _join_names(names: Iterable[str]) -> str:
     return ", ".join(shown + ["..."] * (len(every) > _MAX_LISTED_NAMES))
 
 
-# ------------------------------------------------------------------------- inspection
-
 _MAX_TABLES = 1000
 _MAX_EXAMINED_BYTES = 1 << 24
 _RATE_NAMES = frozenset(
@@ -507,8 +503,6 @@ def _read_first_records(table: Table, places: Sequence[int]) -> dict[int, NDArra
             return {place: values[:rows] for place, values in zip(places, block, strict=True)}
     return {}
 
-
-# ------------------------------------------------------------------------------------------- stamps
 
 _NANOSECONDS_PER_UNIT = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "m": 60 * 10**9, "s": 10**9,
                          "ms": 10**6, "us": 10**3, "ns": 1}  # fmt: skip

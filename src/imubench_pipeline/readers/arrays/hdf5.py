@@ -215,8 +215,6 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
         )
 
 
-# -------------------------------------------------------- units, in attributes of the data sets
-
 _UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 _MAX_WAIT = 3.0
 _MAX_UNIT_LENGTH = 40

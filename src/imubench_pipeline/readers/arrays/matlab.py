@@ -84,9 +84,6 @@ def _list_variables_of_7(file: h5py.File) -> Iterator[Table]:
         yield data_set
 
 
-# --------------------------------------------------------------------------------- version 4
-
-
 def _list_variables_of_4(path: Path) -> Iterator[Table]:
     """Yield the variables of a file."""
     start, size = 0, path.stat().st_size

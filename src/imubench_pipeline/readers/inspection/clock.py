@@ -98,9 +98,6 @@ def _get_source(column: LogColumn) -> str | int:
     return column.source if column.address is None else column.address
 
 
-# ----------------------------------------------------------------------------------- dates
-
-
 def _recognise_date(column: LogColumn, table: LogTable) -> Clock | None:
     form = column.forms[0]
     if not _has_hour(form) or not advances(column.values, DAY):
@@ -121,9 +118,6 @@ def _recognise_date(column: LogColumn, table: LogTable) -> Clock | None:
 
 def _has_hour(form: str) -> bool:
     return form == "iso8601" or any(field in form for field in ("%H", "%I"))
-
-
-# --------------------------------------------------------------------------------- numbers
 
 
 def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
@@ -223,9 +217,6 @@ def _guess_unit(values: NDArray[np.float64], rate: float | None) -> tuple[str, s
     if len(likely) != 1 or step == 1:
         return UNKNOWN, f"{_UNIT_HINT} {shown}"
     return likely[0], f"guessed: {shown}, that is {rates[likely[0]]:.5g} Hz"
-
-
-# ------------------------------------------------------------------------------------ steps
 
 
 def _take_steps(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -229,9 +229,6 @@ def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool)
     return source | {"column": column.source, "unit": unit}
 
 
-# --------------------------------------------------------------------------------- channels
-
-
 def _add_group(drafted: Draft, group: Group, alone: bool) -> None:
     """Add the axes of a group to a draft."""
     unit, comment = group.unit, ""
@@ -288,9 +285,6 @@ def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
 def _is_whole(column: LogColumn) -> bool:
     values = column.values[np.isfinite(column.values)]
     return bool(len(values)) and bool((values == np.rint(values)).all()) and bool(values.any())
-
-
-# -------------------------------------------------------------------------------- left over
 
 
 def _list_remarks(choice: Choice, contents: Contents) -> list[str]:

@@ -132,8 +132,6 @@ def figures_of(
     return stamps, figures, sound
 
 
-# -------------------------------------------------------------------------------------- bags
-
 _BATCH_MESSAGES = 1 << 14
 _MAX_LISTED_NAMES = 10
 _SQLITE_MAGIC = b"SQLite format 3"
@@ -234,8 +232,6 @@ class RosbagFile(LogFile):
                 return
             yield written, messages
 
-    # -------------------------------------------------------------- what the sensor file says
-
     def _topic(self, source: Source) -> tuple[str, str]:
         """Return the topic with the columns, and its type."""
         with explained(self.path):
@@ -273,8 +269,6 @@ class RosbagFile(LogFile):
             f"{present or 'none'}{cut}; expected a topic of {expected}; mend 'variable' or "
             "'column' in the sensor file"
         )
-
-    # ----------------------------------------------------------------------------- findings
 
     def _report(self, topic: str, unclosed: bool, damaged: int, absent: dict[str, int]) -> None:
         fate = "left out" if self.log.time is not None else "missing samples"

@@ -28,8 +28,7 @@ from imubench_pipeline.readers.bounds import (
     MAX_TOPICS,
     MIN_CHECKED_EXPANSION,
 )
-from imubench_pipeline.readers.compressed import open_bytes
-from imubench_pipeline.readers.decompression import unpacked_zstd
+from imubench_pipeline.readers.compressed import open_bytes, unpacked_zstd
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 

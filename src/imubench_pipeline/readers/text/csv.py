@@ -22,7 +22,7 @@ from imubench_pipeline.readers.file_format import (
 )
 from imubench_pipeline.readers.stated_units import stated
 from imubench_pipeline.readers.text.cells import MISSING_CELLS, is_missing, is_number
-from imubench_pipeline.readers.text.complete_lines import CompleteLines, first_lines
+from imubench_pipeline.readers.text.complete_lines import CompleteLines, Records, first_lines
 from imubench_pipeline.readers.text.header import (
     completed,
     says_units,
@@ -31,7 +31,6 @@ from imubench_pipeline.readers.text.header import (
     states_simulated,
 )
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
-from imubench_pipeline.readers.text.records import Records
 from imubench_pipeline.readers.text.stamps import (
     StampError,
     TextTime,
@@ -187,8 +186,6 @@ class CsvFile(LogFile):
                 "note",
             )
 
-    # ------------------------------------------------------------------- findings, faults
-
     def _report(self, layout: TextLayout, records: Records) -> None:
         if layout.passed_over:
             count, (number, text) = len(layout.passed_over), layout.passed_over[0]
@@ -285,9 +282,6 @@ class _WrongWidth:
         return "skip"
 
 
-# ------------------------------------------------------------------------ stated units
-
-
 def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
     """Return the units in a line before the records, by column position, and the line."""
     for raw in layout.preamble:
@@ -300,8 +294,6 @@ def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
             return {place: cell.strip("()[]{}<> ") for place, cell in enumerate(cells)}, raw
     return {}, b""
 
-
-# ------------------------------------------------------------------------- inspection
 
 _MAX_NOTES = 12
 

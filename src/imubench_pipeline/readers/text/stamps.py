@@ -183,8 +183,6 @@ def _convert_to_regex(form: str) -> str:
     return expression
 
 
-# ----------------------------------------------------------------------------------------- patterns
-
 _DATE_FORMS = (
     *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y:%m:%d", "%Y%m%d"),
     *("%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y"),
@@ -245,8 +243,6 @@ def stamps_of(form: str, texts: Sequence[str]) -> NDArray[np.float64]:
     times, present = TextStamps(form).nanoseconds(pa.array(texts))
     return np.where(present, times, np.nan)
 
-
-# ----------------------------------------------------------------------------------------- of a log
 
 _INTEGER = re.compile(r"-?\d{1,19}")
 
