@@ -154,16 +154,7 @@ def _compose_accents(name: str) -> str:
 def only_log(path: Path, present: list[Path]) -> Path:
     """Return the only log of a folder or archive; files in subfolders describe it.
 
-    Parameters
-    ----------
-    path : Path
-    present : list of Path
-        Its files.
-
-    Raises
-    ------
-    RecordingError
-        If there is no log, or more than one.
+    Raise `RecordingError` if there is no log among the files ``present``, or more than one.
     """
     if not present and not path.is_dir():
         raise RecordingError(

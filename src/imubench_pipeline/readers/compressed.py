@@ -285,7 +285,19 @@ def open_bytes(path: Path) -> Bytes:
         with ExitStack() as stack:  # closes the file if it cannot be read
             if archive is None:
                 log = stack.enter_context(closing(FileWithoutHoles(path)))
-                opened = _open_file(path, log)
+                begin = log.read(MAX_MAGIC_LENGTH)
+                log.rewind()
+                for magic, kind in _UNSUPPORTED_COMPRESSIONS.items():
+                    if begin.startswith(magic):
+                        raise RecordingError(
+                            f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, "
+                            "bzip2 or zip: unpack it"
+                        )
+                if how := compression_of(begin):
+                    stream = DECOMPRESSORS[how](log)
+                    opened = Bytes(path.name, stream, path.stat().st_size, (log,))
+                else:
+                    opened = Bytes(path.name, log, _UNKNOWN_SIZE)
             else:
                 file = stack.enter_context(archive.open("rb"))
                 opened = _open_member(archive, path.relative_to(archive).as_posix(), file)
@@ -293,20 +305,6 @@ def open_bytes(path: Path) -> Bytes:
             return opened
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
-
-
-def _open_file(path: Path, file: FileWithoutHoles) -> Bytes:
-    begin = file.read(MAX_MAGIC_LENGTH)
-    file.rewind()
-    for magic, kind in _UNSUPPORTED_COMPRESSIONS.items():
-        if begin.startswith(magic):
-            raise RecordingError(
-                f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
-                "zip: unpack it"
-            )
-    if not (how := compression_of(begin)):
-        return Bytes(path.name, file, _UNKNOWN_SIZE)
-    return Bytes(path.name, DECOMPRESSORS[how](file), path.stat().st_size, (file,))
 
 
 def is_archive(path: Path) -> bool:

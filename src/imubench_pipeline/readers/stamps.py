@@ -66,24 +66,13 @@ class WrapState:
 
 
 def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:
-    """Unwrap the stamps of a counter.
+    """Unwrap the stamps of a counter; int64 for integers, exact, else float64 with NaN if missing.
 
     A step back by more than half of ``wraps`` is a wrap. A step forward by more than half is a late
     record from before the wrap, or a damaged stamp, which then does not affect the others.
 
-    Parameters
-    ----------
-    stamps : ndarray of int or float
-        The next stamps, as written; NaN where one is missing.
-    wraps : float
-        Value at which the counter wraps to 0, in the unit of the stamps.
-    state : WrapState
-        State between blocks; changed in place.
-
-    Returns
-    -------
-    ndarray
-        int64 for integers, exact; else float64, NaN where the stamp is NaN.
+    ``wraps``: value at which the counter wraps to 0, in the unit of the stamps.
+    ``state``: state between blocks; changed in place.
     """
     whole = stamps.dtype.kind in "iu" and float(wraps).is_integer()
     going_on = stamps.astype(np.int64 if whole else np.float64)

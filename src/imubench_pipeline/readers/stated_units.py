@@ -45,19 +45,9 @@ _SPELLINGS: dict[str, tuple[tuple[str, str], ...]] = {
 
 
 def unit_of(text: str, dimension: str) -> str | None:
-    """Return the unit of a text, in the notation of a sensor file.
+    """Return the unit of a text, such as ``m_s2`` or ``dps``, in the notation of a sensor file.
 
-    Parameters
-    ----------
-    text : str
-        Such as ``rad/s``, ``m_s2`` or ``dps``.
-    dimension : str
-        A key of `imubench_pipeline.units.SI_UNITS`.
-
-    Returns
-    -------
-    str or None
-        None: the text is no known unit of this dimension.
+    None if the text is no known unit of the dimension, a key of `imubench_pipeline.units.SI_UNITS`.
     """
     text = text.strip()
     if not text or len(text) > _MAX_UNIT_LENGTH:
@@ -82,16 +72,7 @@ def unit_of(text: str, dimension: str) -> str | None:
 def divided(label: str, dimension: str) -> tuple[str, str | None]:
     """Split a name such as ``Gyroscope x (rad/s)`` or ``accel_x_m_s2`` into name and unit.
 
-    Parameters
-    ----------
-    dimension : str
-        Dimension of the unit that is searched.
-
-    Returns
-    -------
-    name : str
-        Name without the unit, and without texts in brackets except numbers.
-    unit : str or None
+    The name is without texts in brackets, except numbers. ``dimension``: dimension of the unit.
     """
     unit = next((unit for text in bracketed(label) if (unit := unit_of(text, dimension))), None)
     name = _BRACKETED.sub(
@@ -133,9 +114,8 @@ class StatedUnit:
 def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit | None:
     """Return the unit that a log states for a channel; None if there is no known unit.
 
-    ``channel``: Channel or additional column; the result is None for the latter.
-    ``text``, ``where``: Text in the place of the unit, and a description of this place.
-    ``label``: Name of the column, which may contain the unit.
+    ``text``, ``where``: text in the place of the unit, and a description of this place.
+    ``label``: name of the column, which may contain the unit.
     """
     if channel not in CHANNELS:
         return None
@@ -152,9 +132,7 @@ def contradictions(
 ) -> list[Finding]:
     """Return findings on channels for which log and sensor file state different units.
 
-    ``file``: Name of the log.
-    ``sources``: Columns of the sensor file.
-    ``units``: Units that the log states.
+    ``file``: name of the log; ``units``: units that it states.
     """
     findings = []
     for channel, in_log in units.items():

@@ -528,7 +528,21 @@ class ArrayTime:
         self._dated = values.dtype.kind == DATE_KIND
         if self._dated:
             missing |= np.isnat(values)
-            stamps = _dates_to_nanoseconds(values, missing)
+            unit, count = np.datetime_data(values.dtype)
+            if unit not in _NANOSECONDS_PER_UNIT:
+                raise UnusableError(
+                    f"time stamps are dates in units of {unit}; expected "
+                    f"{', '.join(_NANOSECONDS_PER_UNIT)}: convert them"
+                )
+            factor = _NANOSECONDS_PER_UNIT[unit] * count
+            whole = values.astype(f"M8[{count}{unit}]", copy=False).view(np.int64)
+            limit = _MAX_INT64 // factor
+            if np.any(~missing & ((whole > limit) | (whole < -limit))):
+                raise UnusableError(
+                    "time stamps are dates before 1678 or after 2262, expected the time of a log; "
+                    "mend 'column' of 'time' in the sensor file, or copy the file again"
+                )
+            stamps = np.where(missing, 0, whole) * np.int64(factor)
         elif values.dtype.kind == "f":
             stamps = values.astype(np.float64)
             missing |= ~np.isfinite(stamps)
@@ -539,22 +553,3 @@ class ArrayTime:
 
     def _started(self, first: Any) -> str | None:
         return date_of_nanoseconds(first) if self._dated else date_of_stamp(first, self._source)
-
-
-def _dates_to_nanoseconds(dates: NDArray[Any], missing: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return dates as ns since 1970."""
-    unit, count = np.datetime_data(dates.dtype)
-    if unit not in _NANOSECONDS_PER_UNIT:
-        raise UnusableError(
-            f"time stamps are dates in units of {unit}; expected "
-            f"{', '.join(_NANOSECONDS_PER_UNIT)}: convert them"
-        )
-    factor = _NANOSECONDS_PER_UNIT[unit] * count
-    whole = dates.astype(f"M8[{count}{unit}]", copy=False).view(np.int64)
-    limit = _MAX_INT64 // factor
-    if np.any(~missing & ((whole > limit) | (whole < -limit))):
-        raise UnusableError(
-            "time stamps are dates before 1678 or after 2262, expected the time of a log; mend "
-            "'column' of 'time' in the sensor file, or copy the file again"
-        )
-    return np.where(missing, 0, whole) * np.int64(factor)

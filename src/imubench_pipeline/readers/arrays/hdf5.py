@@ -131,7 +131,23 @@ class DataSet(Array):
 
     def unit(self, position: int) -> str | None:
         """Return the unit of the columns, if an attribute states it."""
-        return stated_unit(self.data)
+        data = self.data
+        name = next((name for name in _UNIT_ATTRIBUTES if name in data.attrs), None)
+        if name is None:
+            return None
+        kind = data.attrs.get_id(name)
+        if kind.shape != () or kind.dtype.itemsize > _MAX_STORED_LENGTH:
+            return None
+        if kind.dtype.kind == "S":
+            text = bytes(data.attrs[name]).decode("utf-8", "replace")
+        elif h5py.check_string_dtype(kind.dtype) is not None:
+            path = Path(data.file.filename).resolve()
+            status = path.stat()
+            units = _read_variable_length_texts(str(path), status.st_mtime_ns, status.st_size)
+            text = units.get(str(data.name), "")
+        else:
+            return None
+        return text.strip("\0 \t\r\n")[:_MAX_UNIT_LENGTH] or None
 
     def held_bytes(self, positions: Sequence[int]) -> int:
         """Return the additional memory for reading these columns, bytes."""
@@ -220,26 +236,6 @@ _MAX_WAIT = 3.0
 _MAX_UNIT_LENGTH = 40
 _MAX_STORED_LENGTH = 1 << 12
 _MAX_MEMORY = 1 << 29
-
-
-def stated_unit(data: h5py.Dataset) -> str | None:
-    """Return the unit that an attribute of a data set states."""
-    name = next((name for name in _UNIT_ATTRIBUTES if name in data.attrs), None)
-    if name is None:
-        return None
-    kind = data.attrs.get_id(name)
-    if kind.shape != () or kind.dtype.itemsize > _MAX_STORED_LENGTH:
-        return None
-    if kind.dtype.kind == "S":
-        text = bytes(data.attrs[name]).decode("utf-8", "replace")
-    elif h5py.check_string_dtype(kind.dtype) is not None:
-        path = Path(data.file.filename).resolve()
-        status = path.stat()
-        units = _read_variable_length_texts(str(path), status.st_mtime_ns, status.st_size)
-        text = units.get(str(data.name), "")
-    else:
-        return None
-    return text.strip("\0 \t\r\n")[:_MAX_UNIT_LENGTH] or None
 
 
 @lru_cache(maxsize=4)

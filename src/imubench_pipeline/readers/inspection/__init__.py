@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.readers.contents import Contents, contents
-from imubench_pipeline.readers.file_format import LogColumn, LogTable
+from imubench_pipeline.readers.file_format import LogTable
 from imubench_pipeline.readers.inspection.draft import Draft, block, printable
 from imubench_pipeline.readers.inspection.drafting import draft
 from imubench_pipeline.readers.inspection.names import meaning
@@ -98,29 +98,20 @@ def _list_table(table: LogTable, with_rate: bool) -> Iterator[str]:
     yield "  " + ": ".join(text for text in (title, printable("; ".join(about))) if text)
     for note in table.notes:
         yield f"    | {printable(note)}"
-    shown = table.columns[:_MAX_LINES]
-    rows = [_list_column(column) for column in shown]
+    rows = []
+    for column in table.columns[:_MAX_LINES]:
+        name = printable(column.label) or f"column {column.source}"
+        meant = meaning(column.label)
+        in_name = (meant and meant.unit) or ", ".join(bracketed(column.label))
+        unit = _shorten(printable(column.unit or in_name or _NOT_STATED), 12)
+        values = _shorten(", ".join(map(printable, column.first)), _MAX_VALUES_WIDTH)
+        rows.append((_shorten(name, _MAX_NAME_WIDTH), column.kind, unit, values))
     widths = [max((len(row[place]) for row in rows), default=0) for place in range(3)]
     for row in rows:
         cells = (cell.ljust(width) for cell, width in zip(row, [*widths, 0], strict=True))
         yield ("    " + "  ".join(cells)).rstrip()
     if len(table.columns) > _MAX_LINES:
         yield f"    ... and {len(table.columns) - _MAX_LINES} more"
-
-
-def _list_column(column: LogColumn) -> tuple[str, str, str, str]:
-    """Return name, kind, unit and first values of a column."""
-    name = printable(column.label) or f"column {column.source}"
-    meant = meaning(column.label)
-    in_name = (meant and meant.unit) or ", ".join(bracketed(column.label))
-    unit = column.unit or in_name or _NOT_STATED
-    values = ", ".join(printable(text) for text in column.first)
-    return (
-        _shorten(name, _MAX_NAME_WIDTH),
-        column.kind,
-        _shorten(printable(unit), 12),
-        _shorten(values, _MAX_VALUES_WIDTH),
-    )
 
 
 def _shorten(text: str, longest: int) -> str:

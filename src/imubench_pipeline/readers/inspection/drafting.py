@@ -160,12 +160,9 @@ def _has_equal_entries(clock: Clock, other: Clock) -> bool:
 def _is_local(groups: Sequence[Group], clock: Clock | None) -> bool:
     if clock is None:
         return True
-    by_file: dict[str | None, set[int]] = {}
-    for group in groups:
-        by_file.setdefault(group.table.file, set()).add(id(group.table))
-    if any(len(tables) > 1 for tables in by_file.values()):
-        return False
     tables = _collect_tables(groups, None)
+    if len({table.file for table in tables}) < len(tables):
+        return False
     return len(tables) > 1 or any(clock.column is c for t in tables for c in t.columns)
 
 

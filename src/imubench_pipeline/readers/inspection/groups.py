@@ -120,20 +120,14 @@ def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
                 together["temperature", label, False] = {"": (column, meant)}
     result = []
     for (quantity, _, counted), axes in together.items():
-        placed = _assign_counted_axes(axes) if counted else axes
-        if placed:
-            result.append(_make_group(quantity, table, placed))
+        if counted:  # three numbered columns are axes, without a time before them
+            columns = [axes[number] for number in sorted(axes, key=int)]
+            if len(columns) == 4 and advances(columns[0][0].values):
+                columns = columns[1:]
+            axes = dict(zip(_AXES, columns, strict=True)) if len(columns) == 3 else {}
+        if axes:
+            result.append(_make_group(quantity, table, axes))
     return result + list(_find_roll_pitch_yaw(table, result))
-
-
-def _assign_counted_axes(
-    axes: Mapping[str, tuple[LogColumn, Meaning]],
-) -> dict[str, tuple[LogColumn, Meaning]]:
-    """Return three numbered columns as axes, without a time before them; else no axes."""
-    columns = [axes[number] for number in sorted(axes, key=int)]
-    if len(columns) == 4 and advances(columns[0][0].values):
-        columns = columns[1:]
-    return dict(zip(_AXES, columns, strict=True)) if len(columns) == 3 else {}
 
 
 def _make_group(

@@ -81,23 +81,11 @@ LAYOUTS: dict[str, Layout] = {
 def figures_of(
     messages: Sequence[bytes], layout: Layout, ros_1: bool
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return stamps and numbers of messages.
+    """Return stamps, numbers and soundness of messages, serialised as in ROS 1 or as CDR.
 
-    Parameters
-    ----------
-    messages : sequence of bytes
-        Messages as recorded.
-    ros_1 : bool
-        The messages are serialised as in ROS 1; otherwise as CDR.
-
-    Returns
-    -------
-    stamps : ndarray of int64
-        Stamps of the headers, ns.
-    figures : ndarray of float64, shape (messages, layout.figures)
-        NaN where the message is damaged.
-    sound : ndarray of bool
-        The message has the layout of its type.
+    ``stamps``: stamps of the headers, ns.
+    ``figures``: shape (messages, layout.figures); NaN where the message is damaged.
+    ``sound``: whether the message has the layout of its type.
     """
     stamps = np.zeros(len(messages), np.int64)
     figures = np.full((len(messages), layout.figures), np.nan)

@@ -92,10 +92,8 @@ class CompleteLines:
     lack digits; it is left out with a finding. A truncated compressed file is read to its end, with
     a finding.
 
-    ``findings``: Receives the findings about omitted text.
-    ``skipped``: Bytes of the text to skip.
-    ``records``: Converts complete lines to the text that is read.
-    ``most``: Bytes of the text after which reading stops; None: the whole file.
+    ``skipped``: bytes of the text to skip. ``records``: converts complete lines to the text that is
+    read. ``most``: bytes of the text after which reading stops; None: the whole file.
     """
 
     closed = False

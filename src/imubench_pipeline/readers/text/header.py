@@ -21,16 +21,10 @@ _WORDS_ONLY = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
     """Return the index of the line with the names of the columns, as opposed to units.
 
-    Parameters
-    ----------
-    lines : sequence of sequence of str
-        The cells of the lines before the first record, in order; empty for a line that is not
-        split like the record.
+    The line with the most names is returned, the first of equals; None if no line has names.
 
-    Returns
-    -------
-    int or None
-        The line with the most names; the first of equals. None: no line has names.
+    ``lines``: the cells of the lines before the first record; empty for a line that is not split
+    like the record.
     """
     best, header = 0, None
     for index, cells in enumerate(lines):

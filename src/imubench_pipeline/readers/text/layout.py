@@ -416,11 +416,7 @@ _INTEGER = re.compile(r"\s*[-+]?\d+")
 
 
 def refuse_other_formats(file: str, line: bytes) -> None:
-    """Raise `RecordingError` if a log begins like a web page or JSON.
-
-    ``file``: name of the log.
-    ``line``: first line of the log.
-    """
+    """Raise `RecordingError` if the first line of a log is one of a web page or JSON."""
     begin = line.strip().lower()
     shown = line.strip()[:40].decode("utf-8", "replace")
     if begin.startswith(_MARKUP_PREFIXES):
@@ -436,10 +432,7 @@ def refuse_other_formats(file: str, line: bytes) -> None:
 
 
 def refuse_control_characters(file: str, number: int, begin: bytes) -> None:
-    """Raise `RecordingError` if a log begins with many control characters, unlike text.
-
-    ``number``: number of its first line, from 1.
-    """
+    """Raise `RecordingError` if a log begins with many control characters, unlike text."""
     controls = len(begin) - len(begin.translate(None, _CONTROL_CHARACTERS))
     if controls > max(_MAX_CONTROLS, _MAX_CONTROL_SHARE * len(begin)):
         raise RecordingError(
@@ -450,10 +443,7 @@ def refuse_control_characters(file: str, number: int, begin: bytes) -> None:
 
 
 def refuse_binary(file: str, number: int, line: bytes) -> None:
-    """Raise `RecordingError` if a line contains zero bytes.
-
-    ``number``: number of the line, from 1.
-    """
+    """Raise `RecordingError` if a line contains zero bytes; ``number``: its number, from 1."""
     zeros = line.count(b"\0")
     if not zeros:
         return
@@ -478,11 +468,8 @@ def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequ
     """Raise `RecordingError` if commas may be delimiters as well as decimal signs.
 
     Decimals have no sign and sometimes begin with 0, unlike integers, unless all integers are
-    padded with zeros.
-
-    ``number``: Line number of the first record.
-    ``line``: The first record.
-    ``rows``: Cells of the first records, split at commas.
+    padded with zeros. ``number``, ``line``, ``rows``: line number of the first record, its text,
+    and the cells of the first records, split at commas.
     """
     if {len(row) % 2 for row in rows} != {0}:
         return

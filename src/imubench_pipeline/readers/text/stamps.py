@@ -149,24 +149,17 @@ class TextStamps:
         sound &= (hour < 24) & (minute < 60) & (second <= 60)
         sound &= (year > 1700) & (year < 2200)  # otherwise ns overflow
         days = first + day - 1 + figures("j", 1) - 1
-        seconds = days * 86_400 + hour * 3600 + minute * 60 + second - self._zone(fields)
+        seconds = days * 86_400 + hour * 3600 + minute * 60 + second
+        if "z" in self._fields:
+            zones = pc.fill_null(fields.field("z"), "").dictionary_encode()
+            offsets = np.zeros(len(zones.dictionary), np.int64)  # from UTC, s
+            for place, zone in enumerate(zones.dictionary.to_pylist()):
+                digits = zone.lstrip("+-").replace(":", "")
+                if digits.isdigit():
+                    offset = int(digits[:2]) * 3600 + int(digits[2:] or 0) * 60
+                    offsets[place] = -offset if zone.startswith("-") else offset
+            seconds -= offsets[np.asarray(zones.indices)]
         return seconds * 10**9 + figures("f", 0), sound
-
-    def _zone(self, fields: pa.StructArray) -> NDArray[Any] | int:
-        """Return the offset of the zone from UTC, s."""
-        if "z" not in self._fields:
-            return 0
-        zones = pc.fill_null(fields.field("z"), "").dictionary_encode()
-        offsets = np.array([_parse_offset(zone) for zone in zones.dictionary.to_pylist()], np.int64)
-        return offsets[np.asarray(zones.indices)] if len(offsets) else 0
-
-
-def _parse_offset(zone: str) -> int:
-    digits = zone.lstrip("+-").replace(":", "")
-    if not digits.isdigit():
-        return 0
-    offset = int(digits[:2]) * 3600 + int(digits[2:] or 0) * 60
-    return -offset if zone.startswith("-") else offset
 
 
 def _convert_to_regex(form: str) -> str:
