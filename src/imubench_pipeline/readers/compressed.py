@@ -110,11 +110,7 @@ class _GzipDecompressor:
 
 
 def unpacked_zstd(data: bytes, most: int) -> bytes:
-    """Return the first decompressed bytes of a frame of zstd.
-
-    ``most``: largest number of bytes to decompress.
-    Raise `ValueError` if the data are corrupt.
-    """
+    """Return at most ``most`` bytes of a frame of zstd; raise `ValueError` if it is corrupt."""
     try:
         return _create_zstd().decompress(data, most)
     except zstd.ZstdError as error:
@@ -178,8 +174,7 @@ class Bytes:
     def read(self, size: int) -> bytes:
         """Return the next bytes, at most ``size``; none at the end.
 
-        Raise `RecordingError` if the compressed data are corrupt or encrypted, or expand beyond the
-        limit.
+        Raise `RecordingError` if they are corrupt, encrypted, or expand beyond the limit.
         """
         try:
             # Not `read`, which discards the data before an early end.
@@ -274,10 +269,8 @@ def _make_corrupt_error(name: str, error: Exception) -> RecordingError:
 
 
 def open_bytes(path: Path) -> Bytes:
-    """Open a log for reading.
+    """Open a log: a file, compressed or not, or a member of a zip archive (archive / name).
 
-    ``path``: a file, compressed or not, or a member of a zip archive, as the path of the archive
-    followed by the name in it.
     Raise `RecordingError` if it cannot be opened, or its compression is not supported.
     """
     archive = None if path.is_file() else _find_archive(path)
@@ -324,10 +317,7 @@ def is_member(path: Path) -> bool:
 
 
 def members(archive: Path) -> list[Path]:
-    """Return the visible files of a zip archive, sorted, as its path followed by their names.
-
-    Raise `RecordingError` if the archive cannot be read.
-    """
+    """Return the visible files of a zip archive, sorted, as its path followed by their names."""
     return sorted(archive / name for name in _list_directory(archive) if visible(Path(name)))
 
 
@@ -391,10 +381,7 @@ def _describe_member(info: zipfile.ZipInfo) -> str:
 
 @contextmanager
 def opened_archive(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open a zip archive with a directory within `MAX_DIRECTORY`.
-
-    Raise `RecordingError` if its directory is larger.
-    """
+    """Open a zip archive; raise `RecordingError` if its directory exceeds `MAX_DIRECTORY`."""
     with _Archive(path) as file, zipfile.ZipFile(file) as archive:
         file.most = None
         yield archive

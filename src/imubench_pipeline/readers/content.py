@@ -45,10 +45,7 @@ def is_endless(path: Path) -> bool:
 
 
 def format_of(path: Path, stated: Reader | None = None) -> FileFormat:
-    """Return the format of a file: the stated one, or else the one of its content (`content_of`).
-
-    ``stated``: ``reader`` of the sensor file.
-    """
+    """Return the stated format of a file (``reader``), or else the one of its content."""
     return content_of(path)[0] if stated is None else FILE_FORMATS[stated]
 
 

@@ -39,7 +39,6 @@ class Contents:
 def contents(path: Path) -> Contents:
     """Return the contents of a recording, from the beginning of each of its files.
 
-    ``path``: A log file, or the folder, zip archive or ROS 2 bag of a recording.
     Raise `RecordingError` if it cannot be read, or has no data.
     """
     if not path.exists():

@@ -21,9 +21,7 @@ _REPLACEMENT_ZEROS = 512
 def next_data(descriptor: int, offset: int) -> int | None:
     """Return the offset of the first stored byte at or after an offset; None if there is none.
 
-    Without support of the system, every byte counts as stored.
-
-    ``descriptor``: descriptor of an open file; its position is unspecified afterwards.
+    Without support of the system, every byte counts as stored. The position of the file changes.
     """
     if not hasattr(os, "SEEK_DATA"):
         return offset
@@ -34,10 +32,7 @@ def next_data(descriptor: int, offset: int) -> int | None:
 
 
 class FileWithoutHoles:
-    """A file that is read sequentially; a long hole is replaced by a few zeros.
-
-    ``omitted``: number of zero bytes skipped so far.
-    """
+    """A file without its long holes; ``omitted``: number of zero bytes skipped so far."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb", buffering=0)
@@ -73,10 +68,7 @@ class FileWithoutHoles:
 
 
 class ZeroRuns:
-    """Counts runs of zero bytes in a stream.
-
-    ``least``: Least length of a run that is counted.
-    """
+    """Counts runs of at least ``least`` zero bytes in a stream."""
 
     def __init__(self, least: int = 1) -> None:
         self._least = least

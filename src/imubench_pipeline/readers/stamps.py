@@ -19,11 +19,10 @@ _YEAR_2100 = 4_102_444_800 * 10**9
 
 
 class Clock:
-    """Converts the stamps of a file to s since the first one.
+    """Converts the stamps of a file to s since the first one, and sets its ``started``.
 
-    ``file``: Its ``started`` is set with the first stamp.
-    ``wraps``: Value at which stamps wrap to 0, in their unit; None: they do not wrap.
-    ``started``: Returns ISO 8601 date and time of the first stamp; None if the stamp is no date.
+    ``wraps``: value at which stamps wrap to 0, in their unit; None: they do not wrap.
+    ``started``: returns ISO 8601 date and time of the first stamp; None if the stamp is no date.
     """
 
     def __init__(
@@ -90,22 +89,14 @@ def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[A
 
 
 def date_of(nanoseconds: int) -> str | None:
-    """Return ISO 8601 date and time (UTC) of ns since 1970.
-
-    None outside of the years 2001 to 2099: the stamps then count from another origin, such as the
-    start of the device or of a simulation.
-    """
+    """Return ISO 8601 date and time (UTC) of ns since 1970; None outside of 2001 to 2099."""
     if not _YEAR_2001 <= nanoseconds < _YEAR_2100:
         return None
     return date_of_nanoseconds(nanoseconds)
 
 
 def date_of_stamp(first: float, source: TimeSource) -> str | None:
-    """Return ISO 8601 date and time (UTC) of a numeric stamp, as `date_of` does.
-
-    ``first``: stamp as written, in ticks of ``source``; integer ns are exact.
-    ``source``: unit and scale; the result is None for a count of samples.
-    """
+    """Return ISO 8601 date and time of a stamp as written (see `date_of`); ns are exact."""
     if source.unit not in SECONDS:
         return None
     if source.unit == "ns" and source.scale == 1:

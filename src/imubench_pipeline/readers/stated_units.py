@@ -115,7 +115,6 @@ def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit
     """Return the unit that a log states for a channel; None if there is no known unit.
 
     ``text``, ``where``: text in the place of the unit, and a description of this place.
-    ``label``: name of the column, which may contain the unit.
     """
     if channel not in CHANNELS:
         return None
@@ -130,10 +129,7 @@ def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit
 def contradictions(
     file: str, sources: Mapping[str, ColumnSource], units: Mapping[str, StatedUnit]
 ) -> list[Finding]:
-    """Return findings on channels for which log and sensor file state different units.
-
-    ``file``: name of the log; ``units``: units that it states.
-    """
+    """Return findings on channels whose units in the log (``units``) and sensor file differ."""
     findings = []
     for channel, in_log in units.items():
         source = sources[channel]

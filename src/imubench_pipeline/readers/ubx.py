@@ -208,10 +208,7 @@ def _describe_types(columns: list[str]) -> str:
 
 
 class Words:
-    """Buffer of the measurements of messages that are not yet in a batch.
-
-    ``kind``: class and id of the messages. ``seen``: number of measurements of each data type.
-    """
+    """Buffer of the measurements that are not yet in a batch; ``seen``: number by data type."""
 
     def __init__(self, kind: bytes, columns: list[str]) -> None:
         self._raw = kind == ESF_RAW
@@ -399,10 +396,7 @@ _MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 22, 1 << 26
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return a table for each kind of message with inertial data.
-
-    Raise `RecordingError` if there is no such message.
-    """
+    """Return a table for each message with inertial data; raise `RecordingError` if none."""
     names = list(COLUMNS)
     words = {kind: Words(kind, names) for kind in KINDS}
     frames = Frames(blocks(path, [], _MIN_ZEROS))

@@ -88,8 +88,7 @@ class Row:
 
 
 _MIN_ZEROS = 16
-"""Least run of zero bytes that is reported; shorter runs are noise of the line, and are counted
-with the sentences that they damage."""
+"""Least run of zero bytes that is reported; shorter ones count with the sentences they damage."""
 
 _SENTENCE_CANDIDATES = re.compile(rb"[^$]{6,}")
 """Text after a ``$`` that may be a sentence; shorter text has not even a name."""
@@ -257,12 +256,6 @@ def _parse_numbers(
         if table is not None and len(table) == len(texts):
             columns = {int(name): table.column(name).to_numpy() for name in wanted}
             return columns, 0
-    return _parse_numbers_singly(texts, positions)
-
-
-def _parse_numbers_singly(
-    texts: list[bytes], positions: set[int]
-) -> tuple[dict[int, NDArray[np.float64]], int]:
     fields = {position: np.full(len(texts), np.nan) for position in positions}
     unread = 0
     for number, text in enumerate(texts):
@@ -331,7 +324,7 @@ class VectorNavFile(LogFile):
         wanted = [source.column for source in self.sources.values()]
         able = [kind for kind in FIELDS if all(position_of(kind, c) >= 0 for c in wanted)]
         if not able:
-            named = ", ".join(str(column) for column in wanted)
+            named = ", ".join(map(str, wanted))
             expected = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
             raise RecordingError(
                 f"{self.path.name}: no VectorNav sentence has the columns {named} together; mend "
@@ -456,10 +449,7 @@ _MAX_DESCRIBED_BYTES = 1 << 21  # bytes
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return a table for each kind of sentence with inertial data.
-
-    Raise `RecordingError` if there is no such sentence with a right checksum.
-    """
+    """Return a table for each sentence with inertial data; raise `RecordingError` if none."""
     sentences = {kind: Sentences(kind, stamped=True) for kind in FIELDS}
     rows: dict[str, list[Row]] = {kind: [] for kind in FIELDS}
     read = 0

@@ -78,8 +78,15 @@ class _ArrowTable(Table):
 
     def column(self, position: int) -> Column:
         """Return a column by its position, counted from 0."""
-        kind = self.schema.field(position).type
-        return Column(self.labels[position], _find_numpy_kind(kind), str(kind))
+        kind = stored = self.schema.field(position).type
+        if pa.types.is_dictionary(kind):
+            kind = kind.value_type
+        numpy_kind = "M" if pa.types.is_timestamp(kind) else "O"
+        if pa.types.is_floating(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind):
+            numpy_kind = "f"
+        elif pa.types.is_integer(kind):
+            numpy_kind = "i" if pa.types.is_signed_integer(kind) else "u"
+        return Column(self.labels[position], numpy_kind, str(stored))
 
     def unit(self, position: int) -> str | None:
         """Return the unit of a column, if its metadata state it."""
@@ -146,17 +153,6 @@ class _IpcTable(_ArrowTable):
             yield self._reader.get_batch(number)
 
 
-def _find_numpy_kind(kind: pa.DataType) -> str:
-    """Return the kind of the NumPy type to which a type is converted."""
-    if pa.types.is_dictionary(kind):
-        kind = kind.value_type
-    if pa.types.is_floating(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind):
-        return "f"
-    if pa.types.is_integer(kind):
-        return "i" if pa.types.is_signed_integer(kind) else "u"
-    return "M" if pa.types.is_timestamp(kind) else "O"
-
-
 def _convert_to_numpy(column: pa.Array) -> NDArray[Any]:
     if pa.types.is_dictionary(column.type):
         column = column.dictionary_decode()
@@ -182,11 +178,7 @@ _FIELD_BUFFERS, _FIELD_COMPRESSION = 2, 3
 
 
 def check_batches(path: Path, in_file: bool) -> None:
-    """Raise if a compressed batch is too large to be unpacked as a whole.
-
-    ``in_file``: the format is the file format, not the stream format.
-    Raise `UnusableError` if a batch is too large.
-    """
+    """Raise `UnusableError` if a compressed batch is too large; ``in_file``: no stream format."""
     with pa.memory_map(str(path)) as source:
         source.seek(_FILE_PREFIX_BYTES if in_file else 0)
         for message in pa.ipc.MessageReader.open_stream(source):
@@ -265,11 +257,7 @@ _HEADER_PROBE, _MAX_HEADER = 1 << 10, 1 << 20
 
 
 def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> None:
-    """Raise if the largest pages of all columns together exceed the memory limit.
-
-    ``names``: names of the columns that are read together.
-    Raise `UnusableError` if they exceed the limit, or if there are too many small pages.
-    """
+    """Raise `UnusableError` if pages are too many, or the largest of all columns are too large."""
     most = max(MAX_UNCHECKED_PAGES, path.stat().st_size // MIN_MEAN_PAGE)
     paths = [metadata.schema.column(place).path for place in range(metadata.num_columns)]
     places = [place for place, name in enumerate(paths) if name in names]
@@ -326,10 +314,7 @@ _MAX_DEPTH = 8
 
 
 def _parse_header(data: bytes) -> tuple[dict[int, int], int]:
-    """Return the integers of a structure by field number, and its length.
-
-    Raise `IndexError` if the structure does not end within the data.
-    """
+    """Return the integers of a structure by field number, and its length; `IndexError` if cut."""
     numbers: dict[int, int] = {}
     at, field = 0, 0
     while kind := data[at]:

@@ -194,12 +194,7 @@ class ArrayFile(LogFile):
 
 
 def rows_of_block(row_bytes: int, most: int) -> int:
-    """Return the number of records of a block.
-
-    ``row_bytes``: memory per record, bytes.
-    ``most``: largest memory of a block, bytes.
-    Raise `UnusableError` if a single record exceeds the limit.
-    """
+    """Return the records of a block of ``most`` bytes; `UnusableError` if one is larger."""
     if row_bytes > most:
         raise UnusableError(
             f"one record takes {row_bytes} bytes; expected at most {most}: store the log's columns "
@@ -245,10 +240,7 @@ def numbers(raw: NDArray[Any]) -> NDArray[np.float64]:
 def _find_column(
     tables: dict[str, Table], column: str | int, variable: str | None, key: str
 ) -> _Place:
-    """Return the table and the position of a column.
-
-    Raise `UnusableError` if the column does not exist, or several columns match.
-    """
+    """Return table and position of the only matching column, else raise `UnusableError`."""
     if isinstance(column, int):
         return _take_numbered(_find_table(tables, variable, key), column, key)
     matches = _find_addressed(tables, column, variable)
@@ -404,10 +396,7 @@ _MAX_RATE = 1e6
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return the tables of a file, at most a thousand.
-
-    Raise `RecordingError` if it cannot be read.
-    """
+    """Return the first thousand tables of a file; raise `RecordingError` if it cannot be read."""
     check_not_empty(path)
     file = file_format.load().log_file(path, NOTHING_STATED, {})
     assert isinstance(file, ArrayFile)  # the readers of these files
@@ -518,11 +507,7 @@ class ArrayTime:
         self._dated = False
 
     def seconds(self, raw: NDArray[Any]) -> NDArray[np.float64]:
-        """Return s since the first stamp of the file; NaN where the stamp is missing.
-
-        Raise `UnusableError` if dates do not fit into nanoseconds.
-        Raise `RecordingError` if the first records have no stamp.
-        """
+        """Return s since the first stamp of the file; NaN where the stamp is missing."""
         missing = np.ma.getmaskarray(raw).copy()
         values = np.ma.getdata(raw)
         self._dated = values.dtype.kind == DATE_KIND

@@ -52,9 +52,8 @@ class Hdf5File(ArrayFile):
 def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
     """Return the data sets of a file by name; only hard links are followed.
 
-    ``time_axis``: axis of time of a square matrix.
-    ``passed_over``: prefix of the names in the root group that are not data.
-    Raise `UnusableError` if there are too many objects, or groups are nested too deeply.
+    ``passed_over``: prefix of the names in the root group that are not data. Raise `UnusableError`
+    if there are too many objects, or groups are nested too deeply.
     """
     objects = 0
     seen = {_get_identity(file)}
@@ -97,10 +96,7 @@ def _get_identity(item: h5py.Group | h5py.Dataset) -> tuple[int, int]:
 
 
 class DataSet(Array):
-    """A data set, read by blocks.
-
-    ``time_axis``: See `Array`.
-    """
+    """A data set, read by blocks; ``time_axis``: see `Array`."""
 
     def __init__(self, data: h5py.Dataset, name: str, time_axis: int) -> None:
         try:

@@ -168,10 +168,7 @@ def _list_variables_of_5(path: Path) -> Iterator[Table]:
 
 
 class _Elements:
-    """Reads the elements of a variable one after another.
-
-    ``opened`` opens a new stream; ``checked``: the stream has a checksum at its end.
-    """
+    """Reads the elements of a variable; ``checked``: the stream has a checksum at its end."""
 
     def __init__(
         self,
@@ -187,10 +184,7 @@ class _Elements:
         self.kind = 0  # of the last element
 
     def tag(self, *kinds: int) -> int:
-        """Read type and size of the next element, and return its size.
-
-        The data of a small element follow in the same eight bytes.
-        """
+        """Read type and size of the next element; small data follow in the same eight bytes."""
         self._check(8)
         first = self._read(4)
         self.kind, length = struct.unpack(f"{self.order}HH", first)[:: _TAG_ORDER[self.order]]

@@ -113,9 +113,7 @@ class Array(Table):
     """A vector, a matrix with time along its longer side, or a vector of records with fields.
 
     A field that is a vector of three is the columns ``gyro[1]``, ``gyro[2]`` and ``gyro[3]``; a
-    field of a field is ``imu.gyro``.
-
-    ``time_axis``: Axis of time of a square matrix.
+    field of a field is ``imu.gyro``. ``time_axis``: axis of time of a square matrix.
     """
 
     def __init__(
@@ -207,16 +205,12 @@ _SKIP_BLOCK = 1 << 20
 
 
 class StreamedArray(Array):
-    """An array with consecutive elements in a file or in a compressed part of a file.
+    """An array (see `Array`) with consecutive elements in a file or in a compressed part of it.
 
     If a matrix is stored column by column, each column is read by a stream of its own, so that only
-    one block of each is in memory.
-
-    ``name``, ``shape``, ``dtype``, ``time_axis``: See `Array`.
-    ``fortran``: The first index varies fastest.
-    ``opened``: Opens a new stream of the bytes, which its caller closes.
-    ``offset``: Bytes before the first element.
-    ``checked``: The bytes have a checksum, which is verified at their end.
+    one block of each is in memory. ``fortran``: the first index varies fastest. ``opened``: opens a
+    new stream of the bytes, which its caller closes. ``offset``: bytes before the first element.
+    ``checked``: the bytes have a checksum, which is verified at their end.
     """
 
     def __init__(
@@ -281,10 +275,7 @@ def skip(stream: IO[bytes], size: int, *, seek: bool = True) -> None:
 
 
 def exactly(stream: IO[bytes], size: int) -> bytes:
-    """Return the next bytes of a stream.
-
-    Raise `UnusableError` if the stream ends early.
-    """
+    """Return the next bytes of a stream; raise `UnusableError` if it ends early."""
     read = stream.read(size)
     if len(read) < size:
         raise UnusableError(f"cut short: {len(read)} of {size} bytes of an array; copy it again")

@@ -71,10 +71,7 @@ class Clock:
 
 
 def clocks(table: LogTable, columns: Sequence[LogColumn]) -> list[Clock]:
-    """Return the columns that may be the time, the most plausible first.
-
-    ``columns``: columns of the table that are no channel, and vectors of the same length.
-    """
+    """Return the columns that may be the time of a table, the most plausible first."""
     likely = []
     for place, column in enumerate(columns):
         if (names := table.file_format.time_columns) and column.label not in names:

@@ -84,10 +84,7 @@ _Dumper.add_representer(str, _represent_text)
 
 
 def block(draft: Draft, file: str) -> str:
-    """Return a sensor file as YAML.
-
-    ``file``: name of the log, for the first line.
-    """
+    """Return a sensor file as YAML; ``file``: name of the log, for the first line."""
     above = (("reader", draft.reader), ("rate", draft.rate), ("time", draft.time))
     inside = [(key, entry) for key, entry in above if entry is not None]
     lines = [f"# drafted from the log {printable(file)}"]
@@ -111,10 +108,7 @@ def printable(text: str) -> str:
 
 
 def _format_entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[str]:
-    """Return the lines of entries with aligned comments.
-
-    If the lines would be too long, comments are on lines of their own above the entries.
-    """
+    """Return the lines of entries with aligned comments, or with long comments above them."""
     written = [f"{margin}{key}: {_format_value(entry.value)}" for key, entry in entries]
     comments = [printable(entry.comment) for _, entry in entries]
     behind = [len(line) for line, comment in zip(written, comments, strict=True) if comment]

@@ -77,8 +77,7 @@ class Meaning:
 def meaning(label: str, context: str = "") -> Meaning | None:
     """Return the meaning of the name of a column; None if it is not of an inertial sensor.
 
-    ``context``: name of its table or file, from which the quantity is taken if the label is an axis
-    only.
+    ``context``: name of its table or file, for a label that is an axis only.
     """
     label = label[:_MAX_LABEL_LENGTH].replace("ω", "omega").replace("Ω", "omega")
     for quantity, dimension in DIMENSIONS.items():

@@ -315,9 +315,8 @@ def explained(path: Path) -> Iterator[None]:
 
 
 def opened(path: Path) -> Source:
-    """Open a bag; its kind is recognised by its content.
+    """Open a bag, a file or the folder of a ROS 2 bag; its kind is recognised by its content.
 
-    ``path``: a file, or the folder of a ROS 2 bag.
     Raise `RecordingError` if the path cannot be opened, or is no bag.
     """
     with explained(path):
@@ -346,11 +345,7 @@ _MAX_SLOW_MESSAGES = 20
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return a table for each topic.
-
-    ``path``: a file, or the folder of a ROS 2 bag.
-    Raise `RecordingError` if it is no bag, or has no topic.
-    """
+    """Return a table for each topic; raise `RecordingError` if there is none."""
     source = opened(path)
     try:
         with explained(path):

@@ -31,10 +31,7 @@ _TIME_STRUCT = struct.Struct("<II")
 
 
 class Bag:
-    """A ROS 1 bag.
-
-    ``unclosed``: the bag was not closed, or is truncated; known after the last message.
-    """
+    """A ROS 1 bag; ``unclosed``: it was not closed, or is cut (known after the last message)."""
 
     ros_1 = True
 
@@ -48,10 +45,7 @@ class Bag:
         """Do nothing: the file is open only while messages are read."""
 
     def topics(self) -> dict[str, str]:
-        """Return the topics, and the type of message of each.
-
-        Raise `RecordingError` if this is no bag, or it is damaged.
-        """
+        """Return topics and types of messages; raise `RecordingError` if the bag is damaged."""
         # The connections are in the index; without an index, the whole bag is read.
         with self._path.open("rb") as file:
             try:
@@ -74,10 +68,7 @@ class Bag:
         return {}
 
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
-        """Yield time of recording (ns) and bytes of the messages of a topic.
-
-        Raise `RecordingError` if this is no bag, or it is damaged.
-        """
+        """Yield time of recording (ns) and bytes of the messages of a topic (see `topics`)."""
         with self._path.open("rb") as file:
             at = 0
             size = os.fstat(file.fileno()).st_size

@@ -57,10 +57,7 @@ _Reader = Reader | McapReader | Sqlite3Reader
 
 
 class Bag2:
-    """A ROS 2 bag.
-
-    ``reader``: Reader of the library, not yet opened.
-    """
+    """A ROS 2 bag, from a reader of the library that is not yet opened."""
 
     ros_1 = False
     unclosed = False
@@ -124,10 +121,7 @@ def _list_storages(reader: _Reader) -> list[Any]:
 
 
 def _check_index(storage: McapReader) -> None:
-    """Raise if the chunks expand too far, or too many bytes of chunks overlap in time.
-
-    A damaged index may name the same chunk repeatedly.
-    """
+    """Raise if the chunks expand too far or overlap in time; a damaged index may repeat one."""
     size_of_file = Path(str(storage.path)).stat().st_size
     expanded = sum(chunk.uncompressed_size for chunk in storage.chunks)
     if expanded > max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size_of_file):
@@ -146,10 +140,7 @@ def _check_index(storage: McapReader) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Raise if the metadata of a bag are too long, or a packed file expands too far.
-
-    ``path``: folder of a ROS 2 bag; a device or a named pipe in it is an error.
-    """
+    """Raise if a folder has a device or pipe, long metadata, or a file that expands too far."""
     for file in sorted(path.iterdir()):
         if not file.is_file() and not file.is_dir():
             raise RecordingError(

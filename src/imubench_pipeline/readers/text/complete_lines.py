@@ -169,10 +169,7 @@ class CompleteLines:
         return lines
 
     def zeros(self, fate: str) -> Finding | None:
-        """Return the finding about zero bytes; None if there are none.
-
-        ``fate``: text about the lines with zero bytes.
-        """
+        """Return the finding about zero bytes, if any; ``fate``: text on lines with them."""
         zeros = self._text.zeros
         total = zeros.count * self._text.letter + self._text.bytes.omitted
         return zeros.finding(self._path.name, f"line {zeros.first[1]}", total, fate)
@@ -212,10 +209,7 @@ def describe_missing_text(path: Path) -> str:
 
 
 def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
-    """Yield the lines of a text log from its beginning; the last one may lack its line break.
-
-    ``most``: approximate number of bytes to read; None: the whole file.
-    """
+    """Yield the lines of a log, the last perhaps without line break; ``most``: bytes to read."""
     with CompleteLines(path, [], most=most) as lines:
         while block := lines.read(_READ_BLOCK):
             yield from (line + b"\n" for line in block[:-1].split(b"\n"))
@@ -240,11 +234,9 @@ _TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
 class Records:
     """Removes from the lines of a file all that are no records.
 
-    ``comments``: Prefixes of comment lines.
-    ``header``: The line of names, without its line break; empty if there is none.
-    ``preamble``: The lines before the first record, which a restarted logger repeats.
-    ``runs``: Columns are separated by runs of spaces or tabs, which become one space.
-    ``blank_is_missing``: A blank line between two records is a record with one empty cell.
+    ``preamble``: the lines before the first record, which a restarted logger repeats.
+    ``runs``: columns are separated by runs of spaces or tabs, which become one space.
+    ``blank_is_missing``: a blank line between two records is a record with one empty cell.
     """
 
     def __init__(

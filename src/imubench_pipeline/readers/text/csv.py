@@ -299,11 +299,7 @@ _MAX_NOTES = 12
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return the only table of a text log, as a list.
-
-    ``path``: a file, compressed or not, or a member of a zip archive.
-    Raise `RecordingError` if it is no text, or has no records.
-    """
+    """Return the only table of a text log; raise `RecordingError` if it has no records."""
     layout = find_layout(path, NOTHING_STATED, [], [])
     before = [line.decode("utf-8", "replace") for line in layout.preamble]
     units, units_line = line_of_units(layout)

@@ -69,10 +69,7 @@ class TextLayout:
     """A blank line among the records is a record with one empty cell."""
 
     def position(self, column: Column, key: str) -> int:
-        """Return the position, from 0, of a column that the sensor file names.
-
-        Raise `RecordingError` if the file has no such column, or two with this name.
-        """
+        """Return the position, from 0, of a column; raise `RecordingError` if none, or two."""
         shown = [name[:_MAX_SHOWN_LENGTH] for name in self.names[:_MAX_SHOWN_NAMES]]
         present = ", ".join(shown) + (", ..." if len(self.names) > _MAX_SHOWN_NAMES else "")
         if isinstance(column, int):
@@ -115,12 +112,10 @@ class _Line:
 def find_layout(
     path: Path, log: LogFormat, figures: Sequence[Column], times: Sequence[Column]
 ) -> TextLayout:
-    """Return the layout of a text log.
+    """Return the layout of a text log; raise `RecordingError` if it is no text.
 
-    ``log``: the stated format.
     ``figures`` and ``times``: the required columns of numbers and of time stamps, by name or
     position. If there are none, the most plausible layout is returned.
-    Raise `RecordingError` if there is no record, or the file is no text.
     """
     return _Search(path, log, figures, times).layout()
 
@@ -409,8 +404,7 @@ _MIN_ZERO_SHARE_UTF_16 = 0.4
 
 _CONTROL_CHARACTERS = bytes({*range(1, 32)} - set(b"\t\n\r\f\x1a\x1b"))
 _MAX_CONTROLS, _MAX_CONTROL_SHARE = 4, 0.05
-"""Largest number of control characters of a text, and their largest share; one in ten random bytes
-is a control character."""
+"""Largest number and share of control characters of a text; random bytes have a share of 0.1."""
 
 _INTEGER = re.compile(r"\s*[-+]?\d+")
 

@@ -58,10 +58,7 @@ class StampError(Exception):
 
 
 class TextStamps:
-    """Reads stamps in text.
-
-    ``form``: ``iso8601`` or a ``strptime`` pattern.
-    """
+    """Reads stamps in text; ``form``: ``iso8601`` or a ``strptime`` pattern."""
 
     def __init__(self, form: str) -> None:
         pattern = _ISO_PATTERN if form == "iso8601" else _convert_to_regex(form)
@@ -75,7 +72,7 @@ class TextStamps:
         self._last: tuple[int, bool] = (0, False)
 
     def nanoseconds(self, texts: pa.Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return ns since 1970 or since midnight, and a mask of the stamps that are present.
+        """Return ns since 1970 or midnight, and a mask of the stamps that are present.
 
         Raise `StampError` if a stamp does not match the pattern and is not missing.
         """
@@ -207,9 +204,7 @@ def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
     """Return the patterns that all stamps match, the most plausible first; empty if there are none.
 
     A pattern may have a date only or a time of day only. If day and month are ambiguous, the
-    patterns with the shortest time span are returned.
-
-    ``texts``: stamps as written; missing ones are ignored.
+    patterns with the shortest time span are returned. Missing stamps are ignored.
     """
     stamps = [text.strip() for text in texts if not is_missing(text)]
     if not stamps or not all(
@@ -286,11 +281,7 @@ class TextTime:
         return 0 if self._text is None else self._text.leap_seconds
 
     def seconds(self, part: pa.RecordBatch) -> NDArray[np.float64]:
-        """Return s since the first stamp of the file; NaN where the stamp is missing.
-
-        Raise `StampError` if a stamp cannot be read.
-        Raise `RecordingError` if the first records have no stamp.
-        """
+        """Return s since the first stamp of the file, NaN where missing; raise `StampError`."""
         columns = [part.column(str(position)) for position in self.types]
         if self._text is not None:
             texts = columns[0] if len(columns) == 1 else pc.binary_join_element_wise(*columns, " ")
