@@ -14,8 +14,7 @@ from pathlib import Path
 from imubench_pipeline.tables.findings import Finding
 
 _MAX_HOLE_READ = 1 << 16
-_REPLACEMENT_ZEROS = 512
-"""Bytes: the zeros that are returned in place of a longer hole."""
+_REPLACEMENT_ZEROS = 512  # bytes: the zeros that are returned in place of a longer hole
 
 
 def next_data(descriptor: int, offset: int) -> int | None:

@@ -104,10 +104,7 @@ class Sentences:
         self._head = kind.encode() + b","
         self._commas = len(FIELDS[kind])
         self._stamped = stamped
-        self.right = 0
-        self.wrong = 0
-        self.unread = 0
-        self.garbage = 0
+        self.right = self.wrong = self.unread = self.garbage = 0
         self.others: Counter[str] = Counter()
 
     def add(self, text: bytes) -> list[Row]:

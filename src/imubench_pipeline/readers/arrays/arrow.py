@@ -168,9 +168,7 @@ def _convert_to_numpy(column: pa.Array) -> NDArray[Any]:
 #
 # A message is a FlatBuffers table: "Encapsulated message format" and ``Message.fbs`` of Arrow.
 
-_FILE_PREFIX_BYTES = 8
-"""Bytes of a file before its stream."""
-
+_FILE_PREFIX_BYTES = 8  # bytes of a file before its stream
 _FIELD_HEADER_TYPE, _FIELD_HEADER = 1, 2
 _TYPE_DICTIONARY_BATCH, _TYPE_RECORD_BATCH = 2, 3
 _FIELD_DICTIONARY_DATA = 1

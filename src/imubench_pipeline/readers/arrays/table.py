@@ -27,8 +27,7 @@ _KIND_NAMES = {
     **{"M": "dates", "m": "durations", "c": "complex numbers", "b": "truth values"},
     **{"O": "objects", "V": "raw bytes or arrays"},
 }
-_MAX_FIELD_ELEMENTS = 1024
-"""Largest number of elements of a field that become columns of their own."""
+_MAX_FIELD_ELEMENTS = 1024  # largest number of elements of a field that become columns of their own
 
 
 class UnusableError(Exception):

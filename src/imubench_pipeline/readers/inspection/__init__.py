@@ -71,9 +71,7 @@ def inspect(path: Path, model: str | None = None) -> Inspection:
         return Inspection(listing(log), block(drafted, path.name), drafted, proof(path, drafted))
 
 
-_MAX_LINES = 40
-"""Largest number of tables, and of columns of a table, that are listed."""
-
+_MAX_LINES = 40  # largest number of tables, and of columns of a table, that are listed
 _MAX_NAME_WIDTH, _MAX_VALUES_WIDTH = 44, 60
 _NOT_STATED = "-"
 

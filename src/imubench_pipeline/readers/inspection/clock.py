@@ -28,13 +28,9 @@ _COUNTER_WORDS = frozenset(
      "sequence", "n", "no", "nr", "packet", "row", "record", "id", "num", "number")
 )  # fmt: skip
 _XSENS_TICKS, _XSENS_PACKETS = "sampletimefine", "packetcounter"
-_PLAUSIBLE_RATES = (10.0, 5000.0)
-"""Plausible sampling rates, Hz, for guessing the unit of a clock."""
-
+_PLAUSIBLE_RATES = (10.0, 5000.0)  # plausible sampling rates, Hz, for guessing the unit of a clock
 _MAX_COUNTER_STEP, _MAX_COUNT = 1e6, 2.0**63
-_STEP_RANGE = (1e-9, 1e15)
-"""Range of the steps of stamps, in any unit."""
-
+_STEP_RANGE = (1e-9, 1e15)  # range of the steps of stamps, in any unit
 _WRAP_CANDIDATES = (
     *(1 << bits for bits in (8, 16, 24, 32, 40, 48)),
     *(
@@ -49,9 +45,7 @@ _MAX_STEP_SCATTER, _MIN_EQUAL_STEPS, _MAX_PAUSES = 0.6, 0.8, 0.02
 """Largest relative deviation of a step from the median, least share of such steps, and largest
 share of pauses, for steps that count as equal."""
 
-_RATE_TOLERANCE = 0.1
-"""Largest relative difference of a guessed rate and the stated one."""
-
+_RATE_TOLERANCE = 0.1  # largest relative difference of a guessed rate and the stated one
 _SECONDS_PER_UNIT = {"min": 60, "h": 3600}
 _UNIT_HINT = "the file does not say: s, ms, us or ns?"
 _RATE_HINT = "the file does not say: such as 100 Hz"

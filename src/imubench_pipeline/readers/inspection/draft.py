@@ -35,13 +35,15 @@ class Draft:
     left_over: list[str] = field(default_factory=list)
     """Remarks about columns that are not used, for the user to complete the file."""
 
+    @property
+    def known(self) -> list[tuple[str, Entry]]:
+        """The entries under ``log``, except for columns, that the log determines."""
+        entries = ("reader", self.reader), ("rate", self.rate), ("time", self.time)
+        return [(key, entry) for key, entry in entries if entry is not None]
+
     def log(self) -> dict[str, Any]:
         """Return the values under ``log``."""
-        entries = {
-            key: entry.value
-            for key, entry in (("reader", self.reader), ("rate", self.rate), ("time", self.time))
-            if entry is not None
-        }
+        entries = {key: entry.value for key, entry in self.known}
         entries["channels"] = {name: dict(entry.value) for name, entry in self.channels.items()}
         if self.temperature is not None:
             entries["temperature"] = dict(self.temperature.value)
@@ -85,11 +87,9 @@ _Dumper.add_representer(str, _represent_text)
 
 def block(draft: Draft, file: str) -> str:
     """Return a sensor file as YAML; ``file``: name of the log, for the first line."""
-    above = (("reader", draft.reader), ("rate", draft.rate), ("time", draft.time))
-    inside = [(key, entry) for key, entry in above if entry is not None]
     lines = [f"# drafted from the log {printable(file)}"]
     lines += _format_entries([("vendor", draft.vendor), ("model", draft.model)], "")
-    lines += ["log:", *_format_entries(inside, "  "), "  channels:"]
+    lines += ["log:", *_format_entries(draft.known, "  "), "  channels:"]
     lines += _format_entries(list(draft.channels.items()), "    ")
     if draft.temperature is not None:
         lines += _format_entries([("temperature", draft.temperature)], "  ")

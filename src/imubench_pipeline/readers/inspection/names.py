@@ -45,16 +45,10 @@ _DERIVED_WORDS = frozenset(
 )
 _LINEAR_ACCELERATION = re.compile(r"lin(?:ear)?acc")
 _SHORT_NAMES: dict[str, tuple[Quantity, int]] = {
-    "w": ("gyro", PLAIN),
-    "om": ("gyro", PLAIN),
-    "av": ("gyro", PLAIN),
-    "rate": ("gyro", WEAK),
-    "rates": ("gyro", WEAK),
-    "g": ("gyro", WEAK),
-    "a": ("accel", PLAIN),
-    "f": ("accel", WEAK),
-    "sf": ("accel", WEAK),
-    "gf": ("accel", PLAIN),
+    **dict.fromkeys(("w", "om", "av"), ("gyro", PLAIN)),
+    **dict.fromkeys(("rate", "rates", "g"), ("gyro", WEAK)),
+    **dict.fromkeys(("a", "gf"), ("accel", PLAIN)),
+    **dict.fromkeys(("f", "sf"), ("accel", WEAK)),
 }
 """Short names, which must be a complete word."""
 

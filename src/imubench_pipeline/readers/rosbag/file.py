@@ -340,8 +340,7 @@ def opened(path: Path) -> Source:
             ) from None
 
 
-_MAX_SLOW_MESSAGES = 20
-"""Largest number of messages of a slow topic that are examined."""
+_MAX_SLOW_MESSAGES = 20  # largest number of messages of a slow topic that are examined
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:

@@ -399,9 +399,7 @@ def _decode(raw: bytes) -> str:
 _MARKUP_PREFIXES = (b"<!doctype", b"<html", b"<head", b"<?xml", b"<svg")
 _JSON_PREFIXES = (b'{"', b"[{", b"[[", b"{'")
 _JSON_BRACKETS = (b"{", b"[")
-_MIN_ZERO_SHARE_UTF_16 = 0.4
-"""Least share of zero bytes of a line of UTF-16."""
-
+_MIN_ZERO_SHARE_UTF_16 = 0.4  # least share of zero bytes of a line of UTF-16
 _CONTROL_CHARACTERS = bytes({*range(1, 32)} - set(b"\t\n\r\f\x1a\x1b"))
 _MAX_CONTROLS, _MAX_CONTROL_SHARE = 4, 0.05
 """Largest number and share of control characters of a text; random bytes have a share of 0.1."""

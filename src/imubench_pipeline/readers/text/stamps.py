@@ -30,21 +30,12 @@ _ISO_PATTERN = (
     r"(?::(?P<S>\d\d)(?:[.,](?P<f>\d{1,9})\d*)?)?\s*(?P<z>Z|UTC|[+-]\d\d(?::?\d\d)?)?)?"
 )
 _FIELD_PATTERNS: Mapping[str, str] = {
-    "Y": r"(?P<Y>\d{4})",
-    "y": r"(?P<y>\d\d)",
-    "m": r"(?P<m>\d{1,2})",
-    "b": r"(?P<b>[A-Za-z]{3})",
-    "d": r"(?P<d>\d{1,2})",
-    "j": r"(?P<j>\d{1,3})",
-    "H": r"(?P<H>\d{1,2})",
-    "I": r"(?P<I>\d{1,2})",
-    "p": r"(?P<p>[AaPp][Mm])",
-    "M": r"(?P<M>\d{1,2})",
-    "S": r"(?P<S>\d{1,2})",
-    "f": r"(?P<f>\d{1,9})\d*",
+    "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d\d)", "m": r"(?P<m>\d{1,2})", "b": r"(?P<b>[A-Za-z]{3})",
+    "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})", "H": r"(?P<H>\d{1,2})",
+    "I": r"(?P<I>\d{1,2})", "p": r"(?P<p>[AaPp][Mm])", "M": r"(?P<M>\d{1,2})",
+    "S": r"(?P<S>\d{1,2})", "f": r"(?P<f>\d{1,9})\d*", "%": "%",
     "z": r"(?P<z>Z|UTC|[+-]\d\d(?::?\d\d)?)",
-    "%": "%",
-}
+}  # fmt: skip
 _MONTH_NAMES = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 
 
