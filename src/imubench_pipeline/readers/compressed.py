@@ -396,7 +396,6 @@ class _Archive(io.FileIO):
         self.most: int | None = MAX_DIRECTORY
 
     def read(self, size: int | None = -1) -> bytes:
-        """Return the next bytes."""
         if self.most is not None and size is not None and size > self.most:
             raise RecordingError(
                 f"{self._shown}: the directory of the archive has {size} bytes, which are some "

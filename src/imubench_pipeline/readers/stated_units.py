@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, ColumnSource, quantity_of
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, quantity_of
 from imubench_pipeline.units import UnitError, conversion
 
 _MAX_UNIT_LENGTH = 24
@@ -94,10 +92,6 @@ def bracketed(label: str) -> list[str]:
     return [text for text in _BRACKETED.findall(label) if text.strip() and not text.isdigit()]
 
 
-_MIN_FACTOR_OF_OTHER_UNIT = 1.5
-"""Least ratio of two different units. The ratio of mg and cm/s² is 1.02, but no logger uses both;
-the next one, of mrad/s and °/s, is 17. Smaller ratios may be a calibration in ``scale``."""
-
 _MAX_SHOWN_NAME = 60
 
 
@@ -124,25 +118,3 @@ def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit
         return StatedUnit(unit, where)
     unit = unit_of(label, dimension) or divided(label, dimension)[1]
     return None if unit is None else StatedUnit(unit, f"the name {label[:_MAX_SHOWN_NAME]!r}")
-
-
-def contradictions(
-    file: str, sources: Mapping[str, ColumnSource], units: Mapping[str, StatedUnit]
-) -> list[Finding]:
-    """Return findings on channels whose units in the log (``units``) and sensor file differ."""
-    findings = []
-    for channel, in_log in units.items():
-        source = sources[channel]
-        dimension = QUANTITIES[quantity_of(channel)]
-        read = conversion(source.unit, dimension)[0] * abs(source.scale)
-        factor = conversion(in_log.unit, dimension)[0] / read
-        if 1.0 / _MIN_FACTOR_OF_OTHER_UNIT < factor < _MIN_FACTOR_OF_OTHER_UNIT:
-            continue
-        scaled = "" if source.scale == 1 else f", times {source.scale:g}"
-        detail = (
-            f"{file} states {in_log.unit} for {channel} ({in_log.where}), the sensor file "
-            f"{source.unit}{scaled} (log.channels.{channel}.unit), which is used; if the log is "
-            f"right, the figures are to be multiplied by {factor:.5g}: mend the one that is wrong"
-        )
-        findings.append(Finding("unit_contradicts", "warning", detail, factor, channel))
-    return findings

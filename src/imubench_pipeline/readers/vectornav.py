@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from binascii import crc_hqx
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -131,7 +131,12 @@ class Sentences:
         for good, before, body in zip(right, befores, bodies, strict=True):
             if good and body.startswith(self._head):
                 self.right += 1
-                rows.append(self._row(before, body))
+                row = Row(before, body[len(self._head) :])
+                more = body.count(b",") != self._commas
+                if more and (appended := _APPENDED_FIELDS.search(row.body)) is not None:
+                    row.counter = appended[1] or b""
+                    row.body = row.body[: appended.start()]
+                rows.append(row)
             elif good:
                 name = _take_name(body)
                 many = len(self.others) >= _MAX_OTHER_NAMES and name not in self.others
@@ -149,15 +154,6 @@ class Sentences:
         name = _take_name(body)
         other = name in self.others or name in FIELDS
         return not other and body.count(b",") == self._commas
-
-    def _row(self, before: bytes, body: bytes) -> Row:
-        row = Row(before, body[len(self._head) :])
-        if body.count(b",") != self._commas:
-            appended = _APPENDED_FIELDS.search(row.body)
-            if appended is not None:
-                row.counter = appended[1] or b""
-                row.body = row.body[: appended.start()]
-        return row
 
 
 def _take_name(body: bytes) -> str:
@@ -376,15 +372,18 @@ class VectorNavFile(LogFile):
             texts = [row.counter for row in rows]
         else:
             texts = [row.before.strip(STAMP_PADDING) for row in rows]
-        if self.log.time.format == "iso8601":
-            return _parse_dates(texts)
-        whole = self.log.time.unit == "ns" or self.log.time.column == COUNTER
+        is_date = self.log.time.format == "iso8601"
+        whole = is_date or self.log.time.unit == "ns" or self.log.time.column == COUNTER
         # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
         stamps = np.zeros(len(texts), np.int64 if whole else np.float64)
         missing = np.zeros(len(texts), bool)
         for number, text in enumerate(texts):
             try:
-                stamps[number] = int(text) if whole else float(text)
+                if is_date:  # ns since 1970 (UTC)
+                    kind = pa.timestamp("ns", "UTC" if _ZONE_SUFFIX.search(text) else None)
+                    stamps[number] = pa.scalar(text.decode("ascii")).cast(kind).value
+                else:
+                    stamps[number] = int(text) if whole else float(text)
             except (ValueError, OverflowError):
                 missing[number] = True
         if not whole:
@@ -426,20 +425,6 @@ class VectorNavFile(LogFile):
 
 def _join_names(names: Iterable[str]) -> str:
     return ", ".join(name[:_MAX_SHOWN_NAME] for name in sorted(names)[:_MAX_LISTED_NAMES])
-
-
-def _parse_dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return ISO 8601 stamps as ns since 1970 (UTC), and a mask of the unreadable ones."""
-    stamps = np.zeros(len(texts), np.int64)
-    missing = np.zeros(len(texts), bool)
-    for number, text in enumerate(texts):
-        zone = "UTC" if _ZONE_SUFFIX.search(text) else None
-        try:
-            date = pa.scalar(text.decode("ascii")).cast(pa.timestamp("ns", zone))
-            stamps[number] = date.value
-        except (pa.ArrowInvalid, UnicodeDecodeError):
-            missing[number] = True
-    return stamps, missing
 
 
 _MAX_DESCRIBED_BYTES = 1 << 21  # bytes

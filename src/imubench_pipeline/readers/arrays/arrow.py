@@ -77,7 +77,6 @@ class _ArrowTable(Table):
             self.fault = "has no column"
 
     def column(self, position: int) -> Column:
-        """Return a column by its position, counted from 0."""
         kind = stored = self.schema.field(position).type
         if pa.types.is_dictionary(kind):
             kind = kind.value_type
@@ -89,17 +88,14 @@ class _ArrowTable(Table):
         return Column(self.labels[position], numpy_kind, str(stored))
 
     def unit(self, position: int) -> str | None:
-        """Return the unit of a column, if its metadata state it."""
         stated = self.schema.field(position).metadata or {}
         unit = next((stated[key] for key in (b"unit", b"units") if key in stated), b"")
         return unit.decode("utf-8", "replace") or None
 
     def row_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory per record for reading these columns, bytes."""
         return 8 * len(positions)
 
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
-        """Yield these columns, ``rows`` records at a time or fewer (see `Table.blocks`)."""
         # Columns with the same name are all read.
         same = [self.labels[:position].count(self.labels[position]) for position in positions]
         names = [self.labels[position] for position in positions]

@@ -90,7 +90,6 @@ def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> l
 
 
 def _get_identity(item: h5py.Group | h5py.Dataset) -> tuple[int, int]:
-    """Return the unique identity of an object in its file."""
     info = h5py.h5o.get_info(item.id)
     return info.fileno, info.addr
 

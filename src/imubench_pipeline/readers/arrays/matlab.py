@@ -212,7 +212,6 @@ class _Elements:
         self.skip(-(self.at - begin) % 8)
 
     def skip(self, size: int) -> None:
-        """Skip data."""
         skip(self._stream, size)
         self.at += size
 
@@ -305,11 +304,9 @@ class _Inflated(io.RawIOBase):
 
     @classmethod
     def opened(cls, path: Path, start: int, length: int) -> IO[bytes]:
-        """Open the data for buffered reading."""
         return io.BufferedReader(cls(path, start, length), _READ_BLOCK)
 
     def readable(self) -> bool:
-        """Return True: the stream can be read."""
         return True
 
     def readinto(self, buffer: object) -> int:
@@ -331,7 +328,6 @@ class _Inflated(io.RawIOBase):
         return 0
 
     def close(self) -> None:
-        """Close the file."""
         self._file.close()
         super().close()
 

@@ -188,7 +188,6 @@ def _fill_placeholders(log: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_first_records(file: LogFile) -> _FirstRecords:
-    """Read the first batches of a file."""
     parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in file.sources}
     times: list[NDArray[np.float64]] = []
     rows = 0
@@ -230,7 +229,6 @@ def _describe_rate(files: list[_FirstRecords], draft: Draft) -> str:
 
 
 def _describe_vectors(files: list[_FirstRecords], unfilled: list[str]) -> list[str]:
-    """Describe the lengths of the mean vectors of gyro and accelerometer."""
     means = {
         name: float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
         for file in files

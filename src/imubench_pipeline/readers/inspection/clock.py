@@ -124,11 +124,15 @@ def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
         not _TIME_WORDS.intersection(words) and _COUNTER_WORDS.intersection(words)
     ):
         return _recognise_counter(column, value, joined == _XSENS_PACKETS)
-    unit, scale = _find_stated_unit(column)
+    unit = unit_of(column.unit or "", "time") or divided(column.label, "time")[1]
+    if unit is None:
+        units = [unit_of(word, "time") for word in words if len(word) > 1]
+        unit = next((word for word in reversed(units) if word), None)
+    scale = _SECONDS_PER_UNIT.get(unit or "", 1)
     wrap = _guess_wrap(column.values)
     again = {} if wrap is None else {"wraps": wrap}
     if unit is not None:
-        value["unit"] = unit
+        value["unit"] = "s" if scale != 1 else unit
         if scale != 1:
             value["scale"] = scale
         comment = "'wraps' is guessed from the stamps" if again else ""
@@ -173,17 +177,6 @@ def _recognise_xsens_ticks(column: LogColumn) -> Clock:
     rate = "" if step is None else f", {(1e6 if in_microseconds else 1e4) / step:.5g} Hz"
     tick = "1 us" if in_microseconds else "0.1 ms"
     return Clock(column, Entry(value, f"ticks of {tick}{rate}"), False, (0, 0))
-
-
-def _find_stated_unit(column: LogColumn) -> tuple[str | None, float]:
-    """Return the unit that the file states (s, ms, us or ns; None: none), and a scale factor."""
-    unit = unit_of(column.unit or "", "time")
-    if unit is None:
-        unit = divided(column.label, "time")[1]
-    if unit is None:
-        words = [unit_of(word, "time") for word in words_of(column.label) if len(word) > 1]
-        unit = next((word for word in reversed(words) if word), None)
-    return ("s", _SECONDS_PER_UNIT[unit]) if unit in _SECONDS_PER_UNIT else (unit, 1)
 
 
 def _guess_unit(values: NDArray[np.float64], rate: float | None) -> tuple[str, str]:

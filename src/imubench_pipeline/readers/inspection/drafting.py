@@ -394,7 +394,6 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
 
 
 def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> dict[str, Any]:
-    """Return the values of a sensor file that select a column."""
     source: dict[str, Any] = {}
     if table.file is not None and not alone:
         source["file"] = table.file
@@ -404,7 +403,6 @@ def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool)
 
 
 def _add_group(drafted: Draft, group: Group, alone: bool) -> None:
-    """Add the axes of a group to a draft."""
     unit, comment = group.unit, ""
     if unit is None and group.quantity == "accel":
         unit, comment = _guess_acceleration_unit(group)

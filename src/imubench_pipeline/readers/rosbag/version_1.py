@@ -162,7 +162,6 @@ class Bag:
 
 
 def _get_connection(header: dict[bytes, bytes]) -> int:
-    """Return the number of the connection of a record."""
     (number,) = _UINT32.unpack(header[b"conn"])
     return int(number)
 

@@ -113,7 +113,6 @@ class Bag2:
 
 
 def _list_storages(reader: _Reader) -> list[Any]:
-    """Return the readers of the files of a bag."""
     if not isinstance(reader, Reader):
         return [reader]
     storage = reader.storage

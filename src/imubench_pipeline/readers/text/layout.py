@@ -306,7 +306,16 @@ class _Search:
         width = widths.most_common(1)[0][0] if widths else 0
         first = next((index for index in alike if len(rows[index]) == width), 1)
         if not self._wanted:
-            return self._likely_header(split, comments, lines[: first + 1] if alike else []), first
+            if not alike:
+                raise RecordingError(
+                    f"{self._file}: no line of figures; expected the text of a log"
+                )
+            record = rows[first]
+            near = [line for line in comments if line.number < lines[first].number] + lines[:first]
+            place = likely_header(
+                [completed(self._names_in(split, line, len(record)), record) for line in near]
+            )
+            return (None if place is None else near[place]), first
         if self._names:
             wanted = set(self._names)
             candidates = [*lines, *reversed(comments)]
@@ -336,18 +345,6 @@ class _Search:
         if header is None and (first > 0 or self._names):
             header = lines[max(first - 1, 0)]
         return header, first
-
-    def _likely_header(
-        self, split: Split, comments: list[_Line], lines: list[_Line]
-    ) -> _Line | None:
-        """Return the line of names before the first record, which is the last of the lines."""
-        if not lines:
-            raise RecordingError(f"{self._file}: no line of figures; expected the text of a log")
-        record = split.cells(lines[-1].text)
-        near = [line for line in comments if line.number < lines[-1].number] + lines[:-1]
-        named = [completed(self._names_in(split, line, len(record)), record) for line in near]
-        place = likely_header(named)
-        return None if place is None else near[place]
 
     def _is_record(self, row: list[str]) -> bool:
         """Return whether a line may be a record: numbers in the required columns, or in most."""

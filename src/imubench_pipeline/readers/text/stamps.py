@@ -151,7 +151,6 @@ class TextStamps:
 
 
 def _convert_to_regex(form: str) -> str:
-    """Return the regular expression of a ``strptime`` pattern."""
     form = form.replace("%T", "%H:%M:%S").replace("%F", "%Y-%m-%d").replace("%R", "%H:%M")
     expression = ""
     for part in re.findall(r"[.,]%f|%.|\s+|[^%\s]", form):
