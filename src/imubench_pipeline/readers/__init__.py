@@ -23,18 +23,7 @@ from imubench_pipeline.settings.sensor import (
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
-__all__ = [
-    "POSITION",
-    "TABLE_RATE",
-    "TEMPERATURE",
-    "Batch",
-    "LogFile",
-    "RecordingError",
-    "is_endless",
-    "log_files",
-    "only_log",
-    "read",
-]
+__all__ = ["Batch", "LogFile", "RecordingError", "is_endless", "log_files", "only_log", "read"]
 
 
 def log_files(path: Path) -> list[Path]:

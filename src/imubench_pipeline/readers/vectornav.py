@@ -137,27 +137,20 @@ class Sentences:
                     row.counter = appended[1] or b""
                     row.body = row.body[: appended.start()]
                 rows.append(row)
-            elif good:
-                name = _take_name(body)
+                continue
+            name = body[:_MAX_SENTENCE_NAME].partition(b",")[0].decode("ascii", "replace")
+            # A damaged name: the sentence has the right width, and the name is unknown.
+            unknown = name not in self.others and name not in FIELDS
+            if good:
                 many = len(self.others) >= _MAX_OTHER_NAMES and name not in self.others
                 self.others["..." if many else name] += 1
-            elif body.startswith(self._head) or self._damaged_name(body):
+            elif body.startswith(self._head) or (unknown and body.count(b",") == self._commas):
                 self.wrong += 1
                 if not self._stamped:
                     rows.append(Row(b"", b""))
             else:
                 self.garbage += 1
         return rows
-
-    def _damaged_name(self, body: bytes) -> bool:
-        """Return whether this is a damaged sentence of our kind: right width, unknown name."""
-        name = _take_name(body)
-        other = name in self.others or name in FIELDS
-        return not other and body.count(b",") == self._commas
-
-
-def _take_name(body: bytes) -> str:
-    return body[:_MAX_SENTENCE_NAME].partition(b",")[0].decode("ascii", "replace")
 
 
 def position_of(kind: str, column: str | int) -> int:

@@ -207,7 +207,12 @@ class _Search:
                 self._skipped.append(raw.rstrip(b"\r\n"))
             if number <= self._log.skip_lines or not raw.strip(b"\0 \t\r\n"):
                 continue
-            line = _Line(number, here, raw.rstrip(b"\r\n"), _decode(raw.rstrip(b"\r\n")))
+            stripped = raw.rstrip(b"\r\n")
+            try:
+                text = stripped.decode()
+            except UnicodeDecodeError:
+                text = stripped.decode("latin-1")
+            line = _Line(number, here, stripped, text)
             if line.text.startswith(signs):
                 comments.append(line)
                 comment_bytes += len(line.raw)
@@ -383,14 +388,6 @@ class _Search:
             if commas or points:
                 return "," if commas > points else "."
         return "."
-
-
-def _decode(raw: bytes) -> str:
-    """Decode text as UTF-8, or else as Latin-1."""
-    try:
-        return raw.decode()
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
 
 
 _MARKUP_PREFIXES = (b"<!doctype", b"<html", b"<head", b"<?xml", b"<svg")
