@@ -159,7 +159,14 @@ def proof(path: Path, draft: Draft) -> Proof:
     try:
         if not unfilled:
             parse(Sensor, draft.sensor(), "the sensor file")
-        log = parse(LogFormat, _fill_placeholders(draft.log()), "log")
+        filled: dict[str, Any] = {
+            key: _STAND_IN_RATE if entry == UNKNOWN else entry for key, entry in draft.log().items()
+        }
+        for holder in (filled, filled["channels"]):
+            for key, entry in holder.items():
+                if isinstance(entry, dict) and entry.get("unit") == UNKNOWN:
+                    holder[key] = entry | {"unit": _STAND_IN_UNITS[key[:4]]}
+        log = parse(LogFormat, filled, "log")
         files = [_read_first_records(file) for file in read(path, log)]
     except (RecordingError, ConfigError) as error:
         return Proof(False, printable(f"not read so: {error}"))
@@ -173,18 +180,6 @@ def proof(path: Path, draft: Draft) -> Proof:
         remarks.append(f"from {started[:19]} on")
     rest = f"; left to fill in: {_list_keys(unfilled)}" if unfilled else ""
     return Proof(True, "read so: " + ", ".join(remarks) + rest)
-
-
-def _fill_placeholders(log: dict[str, Any]) -> dict[str, Any]:
-    """Return a log format with arbitrary values in place of the missing ones."""
-    filled: dict[str, Any] = {
-        key: _STAND_IN_RATE if entry == UNKNOWN else entry for key, entry in log.items()
-    }
-    for holder in (filled, filled["channels"]):
-        for key, entry in holder.items():
-            if isinstance(entry, dict) and entry.get("unit") == UNKNOWN:
-                holder[key] = entry | {"unit": _STAND_IN_UNITS[key[:4]]}
-    return filled
 
 
 def _read_first_records(file: LogFile) -> _FirstRecords:

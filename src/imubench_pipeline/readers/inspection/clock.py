@@ -48,7 +48,6 @@ share of pauses, for steps that count as equal."""
 _RATE_TOLERANCE = 0.1  # largest relative difference of a guessed rate and the stated one
 _SECONDS_PER_UNIT = {"min": 60, "h": 3600}
 _UNIT_HINT = "the file does not say: s, ms, us or ns?"
-_RATE_HINT = "the file does not say: such as 100 Hz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +75,6 @@ def clocks(table: LogTable, columns: Sequence[LogColumn]) -> list[Clock]:
             counts_alone = clock.counts and table.rate is None
             likely.append(replace(clock, order=(*clock.order, int(counts_alone), place)))
     return sorted(likely, key=lambda clock: clock.order)
-
-
-def rate_entry(table: LogTable | None) -> Entry:
-    """Return the entry ``rate`` of a sensor file for a log without stamps."""
-    if table is None or table.rate is None:
-        return Entry(UNKNOWN, _RATE_HINT)
-    return Entry(f"{table.rate:.10g} Hz", "stated in the file")
 
 
 def _get_source(column: LogColumn) -> str | int:

@@ -13,7 +13,7 @@ import numpy as np
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.readers.contents import Contents
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
-from imubench_pipeline.readers.inspection.clock import Clock, advances, clocks, rate_entry
+from imubench_pipeline.readers.inspection.clock import Clock, advances, clocks
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, Entry
 from imubench_pipeline.readers.inspection.names import (
     DERIVED,
@@ -218,11 +218,6 @@ class Choice:
     unknown: list[LogColumn]
     """Number columns of the used tables that were not recognised."""
 
-    @property
-    def selected(self) -> list[Group]:
-        """The groups that are used."""
-        return [g for g in (self.gyro, self.accel, self.temperature) if g is not None]
-
 
 def chosen(contents: Contents) -> Choice:
     """Choose the channels, the temperature and the time of a recording."""
@@ -376,9 +371,12 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
         drafted.time = Entry(value, choice.clock.entry.comment)
     if choice.clock is None or choice.clock.counts:
         stating = (table for table in contents.tables if table.rate is not None)
-        drafted.rate = rate_entry(choice.anchor or next(stating, None))
-    files = {group.table.file for group in choice.selected}
-    alone = len(files) == 1 and files == {contents.only}
+        drafted.rate = Entry(UNKNOWN, "the file does not say: such as 100 Hz")
+        table = choice.anchor or next(stating, None)
+        if table is not None and table.rate is not None:
+            drafted.rate = Entry(f"{table.rate:.10g} Hz", "stated in the file")
+    selected = (choice.gyro, choice.accel, choice.temperature)
+    alone = {group.table.file for group in selected if group is not None} == {contents.only}
     for group in (choice.gyro, choice.accel):
         if group is not None:
             _add_group(drafted, group, alone)
