@@ -232,7 +232,7 @@ def chosen(contents: Contents) -> Choice:
         anchor = next((table for table in contents.tables if table.columns), None)
     in_groups = {id(column) for group in recognised for column in group.columns.values()}
 
-    def find_clocks(table: LogTable) -> list[Clock]:
+    def find_table_clocks(table: LogTable) -> list[Clock]:
         """Return the columns that may be the time of a table, the most plausible first."""
         columns = list(table.columns)
         if table.file_format.clock_of == "length":
@@ -241,8 +241,8 @@ def chosen(contents: Contents) -> Choice:
                     columns += other.columns
         return clocks(table, [column for column in columns if id(column) not in in_groups])
 
-    ours = [] if anchor is None else find_clocks(anchor)
-    others = {id(g.table): find_clocks(g.table) for g in able}
+    ours = [] if anchor is None else find_table_clocks(anchor)
+    others = {id(g.table): find_table_clocks(g.table) for g in able}
     rest = [others[id(g.table)] for g in able if anchor is not g.table]
 
     def count_shared(clock: Clock) -> int:

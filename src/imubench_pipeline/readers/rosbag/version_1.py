@@ -144,7 +144,7 @@ class Bag:
         self, header: dict[bytes, bytes], data: bytes, topic: str
     ) -> Iterator[tuple[int, bytes]]:
         if header[b"op"] == _OP_MESSAGE:
-            if self._connections[_get_connection(header)][0] == topic:
+            if self._connections[_UINT32.unpack(header[b"conn"])[0]][0] == topic:
                 seconds, nanoseconds = _TIME_STRUCT.unpack(header[b"time"])
                 yield seconds * 10**9 + nanoseconds, data if len(data) <= MAX_MESSAGE else b""
         elif header[b"op"] == _OP_CONNECTION:
@@ -158,12 +158,7 @@ class Bag:
         if len(self._connections) >= MAX_TOPICS:
             raise ValueError(f"more than {MAX_TOPICS} connections, expected those of a vehicle")
         # The name of the same type in ROS 2.
-        self._connections[_get_connection(header)] = topic, kind.replace("/", "/msg/", 1)
-
-
-def _get_connection(header: dict[bytes, bytes]) -> int:
-    (number,) = _UINT32.unpack(header[b"conn"])
-    return int(number)
+        self._connections[_UINT32.unpack(header[b"conn"])[0]] = topic, kind.replace("/", "/msg/", 1)
 
 
 class _TruncatedError(Exception):

@@ -249,8 +249,7 @@ class Records:
     ) -> None:
         self._comments = tuple(comments)
         alternatives = b"|".join(re.escape(sign) for sign in self._comments)
-        # A pattern that begins with the line break is five times as fast as one that begins with
-        # ^.
+        # A pattern that begins with the line break is five times as fast as one with ^.
         self._comment_lines = re.compile(
             rb"\n" + _NOT_A_COMMENT + rb"(?:" + alternatives + rb")[^\n]*"
         )
