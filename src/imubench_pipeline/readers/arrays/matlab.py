@@ -13,6 +13,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import IO
@@ -167,21 +168,17 @@ def _list_variables_of_5(path: Path) -> Iterator[Table]:
             start = end
 
 
+@dataclass
 class _Elements:
     """Reads the elements of a variable; ``checked``: the stream has a checksum at its end."""
 
-    def __init__(
-        self,
-        stream: IO[bytes],
-        order: str,
-        at: int,
-        end: int,
-        opened: Callable[[], IO[bytes]],
-        checked: bool,
-    ) -> None:
-        self.order, self.opened, self.checked, self._stream = order, opened, checked, stream
-        self.at, self.end = at, end  # bytes from the beginning; end of the enclosing element
-        self.kind = 0  # of the last element
+    stream: IO[bytes]
+    order: str
+    at: int  # bytes from the beginning
+    end: int  # end of the enclosing element
+    opened: Callable[[], IO[bytes]]
+    checked: bool
+    kind: int = 0  # type of the last element
 
     def tag(self, *kinds: int) -> int:
         """Read type and size of the next element; small data follow in the same eight bytes."""
@@ -204,20 +201,16 @@ class _Elements:
         if length > _MAX_ELEMENT_HEADER:
             raise _make_damaged_error(f"{length} bytes of sides or names", self.at)
         read = self._read(length)
-        self.pad(begin)
+        self.skip(-(self.at - begin) % 8)  # the next element begins at a multiple of eight bytes
         return read
 
-    def pad(self, begin: int) -> None:
-        """Skip the padding to a multiple of eight bytes before the next element."""
-        self.skip(-(self.at - begin) % 8)
-
     def skip(self, size: int) -> None:
-        skip(self._stream, size)
+        skip(self.stream, size)
         self.at += size
 
     def _read(self, size: int) -> bytes:
         self.at += size
-        return exactly(self._stream, size)
+        return exactly(self.stream, size)
 
     def _check(self, length: int) -> None:
         if self.at + length > self.end:
