@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import unicodedata
-from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -24,18 +23,7 @@ from imubench_pipeline.settings.sensor import (
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
-__all__ = [
-    "POSITION",
-    "TABLE_RATE",
-    "TEMPERATURE",
-    "Batch",
-    "LogFile",
-    "RecordingError",
-    "is_endless",
-    "log_files",
-    "only_log",
-    "read",
-]
+__all__ = ["Batch", "LogFile", "RecordingError", "is_endless", "log_files", "only_log", "read"]
 
 
 def log_files(path: Path) -> list[Path]:
@@ -49,30 +37,22 @@ def log_files(path: Path) -> list[Path]:
         If the path is a device or a named pipe, which may never end, or if a folder cannot be
         listed.
     """
-    if path.is_dir():
-        return sorted(
-            file for file in _walk_files(path) if visible(file.relative_to(path)) and _is_file(file)
-        )
     if is_endless(path):
         raise OSError(errno.EINVAL, "it is neither a file nor a folder")
-    return [path]
-
-
-def _walk_files(folder: Path) -> Iterator[Path]:
-    """Yield the files of a folder and its subfolders."""
-    waiting = [folder]
+    if not path.is_dir():
+        return [path]
+    files, waiting = [], [path]
     while waiting:
         with os.scandir(waiting.pop()) as entries:
             for entry in entries:
-                if not entry.is_dir(follow_symlinks=False):
-                    yield Path(entry.path)
-                elif visible(Path(entry.name)):
-                    waiting.append(Path(entry.path))
-
-
-def _is_file(path: Path) -> bool:
-    """Return whether a path is a regular file, or a link to a file that may be missing."""
-    return path.is_file() or (path.is_symlink() and not path.exists())
+                file = Path(entry.path)
+                if not visible(Path(entry.name)):
+                    continue
+                if entry.is_dir(follow_symlinks=False):
+                    waiting.append(file)
+                elif file.is_file() or (file.is_symlink() and not file.exists()):
+                    files.append(file)
+    return sorted(files)
 
 
 def read(path: Path, log: LogFormat) -> list[LogFile]:
@@ -101,26 +81,24 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     # In a fixed order, independent of the sensor file, so that findings and columns are too.
     channels = sorted(log.channels, key=CHANNELS.index)
     sources = {str(name): log.channels[name] for name in channels}
-    if log.temperature is not None:
-        sources[TEMPERATURE] = log.temperature
-    if log.position is not None:
-        sources[POSITION] = log.position
-    if log.table_rate is not None:
-        sources[TABLE_RATE] = log.table_rate
+    others = {TEMPERATURE: log.temperature, POSITION: log.position, TABLE_RATE: log.table_rate}
+    sources |= {name: source for name, source in others.items() if source is not None}
     present = _list_present(path, log)
     together: dict[tuple[Path, str], dict[str, ColumnSource]] = {}
     for name, source in sources.items():
         file = _find_file(path, present, source, name)
-        together.setdefault((file, _find_clock(file, log, source)), {})[name] = source
-    in_order = sorted(together.items(), key=lambda item: item[0])
-    return [_open(file, log, columns) for (file, _), columns in in_order]
-
-
-def _find_clock(file: Path, log: LogFormat, source: ColumnSource) -> str:
-    """Return the part of a file with a clock of its own: a topic, or a kind of message."""
-    if source.variable is None or is_member(file):
-        return ""
-    return source.variable if format_of(file, log.reader).clock_of == "variable" else ""
+        clock = ""  # the part of the file with a clock of its own: a topic, or a kind of message
+        if source.variable is not None and not is_member(file):
+            own = format_of(file, log.reader).clock_of == "variable"
+            clock = source.variable if own else ""
+        together.setdefault((file, clock), {})[name] = source
+    files = []
+    for (file, _), columns in sorted(together.items(), key=lambda item: item[0]):
+        inside = None if is_member(file) else _list_present(file, log)
+        if inside is not None:
+            file = only_log(file, inside)  # an archive with one log, among other files
+        files.append(format_of(file, log.reader).load().log_file(file, log, columns))
+    return files
 
 
 def _list_present(path: Path, log: LogFormat) -> list[Path] | None:
@@ -165,16 +143,7 @@ def _compose_accents(name: str) -> str:
 def only_log(path: Path, present: list[Path]) -> Path:
     """Return the only log of a folder or archive; files in subfolders describe it.
 
-    Parameters
-    ----------
-    path : Path
-    present : list of Path
-        Its files.
-
-    Raises
-    ------
-    RecordingError
-        If there is no log, or more than one.
+    Raise `RecordingError` if there is no log among the files ``present``, or more than one.
     """
     if not present and not path.is_dir():
         raise RecordingError(
@@ -194,14 +163,6 @@ def only_log(path: Path, present: list[Path]) -> Path:
 
 
 def _join_names(path: Path, files: list[Path]) -> str:
-    names = (
-        ", ".join(cut(file.relative_to(path).as_posix(), str) for file in files[:30]) or "no file"
-    )
+    shown = ", ".join(cut(file.relative_to(path).as_posix(), str) for file in files[:30])
+    names = shown or "no file"
     return f"{names} and {len(files) - 30} more" if len(files) > 30 else names
-
-
-def _open(file: Path, log: LogFormat, sources: dict[str, ColumnSource]) -> LogFile:
-    inside = None if is_member(file) else _list_present(file, log)
-    if inside is not None:
-        file = only_log(file, inside)  # an archive with one log, among other files
-    return format_of(file, log.reader).load().log_file(file, log, sources)

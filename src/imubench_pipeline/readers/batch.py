@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.model.states import Severity
-from imubench_pipeline.readers.stated_units import StatedUnit, contradictions
+from imubench_pipeline.readers.stated_units import StatedUnit
 from imubench_pipeline.settings.sensor import (
     CHANNELS,
     POSITION,
@@ -32,6 +32,11 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _MIN_MAGNITUDE = 1e-75
 """Least magnitude of the largest value of a column, SI. A column of smaller values is set to 0:
 they are no measurements, and their squares underflow."""
+
+
+_MIN_FACTOR_OF_OTHER_UNIT = 1.5
+"""Least ratio of two different units. The ratio of mg and cm/s² is 1.02, but no logger uses both;
+the next one, of mrad/s and °/s, is 17. Smaller ratios may be a calibration in ``scale``."""
 
 
 def stated_in(key: str) -> str:
@@ -85,10 +90,7 @@ class LogFile(ABC):
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file.
 
-        Raises
-        ------
-        RecordingError
-            If the file does not match its sensor file, or is corrupt.
+        Raise `RecordingError` if the file does not match its sensor file, or is corrupt.
         """
 
     def note(self, finding: str, text: str, value: float, severity: Severity = "warning") -> None:
@@ -102,7 +104,23 @@ class LogFile(ABC):
             for name in self.sources
             if name in CHANNELS and self.fixed_units
         }
-        return contradictions(self.path.name, self.sources, fixed | self.units)
+        findings = []
+        for channel, in_log in (fixed | self.units).items():
+            source = self.sources[channel]
+            dimension = QUANTITIES[quantity_of(channel)]
+            read = conversion(source.unit, dimension)[0] * abs(source.scale)
+            factor = conversion(in_log.unit, dimension)[0] / read
+            if 1.0 / _MIN_FACTOR_OF_OTHER_UNIT < factor < _MIN_FACTOR_OF_OTHER_UNIT:
+                continue
+            scaled = "" if source.scale == 1 else f", times {source.scale:g}"
+            detail = (
+                f"{self.path.name} states {in_log.unit} for {channel} ({in_log.where}), the sensor "
+                f"file {source.unit}{scaled} (log.channels.{channel}.unit), which is used; if the "
+                f"log is right, the figures are to be multiplied by {factor:.5g}: mend the one "
+                "that is wrong"
+            )
+            findings.append(Finding("unit_contradicts", "warning", detail, factor, channel))
+        return findings
 
     def seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:
         """Convert stamps as written to s since the first one; exact for integers."""

@@ -34,10 +34,7 @@ the meantime would keep the pipe open."""
 class BoundError(Exception):
     """The function exceeded its limit of memory or time.
 
-    Attributes
-    ----------
-    is_external : bool
-        The reason lies outside of the function: it waited, as for a disk, or was killed.
+    ``is_external``: the reason lies outside of it: it waited, as for a disk, or was killed.
     """
 
     def __init__(self, text: str, *, is_external: bool = False) -> None:
@@ -86,13 +83,7 @@ def bounded(
 
 
 class Bounded(Generic[T]):
-    """A function call in a process of its own, which starts immediately.
-
-    Parameters
-    ----------
-    memory, function, *arguments, **named
-        See `bounded`.
-    """
+    """A function call in a process of its own, which starts immediately (see `bounded`)."""
 
     def __init__(
         self, memory: int, function: Callable[P, T], *arguments: P.args, **named: P.kwargs
@@ -105,8 +96,17 @@ class Bounded(Generic[T]):
             if self._process:
                 os.close(theirs)
         if self._process == 0:
-            os.close(self._pipe)
-            _send_result(theirs, memory, lambda: function(*arguments, **named))
+            try:
+                os.close(self._pipe)
+                limit_memory(memory)
+                try:
+                    answer: tuple[bool, Any] = True, function(*arguments, **named)
+                except Exception as error:
+                    answer = False, error
+                with os.fdopen(theirs, "wb") as stream:
+                    pickle.dump(answer, stream)
+            finally:
+                os._exit(0)
 
     @property
     def answered(self) -> bool:
@@ -124,22 +124,28 @@ class Bounded(Generic[T]):
     def result(self, seconds: float) -> T:
         """Return the result of the function, or raise its exception; to be called once.
 
-        Raises
-        ------
-        BoundError
-            If the result takes more than ``seconds`` from now, counted as in `bounded` on a busy
-            machine, if the memory limit is exceeded, or if the system ends the process.
+        Raise `BoundError` if a limit is exceeded (see `bounded`; ``seconds`` count from now), or if
+        the system ends the process.
         """
         process = psutil.Process(self._process)
         try:
-            answer = _receive(self._pipe, seconds, process)
-            was_waiting = answer is None and _get_core_time(process) < seconds / 2.0
+            begin = time.monotonic()
+            end, last = begin + seconds, begin + _OVERLOAD_FACTOR * seconds
+            received: list[bytes] = []
+            while True:
+                if select.select([self._pipe], [], [], max(0.0, end - time.monotonic()))[0]:
+                    received.append(os.read(self._pipe, _PIPE_BLOCK))
+                    if not received[-1]:
+                        break
+                elif end < last and is_kept_waiting(process, seconds):
+                    end = min(end + seconds / 4.0, last)
+                else:
+                    was_waiting = _get_core_time(process) < seconds / 2.0
+                    raise BoundError(f"took more than {seconds:g} s", is_external=was_waiting)
         finally:
             self.end()  # it has answered, or it will not
-        if answer is None:
-            raise BoundError(f"took more than {seconds:g} s", is_external=was_waiting)
         try:
-            returned, value = pickle.loads(answer)
+            returned, value = pickle.loads(b"".join(received))
         except (EOFError, pickle.UnpicklingError):
             ended = os.waitstatus_to_exitcode(self._status or 0)
             reason = f"ended the process that read it ({ended})"
@@ -150,37 +156,6 @@ class Bounded(Generic[T]):
         if isinstance(value, MemoryError):
             raise BoundError(f"took more than {self._memory >> 20} MiB of memory")
         raise value
-
-
-def _send_result(pipe: int, memory: int, called: Callable[[], Any]) -> None:
-    """Send the result or the exception of a function, and end this process."""
-    try:
-        limit_memory(memory)
-        try:
-            answer = True, called()
-        except Exception as error:
-            answer = False, error
-        with os.fdopen(pipe, "wb") as stream:
-            pickle.dump(answer, stream)
-    finally:
-        os._exit(0)
-
-
-def _receive(pipe: int, seconds: float, sender: psutil.Process) -> bytes | None:
-    """Return all bytes from a pipe until its end; None if the time limit is exceeded."""
-    begin = time.monotonic()
-    end, last = begin + seconds, begin + _OVERLOAD_FACTOR * seconds
-    received: list[bytes] = []
-    while True:
-        if select.select([pipe], [], [], max(0.0, end - time.monotonic()))[0]:
-            block = os.read(pipe, _PIPE_BLOCK)
-            if not block:
-                return b"".join(received)
-            received.append(block)
-        elif end < last and is_kept_waiting(sender, seconds):
-            end = min(end + seconds / 4.0, last)
-        else:
-            return None
 
 
 def is_kept_waiting(process: psutil.Process, seconds: float) -> bool:

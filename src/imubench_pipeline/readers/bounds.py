@@ -66,8 +66,7 @@ MAX_NPY_HEADER = 10_000
 """Bytes of a header. NumPy has the same limit, but reads a header before it checks the size."""
 
 MAX_STRUCTURE_DEPTH, MAX_MATLAB_NAME, MAX_DIMENSIONS = 16, 256, 32
-"""For MATLAB 5: depth of nested structures; bytes of a name (MATLAB allows 63); dimensions of an
-array."""
+"""For MATLAB 5: depth of structures; bytes of a name (MATLAB allows 63); dimensions of an array."""
 
 # --------------------------------------------------------------------------------------- bags
 
@@ -76,9 +75,7 @@ MAX_BAG_CHUNK, MAX_BAG_OVERLAP = 1 << 27, 96 << 20
 together to sort their messages: the messages take up to five times as much memory."""
 
 MAX_MESSAGE, MAX_MESSAGE_BATCH = 1 << 16, 1 << 24
-"""Bytes of an inertial message (320 and the name of a frame), and of messages that are read
-together.
-"""
+"""Bytes of an inertial message (320 and the name of a frame), and of messages read together."""
 
 MAX_TOPICS, MAX_TOPIC_LENGTH = 10_000, 1024
 """Topics of a bag, and bytes of the name of a topic."""

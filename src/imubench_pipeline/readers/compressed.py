@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import bz2
 import io
 import lzma
+import re
 import stat
 import struct
+import sys
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,14 +21,133 @@ from imubench_pipeline.readers.bounds import (
     MAX_DIRECTORY,
     MAX_EXPANSION_RATIO,
     MAX_MEMBERS,
+    MAX_UNCHECKED_PARTS,
+    MAX_WINDOW,
     MIN_CHECKED_EXPANSION,
+    MIN_MEAN_PART,
 )
-from imubench_pipeline.readers.decompression import DECOMPRESSORS, MAX_MAGIC_LENGTH, compression_of
 from imubench_pipeline.readers.holes import FileWithoutHoles, ZeroRuns
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
 _READ_BLOCK = 1 << 16
+
+
+class _CompressedParts:
+    """The decompressed bytes of one or several consecutive compressed parts.
+
+    Nearly empty parts take time but few bytes of the file: the libraries skip millions of them
+    before they return. Their number is therefore limited.
+
+    ``new`` creates the decompressor of one part. Only zeros may follow a part.
+    """
+
+    def __init__(self, file: FileWithoutHoles, new: Callable[[], Any]) -> None:
+        self._file = file
+        self._new = new
+        self._part = new()
+        self._parts = 1
+        self._size = 0
+
+    def read1(self, size: int) -> bytes:
+        while True:
+            begins = self._part.eof
+            packed = self._part.unused_data if begins else b""
+            if not packed and (begins or self._part.needs_input):
+                packed = self._file.read(_READ_BLOCK)
+            if begins:
+                while packed and not (packed := packed.lstrip(b"\0")):
+                    packed = self._file.read(_READ_BLOCK)
+                if not packed:
+                    return b""
+                self._part = self._new()
+                if self._parts >= MAX_UNCHECKED_PARTS and self._size < MIN_MEAN_PART * self._parts:
+                    raise OSError(
+                        f"{self._parts} compressed parts hold {self._size} bytes, expected more "
+                        f"than {MIN_MEAN_PART} a part"
+                    )
+                self._parts += 1
+            try:
+                block: bytes = self._part.decompress(packed, size)
+            except (OSError, EOFError, lzma.LZMAError, zlib.error, zstd.ZstdError) as error:
+                why = "what follows the compressed data is not compressed" if begins else error
+                raise OSError(str(why)) from None
+            if block:
+                self._size += len(block)
+                return block
+            if not packed and not self._part.eof:
+                raise EOFError
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class _GzipDecompressor:
+    """Decompressor of one member of gzip, with the interface of bz2 and lzma."""
+
+    def __init__(self) -> None:
+        self._inflate = zlib.decompressobj(zlib.MAX_WBITS | 16)
+
+    @property
+    def eof(self) -> bool:
+        return self._inflate.eof
+
+    @property
+    def unused_data(self) -> bytes:
+        return self._inflate.unused_data
+
+    @property
+    def needs_input(self) -> bool:
+        return not self._inflate.unconsumed_tail
+
+    def decompress(self, packed: bytes, most: int) -> bytes:
+        return self._inflate.decompress(self._inflate.unconsumed_tail + packed, most)
+
+
+def unpacked_zstd(data: bytes, most: int) -> bytes:
+    """Return at most ``most`` bytes of a frame of zstd; raise `ValueError` if it is corrupt."""
+    try:
+        return _create_zstd().decompress(data, most)
+    except zstd.ZstdError as error:
+        raise ValueError(str(error)) from None
+
+
+def _create_zstd() -> zstd.ZstdDecompressor:
+    largest: dict[int, int] = {
+        zstd.DecompressionParameter.window_log_max: MAX_WINDOW.bit_length() - 1
+    }
+    return zstd.ZstdDecompressor(options=largest)
+
+
+DECOMPRESSORS: Mapping[str, Callable[[FileWithoutHoles], Any]] = {
+    "gzip": lambda file: _CompressedParts(file, _GzipDecompressor),
+    "zstd": lambda file: _CompressedParts(file, _create_zstd),
+    # The memory for the dictionary that a file requests is allocated before the first byte.
+    "xz": lambda file: _CompressedParts(file, partial(lzma.LZMADecompressor, memlimit=MAX_WINDOW)),
+    "bzip2": lambda file: _CompressedParts(file, bz2.BZ2Decompressor),
+}
+"""Function that opens a compressed file, by compression."""
+
+_MAGIC = re.compile(
+    rb"(?P<gzip>\x1f\x8b\x08[\0-\x1f])|(?P<zstd>\x28\xb5\x2f\xfd)|(?P<xz>\xfd7zXZ\0)"
+    rb"|(?P<bzip2>BZh[1-9](?:1AY&SY|\x17rE8P\x90|.{0,5}\Z))",
+    re.DOTALL,
+)
+MAX_MAGIC_LENGTH = 10
+"""Bytes of the longest signature. Shorter signatures would match random bytes."""
+
+
+def compression_of(begin: bytes) -> str:
+    """Return the compression (a key of `DECOMPRESSORS`) by the first bytes; empty if none."""
+    magic = _MAGIC.match(begin[:MAX_MAGIC_LENGTH])
+    return "" if magic is None else magic.lastgroup or ""
+
+
 _PROBE_BYTES = 1 << 12
 _SCAN_BLOCK = 1 << 20
 _ZIP_LOCAL = b"PK\x03\x04"
@@ -52,10 +174,7 @@ class Bytes:
     def read(self, size: int) -> bytes:
         """Return the next bytes, at most ``size``; none at the end.
 
-        Raises
-        ------
-        RecordingError
-            If the compressed data are corrupt or encrypted, or expand beyond the limit.
+        Raise `RecordingError` if they are corrupt, encrypted, or expand beyond the limit.
         """
         try:
             # Not `read`, which discards the data before an early end.
@@ -114,7 +233,10 @@ class _DeflatedMember:
                 self._left -= len(packed)
             block = self._inflate.decompress(packed, size)
             if block:
-                self._count(block)
+                self._crc = zlib.crc32(block, self._crc)
+                self._size -= len(block)
+                if self._size < 0:
+                    raise zipfile.BadZipFile("more data than the directory says")
                 return block
             if not packed and not self._inflate.eof:
                 raise EOFError
@@ -125,12 +247,6 @@ class _DeflatedMember:
     def close(self) -> None:
         self._file.close()
 
-    def _count(self, block: bytes) -> None:
-        self._crc = zlib.crc32(block, self._crc)
-        self._size -= len(block)
-        if self._size < 0:
-            raise zipfile.BadZipFile("more data than the directory says")
-
 
 _UNSUPPORTED_COMPRESSIONS: Mapping[bytes, str] = {
     b"7z\xbc\xaf\x27\x1c": "7z",
@@ -140,16 +256,8 @@ _UNSUPPORTED_COMPRESSIONS: Mapping[bytes, str] = {
     _ZIP_LOCAL: "zip in another way",
 }
 
-_CORRUPT_DATA_ERRORS = (
-    OSError,
-    ValueError,
-    zlib.error,
-    lzma.LZMAError,
-    zipfile.BadZipFile,
-    RuntimeError,
-    struct.error,
-    MemoryError,
-)
+_CORRUPT_DATA_ERRORS = (OSError, ValueError, zlib.error, lzma.LZMAError, zipfile.BadZipFile,
+                        RuntimeError, struct.error, MemoryError)  # fmt: skip
 """Exceptions of the libraries for data that violate their format."""
 
 
@@ -161,44 +269,35 @@ def _make_corrupt_error(name: str, error: Exception) -> RecordingError:
 
 
 def open_bytes(path: Path) -> Bytes:
-    """Open a log for reading.
+    """Open a log: a file, compressed or not, or a member of a zip archive (archive / name).
 
-    ``path``: a file, compressed or not, or a member of a zip archive, as the path of the archive
-    followed by the name in it.
-
-    Raises
-    ------
-    RecordingError
-        If it cannot be opened, or its compression is not supported.
+    Raise `RecordingError` if it cannot be opened, or its compression is not supported.
     """
     archive = None if path.is_file() else _find_archive(path)
     try:
-        if archive is None:
-            return _open_file(path, FileWithoutHoles(path))
-        return _open_member(archive, path.relative_to(archive).as_posix(), archive.open("rb"))
+        with ExitStack() as stack:  # closes the file if it cannot be read
+            if archive is None:
+                log = stack.enter_context(closing(FileWithoutHoles(path)))
+                begin = log.read(MAX_MAGIC_LENGTH)
+                log.rewind()
+                for magic, kind in _UNSUPPORTED_COMPRESSIONS.items():
+                    if begin.startswith(magic):
+                        raise RecordingError(
+                            f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, "
+                            "bzip2 or zip: unpack it"
+                        )
+                if how := compression_of(begin):
+                    stream = DECOMPRESSORS[how](log)
+                    opened = Bytes(path.name, stream, path.stat().st_size, (log,))
+                else:
+                    opened = Bytes(path.name, log, _UNKNOWN_SIZE)
+            else:
+                file = stack.enter_context(archive.open("rb"))
+                opened = _open_member(archive, path.relative_to(archive).as_posix(), file)
+            stack.pop_all()
+            return opened
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
-
-
-def _open_file(path: Path, file: FileWithoutHoles) -> Bytes:
-    try:
-        begin = file.read(MAX_MAGIC_LENGTH)
-        file.rewind()
-        for magic, kind in _UNSUPPORTED_COMPRESSIONS.items():
-            if begin.startswith(magic):
-                raise RecordingError(
-                    f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
-                    "zip: unpack it"
-                )
-        if not (how := compression_of(begin)):
-            return Bytes(path.name, file, _UNKNOWN_SIZE)
-        return Bytes(path.name, DECOMPRESSORS[how](file), path.stat().st_size, (file,))
-    except BaseException:
-        file.close()
-        raise
-
-
-# ------------------------------------------------------------------------------ zip archives
 
 
 def is_archive(path: Path) -> bool:
@@ -218,13 +317,7 @@ def is_member(path: Path) -> bool:
 
 
 def members(archive: Path) -> list[Path]:
-    """Return the visible files of a zip archive, sorted, as its path followed by their names.
-
-    Raises
-    ------
-    RecordingError
-        If the archive cannot be read.
-    """
+    """Return the visible files of a zip archive, sorted, as its path followed by their names."""
     return sorted(archive / name for name in _list_directory(archive) if visible(Path(name)))
 
 
@@ -288,13 +381,7 @@ def _describe_member(info: zipfile.ZipInfo) -> str:
 
 @contextmanager
 def opened_archive(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open a zip archive with a directory within `MAX_DIRECTORY`.
-
-    Raises
-    ------
-    RecordingError
-        If its directory is larger.
-    """
+    """Open a zip archive; raise `RecordingError` if its directory exceeds `MAX_DIRECTORY`."""
     with _Archive(path) as file, zipfile.ZipFile(file) as archive:
         file.most = None
         yield archive
@@ -309,7 +396,6 @@ class _Archive(io.FileIO):
         self.most: int | None = MAX_DIRECTORY
 
     def read(self, size: int | None = -1) -> bytes:
-        """Return the next bytes."""
         if self.most is not None and size is not None and size > self.most:
             raise RecordingError(
                 f"{self._shown}: the directory of the archive has {size} bytes, which are some "
@@ -322,25 +408,22 @@ def _scan_for_members(archive: Path) -> list[zipfile.ZipInfo]:
     """Return the members of a truncated archive, whose directory at the end is missing."""
     members: list[zipfile.ZipInfo] = []
     with closing(FileWithoutHoles(archive)) as file:
-        data = b""
-        while block := file.read(_SCAN_BLOCK):
+        data, ended = b"", False
+        while not ended:
+            block = file.read(_SCAN_BLOCK)
+            ended = not block
             data += block
             start = file.tell() - len(data)
             at = data.find(_ZIP_LOCAL)
-            while at >= 0 and at + _MAX_HEADER <= len(data):
+            while at >= 0 and (ended or at + _MAX_HEADER <= len(data)):
                 members += _parse_local_header(data[at : at + _MAX_HEADER], start + at)
                 at = data.find(_ZIP_LOCAL, at + 1)
-            if len(members) > MAX_MEMBERS:
+            if len(members) > MAX_MEMBERS and not ended:
                 raise RecordingError(
                     f"{archive.name}: an archive without its directory, with more than "
                     f"{MAX_MEMBERS} members; expected the log alone: pack it anew"
                 )
             data = data[at if at >= 0 else max(len(data) - 3, 0) :]
-        start = file.tell() - len(data)
-        at = data.find(_ZIP_LOCAL)
-        while at >= 0:
-            members += _parse_local_header(data[at : at + _MAX_HEADER], start + at)
-            at = data.find(_ZIP_LOCAL, at + 1)
     return members
 
 
@@ -374,14 +457,6 @@ def _parse_local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
 
 
 def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
-    try:
-        return _open_stored_member(archive, name, file)
-    except BaseException:
-        file.close()
-        raise
-
-
-def _open_stored_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     shown = f"{archive.name}/{name}"
     info = _list_directory(archive).get(name)
     if info is None:
@@ -419,11 +494,7 @@ def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[by
 
     ``findings`` receives findings about truncated compressed data, and about runs of at least
     ``least_zeros`` zero bytes, which no logger writes.
-
-    Raises
-    ------
-    RecordingError
-        If the file cannot be opened, or compressed data are corrupt.
+    Raise `RecordingError` if the file cannot be opened, or compressed data are corrupt.
     """
     zeros = ZeroRuns(least_zeros)
     with closing(open_bytes(path)) as stream:

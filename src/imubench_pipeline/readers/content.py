@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from contextlib import closing
+from itertools import chain
 from pathlib import Path
 
-from imubench_pipeline.readers.compressed import is_member, members, open_bytes
-from imubench_pipeline.readers.decompression import MAX_MAGIC_LENGTH, compression_of
+from imubench_pipeline.readers.compressed import (
+    MAX_MAGIC_LENGTH,
+    compression_of,
+    is_member,
+    members,
+    open_bytes,
+)
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.settings.sensor import Reader
@@ -29,13 +35,8 @@ _UNSUPPORTED_FORMATS = {
 
 def format_of_folder(path: Path) -> FileFormat | None:
     """Return the format of a folder that is one log, such as a ROS 2 bag; else None."""
-    if not path.is_dir():
-        return None
-    for file_format in FILE_FORMATS.values():
-        mark = file_format.signature.folder_has
-        if mark is not None and (path / mark).is_file():
-            return file_format
-    return None
+    marks = ((found, found.signature.folder_has) for found in FILE_FORMATS.values())
+    return next((found for found, mark in marks if mark and (path / mark).is_file()), None)
 
 
 def is_endless(path: Path) -> bool:
@@ -44,10 +45,7 @@ def is_endless(path: Path) -> bool:
 
 
 def format_of(path: Path, stated: Reader | None = None) -> FileFormat:
-    """Return the format of a file: the stated one, or else the one of its content (`content_of`).
-
-    ``stated``: ``reader`` of the sensor file.
-    """
+    """Return the stated format of a file (``reader``), or else the one of its content."""
     return content_of(path)[0] if stated is None else FILE_FORMATS[stated]
 
 
@@ -57,19 +55,18 @@ def content_of(path: Path) -> tuple[FileFormat, str]:
     For a zip archive with several files the format is text.
 
     ``path``: a log file, the folder of a ROS 2 bag, or a member of a zip archive.
-
-    Raises
-    ------
-    RecordingError
-        If it cannot be opened, is compressed twice, or is compressed and its format does not allow
-        that.
+    Raise `RecordingError` if it cannot be opened, is compressed twice, or is compressed and its
+    format does not allow that.
     """
     if (of_folder := format_of_folder(path)) is not None:
         return of_folder, ""
     packed = _find_compression(path)
     if packed == "zip" and path.is_file():
-        of_archive = _recognise_archive(path)
-        return (TEXT, packed) if of_archive is None else (of_archive, "")
+        endings = {member.suffix for member in members(path)}
+        for file_format in FILE_FORMATS.values():
+            if file_format.signature.archive_has in endings:
+                return file_format, ""
+        return TEXT, packed
     with closing(open_bytes(path)) as stream:
         begin = stream.filled(_PROBE_BYTES)
     if packed and (again := _name_compression(begin)):
@@ -83,7 +80,10 @@ def content_of(path: Path) -> tuple[FileFormat, str]:
                 f"{path.name}: is {what}, which is not read; expected a format that 'imubench "
                 f"formats' lists: {advice}"
             )
-    file_format = _recognise_bytes(begin)
+    signatures = [(each, each.signature) for each in FILE_FORMATS.values()]
+    begun = (each for each, its in signatures if begin.startswith(its.begins))
+    told = (each for each, its in signatures if its.tells is not None and its.tells(begin))
+    file_format = next(chain(begun, told), TEXT)
     if packed and not file_format.streamed:
         raise RecordingError(
             f"{path.name}: holds a file of the reader {file_format.name!r}, compressed by "
@@ -107,23 +107,3 @@ def _find_compression(path: Path) -> str:
 
 def _name_compression(begin: bytes) -> str:
     return "zip" if begin.startswith(_ZIP_MAGIC) else compression_of(begin)
-
-
-def _recognise_bytes(begin: bytes) -> FileFormat:
-    for file_format in FILE_FORMATS.values():
-        if begin.startswith(file_format.signature.begins):
-            return file_format
-    for file_format in FILE_FORMATS.values():
-        tells = file_format.signature.tells
-        if tells is not None and tells(begin):
-            return file_format
-    return TEXT
-
-
-def _recognise_archive(path: Path) -> FileFormat | None:
-    """Return the format of a zip archive that is one log; the archive may be cut short."""
-    endings = {member.suffix for member in members(path)}
-    for file_format in FILE_FORMATS.values():
-        if file_format.signature.archive_has in endings:
-            return file_format
-    return None

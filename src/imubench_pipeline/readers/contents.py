@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -39,15 +39,7 @@ class Contents:
 def contents(path: Path) -> Contents:
     """Return the contents of a recording, from the beginning of each of its files.
 
-    Parameters
-    ----------
-    path : Path
-        A log file, or the folder, zip archive or ROS 2 bag of a recording.
-
-    Raises
-    ------
-    RecordingError
-        If it cannot be read, or has no data.
+    Raise `RecordingError` if it cannot be read, or has no data.
     """
     if not path.exists():
         raise RecordingError(f"{path.name}: no such file or folder; expected a log")
@@ -65,9 +57,28 @@ def contents(path: Path) -> Contents:
 def _inspect_files(path: Path, kind: str, files: list[Path]) -> Contents:
     if not files:
         raise RecordingError(f"{path.name}: {kind} without a visible file; expected logs in it")
-    of_files = list(_inspect_each_file(path, files[:MAX_FILES]))
-    tables = [table for of_file, _ in of_files for table in of_file]
-    to_state = {stated for of_file, stated in of_files if not all(table.fault for table in of_file)}
+    tables: list[LogTable] = []
+    to_state = set()  # the formats that the sensor file must state
+    for file in files[:MAX_FILES]:
+        name = file.relative_to(path).as_posix()
+        untold = TEXT
+        try:
+            log = file
+            if not is_member(file) and is_archive(file) and format_of(file) is TEXT:
+                log = only_log(file, members(file))  # an archive with one log
+            file_format, packed = content_of(log)
+            untold = TEXT if is_member(log) else file_format
+            of_file = [
+                replace(table, file=name, about=table.about + (f", {packed}" if packed else ""))
+                for table in file_format.tables(log)
+            ]
+        except RecordingError as error:
+            fault = str(error).removeprefix(f"{file.name}").removeprefix(f"{path.name}/{name}")
+            of_file = [LogTable(TEXT, file=name, fault=fault.lstrip(":, "))]
+            file_format = untold
+        tables += of_file
+        if not all(table.fault for table in of_file):
+            to_state.add(None if file_format is untold else file_format)
     (stated,) = to_state if len(to_state) == 1 else (None,)
     _check_has_numbers(path, tables)
     only = None
@@ -90,27 +101,3 @@ def _check_has_numbers(path: Path, tables: Sequence[LogTable]) -> None:
     raise RecordingError(
         f"{path.name}: holds no column of figures ({why}); expected the log of an inertial sensor"
     )
-
-
-def _inspect_each_file(
-    path: Path, files: list[Path]
-) -> Iterator[tuple[list[LogTable], FileFormat | None]]:
-    """Yield the tables of each file, and the format that the sensor file must state."""
-    for file in files:
-        name = file.relative_to(path).as_posix()
-        untold = TEXT
-        try:
-            log = file
-            if not is_member(file) and is_archive(file) and format_of(file) is TEXT:
-                log = only_log(file, members(file))  # an archive with one log
-            file_format, packed = content_of(log)
-            untold = TEXT if is_member(log) else file_format
-            tables = [
-                replace(table, file=name, about=table.about + (f", {packed}" if packed else ""))
-                for table in file_format.tables(log)
-            ]
-        except RecordingError as error:
-            fault = str(error).removeprefix(f"{file.name}").removeprefix(f"{path.name}/{name}")
-            tables = [LogTable(TEXT, file=name, fault=fault.lstrip(":, "))]
-            file_format = untold
-        yield tables, None if file_format is untold else file_format

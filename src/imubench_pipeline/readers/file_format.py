@@ -59,8 +59,7 @@ class FileFormat:
     """Properties of a format of log files, without the code that reads it."""
 
     name: Reader
-    """Value of ``reader`` in a sensor file, and name of the module in
-    `imubench_pipeline.readers.formats`."""
+    """Value of ``reader`` in a sensor file, and name of the module in ``readers.formats``."""
     title: str
     """Common name of the format."""
     endings: tuple[str, ...]
@@ -79,19 +78,12 @@ class FileFormat:
     vendor: str | None = None
     """Vendor of all sensors with such logs."""
     measured_by_name: bool = False
-    """All names of the format mean measured quantities: its linear acceleration includes
-    gravity."""
+    """All names mean measured quantities: linear acceleration includes gravity."""
     extra: Extra | None = None
     """Extra of the package with the library that the code needs; None: no library."""
 
     def load(self) -> Code:
-        """Return the code.
-
-        Raises
-        ------
-        RecordingError
-            If the library that the code needs is not installed.
-        """
+        """Return the code; raise `RecordingError` if the library that it needs is not installed."""
         if self.extra is None:
             return self.code()
         try:
@@ -101,14 +93,9 @@ class FileFormat:
             raise RecordingError(str(error)) from None
 
     def tables(self, path: Path) -> list[LogTable]:
-        """Return the tables of a log, from its beginning.
+        """Return the tables of a log (a file, or a member of a zip archive), from its beginning.
 
-        ``path``: a file, or a member of a zip archive if the format is streamed.
-
-        Raises
-        ------
-        RecordingError
-            If it cannot be read, or has no data.
+        Raise `RecordingError` if it cannot be read, or has no data.
         """
         return self.load().tables(path, self)
 

@@ -14,16 +14,13 @@ from pathlib import Path
 from imubench_pipeline.tables.findings import Finding
 
 _MAX_HOLE_READ = 1 << 16
-_REPLACEMENT_ZEROS = 512
-"""Bytes: the zeros that are returned in place of a longer hole."""
+_REPLACEMENT_ZEROS = 512  # bytes: the zeros that are returned in place of a longer hole
 
 
 def next_data(descriptor: int, offset: int) -> int | None:
     """Return the offset of the first stored byte at or after an offset; None if there is none.
 
-    Without support of the system, every byte counts as stored.
-
-    ``descriptor``: descriptor of an open file; its position is unspecified afterwards.
+    Without support of the system, every byte counts as stored. The position of the file changes.
     """
     if not hasattr(os, "SEEK_DATA"):
         return offset
@@ -33,33 +30,8 @@ def next_data(descriptor: int, offset: int) -> int | None:
         return None if error.errno == errno.ENXIO else offset
 
 
-def end_of_data(path: Path) -> int:
-    """Return the size of a file without the hole at its end, in bytes.
-
-    All bytes after it read as zeros. The search takes about 40 system calls for any size, and reads
-    no data. Returns 0 for a file that is one hole. Zeros that are stored count as data.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be opened.
-    """
-    with path.open("rb", buffering=0) as file:
-        stored, end = 0, os.fstat(file.fileno()).st_size
-        while stored < end:
-            middle = (stored + end) // 2
-            if next_data(file.fileno(), middle) is None:
-                end = middle
-            else:
-                stored = middle + 1
-        return end
-
-
 class FileWithoutHoles:
-    """A file that is read sequentially; a long hole is replaced by a few zeros.
-
-    ``omitted``: number of zero bytes skipped so far.
-    """
+    """A file without its long holes; ``omitted``: number of zero bytes skipped so far."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb", buffering=0)
@@ -95,13 +67,7 @@ class FileWithoutHoles:
 
 
 class ZeroRuns:
-    """Counts runs of zero bytes in a stream.
-
-    Parameters
-    ----------
-    least : int
-        Least length of a run that is counted.
-    """
+    """Counts runs of at least ``least`` zero bytes in a stream."""
 
     def __init__(self, least: int = 1) -> None:
         self._least = least

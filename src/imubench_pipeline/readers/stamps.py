@@ -19,16 +19,10 @@ _YEAR_2100 = 4_102_444_800 * 10**9
 
 
 class Clock:
-    """Converts the stamps of a file to s since the first one.
+    """Converts the stamps of a file to s since the first one, and sets its ``started``.
 
-    Parameters
-    ----------
-    file : LogFile
-        Its ``started`` is set with the first stamp.
-    wraps : float or None
-        Value at which stamps wrap to 0, in their unit; None: they do not wrap.
-    started : callable
-        Returns ISO 8601 date and time of the first stamp; None if the stamp is no date.
+    ``wraps``: value at which stamps wrap to 0, in their unit; None: they do not wrap.
+    ``started``: returns ISO 8601 date and time of the first stamp; None if the stamp is no date.
     """
 
     def __init__(
@@ -43,10 +37,7 @@ class Clock:
     def seconds(self, stamps: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return s since the first stamp, shape (n,); NaN where the stamp is not present.
 
-        Raises
-        ------
-        RecordingError
-            If the first records have no stamp.
+        Raise `RecordingError` if the first records have no stamp.
         """
         if self._wraps is not None:
             stamps = stamps.copy()
@@ -74,24 +65,13 @@ class WrapState:
 
 
 def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:
-    """Unwrap the stamps of a counter.
+    """Unwrap the stamps of a counter; int64 for integers, exact, else float64 with NaN if missing.
 
     A step back by more than half of ``wraps`` is a wrap. A step forward by more than half is a late
     record from before the wrap, or a damaged stamp, which then does not affect the others.
 
-    Parameters
-    ----------
-    stamps : ndarray of int or float
-        The next stamps, as written; NaN where one is missing.
-    wraps : float
-        Value at which the counter wraps to 0, in the unit of the stamps.
-    state : WrapState
-        State between blocks; changed in place.
-
-    Returns
-    -------
-    ndarray
-        int64 for integers, exact; else float64, NaN where the stamp is NaN.
+    ``wraps``: value at which the counter wraps to 0, in the unit of the stamps.
+    ``state``: state between blocks; changed in place.
     """
     whole = stamps.dtype.kind in "iu" and float(wraps).is_integer()
     going_on = stamps.astype(np.int64 if whole else np.float64)
@@ -109,22 +89,14 @@ def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[A
 
 
 def date_of(nanoseconds: int) -> str | None:
-    """Return ISO 8601 date and time (UTC) of ns since 1970.
-
-    None outside of the years 2001 to 2099: the stamps then count from another origin, such as the
-    start of the device or of a simulation.
-    """
+    """Return ISO 8601 date and time (UTC) of ns since 1970; None outside of 2001 to 2099."""
     if not _YEAR_2001 <= nanoseconds < _YEAR_2100:
         return None
     return date_of_nanoseconds(nanoseconds)
 
 
 def date_of_stamp(first: float, source: TimeSource) -> str | None:
-    """Return ISO 8601 date and time (UTC) of a numeric stamp, as `date_of` does.
-
-    ``first``: stamp as written, in ticks of ``source``; integer ns are exact.
-    ``source``: unit and scale; the result is None for a count of samples.
-    """
+    """Return ISO 8601 date and time of a stamp as written (see `date_of`); ns are exact."""
     if source.unit not in SECONDS:
         return None
     if source.unit == "ns" and source.scale == 1:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, ColumnSource, quantity_of
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, quantity_of
 from imubench_pipeline.units import UnitError, conversion
 
 _MAX_UNIT_LENGTH = 24
@@ -45,19 +43,9 @@ _SPELLINGS: dict[str, tuple[tuple[str, str], ...]] = {
 
 
 def unit_of(text: str, dimension: str) -> str | None:
-    """Return the unit of a text, in the notation of a sensor file.
+    """Return the unit of a text, such as ``m_s2`` or ``dps``, in the notation of a sensor file.
 
-    Parameters
-    ----------
-    text : str
-        Such as ``rad/s``, ``m_s2`` or ``dps``.
-    dimension : str
-        A key of `imubench_pipeline.units.SI_UNITS`.
-
-    Returns
-    -------
-    str or None
-        None: the text is no known unit of this dimension.
+    None if the text is no known unit of the dimension, a key of `imubench_pipeline.units.SI_UNITS`.
     """
     text = text.strip()
     if not text or len(text) > _MAX_UNIT_LENGTH:
@@ -82,26 +70,20 @@ def unit_of(text: str, dimension: str) -> str | None:
 def divided(label: str, dimension: str) -> tuple[str, str | None]:
     """Split a name such as ``Gyroscope x (rad/s)`` or ``accel_x_m_s2`` into name and unit.
 
-    Parameters
-    ----------
-    dimension : str
-        Dimension of the unit that is searched.
-
-    Returns
-    -------
-    name : str
-        Name without the unit, and without texts in brackets except numbers.
-    unit : str or None
+    The name is without texts in brackets, except numbers. ``dimension``: dimension of the unit.
     """
     unit = next((unit for text in bracketed(label) if (unit := unit_of(text, dimension))), None)
     name = _BRACKETED.sub(
         lambda bracket: bracket[0] if bracket[1].strip().isdigit() else " ", label
     )
     if unit is None:
-        for start, tail in _list_tails(name):
-            unit = unit_of(tail, dimension)
-            if unit is not None:
-                return name[:start], unit
+        # The text after each separator, the longest first.
+        text = name.rstrip()
+        begin = max(len(text) - _MAX_UNIT_LENGTH, 0)
+        places = [begin + separator.end() for separator in _SEPARATOR.finditer(text[begin:])]
+        for place in places[-_MAX_TAILS:]:
+            if 0 < place < len(text) and (unit := unit_of(text[place:], dimension)):
+                return name[:place], unit
     return name, unit
 
 
@@ -109,20 +91,6 @@ def bracketed(label: str) -> list[str]:
     """Return the texts in brackets in a name that are no numbers."""
     return [text for text in _BRACKETED.findall(label) if text.strip() and not text.isdigit()]
 
-
-def _list_tails(name: str) -> Iterator[tuple[int, str]]:
-    """Yield position and text after each separator of a name, the longest text first."""
-    text = name.rstrip()
-    begin = max(len(text) - _MAX_UNIT_LENGTH, 0)
-    places = [begin + separator.end() for separator in _SEPARATOR.finditer(text[begin:])]
-    for place in places[-_MAX_TAILS:]:
-        if 0 < place < len(text):
-            yield place, text[place:]
-
-
-_MIN_FACTOR_OF_OTHER_UNIT = 1.5
-"""Least ratio of two different units. The ratio of mg and cm/s² is 1.02, but no logger uses both;
-the next one, of mrad/s and °/s, is 17. Smaller ratios may be a calibration in ``scale``."""
 
 _MAX_SHOWN_NAME = 60
 
@@ -140,14 +108,7 @@ class StatedUnit:
 def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit | None:
     """Return the unit that a log states for a channel; None if there is no known unit.
 
-    Parameters
-    ----------
-    channel : str
-        Channel or additional column; the result is None for the latter.
-    text, where : str
-        Text in the place of the unit, and a description of this place.
-    label : str
-        Name of the column, which may contain the unit.
+    ``text``, ``where``: text in the place of the unit, and a description of this place.
     """
     if channel not in CHANNELS:
         return None
@@ -157,35 +118,3 @@ def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit
         return StatedUnit(unit, where)
     unit = unit_of(label, dimension) or divided(label, dimension)[1]
     return None if unit is None else StatedUnit(unit, f"the name {label[:_MAX_SHOWN_NAME]!r}")
-
-
-def contradictions(
-    file: str, sources: Mapping[str, ColumnSource], units: Mapping[str, StatedUnit]
-) -> list[Finding]:
-    """Return findings on channels for which log and sensor file state different units.
-
-    Parameters
-    ----------
-    file : str
-        Name of the log.
-    sources : mapping of str to ColumnSource
-        Columns of the sensor file.
-    units : mapping of str to StatedUnit
-        Units that the log states.
-    """
-    findings = []
-    for channel, in_log in units.items():
-        source = sources[channel]
-        dimension = QUANTITIES[quantity_of(channel)]
-        read = conversion(source.unit, dimension)[0] * abs(source.scale)
-        factor = conversion(in_log.unit, dimension)[0] / read
-        if 1.0 / _MIN_FACTOR_OF_OTHER_UNIT < factor < _MIN_FACTOR_OF_OTHER_UNIT:
-            continue
-        scaled = "" if source.scale == 1 else f", times {source.scale:g}"
-        detail = (
-            f"{file} states {in_log.unit} for {channel} ({in_log.where}), the sensor file "
-            f"{source.unit}{scaled} (log.channels.{channel}.unit), which is used; if the log is "
-            f"right, the figures are to be multiplied by {factor:.5g}: mend the one that is wrong"
-        )
-        findings.append(Finding("unit_contradicts", "warning", detail, factor, channel))
-    return findings

@@ -62,8 +62,19 @@ class TextLog:
     ) -> None:
         self._log, self._sources, self._rate, self._kind = log, sources, rate, kind
         self._written = 0
-        self._seconds = self._find_stamp_unit()
-        self._names = self._list_columns()
+        self._stamp_unit = 1.0  # s
+        placed: dict[str | int, str] = {}
+        if (time := log.time) is not None:
+            if time.unit is None or time.unit == "samples" or time.wraps is not None:
+                raise ConfigError(
+                    "simulated logs have numeric time stamps in s, ms, us or ns that never wrap"
+                )
+            self._stamp_unit = SECONDS[time.unit] * time.scale
+            placed[time.column] = "time"
+        placed |= {source.column: name for name, source in sources.items()}
+        numbers = [column for column in placed if isinstance(column, int)]
+        all_numbered = len(numbers) == len(placed)
+        self._names = [str(c) for c in (range(1, max(numbers) + 1) if all_numbered else placed)]
         delimiter = log.delimiter or ","
         self._options = pacsv.WriteOptions(
             include_header=False, delimiter=delimiter, quoting_style="none"
@@ -87,7 +98,7 @@ class TextLog:
         count = len(next(iter(block.values())))
         columns: dict[str, NDArray[Any]] = {}
         if self._log.time is not None:
-            stamps = np.arange(self._written, self._written + count) / self._rate / self._seconds
+            stamps = np.arange(self._written, self._written + count) / self._rate / self._stamp_unit
             columns[str(self._log.time.column)] = np.round(stamps, 9)
         for name, source in self._sources.items():
             dimension = "temperature" if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
@@ -98,25 +109,3 @@ class TextLog:
         table = pa.table({name: columns.get(name, empty) for name in self._names})
         pacsv.write_csv(table, self._file, self._options)
         self._written += count
-
-    def _find_stamp_unit(self) -> float:
-        """Return the unit of the stamps in s."""
-        time = self._log.time
-        if time is None:
-            return 1.0
-        if time.unit is None or time.unit == "samples" or time.wraps is not None:
-            raise ConfigError(
-                "simulated logs have numeric time stamps in s, ms, us or ns that never wrap"
-            )
-        return SECONDS[time.unit] * time.scale
-
-    def _list_columns(self) -> list[str]:
-        """Return the names of the columns of the file in order."""
-        placed: dict[str | int, str] = {}
-        if self._log.time is not None:
-            placed[self._log.time.column] = "time"
-        placed |= {source.column: name for name, source in self._sources.items()}
-        if any(isinstance(column, str) for column in placed):
-            return [str(column) for column in placed]
-        width = max(column for column in placed if isinstance(column, int))
-        return [str(number) for number in range(1, width + 1)]

@@ -77,7 +77,12 @@ class UbxFile(LogFile):
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
-        self._check_columns()
+        for name, source in self.sources.items():
+            if source.column not in COLUMNS:
+                raise RecordingError(
+                    f"{self.path.name}: no column {source.column!r} for {name}; a UBX log has "
+                    f"{', '.join(COLUMNS)}; mend 'column' of {name} in the sensor file"
+                )
         kind = self._kind()
         self._check_time(kind)
         frames = Frames(blocks(self.path, self.findings, _MIN_ZEROS))
@@ -106,27 +111,13 @@ class UbxFile(LogFile):
         table, stamps = records.grouped(columns, values, clock.stamps(tags, places), ended)
         if len(table):
             figures = dict(zip(self._columns(), np.ascontiguousarray(table.T), strict=True))
-            yield Batch(
-                None if self.log.time is None else self.seconds(stamps, clock.first),
-                {
-                    name: self.to_si(name, figures[str(source.column)])
-                    for name, source in self.sources.items()
-                },
-            )
-
-    # -------------------------------------------------------------- what the sensor file says
+            time = None if self.log.time is None else self.seconds(stamps, clock.first)
+            wanted = {name: figures[str(source.column)] for name, source in self.sources.items()}
+            yield Batch(time, {name: self.to_si(name, raw) for name, raw in wanted.items()})
 
     def _columns(self) -> list[str]:
         """Return the required columns, each once."""
         return list(dict.fromkeys(str(source.column) for source in self.sources.values()))
-
-    def _check_columns(self) -> None:
-        for name, source in self.sources.items():
-            if source.column not in COLUMNS:
-                raise RecordingError(
-                    f"{self.path.name}: no column {source.column!r} for {name}; a UBX log has "
-                    f"{', '.join(COLUMNS)}; mend 'column' of {name} in the sensor file"
-                )
 
     def _check_time(self, kind: bytes) -> None:
         time = self.log.time
@@ -189,11 +180,8 @@ class UbxFile(LogFile):
         """Return whether the log read so far is enough to choose the message."""
         for of_kind in words.values():
             of_kind.drained()
-        return frames.read > _MIN_PROBED_BYTES and any(
-            of_kind.present for of_kind in words.values()
-        )
-
-    # ----------------------------------------------------------------------------- findings
+        present = any(of_kind.present for of_kind in words.values())
+        return frames.read > _MIN_PROBED_BYTES and present
 
     def _report(self, kind: bytes, words: Words, frames: Frames, rows: int) -> None:
         name = KINDS[kind]
@@ -204,14 +192,11 @@ class UbxFile(LogFile):
                 f"{words.types() or 'none'}, {frames.wrong[kind]} with a wrong checksum; expected "
                 f"{_describe_types(absent)}; mend 'column' or 'variable' in the sensor file"
             )
-        shifts = (
-            ""
-            if self.log.time is not None
-            else "; state 'time' (column time_tag, unit ms), for without it what follows is "
-            "shifted in time"
-        )
         if wrong := frames.wrong[kind]:
-            detail = f"{wrong} {name} messages have a wrong checksum; left out{shifts}"
+            detail = f"{wrong} {name} messages have a wrong checksum; left out"
+            if self.log.time is None:
+                detail += "; state 'time' (column time_tag, unit ms), for without it what follows "
+                detail += "is shifted in time"
             self.note("wrong_checksum", detail, wrong)
         if cut := frames.cut[kind]:
             detail = f"{cut} {name} messages are cut short by the end of the log; left out"
@@ -223,10 +208,7 @@ def _describe_types(columns: list[str]) -> str:
 
 
 class Words:
-    """Buffer of the measurements of messages that are not yet in a batch.
-
-    ``kind``: class and id of the messages. ``seen``: number of measurements of each data type.
-    """
+    """Buffer of the measurements that are not yet in a batch; ``seen``: number by data type."""
 
     def __init__(self, kind: bytes, columns: list[str]) -> None:
         self._raw = kind == ESF_RAW
@@ -409,32 +391,40 @@ def _group_records(
     return count
 
 
-# ------------------------------------------------------------------------- inspection
-
 _MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 22, 1 << 26
 """Bytes that are examined after a first message was found, and bytes searched for it."""
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return a table for each kind of message with inertial data.
-
-    Raises
-    ------
-    RecordingError
-        If there is no such message.
-    """
+    """Return a table for each message with inertial data; raise `RecordingError` if none."""
     names = list(COLUMNS)
     words = {kind: Words(kind, names) for kind in KINDS}
     frames = Frames(blocks(path, [], _MIN_ZEROS))
     for key, payload in frames:
         if key in words and len(words[key]) < MAX_EXAMINED_RECORDS * len(names):
             words[key].add(payload)
-        if frames.read > (
-            _MAX_DESCRIBED_BYTES if any(map(len, words.values())) else _MAX_SEARCHED_BYTES
-        ):
+        found = any(map(len, words.values()))
+        if frames.read > (_MAX_DESCRIBED_BYTES if found else _MAX_SEARCHED_BYTES):
             break
-    present = [kind for kind in KINDS if len(words[kind])]
-    described = [_describe_messages(file_format, kind, words[kind], frames) for kind in present]
+    described = []
+    for kind, name in KINDS.items():
+        if not len(words[kind]):
+            continue
+        places, figures, tags, _ = words[kind].drained()
+        columns = []
+        for place, column in enumerate(COLUMNS):
+            values = figures[places == place]
+            if len(values):
+                unit = UNITS[column.split("_")[0]]
+                columns.append(LogColumn(column, column, "number", shown(values), values, unit))
+        if columns:
+            first = tags[places == places[0]].astype(np.float64)
+            ticks = first * TICK_MS if kind == ESF_RAW else first
+            columns.append(LogColumn("time_tag", "time_tag", "number", shown(ticks), ticks, "ms"))
+            if kind == ESF_RAW:
+                columns.append(LogColumn("sTtag", "sTtag", "number", shown(first), first))
+        about = f"{frames.right[kind]} messages at the beginning"
+        described.append(LogTable(file_format, name, tuple(columns), variable=name, about=about))
     if not any(table.columns for table in described):
         raise RecordingError(
             f"{path.name}: no inertial figures in ESF-MEAS or ESF-RAW among "
@@ -442,25 +432,3 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
             "switch ESF-RAW on in the receiver"
         )
     return sorted(described, key=lambda table: table.name != KINDS[ESF_RAW])
-
-
-def _describe_messages(
-    file_format: FileFormat, kind: bytes, words: Words, frames: Frames
-) -> LogTable:
-    """Describe one kind of message."""
-    places, figures, tags, _ = words.drained()
-    name = KINDS[kind]
-    columns = []
-    for place, column in enumerate(COLUMNS):
-        values = figures[places == place]
-        if len(values):
-            unit = UNITS[column.split("_")[0]]
-            columns.append(LogColumn(column, column, "number", shown(values), values, unit))
-    if columns:
-        first = tags[places == places[0]].astype(np.float64)
-        ticks = first * TICK_MS if kind == ESF_RAW else first
-        columns.append(LogColumn("time_tag", "time_tag", "number", shown(ticks), ticks, "ms"))
-        if kind == ESF_RAW:
-            columns.append(LogColumn("sTtag", "sTtag", "number", shown(first), first))
-    about = f"{frames.right[kind]} messages at the beginning"
-    return LogTable(file_format, name, tuple(columns), variable=name, about=about)

@@ -8,9 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 _SYNC_BYTES = b"\xb5\x62"
-_OVERHEAD = 8
-"""Bytes of a message without its payload: sync, class and id, length, checksum."""
-
+_OVERHEAD = 8  # bytes of a message without its payload: sync, class and id, length, checksum
 _MESSAGE_CLASSES = frozenset(
     b"\x01\x02\x03\x04\x05\x06\x09\x0a\x0b\x0c\x0d\x10\x13\x21\x27\x28\x2a"
 )

@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from binascii import crc_hqx
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -26,7 +26,6 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
-from imubench_pipeline.model.states import Severity
 from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile
 from imubench_pipeline.readers.compressed import BLOCK_BYTES, blocks
 from imubench_pipeline.readers.file_format import (
@@ -63,10 +62,8 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "VNACC": _make_axis_names("accel"),
     "VNGYR": _make_axis_names("gyro"),
     "VNYBA": (*_ATTITUDE_FIELDS, *_make_axis_names("linear_accel", "gyro")),  # without gravity
-    "VNYIA": (
-        *_ATTITUDE_FIELDS,
-        *_make_axis_names("inertial_accel", "gyro"),
-    ),  # in the frame of the Earth
+    # In the frame of the Earth.
+    "VNYIA": (*_ATTITUDE_FIELDS, *_make_axis_names("inertial_accel", "gyro")),
 }
 """The fields of each sentence with angular rate or acceleration."""
 
@@ -91,8 +88,7 @@ class Row:
 
 
 _MIN_ZEROS = 16
-"""Least run of zero bytes that is reported; shorter runs are noise of the line, and are counted
-with the sentences that they damage."""
+"""Least run of zero bytes that is reported; shorter ones count with the sentences they damage."""
 
 _SENTENCE_CANDIDATES = re.compile(rb"[^$]{6,}")
 """Text after a ``$`` that may be a sentence; shorter text has not even a name."""
@@ -108,10 +104,7 @@ class Sentences:
         self._head = kind.encode() + b","
         self._commas = len(FIELDS[kind])
         self._stamped = stamped
-        self.right = 0
-        self.wrong = 0
-        self.unread = 0
-        self.garbage = 0
+        self.right = self.wrong = self.unread = self.garbage = 0
         self.others: Counter[str] = Counter()
 
     def add(self, text: bytes) -> list[Row]:
@@ -134,42 +127,30 @@ class Sentences:
                 checks.append(check.rstrip() if body else b"")
                 before = b""
         rows: list[Row] = []
-        for good, before, body in zip(
-            right_checksums(bodies, checks), befores, bodies, strict=True
-        ):
+        right = right_checksums(bodies, checks)
+        for good, before, body in zip(right, befores, bodies, strict=True):
             if good and body.startswith(self._head):
                 self.right += 1
-                rows.append(self._row(before, body))
-            elif good:
-                name = _take_name(body)
+                row = Row(before, body[len(self._head) :])
+                more = body.count(b",") != self._commas
+                if more and (appended := _APPENDED_FIELDS.search(row.body)) is not None:
+                    row.counter = appended[1] or b""
+                    row.body = row.body[: appended.start()]
+                rows.append(row)
+                continue
+            name = body[:_MAX_SENTENCE_NAME].partition(b",")[0].decode("ascii", "replace")
+            # A damaged name: the sentence has the right width, and the name is unknown.
+            unknown = name not in self.others and name not in FIELDS
+            if good:
                 many = len(self.others) >= _MAX_OTHER_NAMES and name not in self.others
                 self.others["..." if many else name] += 1
-            elif body.startswith(self._head) or self._damaged_name(body):
+            elif body.startswith(self._head) or (unknown and body.count(b",") == self._commas):
                 self.wrong += 1
                 if not self._stamped:
                     rows.append(Row(b"", b""))
             else:
                 self.garbage += 1
         return rows
-
-    def _damaged_name(self, body: bytes) -> bool:
-        """Return whether this is a damaged sentence of our kind: right width, unknown name."""
-        name = _take_name(body)
-        other = name in self.others or name in FIELDS
-        return not other and body.count(b",") == self._commas
-
-    def _row(self, before: bytes, body: bytes) -> Row:
-        row = Row(before, body[len(self._head) :])
-        if body.count(b",") != self._commas:
-            appended = _APPENDED_FIELDS.search(row.body)
-            if appended is not None:
-                row.counter = appended[1] or b""
-                row.body = row.body[: appended.start()]
-        return row
-
-
-def _take_name(body: bytes) -> str:
-    return body[:_MAX_SENTENCE_NAME].partition(b",")[0].decode("ascii", "replace")
 
 
 def position_of(kind: str, column: str | int) -> int:
@@ -203,10 +184,8 @@ def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
         yield rest
     elif rest.strip(b"\0\r\t "):
         shown = rest[:60].decode("ascii", "replace")
-        detail = (
-            f"{path.name}: the last line has no line break and no right checksum; left out: "
-            f"{shown!r}"
-        )
+        why = "the last line has no line break and no right checksum"
+        detail = f"{path.name}: {why}; left out: {shown!r}"
         findings.append(Finding("incomplete_last_record", "note", detail, 1))
 
 
@@ -263,12 +242,6 @@ def _parse_numbers(
         if table is not None and len(table) == len(texts):
             columns = {int(name): table.column(name).to_numpy() for name in wanted}
             return columns, 0
-    return _parse_numbers_singly(texts, positions)
-
-
-def _parse_numbers_singly(
-    texts: list[bytes], positions: set[int]
-) -> tuple[dict[int, NDArray[np.float64]], int]:
     fields = {position: np.full(len(texts), np.nan) for position in positions}
     unread = 0
     for number, text in enumerate(texts):
@@ -314,7 +287,15 @@ class VectorNavFile(LogFile):
             if self.log.time is not None:
                 stamps, missing = self._stamps(rows)
                 if clock.first is None and missing.all():
-                    raise self._without_stamp(rows)
+                    at_host = self.log.time.column == HOST_TIME
+                    where = "before the '$'" if at_host else "'T' and a count at the end"
+                    before, body = rows[0].before[:40], rows[0].body[-40:]
+                    raise RecordingError(
+                        f"{self.path.name}: no stamp that can be read in the first {len(rows)} "
+                        f"sentences; expected {where}, found {before.decode('ascii', 'replace')!r} "
+                        f"before {body.decode('ascii', 'replace')!r}; mend 'time' in the sensor "
+                        "file, or drop it and state 'rate'"
+                    )
                 time = clock.seconds(stamps, ~missing)
             fields, unread = fields_of(kind, rows, set(positions.values()))
             records.unread += unread
@@ -324,14 +305,12 @@ class VectorNavFile(LogFile):
             yield Batch(time, columns)
         self._report(kind, records)
 
-    # ---------------------------------------------------------------- which sentence it is
-
     def _kind(self) -> str:
         """Return the kind of sentence with the columns."""
         wanted = [source.column for source in self.sources.values()]
         able = [kind for kind in FIELDS if all(position_of(kind, c) >= 0 for c in wanted)]
         if not able:
-            named = ", ".join(str(column) for column in wanted)
+            named = ", ".join(map(str, wanted))
             expected = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
             raise RecordingError(
                 f"{self.path.name}: no VectorNav sentence has the columns {named} together; mend "
@@ -370,8 +349,6 @@ class VectorNavFile(LogFile):
                 break
         return set(names)
 
-    # --------------------------------------------------------------------------- stamps
-
     def _check_time(self) -> None:
         time = self.log.time
         if time is not None and time.column not in (HOST_TIME, COUNTER):
@@ -388,30 +365,23 @@ class VectorNavFile(LogFile):
             texts = [row.counter for row in rows]
         else:
             texts = [row.before.strip(STAMP_PADDING) for row in rows]
-        if self.log.time.format == "iso8601":
-            return _parse_dates(texts)
-        whole = self.log.time.unit == "ns" or self.log.time.column == COUNTER
+        is_date = self.log.time.format == "iso8601"
+        whole = is_date or self.log.time.unit == "ns" or self.log.time.column == COUNTER
         # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
         stamps = np.zeros(len(texts), np.int64 if whole else np.float64)
         missing = np.zeros(len(texts), bool)
         for number, text in enumerate(texts):
             try:
-                stamps[number] = int(text) if whole else float(text)
+                if is_date:  # ns since 1970 (UTC)
+                    kind = pa.timestamp("ns", "UTC" if _ZONE_SUFFIX.search(text) else None)
+                    stamps[number] = pa.scalar(text.decode("ascii")).cast(kind).value
+                else:
+                    stamps[number] = int(text) if whole else float(text)
             except (ValueError, OverflowError):
                 missing[number] = True
         if not whole:
             missing |= ~np.isfinite(stamps)
         return stamps, missing
-
-    def _without_stamp(self, rows: list[Row]) -> RecordingError:
-        at_host = self.log.time is not None and self.log.time.column == HOST_TIME
-        where = "before the '$'" if at_host else "'T' and a count at the end"
-        return RecordingError(
-            f"{self.path.name}: no stamp that can be read in the first {len(rows)} sentences; "
-            f"expected {where}, found {rows[0].before[:40].decode('ascii', 'replace')!r} "
-            f"before {rows[0].body[-40:].decode('ascii', 'replace')!r}; mend 'time' in the "
-            "sensor file, or drop it and state 'rate'"
-        )
 
     def _started(self, first: Any) -> str | None:
         time = self.log.time
@@ -421,8 +391,6 @@ class VectorNavFile(LogFile):
         scale = SECONDS[time.unit or "ns"] * 1e9
         return date_of(stamp if isinstance(stamp, int) else round(stamp * scale))
 
-    # ------------------------------------------------------------------------- findings
-
     def _report(self, kind: str, records: Sentences) -> None:
         if not records.right:
             raise RecordingError(
@@ -431,67 +399,32 @@ class VectorNavFile(LogFile):
                 "sensor file right, and the checksum on (register 30)?"
             )
         fate = "left out" if self.log.time is not None else "missing samples"
-        others = _join_names(records.others)
-        self._count(
-            records.wrong,
-            "wrong_checksum",
-            f"${kind} sentences are cut short or have a wrong checksum; {fate}",
-        )
-        self._count(
-            records.unread,
-            "unreadable_sentence",
-            f"${kind} sentences have a right checksum but not the {len(FIELDS[kind])} numbers "
-            "expected; their figures are missing",
-        )
-        self._count(
-            records.others.total(),
-            "other_sentences",
-            f"other sentences ({others}) passed over",
-            "note",
-        )
-        self._count(
-            records.garbage,
-            "not_sentences",
-            "lines or parts of lines are no sentence; passed over",
-            "note",
-        )
-
-    def _count(self, count: int, name: str, text: str, severity: Severity = "warning") -> None:
-        if count:
-            self.note(name, f"{count} {text}", count, severity)
+        if count := records.wrong:
+            text = f"{count} ${kind} sentences are cut short or have a wrong checksum; {fate}"
+            self.note("wrong_checksum", text, count)
+        if count := records.unread:
+            text = (
+                f"{count} ${kind} sentences have a right checksum but not the "
+                f"{len(FIELDS[kind])} numbers expected; their figures are missing"
+            )
+            self.note("unreadable_sentence", text, count)
+        if count := records.others.total():
+            text = f"{count} other sentences ({_join_names(records.others)}) passed over"
+            self.note("other_sentences", text, count, "note")
+        if count := records.garbage:
+            text = f"{count} lines or parts of lines are no sentence; passed over"
+            self.note("not_sentences", text, count, "note")
 
 
 def _join_names(names: Iterable[str]) -> str:
     return ", ".join(name[:_MAX_SHOWN_NAME] for name in sorted(names)[:_MAX_LISTED_NAMES])
 
 
-def _parse_dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return ISO 8601 stamps as ns since 1970 (UTC), and a mask of the unreadable ones."""
-    stamps = np.zeros(len(texts), np.int64)
-    missing = np.zeros(len(texts), bool)
-    for number, text in enumerate(texts):
-        zone = "UTC" if _ZONE_SUFFIX.search(text) else None
-        try:
-            date = pa.scalar(text.decode("ascii")).cast(pa.timestamp("ns", zone))
-            stamps[number] = date.value
-        except (pa.ArrowInvalid, UnicodeDecodeError):
-            missing[number] = True
-    return stamps, missing
-
-
-# ------------------------------------------------------------------------- inspection
-
 _MAX_DESCRIBED_BYTES = 1 << 21  # bytes
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return a table for each kind of sentence with inertial data.
-
-    Raises
-    ------
-    RecordingError
-        If there is no such sentence with a right checksum.
-    """
+    """Return a table for each sentence with inertial data; raise `RecordingError` if none."""
     sentences = {kind: Sentences(kind, stamped=True) for kind in FIELDS}
     rows: dict[str, list[Row]] = {kind: [] for kind in FIELDS}
     read = 0
@@ -508,46 +441,34 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
             f"{path.name}: no sentence of {', '.join(FIELDS)} with a right checksum at its "
             "beginning; set the output of the device (registers 6 and 30)"
         )
-    return [
-        _describe_sentence(file_format, kind, rows[kind], len(present) == 1) for kind in present
-    ]
-
-
-def _describe_sentence(
-    file_format: FileFormat, kind: str, rows: list[Row], alone: bool
-) -> LogTable:
-    fields, _ = fields_of(kind, rows[:MAX_EXAMINED_RECORDS], set(range(len(FIELDS[kind]))))
-    columns = [
-        LogColumn(
-            name if alone else f"{kind}.{name}",
-            name,
-            "number",
-            shown(fields[place]),
-            fields[place],
-            UNITS.get(name),
-        )
-        for place, name in enumerate(FIELDS[kind])
-    ]
-    columns += _describe_time(
-        HOST_TIME, [row.before.strip(STAMP_PADDING) for row in rows[:MAX_EXAMINED_RECORDS]]
-    )
-    columns += _describe_time(COUNTER, [row.counter for row in rows[:MAX_EXAMINED_RECORDS]])
-    about = f"{len(rows)} sentences at the beginning"
-    return LogTable(file_format, kind, tuple(columns), about=about)
+    described = []
+    for kind in present:
+        first = rows[kind][:MAX_EXAMINED_RECORDS]
+        fields, _ = fields_of(kind, first, set(range(len(FIELDS[kind]))))
+        columns = []
+        for place, name in enumerate(FIELDS[kind]):
+            source = name if len(present) == 1 else f"{kind}.{name}"
+            values = fields[place]
+            unit = UNITS.get(name)
+            columns.append(LogColumn(source, name, "number", shown(values), values, unit))
+        columns += _describe_time(HOST_TIME, [row.before.strip(STAMP_PADDING) for row in first])
+        columns += _describe_time(COUNTER, [row.counter for row in first])
+        about = f"{len(rows[kind])} sentences at the beginning"
+        described.append(LogTable(file_format, kind, tuple(columns), about=about))
+    return described
 
 
 def _describe_time(name: str, cells: list[bytes]) -> list[LogColumn]:
     """Return a list with the column of stamps, empty if there are no stamps."""
     texts = [cell.decode("ascii", "replace") for cell in cells]
-    first = tuple(text for text in texts[:MAX_SHOWN_VALUES])
+    first = tuple(texts[:MAX_SHOWN_VALUES])
     if not any(texts):
         return []
     if all(is_number(text, ".") for text in texts if text):
         values = np.array([float(text) if text else np.nan for text in texts])
         return [LogColumn(name, name, "number", first, values)]
     try:
-        return [
-            LogColumn(name, name, "date", first, stamps_of("iso8601", texts), None, ("iso8601",))
-        ]
+        dates = stamps_of("iso8601", texts)
+        return [LogColumn(name, name, "date", first, dates, None, ("iso8601",))]
     except StampError:
         return [LogColumn(name, name, "text", first)]

@@ -11,10 +11,10 @@ from __future__ import annotations
 import json
 import struct
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -22,19 +22,19 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
-from imubench_pipeline.readers.arrays.parquet_pages import check_pages
 from imubench_pipeline.readers.arrays.table import Column, Table, UnusableError
-from imubench_pipeline.readers.bounds import MAX_ARROW_BATCH
+from imubench_pipeline.readers.bounds import (
+    MAX_ARROW_BATCH,
+    MAX_PAGE_BYTES,
+    MAX_UNCHECKED_PAGES,
+    MIN_MEAN_PAGE,
+)
 
 METADATA = b"imubench"
 """Metadata key of Parquet files that this package writes; the value is JSON."""
 
-_PARQUET_MAGIC, _ARROW_FILE_MAGIC, _ARROW_STREAM_MAGIC, _FEATHER_1_MAGIC = (
-    b"PAR1",
-    b"ARROW1",
-    b"\xff\xff\xff\xff",
-    b"FEA1",
-)
+_PARQUET_MAGIC, _FEATHER_1_MAGIC = b"PAR1", b"FEA1"
+_ARROW_FILE_MAGIC, _ARROW_STREAM_MAGIC = b"ARROW1", b"\xff\xff\xff\xff"
 
 
 class ArrowFile(ArrayFile):
@@ -77,22 +77,25 @@ class _ArrowTable(Table):
             self.fault = "has no column"
 
     def column(self, position: int) -> Column:
-        """Return a column by its position, counted from 0."""
-        kind = self.schema.field(position).type
-        return Column(self.labels[position], _find_numpy_kind(kind), str(kind))
+        kind = stored = self.schema.field(position).type
+        if pa.types.is_dictionary(kind):
+            kind = kind.value_type
+        numpy_kind = "M" if pa.types.is_timestamp(kind) else "O"
+        if pa.types.is_floating(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind):
+            numpy_kind = "f"
+        elif pa.types.is_integer(kind):
+            numpy_kind = "i" if pa.types.is_signed_integer(kind) else "u"
+        return Column(self.labels[position], numpy_kind, str(stored))
 
     def unit(self, position: int) -> str | None:
-        """Return the unit of a column, if its metadata state it."""
         stated = self.schema.field(position).metadata or {}
         unit = next((stated[key] for key in (b"unit", b"units") if key in stated), b"")
         return unit.decode("utf-8", "replace") or None
 
     def row_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory per record for reading these columns, bytes."""
         return 8 * len(positions)
 
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
-        """Yield these columns, ``rows`` records at a time or fewer (see `Table.blocks`)."""
         # Columns with the same name are all read.
         same = [self.labels[:position].count(self.labels[position]) for position in positions]
         names = [self.labels[position] for position in positions]
@@ -117,7 +120,9 @@ class _ParquetTable(_ArrowTable):
         super().__init__(file.schema_arrow)
         self._path, self._file = path, file
         self.rows = file.metadata.num_rows
-        self.simulated = _states_simulated(file.metadata.metadata or {})
+        with suppress(ValueError):
+            about = json.loads((file.metadata.metadata or {}).get(METADATA, b"{}"))
+            self.simulated = isinstance(about, dict) and about.get("simulated") is True
 
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
         check_pages(self._path, self._file.metadata, names)
@@ -144,26 +149,6 @@ class _IpcTable(_ArrowTable):
             yield self._reader.get_batch(number)
 
 
-def _states_simulated(metadata: Mapping[bytes, bytes]) -> bool:
-    """Return whether the metadata of this package mark a file as simulated."""
-    try:
-        about = json.loads(metadata.get(METADATA, b"{}"))
-    except ValueError:
-        return False
-    return isinstance(about, dict) and about.get("simulated") is True
-
-
-def _find_numpy_kind(kind: pa.DataType) -> str:
-    """Return the kind of the NumPy type to which a type is converted."""
-    if pa.types.is_dictionary(kind):
-        kind = kind.value_type
-    if pa.types.is_floating(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind):
-        return "f"
-    if pa.types.is_integer(kind):
-        return "i" if pa.types.is_signed_integer(kind) else "u"
-    return "M" if pa.types.is_timestamp(kind) else "O"
-
-
 def _convert_to_numpy(column: pa.Array) -> NDArray[Any]:
     if pa.types.is_dictionary(column.type):
         column = column.dictionary_decode()
@@ -179,27 +164,15 @@ def _convert_to_numpy(column: pa.Array) -> NDArray[Any]:
 #
 # A message is a FlatBuffers table: "Encapsulated message format" and ``Message.fbs`` of Arrow.
 
-_FILE_PREFIX_BYTES = 8
-"""Bytes of a file before its stream."""
-
+_FILE_PREFIX_BYTES = 8  # bytes of a file before its stream
 _FIELD_HEADER_TYPE, _FIELD_HEADER = 1, 2
 _TYPE_DICTIONARY_BATCH, _TYPE_RECORD_BATCH = 2, 3
 _FIELD_DICTIONARY_DATA = 1
 _FIELD_BUFFERS, _FIELD_COMPRESSION = 2, 3
-_SIZE_STRUCT = struct.Struct("<q")
-_BUFFER_STRUCT = struct.Struct("<qq")
 
 
 def check_batches(path: Path, in_file: bool) -> None:
-    """Raise if a compressed batch is too large to be unpacked as a whole.
-
-    ``in_file``: the format is the file format, not the stream format.
-
-    Raises
-    ------
-    UnusableError
-        If a batch is too large.
-    """
+    """Raise `UnusableError` if a compressed batch is too large; ``in_file``: no stream format."""
     with pa.memory_map(str(path)) as source:
         source.seek(_FILE_PREFIX_BYTES if in_file else 0)
         for message in pa.ipc.MessageReader.open_stream(source):
@@ -226,11 +199,9 @@ def _read_unpacked_sizes(metadata: bytes, body: pa.Buffer | None) -> Iterator[in
             return
         start, count = header.vector(_FIELD_BUFFERS)
         for number in range(count):
-            offset, length = _BUFFER_STRUCT.unpack_from(
-                metadata, start + number * _BUFFER_STRUCT.size
-            )
-            if length >= _SIZE_STRUCT.size:
-                yield max(0, *_SIZE_STRUCT.unpack(bytes(body[offset : offset + _SIZE_STRUCT.size])))
+            offset, length = struct.unpack_from("<qq", metadata, start + 16 * number)
+            if length >= 8:
+                yield max(0, *struct.unpack("<q", bytes(body[offset : offset + 8])))
     except struct.error:
         raise UnusableError("corrupt data: a damaged message; copy the file again") from None
 
@@ -266,3 +237,127 @@ class _FlatTable:
             return 0, 0
         at = place + struct.unpack_from("<I", self._data, place)[0]
         return at + 4, int(struct.unpack_from("<I", self._data, at)[0])
+
+
+# ------------------------------------------- unpacked size of the pages of Parquet
+#
+# A page is unpacked as a whole, to the size in its own header; the metadata at the end of the file
+# do not have this size. The header is a structure of Thrift's compact protocol: ``PageHeader`` of
+# ``parquet.thrift``.
+
+_FIELD_UNPACKED_SIZE, _FIELD_PACKED_SIZE = 2, 3
+_HEADER_PROBE, _MAX_HEADER = 1 << 10, 1 << 20
+"""Bytes of a header that are read first, and at most: it may contain the extremes of its page."""
+
+
+def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> None:
+    """Raise `UnusableError` if pages are too many, or the largest of all columns are too large."""
+    most = max(MAX_UNCHECKED_PAGES, path.stat().st_size // MIN_MEAN_PAGE)
+    paths = [metadata.schema.column(place).path for place in range(metadata.num_columns)]
+    places = [place for place, name in enumerate(paths) if name in names]
+    number = 0
+    with path.open("rb") as file:
+        for group in range(metadata.num_row_groups):
+            together = 0
+            for place in places:
+                largest = 0
+                for unpacked in pages(file, metadata.row_group(group).column(place)):
+                    number += 1
+                    largest = max(largest, unpacked)
+                    if number > most:
+                        raise UnusableError(
+                            f"more than {most} pages; expected larger ones: write it with "
+                            "pyarrow.parquet.write_table"
+                        )
+                together += largest
+            if together > MAX_PAGE_BYTES:
+                raise UnusableError(
+                    f"pages unpack to {together} bytes together; expected at most "
+                    f"{MAX_PAGE_BYTES}: write it with pyarrow.parquet.write_table, which makes "
+                    "smaller ones"
+                )
+
+
+def pages(file: BinaryIO, column: pq.ColumnChunkMetaData) -> Iterator[int]:
+    """Yield the unpacked size of each page of a column, bytes."""
+    at = column.data_page_offset
+    if column.has_dictionary_page and 0 < column.dictionary_page_offset < at:
+        at = column.dictionary_page_offset
+    end = at + column.total_compressed_size
+    while at < end:
+        for most in (_HEADER_PROBE, _MAX_HEADER):
+            file.seek(at)
+            data = file.read(most)
+            try:
+                fields, length = _parse_header(data)
+                break
+            except IndexError:
+                continue
+        else:
+            raise UnusableError("corrupt data: a damaged page; copy the file again")
+        unpacked, packed = fields.get(_FIELD_UNPACKED_SIZE, 0), fields.get(_FIELD_PACKED_SIZE, -1)
+        if unpacked < 0 or packed < 0:
+            raise UnusableError("corrupt data: a damaged page; copy the file again")
+        yield unpacked
+        at += length + packed
+
+
+_TYPE_TRUE, _TYPE_FALSE, _TYPE_BYTE, _TYPE_DOUBLE, _TYPE_BINARY, _TYPE_STRUCT = 1, 2, 3, 7, 8, 12
+_INTEGER_TYPES = frozenset((4, 5, 6))
+_MAX_DEPTH = 8
+
+
+def _parse_header(data: bytes) -> tuple[dict[int, int], int]:
+    """Return the integers of a structure by field number, and its length; `IndexError` if cut."""
+    numbers: dict[int, int] = {}
+    at, field = 0, 0
+    while kind := data[at]:
+        field, at = _parse_field(data, at, field)
+        kind &= 15
+        if kind in _INTEGER_TYPES:
+            value, at = _parse_varint(data, at)
+            numbers[field] = (value >> 1) ^ -(value & 1)
+        else:
+            at = _skip_value(data, at, kind, 0)
+    return numbers, at + 1
+
+
+def _parse_field(data: bytes, at: int, before: int) -> tuple[int, int]:
+    """Return the number of the field with its type at a position, and the next position."""
+    step = data[at] >> 4
+    if step:
+        return before + step, at + 1
+    number, at = _parse_varint(data, at + 1)
+    return (number >> 1) ^ -(number & 1), at
+
+
+def _parse_varint(data: bytes, at: int) -> tuple[int, int]:
+    value = shift = 0
+    while True:
+        value |= (data[at] & 127) << shift
+        at, more = at + 1, data[at] > 127
+        shift += 7
+        if not more:
+            return value, at
+        if shift > 63:
+            raise IndexError("a number without end")
+
+
+def _skip_value(data: bytes, at: int, kind: int, depth: int) -> int:
+    """Return the position after a value of a type."""
+    if kind in (_TYPE_TRUE, _TYPE_FALSE):
+        return at
+    if kind in _INTEGER_TYPES:
+        return _parse_varint(data, at)[1]
+    if kind in (_TYPE_BYTE, _TYPE_DOUBLE):
+        return at + (1 if kind == _TYPE_BYTE else 8)
+    if kind == _TYPE_BINARY:
+        size, at = _parse_varint(data, at)
+        return at + size
+    if kind == _TYPE_STRUCT and depth < _MAX_DEPTH:
+        field = 0
+        while inner := data[at]:
+            field, at = _parse_field(data, at, field)
+            at = _skip_value(data, at, inner & 15, depth + 1)
+        return at + 1
+    raise IndexError("no type of a page header")

@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 from abc import abstractmethod
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import islice
@@ -54,7 +54,7 @@ from imubench_pipeline.readers.file_format import (
     shown,
 )
 from imubench_pipeline.readers.stamps import Clock, date_of_nanoseconds, date_of_stamp
-from imubench_pipeline.readers.stated_units import StatedUnit, stated
+from imubench_pipeline.readers.stated_units import stated
 from imubench_pipeline.settings.sensor import TimeSource
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
@@ -78,7 +78,7 @@ class ArrayFile(LogFile):
         """Yield the records in the order of the file (see `LogFile.batches`)."""
         check_not_empty(self.path)
         time = None if self.log.time is None else ArrayTime(self, self.log.time)
-        for block in self._guarded():
+        for block in self._blocks():
             # Values in a damaged file may overflow; infinities are counted as such.
             with np.errstate(over="ignore", invalid="ignore"):
                 try:
@@ -88,16 +88,22 @@ class ArrayFile(LogFile):
                 columns = {name: self.to_si(name, numbers(raw)) for name, raw in block.items()}
             yield Batch(seconds, columns)
 
-    def _guarded(self) -> Iterator[dict[str, NDArray[Any]]]:
+    def _blocks(self) -> Iterator[dict[str, NDArray[Any]]]:
         """Yield the blocks as written; exceptions of the libraries become `RecordingError`."""
         with explained(self.path), ExitStack() as stack:
-            yield from self._blocks(self._places(list(islice(self.tables(stack), MAX_ARRAYS + 1))))
+            yield from self._read(self._places(list(islice(self.tables(stack), MAX_ARRAYS + 1))))
 
-    # --------------------------------------------------------------------------- blocks
-
-    def _blocks(self, places: dict[str, _Place]) -> Iterator[dict[str, NDArray[Any]]]:
+    def _read(self, places: dict[str, _Place]) -> Iterator[dict[str, NDArray[Any]]]:
         tables = list(dict.fromkeys(table for table, _ in places.values()))
-        _check_lengths(places)
+        lengths = {key: table.rows for key, (table, _) in places.items()}
+        if len(set(lengths.values())) > 1:
+            raise UnusableError(
+                f"columns of unequal length: {lengths}; expected one length: cut the longer ones, "
+                "or split them into files with 'file:'"
+            )
+        if 0 in lengths.values():
+            names = _join_names(table.shown for table in tables)
+            raise UnusableError(f"no record in {names}; expected at least one")
         wanted = {
             table: sorted({position for owner, position in places.values() if owner is table})
             for table in tables
@@ -108,9 +114,8 @@ class ArrayFile(LogFile):
                 f"the columns lie in chunks of {chunk_bytes} bytes together; expected at most "
                 f"{MAX_CHUNK_BYTES}: repack the file with smaller chunks"
             )
-        rows = rows_of_block(
-            sum(table.row_bytes(wanted[table]) for table in tables), MAX_BLOCK_BYTES
-        )
+        row_bytes = sum(table.row_bytes(wanted[table]) for table in tables)
+        rows = rows_of_block(row_bytes, MAX_BLOCK_BYTES)
         read, size = 0, self.path.stat().st_size
         most = max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size)
         streams = [table.blocks(wanted[table], rows) for table in tables]
@@ -135,8 +140,6 @@ class ArrayFile(LogFile):
         if promised is not None and read != promised:
             raise UnusableError(f"cut short: {read} of {promised} records; copy it again")
 
-    # -------------------------------------------------------------------------- columns
-
     def _places(self, tables: Sequence[Table]) -> dict[str, _Place]:
         by_name: dict[str, Table] = {}
         if len(tables) > MAX_ARRAYS:
@@ -149,9 +152,13 @@ class ArrayFile(LogFile):
         for key, source in self.sources.items():
             places[key] = _find_column(by_name, source.column, source.variable, key)
             _check_kind(places[key], key, NUMBER_KINDS)
+            table, position = places[key]
+            label = table.column(position).label or table.name.rpartition("/")[2]
+            where = f"an attribute of {table.shown}"
+            if unit := stated(key, table.unit(position), where, label):
+                self.units[key] = unit
         if self.log.time is not None:
             places[_TIME_KEY] = self._time_place(by_name)
-        self.units = _find_stated_units(places)
         self.simulated = any(table.simulated for table, _ in places.values())
         return places
 
@@ -186,28 +193,8 @@ class ArrayFile(LogFile):
         return place
 
 
-def _find_stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
-    """Return the units that a file states for its channels."""
-    units = {}
-    for name, (table, position) in places.items():
-        label = table.column(position).label or table.name.rpartition("/")[2]
-        where = f"an attribute of {table.shown}"
-        if unit := stated(name, table.unit(position), where, label):
-            units[name] = unit
-    return units
-
-
 def rows_of_block(row_bytes: int, most: int) -> int:
-    """Return the number of records of a block.
-
-    ``row_bytes``: memory per record, bytes.
-    ``most``: largest memory of a block, bytes.
-
-    Raises
-    ------
-    UnusableError
-        If a single record exceeds the limit.
-    """
+    """Return the records of a block of ``most`` bytes; `UnusableError` if one is larger."""
     if row_bytes > most:
         raise UnusableError(
             f"one record takes {row_bytes} bytes; expected at most {most}: store the log's columns "
@@ -253,13 +240,7 @@ def numbers(raw: NDArray[Any]) -> NDArray[np.float64]:
 def _find_column(
     tables: dict[str, Table], column: str | int, variable: str | None, key: str
 ) -> _Place:
-    """Return the table and the position of a column.
-
-    Raises
-    ------
-    UnusableError
-        If the column does not exist, or several columns match.
-    """
+    """Return table and position of the only matching column, else raise `UnusableError`."""
     if isinstance(column, int):
         return _take_numbered(_find_table(tables, variable, key), column, key)
     matches = _find_addressed(tables, column, variable)
@@ -384,18 +365,6 @@ def _check_kind(place: _Place, key: str, expected: str) -> None:
     raise UnusableError(f"{where} for {key} holds {column.holds}; expected numbers: {mend}")
 
 
-def _check_lengths(places: dict[str, _Place]) -> None:
-    lengths = {key: table.rows for key, (table, _) in places.items()}
-    if len(set(lengths.values())) > 1:
-        raise UnusableError(
-            f"columns of unequal length: {lengths}; expected one length: cut the longer ones, or "
-            "split them into files with 'file:'"
-        )
-    if 0 in lengths.values():
-        names = _join_names(dict.fromkeys(table.shown for table, _ in places.values()))
-        raise UnusableError(f"no record in {names}; expected at least one")
-
-
 def _describe_contents(tables: dict[str, Table], labels: bool = False) -> str:
     """Describe the arrays of a file and, if ``labels``, their columns, or why none can be used."""
     usable = [table for table in tables.values() if table.fault is None]
@@ -413,12 +382,9 @@ def _describe_contents(tables: dict[str, Table], labels: bool = False) -> str:
 
 def _join_names(names: Iterable[str]) -> str:
     every = list(names)
-    return ", ".join(cut(name, str) for name in every[:_MAX_LISTED_NAMES]) + (
-        ", ..." if len(every) > _MAX_LISTED_NAMES else ""
-    )
+    shown = [cut(name, str) for name in every[:_MAX_LISTED_NAMES]]
+    return ", ".join(shown + ["..."] * (len(every) > _MAX_LISTED_NAMES))
 
-
-# ------------------------------------------------------------------------- inspection
 
 _MAX_TABLES = 1000
 _MAX_EXAMINED_BYTES = 1 << 24
@@ -430,33 +396,23 @@ _MAX_RATE = 1e6
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return the tables of a file, at most a thousand.
-
-    Raises
-    ------
-    RecordingError
-        If it cannot be read.
-    """
+    """Return the first thousand tables of a file; raise `RecordingError` if it cannot be read."""
     check_not_empty(path)
     file = file_format.load().log_file(path, NOTHING_STATED, {})
     assert isinstance(file, ArrayFile)  # the readers of these files
     with explained(path), ExitStack() as stack:
         tables = list(islice(file.tables(stack), _MAX_TABLES))
         described = [_describe_table(path, file_format, table) for table in tables]
-    rates = {rate for table in described if (rate := _find_rate(table)) is not None}
+    rates = set()
+    for table in described:
+        # A single value with the name of a rate.
+        name = re.sub(r"[\W_\d]+", "", table.name.rpartition("/")[2]).lower().removesuffix("hz")
+        if table.rows == len(table.columns) == 1 and name in _RATE_NAMES:
+            rates |= {float(value) for value in table.columns[0].values if 0 < value < _MAX_RATE}
     if len(rates) == 1:
         (rate,) = rates
         described = [replace(table, rate=rate) for table in described]
     return _combine_vectors(described)
-
-
-def _find_rate(table: LogTable) -> float | None:
-    """Return the rate in a table with a single value with the name of a rate; else None."""
-    name = re.sub(r"[\W_\d]+", "", table.name.rpartition("/")[2]).lower().removesuffix("hz")
-    if table.rows != 1 or len(table.columns) != 1 or name not in _RATE_NAMES:
-        return None
-    values = table.columns[0].values
-    return float(values[0]) if len(values) and 0 < values[0] < _MAX_RATE else None
 
 
 def _combine_vectors(described: Sequence[LogTable]) -> list[LogTable]:
@@ -492,16 +448,29 @@ def _describe_table(path: Path, file_format: FileFormat, table: Table) -> LogTab
     columns = []
     labels = Counter(table.labels)
     for place, column in enumerate(described):
-        source, address = _name_column(table, place, labels)
+        label = table.labels[place] if table.labels else ""
+        is_unique = label.isprintable() and labels[label] == 1
+        source: str | int = label if label and is_unique else place + 1  # in its table
+        address = source  # in the whole file
+        if table.name and table.labels:
+            address = f"{table.name}/{label}"
+        elif table.name and table.width == 1:
+            source = address = table.name
+        elif table.name:
+            address = f"{table.name}[{place + 1}]"
         raw = values.get(place, np.empty(0))
         dated = column.kind == DATE_KIND
+        first = tuple(map(str, raw[:MAX_SHOWN_VALUES])) if dated else shown(raw)
+        if dated:
+            dates = raw.astype("M8[ns]")
+            raw = np.where(np.isnat(dates), np.nan, dates.astype(np.int64).astype(np.float64))
         columns.append(
             LogColumn(
                 source,
                 column.label or (table.name if table.width == 1 else ""),
                 kinds.get(column.kind, "other"),
-                tuple(map(str, raw[:MAX_SHOWN_VALUES])) if dated else shown(raw),
-                _dates_to_floats(raw) if dated else numbers(raw),
+                first,
+                numbers(raw),
                 units[place],
                 ("iso8601",) if dated else (),
                 address,
@@ -511,24 +480,6 @@ def _describe_table(path: Path, file_format: FileFormat, table: Table) -> LogTab
     variable = None if whole or not table.name else table.name
     about = "" if table.rows is None else f"{table.rows} x {table.width}"
     return LogTable(file_format, table.name, tuple(columns), variable, rows=table.rows, about=about)
-
-
-def _name_column(
-    table: Table, place: int, labels: Mapping[str, int]
-) -> tuple[str | int, str | int]:
-    """Return the name of a column in its table, and in the whole file."""
-    label = table.labels[place] if table.labels else ""
-    if label and (not label.isprintable() or labels[label] > 1):
-        label = ""
-    if label:
-        return label, f"{table.name}/{label}" if table.name else label
-    if not table.name:
-        return place + 1, place + 1
-    if table.labels:
-        return place + 1, f"{table.name}/{table.labels[place]}"
-    return (
-        (table.name, table.name) if table.width == 1 else (place + 1, f"{table.name}[{place + 1}]")
-    )
 
 
 def _read_first_records(table: Table, places: Sequence[int]) -> dict[int, NDArray[Any]]:
@@ -542,23 +493,8 @@ def _read_first_records(table: Table, places: Sequence[int]) -> dict[int, NDArra
     return {}
 
 
-def _dates_to_floats(raw: NDArray[Any]) -> NDArray[np.float64]:
-    """Return dates as ns since 1970; NaN where one is missing."""
-    dates = raw.astype("M8[ns]")
-    return np.where(np.isnat(dates), np.nan, dates.astype(np.int64).astype(np.float64))
-
-
-# ------------------------------------------------------------------------------------------- stamps
-
-_NANOSECONDS_PER_UNIT = {
-    "D": 86_400 * 10**9,
-    "h": 3_600 * 10**9,
-    "m": 60 * 10**9,
-    "s": 10**9,
-    "ms": 10**6,
-    "us": 10**3,
-    "ns": 1,
-}
+_NANOSECONDS_PER_UNIT = {"D": 86_400 * 10**9, "h": 3_600 * 10**9, "m": 60 * 10**9, "s": 10**9,
+                         "ms": 10**6, "us": 10**3, "ns": 1}  # fmt: skip
 _MAX_INT64 = 2**63 - 1
 
 
@@ -571,21 +507,27 @@ class ArrayTime:
         self._dated = False
 
     def seconds(self, raw: NDArray[Any]) -> NDArray[np.float64]:
-        """Return s since the first stamp of the file; NaN where the stamp is missing.
-
-        Raises
-        ------
-        UnusableError
-            If dates do not fit into nanoseconds.
-        RecordingError
-            If the first records have no stamp.
-        """
+        """Return s since the first stamp of the file; NaN where the stamp is missing."""
         missing = np.ma.getmaskarray(raw).copy()
         values = np.ma.getdata(raw)
         self._dated = values.dtype.kind == DATE_KIND
         if self._dated:
             missing |= np.isnat(values)
-            stamps = _dates_to_nanoseconds(values, missing)
+            unit, count = np.datetime_data(values.dtype)
+            if unit not in _NANOSECONDS_PER_UNIT:
+                raise UnusableError(
+                    f"time stamps are dates in units of {unit}; expected "
+                    f"{', '.join(_NANOSECONDS_PER_UNIT)}: convert them"
+                )
+            factor = _NANOSECONDS_PER_UNIT[unit] * count
+            whole = values.astype(f"M8[{count}{unit}]", copy=False).view(np.int64)
+            limit = _MAX_INT64 // factor
+            if np.any(~missing & ((whole > limit) | (whole < -limit))):
+                raise UnusableError(
+                    "time stamps are dates before 1678 or after 2262, expected the time of a log; "
+                    "mend 'column' of 'time' in the sensor file, or copy the file again"
+                )
+            stamps = np.where(missing, 0, whole) * np.int64(factor)
         elif values.dtype.kind == "f":
             stamps = values.astype(np.float64)
             missing |= ~np.isfinite(stamps)
@@ -596,22 +538,3 @@ class ArrayTime:
 
     def _started(self, first: Any) -> str | None:
         return date_of_nanoseconds(first) if self._dated else date_of_stamp(first, self._source)
-
-
-def _dates_to_nanoseconds(dates: NDArray[Any], missing: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return dates as ns since 1970."""
-    unit, count = np.datetime_data(dates.dtype)
-    if unit not in _NANOSECONDS_PER_UNIT:
-        raise UnusableError(
-            f"time stamps are dates in units of {unit}; expected "
-            f"{', '.join(_NANOSECONDS_PER_UNIT)}: convert them"
-        )
-    factor = _NANOSECONDS_PER_UNIT[unit] * count
-    whole = dates.astype(f"M8[{count}{unit}]", copy=False).view(np.int64)
-    limit = _MAX_INT64 // factor
-    if np.any(~missing & ((whole > limit) | (whole < -limit))):
-        raise UnusableError(
-            "time stamps are dates before 1678 or after 2262, expected the time of a log; mend "
-            "'column' of 'time' in the sensor file, or copy the file again"
-        )
-    return np.where(missing, 0, whole) * np.int64(factor)

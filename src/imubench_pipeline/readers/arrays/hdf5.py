@@ -46,31 +46,32 @@ class Hdf5File(ArrayFile):
                 "not an HDF5 file, or its beginning is damaged; mend 'reader' in the sensor file, "
                 "or copy the file again"
             )
-        return data_sets(stack.enter_context(opened(self.path)))
-
-
-def opened(path: Path) -> h5py.File:
-    """Open an HDF5 file for reading."""
-    return h5py.File(path, "r")
+        return data_sets(stack.enter_context(h5py.File(self.path, "r")))
 
 
 def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
     """Return the data sets of a file by name; only hard links are followed.
 
-    ``time_axis``: axis of time of a square matrix.
-    ``passed_over``: prefix of the names in the root group that are not data.
-
-    Raises
-    ------
-    UnusableError
-        If there are too many objects, or groups are nested too deeply.
+    ``passed_over``: prefix of the names in the root group that are not data. Raise `UnusableError`
+    if there are too many objects, or groups are nested too deeply.
     """
     objects = 0
     seen = {_get_identity(file)}
 
     def below(group: h5py.Group, above: str, depth: int) -> Iterator[DataSet]:
         nonlocal objects
-        for key in _list_names(group, objects, depth):
+        # The `visit` of the library crashes the process on deeply nested groups.
+        if depth > MAX_GROUP_DEPTH:
+            raise UnusableError(
+                f"groups lie more than {MAX_GROUP_DEPTH} deep; expected the log of one sensor: "
+                "copy its data sets into a file of their own"
+            )
+        if objects + len(group) > MAX_OBJECTS:
+            raise UnusableError(
+                f"more than {MAX_OBJECTS} objects; expected the log of one sensor: copy its data "
+                "sets into a file of their own"
+            )
+        for key in sorted(group, key=lambda key: key.encode() if isinstance(key, str) else key):
             objects += 1
             name = key if isinstance(key, str) else key.decode("utf-8", "replace")
             hard = isinstance(group.get(key, getlink=True), h5py.HardLink)
@@ -88,36 +89,13 @@ def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> l
     return list(below(file, "", 0))
 
 
-def _list_names(group: h5py.Group, before: int, depth: int) -> list[str | bytes]:
-    """Return the names in a group; ``before``: number of names in other groups so far."""
-    # The `visit` of the library crashes the process on deeply nested groups.
-    if depth > MAX_GROUP_DEPTH:
-        raise UnusableError(
-            f"groups lie more than {MAX_GROUP_DEPTH} deep; expected the log of one sensor: copy "
-            "its data sets into a file of their own"
-        )
-    if before + len(group) > MAX_OBJECTS:
-        raise UnusableError(
-            f"more than {MAX_OBJECTS} objects; expected the log of one sensor: copy its data "
-            "sets into a file of their own"
-        )
-    return sorted(group, key=lambda name: name.encode() if isinstance(name, str) else name)
-
-
 def _get_identity(item: h5py.Group | h5py.Dataset) -> tuple[int, int]:
-    """Return the unique identity of an object in its file."""
     info = h5py.h5o.get_info(item.id)
     return info.fileno, info.addr
 
 
 class DataSet(Array):
-    """A data set, read by blocks.
-
-    Parameters
-    ----------
-    time_axis : int
-        See `Array`.
-    """
+    """A data set, read by blocks; ``time_axis``: see `Array`."""
 
     def __init__(self, data: h5py.Dataset, name: str, time_axis: int) -> None:
         try:
@@ -148,7 +126,23 @@ class DataSet(Array):
 
     def unit(self, position: int) -> str | None:
         """Return the unit of the columns, if an attribute states it."""
-        return stated_unit(self.data)
+        data = self.data
+        name = next((name for name in _UNIT_ATTRIBUTES if name in data.attrs), None)
+        if name is None:
+            return None
+        kind = data.attrs.get_id(name)
+        if kind.shape != () or kind.dtype.itemsize > _MAX_STORED_LENGTH:
+            return None
+        if kind.dtype.kind == "S":
+            text = bytes(data.attrs[name]).decode("utf-8", "replace")
+        elif h5py.check_string_dtype(kind.dtype) is not None:
+            path = Path(data.file.filename).resolve()
+            status = path.stat()
+            units = _read_variable_length_texts(str(path), status.st_mtime_ns, status.st_size)
+            text = units.get(str(data.name), "")
+        else:
+            return None
+        return text.strip("\0 \t\r\n")[:_MAX_UNIT_LENGTH] or None
 
     def held_bytes(self, positions: Sequence[int]) -> int:
         """Return the additional memory for reading these columns, bytes."""
@@ -168,22 +162,18 @@ class DataSet(Array):
         _check_written(data_set, self.name, self._chunk)
         names = self.fields(positions)
         data = data_set.fields(names) if names else data_set
-        low, high = min(positions), max(positions) + 1
+        # A record is read as a whole, at position 0.
+        low, high = (0, 1) if self.labels else (min(positions), max(positions) + 1)
         for start in range(0, self.rows, rows):
-            block = self._block(data, slice(start, start + rows), slice(low, high))
-            before = 0 if names else low
-            yield [self.column_in(block, position - before) for position in positions]
-
-    def _block(self, data: Any, time: slice, columns: slice) -> NDArray[Any]:
-        """Return a block with time along the first axis; a vector for records."""
-        if len(self.shape) == 1:
-            block = np.asarray(data[time])
-            return block if self.labels else block.reshape(-1, 1)
-        if self.labels:
-            columns = slice(0, 1)
-        block = np.asarray(data[time, columns] if self.time_axis == 0 else data[columns, time])
-        block = block if self.time_axis == 0 else block.T
-        return block[:, 0] if self.labels else block
+            time = slice(start, start + rows)
+            if len(self.shape) == 1:
+                block = np.asarray(data[time])
+            elif self.time_axis == 0:
+                block = np.asarray(data[time, low:high])
+            else:
+                block = np.asarray(data[low:high, time]).T
+            block = block.reshape(-1) if self.labels else block.reshape(len(block), -1)
+            yield [self.column_in(block, position - low) for position in positions]
 
 
 def _is_sound(dtype: np.dtype[Any]) -> bool:
@@ -193,11 +183,8 @@ def _is_sound(dtype: np.dtype[Any]) -> bool:
     assert dtype.fields is not None  # a type with names has them
     places = sorted((offset, offset + kind.itemsize) for kind, offset, *_ in dtype.fields.values())
     apart = all(end <= start for (_, end), (start, _) in pairwise(places))
-    return (
-        apart
-        and places[-1][1] <= dtype.itemsize
-        and all(_is_sound(dtype[name]) for name in dtype.names)
-    )
+    fits = apart and places[-1][1] <= dtype.itemsize
+    return fits and all(_is_sound(dtype[name]) for name in dtype.names)
 
 
 def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
@@ -239,33 +226,11 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
         )
 
 
-# -------------------------------------------------------- units, in attributes of the data sets
-
 _UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 _MAX_WAIT = 3.0
 _MAX_UNIT_LENGTH = 40
 _MAX_STORED_LENGTH = 1 << 12
 _MAX_MEMORY = 1 << 29
-
-
-def stated_unit(data: h5py.Dataset) -> str | None:
-    """Return the unit that an attribute of a data set states."""
-    name = next((name for name in _UNIT_ATTRIBUTES if name in data.attrs), None)
-    if name is None:
-        return None
-    kind = data.attrs.get_id(name)
-    if kind.shape != () or kind.dtype.itemsize > _MAX_STORED_LENGTH:
-        return None
-    if kind.dtype.kind == "S":
-        text = bytes(data.attrs[name]).decode("utf-8", "replace")
-    elif h5py.check_string_dtype(kind.dtype) is not None:
-        path = Path(data.file.filename).resolve()
-        status = path.stat()
-        units = _read_variable_length_texts(str(path), status.st_mtime_ns, status.st_size)
-        text = units.get(str(data.name), "")
-    else:
-        return None
-    return text.strip("\0 \t\r\n")[:_MAX_UNIT_LENGTH] or None
 
 
 @lru_cache(maxsize=4)
@@ -277,20 +242,9 @@ def _read_variable_length_texts(path: str, *_: int) -> dict[str, str]:
     so the process stops at the first text that is too long for a unit.
     """
     try:
-        done = subprocess.run(
-            [
-                sys.executable,
-                "-c",
-                _READER_SCRIPT,
-                path,
-                str(_MAX_STORED_LENGTH),
-                str(_MAX_MEMORY),
-                *_UNIT_ATTRIBUTES,
-            ],
-            capture_output=True,
-            timeout=_MAX_WAIT,
-            check=True,
-        )
+        limits = str(_MAX_STORED_LENGTH), str(_MAX_MEMORY)
+        command = [sys.executable, "-c", _READER_SCRIPT, path, *limits, *_UNIT_ATTRIBUTES]
+        done = subprocess.run(command, capture_output=True, timeout=_MAX_WAIT, check=True)
         units = json.loads(done.stdout)
     except (subprocess.SubprocessError, OSError, ValueError):
         return {}

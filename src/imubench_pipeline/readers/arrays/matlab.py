@@ -13,6 +13,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import IO
@@ -36,6 +37,7 @@ from imubench_pipeline.readers.arrays.table import (
 from imubench_pipeline.readers.bounds import MAX_DIMENSIONS, MAX_MATLAB_NAME, MAX_STRUCTURE_DEPTH
 
 _MAX_CLASS_LENGTH = 64
+_COMPLEX_FAULT = "holds complex numbers; expected numbers: save real() of it"
 
 
 class MatlabFile(ArrayFile):
@@ -44,12 +46,13 @@ class MatlabFile(ArrayFile):
     def tables(self, stack: ExitStack) -> Iterable[Table]:
         """Describe every variable."""
         if h5py.is_hdf5(self.path):
-            return _list_variables(stack.enter_context(hdf5.opened(self.path)))
-        if _is_version_5(self.path):
-            return _list_variables_of_5(self.path)
+            return _list_variables_of_7(stack.enter_context(h5py.File(self.path, "r")))
         with self.path.open("rb") as file:
-            begin = file.read(HEADER_BYTES)
-        if header_of(begin) is not None:
+            begin = file.read(max(HEADER_BYTES, _HEADER_5_BYTES))
+        order = _BYTE_ORDERS.get(begin[126:_HEADER_5_BYTES])
+        if order is not None and struct.unpack(f"{order}H", begin[124:126])[0] >> 8 == _VERSION:
+            return _list_variables_of_5(self.path)
+        if header_of(begin[:HEADER_BYTES]) is not None:
             return _list_variables_of_4(self.path)
         raise UnusableError(
             "not a MATLAB file of version 4, 5 or 7.3, or its beginning is damaged; save it with "
@@ -57,42 +60,35 @@ class MatlabFile(ArrayFile):
         )
 
 
-def _list_variables(file: h5py.File) -> list[Table]:
-    """Return the variables of version 7.3, where matrices are stored transposed."""
-    tables: list[Table] = []
+def _list_variables_of_7(file: h5py.File) -> Iterator[Table]:
+    """Yield the variables of version 7.3, where matrices are stored transposed."""
     # Parts of cells, objects and sparse matrices are not variables.
     for data_set in hdf5.data_sets(file, time_axis=1, passed_over="#"):
+        attributes = data_set.data.attrs
         if "MATLAB_sparse" in data_set.data.parent.attrs:
             continue
-        if data_set.fault is None:
-            data_set.fault = _find_fault(data_set)
-        tables.append(data_set)
-    return tables
-
-
-def _find_fault(data_set: hdf5.DataSet) -> str | None:
-    if data_set.dtype.names is not None:
-        return "holds complex numbers; expected numbers: save real() of it"
-    attributes = data_set.data.attrs
-    if "MATLAB_empty" in attributes:
-        return "is empty; expected a vector or a matrix"
-    if "MATLAB_class" not in attributes:
-        return None
-    # Only fixed-length texts are read: the library may crash on damaged texts of other kinds.
-    kind = attributes.get_id("MATLAB_class")
-    if kind.dtype.kind != "S" or kind.shape != () or kind.dtype.itemsize > _MAX_CLASS_LENGTH:
-        return "has a damaged class; copy the file again"
-    if np.bytes_(attributes["MATLAB_class"]) == b"char":
-        return "holds text; expected numbers"
-    return None
-
-
-# --------------------------------------------------------------------------------- version 4
+        if data_set.fault is not None:
+            pass
+        elif data_set.dtype.names is not None:
+            data_set.fault = _COMPLEX_FAULT
+        elif "MATLAB_empty" in attributes:
+            data_set.fault = "is empty; expected a vector or a matrix"
+        elif "MATLAB_class" in attributes:
+            # Only fixed-length texts are read: the library may crash on damaged texts of other
+            # kinds.
+            kind = attributes.get_id("MATLAB_class").dtype
+            is_text = kind.kind == "S" and attributes.get_id("MATLAB_class").shape == ()
+            if not is_text or kind.itemsize > _MAX_CLASS_LENGTH:
+                data_set.fault = "has a damaged class; copy the file again"
+            elif np.bytes_(attributes["MATLAB_class"]) == b"char":
+                data_set.fault = "holds text; expected numbers"
+        yield data_set
 
 
 def _list_variables_of_4(path: Path) -> Iterator[Table]:
     """Yield the variables of a file."""
     start, size = 0, path.stat().st_size
+    opened = partial(_open_plain, path)
     with path.open("rb") as file:
         while start < size:
             file.seek(start)
@@ -105,7 +101,6 @@ def _list_variables_of_4(path: Path) -> Iterator[Table]:
             if header.fault is not None:
                 yield UnsupportedArray(header.name, header.fault)
             else:
-                opened = partial(_open_plain, path)
                 yield StreamedArray(
                     header.name, header.shape, header.dtype, True, opened, begin, False
                 )
@@ -146,14 +141,6 @@ _TAG_ORDER = {"<": 1, ">": -1}
 _READ_BLOCK = 1 << 16
 
 
-def _is_version_5(path: Path) -> bool:
-    """Return whether a file begins like a MATLAB file of version 5."""
-    with path.open("rb") as file:
-        header = file.read(_HEADER_5_BYTES)
-    order = _BYTE_ORDERS.get(header[126:])
-    return order is not None and struct.unpack(f"{order}H", header[124:126])[0] >> 8 == _VERSION
-
-
 def _list_variables_of_5(path: Path) -> Iterator[Table]:
     """Yield the variables of a file, and the fields of its structures as ``name/field``."""
     size = path.stat().st_size
@@ -167,44 +154,34 @@ def _list_variables_of_5(path: Path) -> Iterator[Table]:
             if end > size:
                 raise _make_truncated_error(end, size)
             if kind == _TYPE_COMPRESSED:
-                opened = partial(_open_inflated, path, begin, length)
+                opened = partial(_Inflated.opened, path, begin, length)
                 with opened() as stream:
                     most = MAX_DEFLATE_RATIO * (length + 8)
                     elements = _Elements(stream, order, 0, most, opened, checked=True)
                     yield from _read_matrix(elements, elements.tag(_TYPE_MATRIX))
             elif kind == _TYPE_MATRIX:
-                opened = partial(_open_plain, path)
-                elements = _Elements(file, order, begin, end, opened, checked=False)
+                plain = partial(_open_plain, path)
+                elements = _Elements(file, order, begin, end, plain, checked=False)
                 yield from _read_matrix(elements, length)
             else:
                 raise _make_damaged_error(f"a variable of type {kind}", start)
             start = end
 
 
+@dataclass
 class _Elements:
-    """Reads the elements of a variable one after another.
+    """Reads the elements of a variable; ``checked``: the stream has a checksum at its end."""
 
-    ``opened`` opens a new stream; ``checked``: the stream has a checksum at its end.
-    """
-
-    def __init__(
-        self,
-        stream: IO[bytes],
-        order: str,
-        at: int,
-        end: int,
-        opened: Callable[[], IO[bytes]],
-        checked: bool,
-    ) -> None:
-        self.order, self.opened, self.checked, self._stream = order, opened, checked, stream
-        self.at, self.end = at, end  # bytes from the beginning; end of the enclosing element
-        self.kind = 0  # of the last element
+    stream: IO[bytes]
+    order: str
+    at: int  # bytes from the beginning
+    end: int  # end of the enclosing element
+    opened: Callable[[], IO[bytes]]
+    checked: bool
+    kind: int = 0  # type of the last element
 
     def tag(self, *kinds: int) -> int:
-        """Read type and size of the next element, and return its size.
-
-        The data of a small element follow in the same eight bytes.
-        """
+        """Read type and size of the next element; small data follow in the same eight bytes."""
         self._check(8)
         first = self._read(4)
         self.kind, length = struct.unpack(f"{self.order}HH", first)[:: _TAG_ORDER[self.order]]
@@ -224,21 +201,16 @@ class _Elements:
         if length > _MAX_ELEMENT_HEADER:
             raise _make_damaged_error(f"{length} bytes of sides or names", self.at)
         read = self._read(length)
-        self.pad(begin)
+        self.skip(-(self.at - begin) % 8)  # the next element begins at a multiple of eight bytes
         return read
 
-    def pad(self, begin: int) -> None:
-        """Skip the padding to a multiple of eight bytes before the next element."""
-        self.skip(-(self.at - begin) % 8)
-
     def skip(self, size: int) -> None:
-        """Skip data."""
-        skip(self._stream, size)
+        skip(self.stream, size)
         self.at += size
 
     def _read(self, size: int) -> bytes:
         self.at += size
-        return exactly(self._stream, size)
+        return exactly(self.stream, size)
 
     def _check(self, length: int) -> None:
         if self.at + length > self.end:
@@ -268,7 +240,10 @@ def _read_matrix(
     else:
         (flags, _) = struct.unpack(f"{elements.order}II", elements.data(6)[:8].ljust(8, b"\0"))
         kind = flags & 0xFF
-        shape = () if kind == _CLASS_TABLE else _read_shape(elements)
+        sides = b"" if kind == _CLASS_TABLE else elements.data(5)
+        shape = struct.unpack(f"{elements.order}{len(sides) // 4}i", sides)
+        if kind != _CLASS_TABLE and (not 2 <= len(shape) <= MAX_DIMENSIONS or min(shape) < 0):
+            raise _make_damaged_error(f"sides {shape[:MAX_DIMENSIONS]}", elements.at)
         own = elements.data(1, 16).decode("utf-8", "replace")
         if len(own) > MAX_MATLAB_NAME:
             raise _make_damaged_error(f"a name of {len(own)} letters", elements.at)
@@ -280,33 +255,20 @@ def _read_matrix(
         elif not _FIRST_NUMERIC_CLASS <= kind <= _LAST_NUMERIC_CLASS:
             yield UnsupportedArray(name, _CLASS_FAULTS.get(kind, f"is of the unknown class {kind}"))
         elif flags & _FLAG_COMPLEX:
-            yield UnsupportedArray(
-                name, "holds complex numbers; expected numbers: save real() of it"
-            )
+            yield UnsupportedArray(name, _COMPLEX_FAULT)
         else:
-            yield _read_numeric(elements, name, shape)
+            size = elements.tag(*_NUMBER_TYPES)
+            dtype = np.dtype(elements.order + _NUMBER_TYPES[elements.kind])
+            if size != math.prod(shape) * dtype.itemsize:
+                raise UnusableError(
+                    f"corrupt data: {name} promises {describe_shape(shape)} values of "
+                    f"{dtype.itemsize} bytes, but has {size} bytes; copy the file again"
+                )
+            opened, checked = elements.opened, elements.checked
+            yield StreamedArray(name, shape, dtype, True, opened, elements.at, checked)
     elements.end = outer
     if above is not None:
         elements.skip(end - elements.at)
-
-
-def _read_shape(elements: _Elements) -> tuple[int, ...]:
-    data = elements.data(5)
-    shape: tuple[int, ...] = struct.unpack(f"{elements.order}{len(data) // 4}i", data)
-    if not 2 <= len(shape) <= MAX_DIMENSIONS or min(shape) < 0:
-        raise _make_damaged_error(f"sides {shape[:MAX_DIMENSIONS]}", elements.at)
-    return shape
-
-
-def _read_numeric(elements: _Elements, name: str, shape: tuple[int, ...]) -> StreamedArray:
-    size = elements.tag(*_NUMBER_TYPES)
-    dtype = np.dtype(elements.order + _NUMBER_TYPES[elements.kind])
-    if size != math.prod(shape) * dtype.itemsize:
-        raise UnusableError(
-            f"corrupt data: {name} promises {describe_shape(shape)} values of {dtype.itemsize} "
-            f"bytes, but has {size} bytes; copy the file again"
-        )
-    return StreamedArray(name, shape, dtype, True, elements.opened, elements.at, elements.checked)
 
 
 def _read_fields(elements: _Elements, name: str, depth: int) -> Iterator[Table]:
@@ -333,8 +295,11 @@ class _Inflated(io.RawIOBase):
         self._left = length
         self._inflate = zlib.decompressobj()
 
+    @classmethod
+    def opened(cls, path: Path, start: int, length: int) -> IO[bytes]:
+        return io.BufferedReader(cls(path, start, length), _READ_BLOCK)
+
     def readable(self) -> bool:
-        """Return True: the stream can be read."""
         return True
 
     def readinto(self, buffer: object) -> int:
@@ -356,14 +321,9 @@ class _Inflated(io.RawIOBase):
         return 0
 
     def close(self) -> None:
-        """Close the file."""
         self._file.close()
         super().close()
 
 
 def _open_plain(path: Path) -> IO[bytes]:
     return path.open("rb")
-
-
-def _open_inflated(path: Path, start: int, length: int) -> IO[bytes]:
-    return io.BufferedReader(_Inflated(path, start, length), _READ_BLOCK)

@@ -44,10 +44,9 @@ class Header:
 
 
 def header_of(begin: bytes) -> Header | None:
-    """Return the header at the beginning of some bytes; None if there is none.
+    """Return the header in the first `HEADER_BYTES` bytes; None if there is none.
 
-    ``begin``: `HEADER_BYTES` bytes, fewer at the end of a file. Random bytes are not accepted: most
-    of the first 16 bytes must be zero, and the name must be valid.
+    Random bytes are not accepted: most of the first 16 bytes must be zero, and the name valid.
     """
     before = struct.calcsize(_HEADER_FORMAT)
     if len(begin) < before:

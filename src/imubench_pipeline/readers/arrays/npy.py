@@ -9,14 +9,14 @@ pickled, are rejected: reading them would execute code in the file.
 from __future__ import annotations
 
 import io
+import math
 import struct
 import zipfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from functools import partial
-from typing import IO, Any
+from typing import IO
 
-import numpy as np
 from numpy.lib import format as npy
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
@@ -51,27 +51,27 @@ class NumpyFile(ArrayFile):
                 "numpy.savez writes: mend 'reader' in the sensor file, or copy the file again"
             )
         archive = stack.enter_context(opened_archive(self.path))
-        return list(_read_members(archive, self.path.stat().st_size))
-
-
-def _read_members(archive: zipfile.ZipFile, size: int) -> Iterator[Table]:
-    for info in archive.infolist():
-        if not info.filename.endswith(_SUFFIX):
-            continue
-        name = info.filename.removesuffix(_SUFFIX)
-        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise UnusableError(
-                f"{name} is packed by method {info.compress_type}; expected stored or deflated: "
-                "save it with numpy.savez or numpy.savez_compressed"
-            )
-        if info.compress_size > size or info.file_size > MAX_DEFLATE_RATIO * (
-            info.compress_size + 8
-        ):
-            raise UnusableError(
-                f"{name} is said to have {info.file_size} bytes, which {info.compress_size} packed "
-                f"bytes in a file of {size} cannot hold; the file is corrupt: copy it again"
-            )
-        yield _read_array_header(name, partial(archive.open, info), info.file_size, checked=True)
+        size = self.path.stat().st_size
+        tables = []
+        for info in archive.infolist():
+            if not info.filename.endswith(_SUFFIX):
+                continue
+            name = info.filename.removesuffix(_SUFFIX)
+            if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise UnusableError(
+                    f"{name} is packed by method {info.compress_type}; expected stored or "
+                    "deflated: save it with numpy.savez or numpy.savez_compressed"
+                )
+            most = MAX_DEFLATE_RATIO * (info.compress_size + 8)
+            if info.compress_size > size or info.file_size > most:
+                raise UnusableError(
+                    f"{name} is said to have {info.file_size} bytes, which {info.compress_size} "
+                    f"packed bytes in a file of {size} cannot hold; the file is corrupt: copy it "
+                    "again"
+                )
+            opened = partial(archive.open, info)
+            tables.append(_read_array_header(name, opened, info.file_size, checked=True))
+        return tables
 
 
 def _read_array_header(
@@ -95,13 +95,10 @@ def _read_array_header(
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
         shape, fortran, dtype = read(io.BytesIO(length + exactly(stream, header_size)))
         offset = stream.tell()
-    if version == (3, 0):
-        _decode_names(dtype)
+    if version == (3, 0) and dtype.names is not None:  # differs from 2.0 by UTF-8
+        dtype.names = tuple(name.encode("latin1").decode("utf-8") for name in dtype.names)
     array = StreamedArray(name, shape, dtype, fortran, opened, offset, checked)
-    elements = 1
-    for side in shape:
-        elements *= side
-    promised = offset + elements * dtype.itemsize
+    promised = offset + math.prod(shape) * dtype.itemsize
     if min(shape, default=0) < 0 or (promised > size and not dtype.hasobject):
         raise UnusableError(
             f"{shown} promises {describe_shape(shape)} values of {dtype.itemsize} bytes, "
@@ -114,9 +111,3 @@ def _read_array_header(
             "expected one array: save several with numpy.savez"
         )
     return array
-
-
-def _decode_names(dtype: np.dtype[Any]) -> None:
-    """Decode the names of fields in place: version 3.0 differs from 2.0 by UTF-8."""
-    if dtype.names is not None:
-        dtype.names = tuple(name.encode("latin1").decode("utf-8") for name in dtype.names)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -23,21 +22,12 @@ DATE_KIND = "M"
 """Kind of the NumPy type of dates (datetime64)."""
 
 _KIND_NAMES = {
-    "f": "numbers",
-    "i": "numbers",
-    "u": "numbers",
-    "M": "dates",
-    "m": "durations",
-    "c": "complex numbers",
-    "b": "truth values",
-    "S": "text",
-    "U": "text",
-    "T": "text",
-    "O": "objects",
-    "V": "raw bytes or arrays",
+    **dict.fromkeys(NUMBER_KINDS, "numbers"),
+    **dict.fromkeys("SUT", "text"),
+    **{"M": "dates", "m": "durations", "c": "complex numbers", "b": "truth values"},
+    **{"O": "objects", "V": "raw bytes or arrays"},
 }
-_MAX_FIELD_ELEMENTS = 1024
-"""Largest number of elements of a field that become columns of their own."""
+_MAX_FIELD_ELEMENTS = 1024  # largest number of elements of a field that become columns of their own
 
 
 class UnusableError(Exception):
@@ -56,7 +46,7 @@ class Column:
     """Kind of the data in words."""
 
 
-class Table(ABC):
+class Table:
     """Columns of equal length with a common name in a file."""
 
     name: str = ""
@@ -77,28 +67,28 @@ class Table(ABC):
         """Name of the table in messages."""
         return self.name or "the table"
 
-    @abstractmethod
     def column(self, position: int) -> Column:
         """Return a column by its position, counted from 0."""
+        raise UnusableError(f"{self.shown} {self.fault}")
 
     def unit(self, position: int) -> str | None:
         """Return the unit of a column, if the file states it."""
         return None
 
-    @abstractmethod
     def row_bytes(self, positions: Sequence[int]) -> int:
         """Return the memory per record for reading these columns, bytes."""
+        return 0
 
     def held_bytes(self, positions: Sequence[int]) -> int:
         """Return the additional memory for reading these columns, bytes."""
         return 0
 
-    @abstractmethod
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
         """Yield these columns, ``rows`` records at a time or fewer.
 
         A column with missing values is a masked array, or has NaN or NaT there.
         """
+        return iter(())
 
 
 class UnsupportedArray(Table):
@@ -107,18 +97,6 @@ class UnsupportedArray(Table):
     def __init__(self, name: str, fault: str) -> None:
         self.name = name
         self.fault = fault
-
-    def column(self, position: int) -> Column:
-        """Raise `UnusableError`: there are no columns."""
-        raise UnusableError(f"{self.shown} {self.fault}")
-
-    def row_bytes(self, positions: Sequence[int]) -> int:
-        """Return 0: nothing is read."""
-        return 0
-
-    def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
-        """Yield nothing."""
-        return iter(())
 
 
 @dataclass(frozen=True)
@@ -134,12 +112,7 @@ class Array(Table):
     """A vector, a matrix with time along its longer side, or a vector of records with fields.
 
     A field that is a vector of three is the columns ``gyro[1]``, ``gyro[2]`` and ``gyro[3]``; a
-    field of a field is ``imu.gyro``.
-
-    Parameters
-    ----------
-    time_axis : int
-        Axis of time of a square matrix.
+    field of a field is ``imu.gyro``. ``time_axis``: axis of time of a square matrix.
     """
 
     def __init__(
@@ -151,12 +124,12 @@ class Array(Table):
         self.time_axis = time_axis
         self._leaves: list[_Leaf] = []
         if len(shape) not in (1, 2):
-            self.fault = (
-                f"has {len(shape)} dimensions ({describe_shape(shape)}); expected a vector, or a "
-                "matrix with a column a channel: reshape it"
-                if shape
-                else "is a single value; expected a vector or a matrix"
-            )
+            self.fault = "is a single value; expected a vector or a matrix"
+            if shape:
+                self.fault = (
+                    f"has {len(shape)} dimensions ({describe_shape(shape)}); expected a vector, or "
+                    "a matrix with a column a channel: reshape it"
+                )
             return
         if 0 in shape:
             self.fault = f"is empty ({describe_shape(shape)}); expected at least one record"
@@ -174,18 +147,15 @@ class Array(Table):
             self.width = len(self._leaves)
             self.labels = [leaf.label for leaf in self._leaves]
         elif dtype.kind not in NUMBER_KINDS + DATE_KIND:
-            self.fault = (
-                f"holds {_KIND_NAMES.get(dtype.kind, str(dtype))}; expected numbers: convert it"
-            )
+            holds = _KIND_NAMES.get(dtype.kind, str(dtype))
+            self.fault = f"holds {holds}; expected numbers: convert it"
 
     def column(self, position: int) -> Column:
         """Return a column by its position, counted from 0."""
         if not self._leaves:
             return Column("", self.dtype.kind, _KIND_NAMES[self.dtype.kind])
-        leaf = self._leaves[position]
-        return Column(
-            leaf.label, leaf.dtype.kind, _KIND_NAMES.get(leaf.dtype.kind, str(leaf.dtype))
-        )
+        label, dtype = self._leaves[position].label, self._leaves[position].dtype
+        return Column(label, dtype.kind, _KIND_NAMES.get(dtype.kind, str(dtype)))
 
     def fields(self, positions: Sequence[int]) -> list[str]:
         """Return the fields of a record with these columns; empty if it has no fields."""
@@ -234,23 +204,12 @@ _SKIP_BLOCK = 1 << 20
 
 
 class StreamedArray(Array):
-    """An array with consecutive elements in a file or in a compressed part of a file.
+    """An array (see `Array`) with consecutive elements in a file or in a compressed part of it.
 
     If a matrix is stored column by column, each column is read by a stream of its own, so that only
-    one block of each is in memory.
-
-    Parameters
-    ----------
-    name, shape, dtype, time_axis
-        See `Array`.
-    fortran : bool
-        The first index varies fastest.
-    opened : callable
-        Opens a new stream of the bytes, which its caller closes.
-    offset : int
-        Bytes before the first element.
-    checked : bool
-        The bytes have a checksum, which is verified at their end.
+    one block of each is in memory. ``fortran``: the first index varies fastest. ``opened``: opens a
+    new stream of the bytes, which its caller closes. ``offset``: bytes before the first element.
+    ``checked``: the bytes have a checksum, which is verified at their end.
     """
 
     def __init__(
@@ -279,19 +238,19 @@ class StreamedArray(Array):
         """Yield these columns, ``rows`` records at a time or fewer (see `Table.blocks`)."""
         assert self.rows is not None  # from the shape
         with ExitStack() as stack:
-            if self._by_record:
-                streams = [self._at(stack, 0)]
-            else:
-                streams = [self._at(stack, position * self.rows) for position in positions]
+            starts = [0] if self._by_record else [place * self.rows for place in positions]
+            streams = [self._at(stack, start) for start in starts]
             for start in range(0, self.rows, rows):
                 count = min(rows, self.rows - start)
                 if self._by_record:
-                    block = self._next(streams[0], count * self._across)
+                    size = count * self._across * self.dtype.itemsize
+                    block = np.frombuffer(exactly(streams[0], size), self.dtype)
                     if not self._leaves:
                         block = block.reshape(count, self._across)
                     yield [self.column_in(block, position) for position in positions]
                 else:
-                    yield [self._next(stream, count) for stream in streams]
+                    parts = [exactly(stream, count * self.dtype.itemsize) for stream in streams]
+                    yield [np.frombuffer(part, self.dtype) for part in parts]
             if self._checked:
                 last = streams[0 if self._by_record else int(np.argmax(positions))]
                 while last.read(_SKIP_BLOCK):
@@ -304,10 +263,6 @@ class StreamedArray(Array):
         skip(stream, place, seek=not self._checked)
         return stream
 
-    def _next(self, stream: IO[bytes], elements: int) -> NDArray[Any]:
-        wanted = elements * self.dtype.itemsize
-        return np.frombuffer(exactly(stream, wanted), self.dtype)
-
 
 def skip(stream: IO[bytes], size: int, *, seek: bool = True) -> None:
     """Skip bytes of a stream; read them if it cannot seek or ``seek`` is false."""
@@ -319,13 +274,7 @@ def skip(stream: IO[bytes], size: int, *, seek: bool = True) -> None:
 
 
 def exactly(stream: IO[bytes], size: int) -> bytes:
-    """Return the next bytes of a stream.
-
-    Raises
-    ------
-    UnusableError
-        If the stream ends early.
-    """
+    """Return the next bytes of a stream; raise `UnusableError` if it ends early."""
     read = stream.read(size)
     if len(read) < size:
         raise UnusableError(f"cut short: {len(read)} of {size} bytes of an array; copy it again")

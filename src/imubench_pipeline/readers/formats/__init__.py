@@ -25,16 +25,12 @@ def _load_format(name: str) -> FileFormat:
     return file_format
 
 
-def _check_names() -> None:
-    modules = {module.name for module in pkgutil.iter_modules(__path__)}
-    if missing := modules.symmetric_difference(get_args(Reader)):
-        raise ImportError(
-            f"{', '.join(sorted(missing))}: a format of log files has a module in readers/formats "
-            "and its name in settings.sensor.Reader; one of them is missing"
-        )
-
-
-_check_names()
+_modules = {module.name for module in pkgutil.iter_modules(__path__)}
+if _missing := _modules.symmetric_difference(get_args(Reader)):
+    raise ImportError(
+        f"{', '.join(sorted(_missing))}: a format of log files has a module in readers/formats "
+        "and its name in settings.sensor.Reader; one of them is missing"
+    )
 
 FILE_FORMATS: Mapping[Reader, FileFormat] = {name: _load_format(name) for name in get_args(Reader)}
 """All formats by the value of ``reader`` in a sensor file."""

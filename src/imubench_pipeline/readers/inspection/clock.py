@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,13 +28,9 @@ _COUNTER_WORDS = frozenset(
      "sequence", "n", "no", "nr", "packet", "row", "record", "id", "num", "number")
 )  # fmt: skip
 _XSENS_TICKS, _XSENS_PACKETS = "sampletimefine", "packetcounter"
-_PLAUSIBLE_RATES = (10.0, 5000.0)
-"""Plausible sampling rates, Hz, for guessing the unit of a clock."""
-
+_PLAUSIBLE_RATES = (10.0, 5000.0)  # plausible sampling rates, Hz, for guessing the unit of a clock
 _MAX_COUNTER_STEP, _MAX_COUNT = 1e6, 2.0**63
-_STEP_RANGE = (1e-9, 1e15)
-"""Range of the steps of stamps, in any unit."""
-
+_STEP_RANGE = (1e-9, 1e15)  # range of the steps of stamps, in any unit
 _WRAP_CANDIDATES = (
     *(1 << bits for bits in (8, 16, 24, 32, 40, 48)),
     *(
@@ -49,12 +45,9 @@ _MAX_STEP_SCATTER, _MIN_EQUAL_STEPS, _MAX_PAUSES = 0.6, 0.8, 0.02
 """Largest relative deviation of a step from the median, least share of such steps, and largest
 share of pauses, for steps that count as equal."""
 
-_RATE_TOLERANCE = 0.1
-"""Largest relative difference of a guessed rate and the stated one."""
-
+_RATE_TOLERANCE = 0.1  # largest relative difference of a guessed rate and the stated one
 _SECONDS_PER_UNIT = {"min": 60, "h": 3600}
 _UNIT_HINT = "the file does not say: s, ms, us or ns?"
-_RATE_HINT = "the file does not say: such as 100 Hz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,80 +63,47 @@ class Clock:
     """Sort key; a lower one is more plausible."""
 
 
-def clocks(table: LogTable, columns: Sequence[LogColumn], rate: float | None) -> list[Clock]:
-    """Return the columns that may be the time, the most plausible first.
-
-    ``columns``: columns of the table that are no channel, and vectors of the same length.
-    ``rate``: rate that the file states, Hz.
-    """
+def clocks(table: LogTable, columns: Sequence[LogColumn]) -> list[Clock]:
+    """Return the columns that may be the time of a table, the most plausible first."""
     likely = []
     for place, column in enumerate(columns):
         if (names := table.file_format.time_columns) and column.label not in names:
             continue
-        clock = (
-            _recognise_date(column, table)
-            if column.kind == "date"
-            else _recognise_number(column, rate)
-        )
-        if clock is not None:
-            counts_alone = clock.counts and rate is None
-            order = (*clock.order, int(counts_alone), place)
-            likely.append(Clock(clock.column, clock.entry, clock.counts, order))
+        is_date = column.kind == "date"
+        recognised = _recognise_date if is_date else _recognise_number
+        if (clock := recognised(column, table)) is not None:
+            counts_alone = clock.counts and table.rate is None
+            likely.append(replace(clock, order=(*clock.order, int(counts_alone), place)))
     return sorted(likely, key=lambda clock: clock.order)
-
-
-def rate_entry(table: LogTable | None) -> Entry:
-    """Return the entry ``rate`` of a sensor file for a log without stamps."""
-    if table is None or table.rate is None:
-        return Entry(UNKNOWN, _RATE_HINT)
-    return Entry(f"{table.rate:.10g} Hz", "stated in the file")
 
 
 def _get_source(column: LogColumn) -> str | int:
     return column.source if column.address is None else column.address
 
 
-# ----------------------------------------------------------------------------------- dates
-
-
 def _recognise_date(column: LogColumn, table: LogTable) -> Clock | None:
     form = column.forms[0]
-    has_day = form == "iso8601" or "%d" in form
-    has_hour = form == "iso8601" or "%H" in form or "%I" in form
-    if not has_hour or not advances(column.values, DAY):
+    if not _has_hour(form) or not advances(column.values, DAY):
         return None
     value: dict[str, Any] = {"column": _get_source(column), "format": form}
-    if not has_day:
+    day = column
+    if form != "iso8601" and "%d" not in form:
         days = [c for c in table.columns if c.kind == "date" and not _has_hour(c.forms[0])]
-        if days and days[0].forms:
-            value = {
-                "column": _get_source(column),
-                "date": _get_source(days[0]),
-                "format": f"{days[0].forms[0]} {form}",
-            }
-            return Clock(
-                column, Entry(value, _comment_on_day(days[0])), False, (_rank_resolution(column), 1)
-            )
-    return Clock(
-        column, Entry(value, _comment_on_day(column)), False, (_rank_resolution(column), 1)
-    )
+        if days:
+            day = days[0]
+            form = f"{day.forms[0]} {form}"
+            value = {"column": value["column"], "date": _get_source(day), "format": form}
+    # Day and month may be exchanged.
+    others = [other for other in day.forms[1:] if sorted(other) == sorted(day.forms[0])]
+    comment = f"or {others[0]}? {day.first[0]!r} does not tell" if others else ""
+    return Clock(column, Entry(value, comment), False, (_rank_resolution(column), 1))
 
 
 def _has_hour(form: str) -> bool:
     return form == "iso8601" or any(field in form for field in ("%H", "%I"))
 
 
-def _comment_on_day(column: LogColumn) -> str:
-    """Return a comment if day and month may be exchanged, else an empty text."""
-    form = column.forms[0]
-    others = [other for other in column.forms[1:] if sorted(other) == sorted(form)]
-    return f"or {others[0]}? {column.first[0]!r} does not tell" if others else ""
-
-
-# --------------------------------------------------------------------------------- numbers
-
-
-def _recognise_number(column: LogColumn, rate: float | None) -> Clock | None:
+def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
     """Return a column of numbers as a clock; None if it is none."""
     if column.kind != "number" or not advances(column.values):
         return None
@@ -156,17 +116,21 @@ def _recognise_number(column: LogColumn, rate: float | None) -> Clock | None:
         not _TIME_WORDS.intersection(words) and _COUNTER_WORDS.intersection(words)
     ):
         return _recognise_counter(column, value, joined == _XSENS_PACKETS)
-    unit, scale = _find_stated_unit(column)
+    unit = unit_of(column.unit or "", "time") or divided(column.label, "time")[1]
+    if unit is None:
+        units = [unit_of(word, "time") for word in words if len(word) > 1]
+        unit = next((word for word in reversed(units) if word), None)
+    scale = _SECONDS_PER_UNIT.get(unit or "", 1)
     wrap = _guess_wrap(column.values)
     again = {} if wrap is None else {"wraps": wrap}
     if unit is not None:
-        value["unit"] = unit
+        value["unit"] = "s" if scale != 1 else unit
         if scale != 1:
             value["scale"] = scale
         comment = "'wraps' is guessed from the stamps" if again else ""
         return Clock(column, Entry(value | again, comment), False, (_rank_resolution(column), 0))
     named = bool(_TIME_WORDS.intersection(words))
-    value["unit"], comment = _guess_unit(column.values, rate)
+    value["unit"], comment = _guess_unit(column.values, table.rate)
     if not named:
         grows = "grows evenly" if _is_regular(column.values) else "" if column.label else "grows"
         if value["unit"] == UNKNOWN or not grows or (_take_steps(column.values) < 0).any():
@@ -198,28 +162,13 @@ def _recognise_counter(column: LogColumn, value: dict[str, Any], of_16_bits: boo
 def _recognise_xsens_ticks(column: LogColumn) -> Clock:
     """Return the tick clock of Xsens: 0.1 ms in motion trackers, 1 us in wearables."""
     step = typical_step(column.values)
-    of_microseconds = step is not None and step > 8000
-    value: dict[str, Any] = {
-        "column": _get_source(column),
-        "unit": "us" if of_microseconds else "ms",
-    }
-    if not of_microseconds:
-        value["scale"] = 0.1
+    value: dict[str, Any] = {"column": _get_source(column)}
+    in_microseconds = step is not None and step > 8000
+    value |= {"unit": "us"} if in_microseconds else {"unit": "ms", "scale": 0.1}
     value["wraps"] = 1 << 32
-    rate = "" if step is None else f", {(1e6 if of_microseconds else 1e4) / step:.5g} Hz"
-    tick = "1 us" if of_microseconds else "0.1 ms"
+    rate = "" if step is None else f", {(1e6 if in_microseconds else 1e4) / step:.5g} Hz"
+    tick = "1 us" if in_microseconds else "0.1 ms"
     return Clock(column, Entry(value, f"ticks of {tick}{rate}"), False, (0, 0))
-
-
-def _find_stated_unit(column: LogColumn) -> tuple[str | None, float]:
-    """Return the unit that the file states (s, ms, us or ns; None: none), and a scale factor."""
-    unit = unit_of(column.unit or "", "time")
-    if unit is None:
-        unit = divided(column.label, "time")[1]
-    if unit is None:
-        words = [unit_of(word, "time") for word in words_of(column.label) if len(word) > 1]
-        unit = next((word for word in reversed(words) if word), None)
-    return ("s", _SECONDS_PER_UNIT[unit]) if unit in _SECONDS_PER_UNIT else (unit, 1)
 
 
 def _guess_unit(values: NDArray[np.float64], rate: float | None) -> tuple[str, str]:
@@ -244,9 +193,6 @@ def _guess_unit(values: NDArray[np.float64], rate: float | None) -> tuple[str, s
     if len(likely) != 1 or step == 1:
         return UNKNOWN, f"{_UNIT_HINT} {shown}"
     return likely[0], f"guessed: {shown}, that is {rates[likely[0]]:.5g} Hz"
-
-
-# ------------------------------------------------------------------------------------ steps
 
 
 def _take_steps(values: NDArray[np.float64]) -> NDArray[np.float64]:

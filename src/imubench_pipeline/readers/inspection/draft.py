@@ -35,13 +35,15 @@ class Draft:
     left_over: list[str] = field(default_factory=list)
     """Remarks about columns that are not used, for the user to complete the file."""
 
+    @property
+    def known(self) -> list[tuple[str, Entry]]:
+        """The entries under ``log``, except for columns, that the log determines."""
+        entries = ("reader", self.reader), ("rate", self.rate), ("time", self.time)
+        return [(key, entry) for key, entry in entries if entry is not None]
+
     def log(self) -> dict[str, Any]:
         """Return the values under ``log``."""
-        entries = {
-            key: entry.value
-            for key, entry in (("reader", self.reader), ("rate", self.rate), ("time", self.time))
-            if entry is not None
-        }
+        entries = {key: entry.value for key, entry in self.known}
         entries["channels"] = {name: dict(entry.value) for name, entry in self.channels.items()}
         if self.temperature is not None:
             entries["temperature"] = dict(self.temperature.value)
@@ -84,15 +86,10 @@ _Dumper.add_representer(str, _represent_text)
 
 
 def block(draft: Draft, file: str) -> str:
-    """Return a sensor file as YAML.
-
-    ``file``: name of the log, for the first line.
-    """
-    above = (("reader", draft.reader), ("rate", draft.rate), ("time", draft.time))
-    inside = [(key, entry) for key, entry in above if entry is not None]
+    """Return a sensor file as YAML; ``file``: name of the log, for the first line."""
     lines = [f"# drafted from the log {printable(file)}"]
     lines += _format_entries([("vendor", draft.vendor), ("model", draft.model)], "")
-    lines += ["log:", *_format_entries(inside, "  "), "  channels:"]
+    lines += ["log:", *_format_entries(draft.known, "  "), "  channels:"]
     lines += _format_entries(list(draft.channels.items()), "    ")
     if draft.temperature is not None:
         lines += _format_entries([("temperature", draft.temperature)], "  ")
@@ -111,10 +108,7 @@ def printable(text: str) -> str:
 
 
 def _format_entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[str]:
-    """Return the lines of entries with aligned comments.
-
-    If the lines would be too long, comments are on lines of their own above the entries.
-    """
+    """Return the lines of entries with aligned comments, or with long comments above them."""
     written = [f"{margin}{key}: {_format_value(entry.value)}" for key, entry in entries]
     comments = [printable(entry.comment) for _, entry in entries]
     behind = [len(line) for line, comment in zip(written, comments, strict=True) if comment]
@@ -134,17 +128,10 @@ def _format_entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[s
 
 def _format_value(value: Any) -> str:
     """Return a value as YAML on one line of printable characters."""
-    written = [
-        yaml.dump(
-            value,
-            Dumper=_Dumper,
-            default_flow_style=True,
-            sort_keys=False,
-            width=_MAX_YAML_WIDTH,
-            allow_unicode=as_it_is,
-        )
-        .removesuffix("...\n")
-        .strip()
-        for as_it_is in (True, False)
-    ]
-    return next((text for text in written if text.isprintable()), written[-1])
+    for as_it_is in (True, False):
+        text = yaml.dump(value, Dumper=_Dumper, default_flow_style=True, sort_keys=False,
+                         width=_MAX_YAML_WIDTH, allow_unicode=as_it_is)  # fmt: skip
+        text = text.removesuffix("...\n").strip()
+        if text.isprintable():
+            break
+    return text

@@ -1,37 +1,365 @@
-"""Convert the chosen columns of a log to the entries of a sensor file."""
+"""Recognise, group and choose the columns of a log, and draft its sensor file."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.readers.contents import Contents
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
-from imubench_pipeline.readers.inspection.choice import Choice, chosen
-from imubench_pipeline.readers.inspection.clock import rate_entry
+from imubench_pipeline.readers.inspection.clock import Clock, advances, clocks
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, Entry
-from imubench_pipeline.readers.inspection.groups import Group
-from imubench_pipeline.readers.inspection.names import WITHOUT_GRAVITY
+from imubench_pipeline.readers.inspection.names import (
+    DERIVED,
+    DIMENSIONS,
+    PLAIN,
+    WEAK,
+    WITHOUT_GRAVITY,
+    Meaning,
+    Quantity,
+    meaning,
+    quantity_of_text,
+)
+from imubench_pipeline.readers.stated_units import bracketed, unit_of
 from imubench_pipeline.settings.sensor import CHANNELS
+from imubench_pipeline.units import conversion
+
+_AXES = "xyz"
+GRAVITY_BY_UNIT: Mapping[str, float] = {"g": 1.0, "m/s^2": STANDARD_GRAVITY, "mg": 1000.0}
+"""Gravity in each unit that can be guessed from it."""
+
+_GRAVITY_TOLERANCE, _STATED_GRAVITY_TOLERANCE = 0.1, 0.2
+_NAMELESS_GRAVITY_TOLERANCE = 0.05
+_MIN_CONSTANT_RECORDS = 40
+"""Least number of equal records of all axes of a sensor that was not read."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """The axes of one sensor, or a temperature."""
+
+    quantity: Quantity
+    table: LogTable
+    columns: dict[str, LogColumn]
+    """Columns by axis; the key of a temperature is an empty text."""
+    unit: str | None
+    """The unit that the file states."""
+    written: str
+    """Text of the file in the place of the unit, if it is no known unit."""
+    rank: int
+    """See `imubench_pipeline.readers.inspection.names.Meaning`."""
+    guessed: str = ""
+    """Reason for the choice of the columns, if it is not from their names."""
+
+    @property
+    def names(self) -> str:
+        """Names of the columns in the file."""
+        return ", ".join(
+            column.label or f"column {column.source}" for column in self.columns.values()
+        )
+
+    @property
+    def mean_length(self) -> float | None:
+        """Length of the mean vector in the unit of the file; None if an axis is missing."""
+        if sorted(self.columns) != list(_AXES):
+            return None
+        axes = [column.values[np.isfinite(column.values)] for column in self.columns.values()]
+        means = [values.mean() for values in axes if len(values)]
+        return float(np.linalg.norm(means)) if len(means) == len(_AXES) else None
+
+    @property
+    def constant(self) -> bool:
+        """Whether all axes are constant in the first records, as unused fields are."""
+        axes = [column.values[np.isfinite(column.values)] for column in self.columns.values()]
+        return all(len(axis) >= _MIN_CONSTANT_RECORDS and np.ptp(axis) == 0.0 for axis in axes)
+
+    @property
+    def gravity_unit(self) -> str | None:
+        """Unit in which the mean has the length of gravity; the stated one, if there is one."""
+        length = self.mean_length
+        if length is None:
+            return None
+        if self.unit is not None:
+            in_si = length * conversion(self.unit, DIMENSIONS["accel"])[0]
+            is_gravity = abs(in_si / STANDARD_GRAVITY - 1) < _STATED_GRAVITY_TOLERANCE
+            return self.unit if is_gravity else None
+        return next(
+            (u for u, g in GRAVITY_BY_UNIT.items() if abs(length / g - 1) < _GRAVITY_TOLERANCE),
+            None,
+        )
+
+
+def groups(contents: Contents) -> list[Group]:
+    """Return all groups of a recording, in the order of its tables."""
+    recognised: list[Group] = []
+    for table in contents.tables:
+        if table.fault is None:
+            recognised += _group_by_name(table, contents) or _group_without_names(table)
+    return recognised
+
+
+def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
+    """Return the groups that are recognised by the names of their columns."""
+    # The most specific name of the table or its file that contains a quantity.
+    file = PurePosixPath(table.file or contents.path.name)
+    titles = (table.name.rpartition("/")[2], table.name, file.name.partition(".")[0])
+    context = next((title for title in titles if title and quantity_of_text(title)), "")
+    together: dict[tuple[Quantity, str, bool], dict[str, tuple[LogColumn, Meaning]]] = {}
+    for column in table.columns:
+        if column.kind != "number":
+            continue
+        label = column.label or f"{context}[{column.source}]"
+        meant = meaning(label, context)
+        if meant is not None:
+            if meant.quantity != "temperature":
+                key = meant.quantity, meant.stem, meant.axis.isdecimal()
+                together.setdefault(key, {}).setdefault(meant.axis, (column, meant))
+            elif column.label or not advances(column.values):
+                together["temperature", label, False] = {"": (column, meant)}
+    result = []
+    for (quantity, _, counted), axes in together.items():
+        if counted:  # three numbered columns are axes, without a time before them
+            columns = [axes[number] for number in sorted(axes, key=int)]
+            if len(columns) == 4 and advances(columns[0][0].values):
+                columns = columns[1:]
+            axes = dict(zip(_AXES, columns, strict=True)) if len(columns) == 3 else {}
+        if axes:
+            result.append(_make_group(quantity, table, axes))
+    return result + list(_find_roll_pitch_yaw(table, result))
+
+
+def _make_group(
+    quantity: Quantity, table: LogTable, axes: Mapping[str, tuple[LogColumn, Meaning]]
+) -> Group:
+    columns = {axis: axes[axis][0] for axis in sorted(axes)}
+    meanings = [meaning for _, meaning in axes.values()]
+    column = next(iter(columns.values()))
+    beside = column.unit or ""
+    unit = unit_of(beside, DIMENSIONS[quantity]) or meanings[0].unit
+    same = {unit_of(c.unit or "", DIMENSIONS[quantity]) or m.unit for c, m in axes.values()} == {
+        unit
+    }
+    written = beside or ", ".join(bracketed(column.label))
+    rank = max(meaning.rank for meaning in meanings)
+    if table.file_format.measured_by_name:
+        rank = DERIVED if rank == DERIVED else PLAIN
+    return Group(quantity, table, columns, unit if same else None, written, rank)
+
+
+def _find_roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]:
+    """Yield the rates with the names p, q and r, if there is no other gyro."""
+    if any(group.quantity == "gyro" for group in named):
+        return
+    by_name = {re.split(r"[\s(\[]", c.label)[0].lower(): c for c in table.columns}
+    if {"p", "q", "r"} <= set(by_name):
+        meanings = {
+            axis: (by_name[name], meaning(by_name[name].label.lower().replace(name, f"w{axis}", 1)))
+            for axis, name in zip(_AXES, "pqr", strict=True)
+        }
+        axes = {axis: (column, meant) for axis, (column, meant) in meanings.items() if meant}
+        if len(axes) == 3:
+            why = "guessed from the names p, q and r"
+            yield replace(_make_group("gyro", table, axes), rank=WEAK, guessed=why)
+
+
+def _group_without_names(table: LogTable) -> list[Group]:
+    """Return gyro and accelerometer from unnamed columns, distinguished by gravity."""
+    columns = [c for c in table.columns if c.kind == "number"]
+    if any(column.label for column in columns) or len(columns) > 8:
+        return []
+    if columns and advances(columns[0].values):
+        columns = columns[1:]
+    threes = [
+        Group("accel", table, dict(zip(_AXES, columns[n : n + 3], strict=True)), None, "", WEAK)
+        for n in range(0, len(columns) - 2, 3)
+    ]
+    lengths = [group.mean_length for group in threes]
+    gravities = np.array(list(GRAVITY_BY_UNIT.values()))
+    heavy = [
+        n
+        for n, length in enumerate(lengths)
+        if length and (abs(length / gravities - 1) < _NAMELESS_GRAVITY_TOLERANCE).any()
+    ]
+    if len(threes) not in (1, 2) or len(heavy) != 1:
+        return []
+    guessed = []
+    for n, group in enumerate(threes):
+        is_accel = n == heavy[0]
+        why = "no names" if is_accel else "no names: guessed by its place"
+        quantity: Quantity = "accel" if is_accel else "gyro"
+        guessed.append(replace(group, quantity=quantity, guessed=why))
+    return guessed
+
+
+_QUANTITY_NAMES = {"gyro": "gyro", "accel": "accelerometer", "temperature": "temperature"}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The columns of a log that are used, and the others."""
+
+    gyro: Group | None
+    accel: Group | None
+    temperature: Group | None
+    clock: Clock | None
+    local: bool
+    """The time column is in the table of the channels, in each file."""
+    anchor: LogTable | None
+    """The table with which all others must share their records or their clock."""
+    other_clocks: list[Clock]
+    left: list[tuple[Group, str]]
+    """Recognised groups that are not used, each with the reason."""
+    unknown: list[LogColumn]
+    """Number columns of the used tables that were not recognised."""
+
+
+def chosen(contents: Contents) -> Choice:
+    """Choose the channels, the temperature and the time of a recording."""
+    recognised = groups(contents)
+    left = [(g, _explain_rejection(g)) for g in recognised if _explain_rejection(g)]
+    able = [group for group in recognised if not _explain_rejection(group)]
+    gyro = _select_best([g for g in able if g.quantity == "gyro"], None, able)
+    accels = [g for g in able if g.quantity == "accel"]
+    first = gyro or _select_best(accels, None, able)
+    anchor = first.table if first else None
+    if anchor is None:
+        anchor = next((table for table in contents.tables if table.columns), None)
+    in_groups = {id(column) for group in recognised for column in group.columns.values()}
+
+    def find_table_clocks(table: LogTable) -> list[Clock]:
+        """Return the columns that may be the time of a table, the most plausible first."""
+        columns = list(table.columns)
+        if table.file_format.clock_of == "length":
+            for other in contents.tables:
+                if other is not table and other.file == table.file and other.rows == table.rows:
+                    columns += other.columns
+        return clocks(table, [column for column in columns if id(column) not in in_groups])
+
+    ours = [] if anchor is None else find_table_clocks(anchor)
+    others = {id(g.table): find_table_clocks(g.table) for g in able}
+    rest = [others[id(g.table)] for g in able if anchor is not g.table]
+
+    def count_shared(clock: Clock) -> int:
+        """Return the number of other groups with the same clock."""
+        return sum(any(_has_equal_entries(clock, other) for other in theirs) for theirs in rest)
+
+    clock = max(ours, key=lambda clock: (not clock.counts, count_shared(clock)), default=None)
+
+    def fits(group: Group) -> bool:
+        table, clock_of = group.table, group.table.file_format.clock_of
+        if anchor is None or anchor is table:
+            return anchor is table
+        if anchor.file == table.file and clock_of != "variable":
+            return clock_of == "length" and anchor.rows == table.rows
+        return clock is None or any(_has_equal_entries(clock, other) for other in others[id(table)])
+
+    fitting = [group for group in able if group is gyro or fits(group)]
+    why = "other records than the channels, or another time"
+    if first is None:
+        why = "there is no channel"
+    left += [(g, why) for g in able if g not in fitting]
+    accel = _select_best([g for g in fitting if g.quantity == "accel"], gyro, able)
+    temperature = _select_best(
+        [g for g in fitting if g.quantity == "temperature"], gyro or accel, able
+    )
+    selected = [group for group in (gyro, accel, temperature) if group is not None]
+    left += [(g, f"another {_QUANTITY_NAMES[g.quantity]}") for g in fitting if g not in selected]
+    spoken = in_groups | {id(other.column) for other in ours}
+    return Choice(
+        gyro,
+        accel,
+        temperature,
+        clock,
+        _is_local(selected, clock),
+        anchor,
+        [other for other in ours if other is not clock],
+        left,
+        [
+            column
+            for table in _collect_tables(selected, anchor)
+            for column in table.columns
+            if id(column) not in spoken and not (clock and column.source == clock.column.source)
+        ],
+    )
+
+
+def _explain_rejection(group: Group) -> str:
+    """Return the reason why a group is never used; empty if it can be used."""
+    if group.rank == DERIVED:
+        return "of a filter or about the measurement, not what the sensor measures"
+    if group.rank == WITHOUT_GRAVITY and group.gravity_unit is None:
+        return "without gravity: not what the accelerometer measures"
+    if group.quantity != "temperature" and len(group.columns) > 1 and group.constant:
+        return "the same in all of the first records: nothing was measured here"
+    return ""
+
+
+def _select_best(
+    likely: Sequence[Group], beside: Group | None, every: Sequence[Group]
+) -> Group | None:
+    """Return the most plausible group, preferring tables with ``beside`` or with other groups."""
+
+    def order(group: Group) -> tuple[Any, ...]:
+        near = beside is not None and (group.table is beside.table)
+        same_file = beside is not None and group.table.file == beside.table.file
+        heavy = group.quantity != "accel" or group.gravity_unit is not None
+        company = {g.quantity for g in every if g.table is group.table}
+        sure = group.rank == PLAIN or (group.rank == WITHOUT_GRAVITY and heavy)
+        return (
+            not sure,
+            -len(group.columns),
+            not heavy,
+            not near,
+            not same_file,
+            -len(company),
+            group.unit is None,
+        )
+
+    return min(likely, key=order, default=None)
+
+
+def _has_equal_entries(clock: Clock, other: Clock) -> bool:
+    """Return whether two clocks have the same entries in a sensor file."""
+    if clock.column.source != other.column.source:
+        return False
+    keys = ("unit", "format", "date", "scale")
+    return all(clock.entry.value.get(key) == other.entry.value.get(key) for key in keys)
+
+
+def _is_local(groups: Sequence[Group], clock: Clock | None) -> bool:
+    if clock is None:
+        return True
+    tables = _collect_tables(groups, None)
+    if len({table.file for table in tables}) < len(tables):
+        return False
+    return len(tables) > 1 or any(clock.column is c for t in tables for c in t.columns)
+
+
+def _collect_tables(groups: Sequence[Group], anchor: LogTable | None) -> list[LogTable]:
+    tables = [group.table for group in groups] or ([anchor] if anchor else [])
+    return list({id(table): table for table in tables}.values())
+
 
 _GYRO_HINT = "the file does not say: deg/s or rad/s? see the logger's manual"
 _MAX_LISTED_NAMES = 20
 _FILE_SUFFIXES = re.compile(r"(?:\.[A-Za-z]\w{0,7})+$")
 _COUNTS_PER_G = tuple(1 << bits for bits in range(8, 20))
-_GRAVITY_TOLERANCE = 0.06
+_COUNT_TOLERANCE = 0.06
 
 
 def draft(contents: Contents, model: str | None = None) -> Draft:
-    """Draft a sensor file from the contents of a recording.
-
-    ``model``: name of the sensor; None: the name of the log.
-    """
+    """Draft a sensor file from the contents of a recording; ``model``: name of the sensor."""
     choice = chosen(contents)
+    usable = (table.file_format for table in contents.tables if table.fault is None)
+    vendor = next((made.vendor for made in usable if made.vendor), "unknown")
     drafted = Draft(
-        Entry(_find_vendor(contents), "who makes the sensor, for the report"),
+        Entry(vendor, "who makes the sensor, for the report"),
         Entry(model or _FILE_SUFFIXES.sub("", contents.path.name) or "sensor", "what it is called"),
     )
     if contents.stated is not None:
@@ -42,31 +370,28 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
             value["column"] = choice.clock.column.source
         drafted.time = Entry(value, choice.clock.entry.comment)
     if choice.clock is None or choice.clock.counts:
-        drafted.rate = rate_entry(choice.anchor or _find_table_with_rate(contents.tables))
-    files = {group.table.file for group in choice.selected}
-    alone = len(files) == 1 and files == {contents.only}
+        stating = (table for table in contents.tables if table.rate is not None)
+        drafted.rate = Entry(UNKNOWN, "the file does not say: such as 100 Hz")
+        table = choice.anchor or next(stating, None)
+        if table is not None and table.rate is not None:
+            drafted.rate = Entry(f"{table.rate:.10g} Hz", "stated in the file")
+    selected = (choice.gyro, choice.accel, choice.temperature)
+    alone = {group.table.file for group in selected if group is not None} == {contents.only}
     for group in (choice.gyro, choice.accel):
         if group is not None:
             _add_group(drafted, group, alone)
     if choice.temperature is not None:
         _add_temperature(drafted, choice.temperature, alone)
     if not drafted.channels:
-        _add_placeholders(drafted)
+        entry = Entry(
+            {"column": UNKNOWN, "unit": UNKNOWN}, "no name of a column tells: fill in, or remove"
+        )
+        drafted.channels = dict.fromkeys(CHANNELS, entry)
     drafted.left_over += _list_remarks(choice, contents)
     return drafted
 
 
-def _find_vendor(contents: Contents) -> str:
-    usable = (table.file_format for table in contents.tables if table.fault is None)
-    return next((made.vendor for made in usable if made.vendor), "unknown")
-
-
-def _find_table_with_rate(tables: Iterable[LogTable]) -> LogTable | None:
-    return next((table for table in tables if table.rate is not None), None)
-
-
 def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> dict[str, Any]:
-    """Return the values of a sensor file that select a column."""
     source: dict[str, Any] = {}
     if table.file is not None and not alone:
         source["file"] = table.file
@@ -75,11 +400,7 @@ def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool)
     return source | {"column": column.source, "unit": unit}
 
 
-# --------------------------------------------------------------------------------- channels
-
-
 def _add_group(drafted: Draft, group: Group, alone: bool) -> None:
-    """Add the axes of a group to a draft."""
     unit, comment = group.unit, ""
     if unit is None and group.quantity == "accel":
         unit, comment = _guess_acceleration_unit(group)
@@ -106,7 +427,7 @@ def _guess_acceleration_unit(group: Group) -> tuple[str, str]:
         return UNKNOWN, "the file does not say: m/s^2, g or mg?"
     if unit is not None:
         return unit, f"guessed: the mean is {length:.4g} long, as gravity in {unit}"
-    counts = [count for count in _COUNTS_PER_G if abs(length / count - 1) < _GRAVITY_TOLERANCE]
+    counts = [count for count in _COUNTS_PER_G if abs(length / count - 1) < _COUNT_TOLERANCE]
     hint = (
         f": counts of g/{counts[0]}? then 'unit: g, scale: {1 / counts[0]:.10g}'" if counts else ""
     )
@@ -131,19 +452,9 @@ def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
     drafted.temperature = Entry(_describe_source(group.table, column, unit, alone), comment)
 
 
-def _add_placeholders(drafted: Draft) -> None:
-    for name in CHANNELS:
-        drafted.channels[name] = Entry(
-            {"column": UNKNOWN, "unit": UNKNOWN}, "no name of a column tells: fill in, or remove"
-        )
-
-
 def _is_whole(column: LogColumn) -> bool:
     values = column.values[np.isfinite(column.values)]
     return bool(len(values)) and bool((values == np.rint(values)).all()) and bool(values.any())
-
-
-# -------------------------------------------------------------------------------- left over
 
 
 def _list_remarks(choice: Choice, contents: Contents) -> list[str]:

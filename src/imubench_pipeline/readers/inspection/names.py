@@ -32,11 +32,7 @@ _GYRO = re.compile(
 )
 _ACCEL = re.compile(r"acc(?!ur)|specificforce|gforce")
 _TEMPERATURE = re.compile(r"temp(?!or|l)")
-_PATTERNS: dict[Quantity, re.Pattern[str]] = {
-    "gyro": _GYRO,
-    "accel": _ACCEL,
-    "temperature": _TEMPERATURE,
-}
+_PATTERNS = dict(zip(DIMENSIONS, (_GYRO, _ACCEL, _TEMPERATURE), strict=True))
 _OTHER_QUANTITIES = re.compile(
     r"ang(?:ular|le)?acc|alpha|quat|euler|orient|attitude|angle|inclin|heading|mag(?!ic)|baro|press"
 )
@@ -49,16 +45,10 @@ _DERIVED_WORDS = frozenset(
 )
 _LINEAR_ACCELERATION = re.compile(r"lin(?:ear)?acc")
 _SHORT_NAMES: dict[str, tuple[Quantity, int]] = {
-    "w": ("gyro", PLAIN),
-    "om": ("gyro", PLAIN),
-    "av": ("gyro", PLAIN),
-    "rate": ("gyro", WEAK),
-    "rates": ("gyro", WEAK),
-    "g": ("gyro", WEAK),
-    "a": ("accel", PLAIN),
-    "f": ("accel", WEAK),
-    "sf": ("accel", WEAK),
-    "gf": ("accel", PLAIN),
+    **dict.fromkeys(("w", "om", "av"), ("gyro", PLAIN)),
+    **dict.fromkeys(("rate", "rates", "g"), ("gyro", WEAK)),
+    **dict.fromkeys(("a", "gf"), ("accel", PLAIN)),
+    **dict.fromkeys(("f", "sf"), ("accel", WEAK)),
 }
 """Short names, which must be a complete word."""
 
@@ -81,17 +71,17 @@ class Meaning:
 def meaning(label: str, context: str = "") -> Meaning | None:
     """Return the meaning of the name of a column; None if it is not of an inertial sensor.
 
-    ``context``: name of its table or file, from which the quantity is taken if the label is an axis
-    only.
+    ``context``: name of its table or file, for a label that is an axis only.
     """
     label = label[:_MAX_LABEL_LENGTH].replace("ω", "omega").replace("Ω", "omega")
     for quantity, dimension in DIMENSIONS.items():
         name, unit = divided(label, dimension)
         meant = _interpret_name(name)
-        if meant is None and (axis := _find_bare_axis(name)):
+        words = _split_words(name)
+        if meant is None and len(words) == 1 and (words[0] in _AXES or _is_axis_number(words[0])):
             by_context = quantity_of_text(context)
             if by_context is not None:
-                meant = Meaning(by_context[0], axis, "", None, by_context[1])
+                meant = Meaning(by_context[0], words[0], "", None, by_context[1])
         if meant is None and unit is not None:
             meant = _interpret_by_unit(quantity, name, unit)
         if meant is not None and meant.quantity == quantity:
@@ -118,14 +108,6 @@ def _split_words(text: str) -> list[str]:
     return [word.lower() for word in _WORD.findall(text)]
 
 
-def _find_bare_axis(name: str) -> str:
-    """Return the axis of a name that is an axis only; else an empty text."""
-    words = _split_words(name)
-    if len(words) == 1 and (words[0] in _AXES or _is_axis_number(words[0])):
-        return words[0]
-    return ""
-
-
 def _interpret_name(name: str) -> Meaning | None:
     words = _split_words(name)
     joined = "".join(words)
@@ -142,11 +124,10 @@ def _interpret_name(name: str) -> Meaning | None:
         return Meaning("gyro" if is_gyro else "accel", axis, joined, None, _rank_name(rest, joined))
     if is_gyro or not rest or axis.isdigit():
         return None
-    short = _SHORT_NAMES.get(beside)
-    if short is None:
+    if beside not in _SHORT_NAMES:
         return None
-    rank = _rank_name(rest, joined)
-    return Meaning(short[0], axis, joined, None, max(short[1], rank))
+    quantity, rank = _SHORT_NAMES[beside]
+    return Meaning(quantity, axis, joined, None, max(rank, _rank_name(rest, joined)))
 
 
 def _interpret_by_unit(quantity: Quantity, name: str, unit: str) -> Meaning | None:

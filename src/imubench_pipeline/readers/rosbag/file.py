@@ -81,23 +81,11 @@ LAYOUTS: dict[str, Layout] = {
 def figures_of(
     messages: Sequence[bytes], layout: Layout, ros_1: bool
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return stamps and numbers of messages.
+    """Return stamps, numbers and soundness of messages, serialised as in ROS 1 or as CDR.
 
-    Parameters
-    ----------
-    messages : sequence of bytes
-        Messages as recorded.
-    ros_1 : bool
-        The messages are serialised as in ROS 1; otherwise as CDR.
-
-    Returns
-    -------
-    stamps : ndarray of int64
-        Stamps of the headers, ns.
-    figures : ndarray of float64, shape (messages, layout.figures)
-        NaN where the message is damaged.
-    sound : ndarray of bool
-        The message has the layout of its type.
+    ``stamps``: stamps of the headers, ns.
+    ``figures``: shape (messages, layout.figures); NaN where the message is damaged.
+    ``sound``: whether the message has the layout of its type.
     """
     stamps = np.zeros(len(messages), np.int64)
     figures = np.full((len(messages), layout.figures), np.nan)
@@ -115,29 +103,22 @@ def figures_of(
             continue
         table = np.frombuffer(b"".join(messages[place] for place in places), np.uint8)
         table = table.reshape(len(places), size)
-        seconds, nanoseconds, name_size = _view_integers(table[:, 4:16], f"{order}u4").T
+        header = np.ascontiguousarray(table[:, 4:16]).view(f"{order}u4").astype(np.uint32)
+        seconds, nanoseconds, name_size = header.T
         if not ros_1:
             seconds = seconds.astype(np.uint32).view(np.int32)
-        ends = 16 + name_size.astype(np.int64)
-        begins = (
-            ends if ros_1 else _ENCAPSULATION_BYTES + -(-(ends - _ENCAPSULATION_BYTES) // 8) * 8
-        )
+        begins = 16 + name_size.astype(np.int64)
+        if not ros_1:
+            begins += -(begins - _ENCAPSULATION_BYTES) % 8
         good = (begins == before) & (nanoseconds < _NANOSECONDS_PER_SECOND)
         written = np.ascontiguousarray(table[good, before : before + 8 * layout.figures])
         chosen = np.array(places)[good]
         figures[chosen] = written.view(f"{order}f8")
-        stamps[chosen] = (
-            seconds[good].astype(np.int64) * _NANOSECONDS_PER_SECOND + nanoseconds[good]
-        )
+        whole = seconds[good].astype(np.int64)
+        stamps[chosen] = whole * _NANOSECONDS_PER_SECOND + nanoseconds[good]
         sound[chosen] = True
     return stamps, figures, sound
 
-
-def _view_integers(table: NDArray[np.uint8], kind: str) -> NDArray[np.uint32]:
-    return np.ascontiguousarray(table).view(kind).astype(np.uint32)
-
-
-# -------------------------------------------------------------------------------------- bags
 
 _BATCH_MESSAGES = 1 << 14
 _MAX_LISTED_NAMES = 10
@@ -157,7 +138,17 @@ class RosbagFile(LogFile):
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the bag (see `LogFile.batches`)."""
-        self._check_time()
+        time = self.log.time
+        if time is not None and time.column not in (HEADER_STAMP, LOG_TIME):
+            raise RecordingError(
+                f"{self.path.name}: no time column {time.column!r}; a ROS bag has {HEADER_STAMP!r} "
+                f"and {LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
+            )
+        if time is not None and time.unit != "ns":
+            raise RecordingError(
+                f"{self.path.name}: {time.column} is {time.unit or time.format} in the sensor "
+                "file; a ROS bag gives ns; expected 'unit: ns' of 'time'"
+            )
         source = opened(self.path)
         try:
             topic, kind = self._topic(source)
@@ -182,15 +173,11 @@ class RosbagFile(LogFile):
                 if not len(chosen):
                     continue
                 time = clock.seconds(chosen, np.ones(len(chosen), bool))
-            yield Batch(
-                time,
-                {
-                    name: self.to_si(
-                        name, np.ascontiguousarray(figures[:, layout.columns[str(source.column)]])
-                    )
-                    for name, source in self.sources.items()
-                },
-            )
+            columns = {}
+            for name, wanted in self.sources.items():
+                raw = figures[:, layout.columns[str(wanted.column)]]
+                columns[name] = self.to_si(name, np.ascontiguousarray(raw))
+            yield Batch(time, columns)
         if not sound:
             raise RecordingError(
                 f"{self.path.name}: no message of {topic} can be read, {damaged} are not as their "
@@ -212,8 +199,6 @@ class RosbagFile(LogFile):
                 figures[np.ix_(without, columns)] = np.nan
                 absent[quantity] += int(without.sum())
 
-    # ---------------------------------------------------------------------------- the bag
-
     def _blocks(
         self, source: Source, topic: str
     ) -> Iterator[tuple[NDArray[np.int64], list[bytes]]]:
@@ -234,23 +219,6 @@ class RosbagFile(LogFile):
             if not times:
                 return
             yield written, messages
-
-    # -------------------------------------------------------------- what the sensor file says
-
-    def _check_time(self) -> None:
-        time = self.log.time
-        if time is None:
-            return
-        if time.column not in (HEADER_STAMP, LOG_TIME):
-            raise RecordingError(
-                f"{self.path.name}: no time column {time.column!r}; a ROS bag has {HEADER_STAMP!r} "
-                f"and {LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
-            )
-        if time.unit != "ns":
-            raise RecordingError(
-                f"{self.path.name}: {time.column} is {time.unit or time.format} in the sensor "
-                "file; a ROS bag gives ns; expected 'unit: ns' of 'time'"
-            )
 
     def _topic(self, source: Source) -> tuple[str, str]:
         """Return the topic with the columns, and its type."""
@@ -290,8 +258,6 @@ class RosbagFile(LogFile):
             "'column' in the sensor file"
         )
 
-    # ----------------------------------------------------------------------------- findings
-
     def _report(self, topic: str, unclosed: bool, damaged: int, absent: dict[str, int]) -> None:
         fate = "left out" if self.log.time is not None else "missing samples"
         if damaged:
@@ -310,21 +276,23 @@ class RosbagFile(LogFile):
                 )
         if unclosed:
             self.note("truncated_file", "the bag was not closed; read as far as it goes", 1)
-        for path in _list_unmerged(self.path):
-            self.note(
-                "truncated_file",
-                f"{path.name} holds records that are not yet in the bag and are not read; merge "
-                "them with sqlite3 and 'pragma wal_checkpoint'",
-                1,
-            )
+        # The journals of SQLite have the latest records.
+        beside = [self.path.with_name(f"{self.path.name}-wal")]
+        for journal in self.path.glob("*-wal") if self.path.is_dir() else beside:
+            if journal.is_file() and journal.stat().st_size:
+                self.note(
+                    "truncated_file",
+                    f"{journal.name} holds records that are not yet in the bag and are not read; "
+                    "merge them with sqlite3 and 'pragma wal_checkpoint'",
+                    1,
+                )
 
 
 def _join_names(names: Iterable[str]) -> str:
     """Return the first names as text."""
     every = list(names)
-    return ", ".join(cut(name, str) for name in every[:_MAX_LISTED_NAMES]) + ", ..." * (
-        len(every) > _MAX_LISTED_NAMES
-    )
+    shown = [cut(name, str) for name in every[:_MAX_LISTED_NAMES]]
+    return ", ".join(shown + ["..."] * (len(every) > _MAX_LISTED_NAMES))
 
 
 @contextmanager
@@ -347,60 +315,36 @@ def explained(path: Path) -> Iterator[None]:
 
 
 def opened(path: Path) -> Source:
-    """Open a bag; its kind is recognised by its content.
+    """Open a bag, a file or the folder of a ROS 2 bag; its kind is recognised by its content.
 
-    ``path``: a file, or the folder of a ROS 2 bag.
-
-    Raises
-    ------
-    RecordingError
-        If the path cannot be opened, or is no bag.
+    Raise `RecordingError` if the path cannot be opened, or is no bag.
     """
     with explained(path):
         try:
-            return _open_by_content(path)
+            if path.is_dir():
+                for database in sorted(path.glob("*.db3")):
+                    check_database(database)
+                check_folder(path)
+                return Bag2(Reader(path))
+            with path.open("rb") as file:
+                begin = file.read(16)
+            if begin.startswith(b"\x89MCAP"):
+                return Bag2(McapReader(path))
+            if begin.startswith(_SQLITE_MAGIC):
+                check_database(path)
+                return Bag2(Sqlite3Reader(path))
+            return Bag(path)
         except OSError as error:
             raise RecordingError(
                 f"{path.name}: cannot be opened ({error.strerror or error})"
             ) from None
 
 
-def _open_by_content(path: Path) -> Source:
-    if path.is_dir():
-        for database in sorted(path.glob("*.db3")):
-            check_database(database)
-        check_folder(path)
-        return Bag2(Reader(path))
-    with path.open("rb") as file:
-        begin = file.read(16)
-    if begin.startswith(b"\x89MCAP"):
-        return Bag2(McapReader(path))
-    if begin.startswith(_SQLITE_MAGIC):
-        check_database(path)
-        return Bag2(Sqlite3Reader(path))
-    return Bag(path)
-
-
-def _list_unmerged(path: Path) -> list[Path]:
-    """Return the journals of SQLite with the latest records, which are not in the database."""
-    logs = path.glob("*-wal") if path.is_dir() else [path.with_name(f"{path.name}-wal")]
-    return [log for log in logs if log.is_file() and log.stat().st_size]
-
-
-_MAX_SLOW_MESSAGES = 20
-"""Largest number of messages of a slow topic that are examined."""
+_MAX_SLOW_MESSAGES = 20  # largest number of messages of a slow topic that are examined
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return a table for each topic.
-
-    ``path``: a file, or the folder of a ROS 2 bag.
-
-    Raises
-    ------
-    RecordingError
-        If it is no bag, or has no topic.
-    """
+    """Return a table for each topic; raise `RecordingError` if there is none."""
     source = opened(path)
     try:
         with explained(path):
@@ -425,30 +369,19 @@ def _describe_topic(
         )
     layout = LAYOUTS[kind]
     count = MAX_EXAMINED_RECORDS if layout.covariances else _MAX_SLOW_MESSAGES
-    columns = () if rows == 0 else _describe_columns(source, topic, layout, count)
-    fault = None if columns else "has no message that can be read"
-    return LogTable(file_format, topic, columns, topic, rows=rows, about=kind, fault=fault)
-
-
-def _describe_columns(
-    source: Source, topic: str, layout: Layout, count: int
-) -> tuple[LogColumn, ...]:
-    messages = list(islice(source.messages(topic), count))
-    if not messages:
-        return ()
+    messages = [] if rows == 0 else list(islice(source.messages(topic), count))
     stamps, figures, sound = figures_of([data for _, data in messages], layout, source.ros_1)
-    if not sound.any():
-        return ()
     columns = []
     for name, place in layout.columns.items():
         values = figures[sound, place]
         covariance = layout.covariances.get(name.partition(".")[0])
-        if covariance is not None and (figures[sound, covariance] == -1).all():
-            continue  # the messages say that it is not measured
-        columns.append(LogColumn(name, name, "number", shown(values), values, layout.units[name]))
+        if covariance is None or (figures[sound, covariance] != -1).any():  # it is measured
+            unit = layout.units[name]
+            columns.append(LogColumn(name, name, "number", shown(values), values, unit))
     logged = np.array([time for time, _ in messages], np.int64)
     for name, times in ((HEADER_STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
-        columns.append(
-            LogColumn(name, name, "number", shown(times), times.astype(np.float64), "ns")
-        )
-    return tuple(columns)
+        values = times.astype(np.float64)
+        columns.append(LogColumn(name, name, "number", shown(times), values, "ns"))
+    fault = None if sound.any() else "has no message that can be read"
+    described = tuple(columns) if sound.any() else ()
+    return LogTable(file_format, topic, described, topic, rows=rows, about=kind, fault=fault)

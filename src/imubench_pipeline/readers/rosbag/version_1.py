@@ -31,10 +31,7 @@ _TIME_STRUCT = struct.Struct("<II")
 
 
 class Bag:
-    """A ROS 1 bag.
-
-    ``unclosed``: the bag was not closed, or is truncated; known after the last message.
-    """
+    """A ROS 1 bag; ``unclosed``: it was not closed, or is cut (known after the last message)."""
 
     ros_1 = True
 
@@ -48,13 +45,7 @@ class Bag:
         """Do nothing: the file is open only while messages are read."""
 
     def topics(self) -> dict[str, str]:
-        """Return the topics, and the type of message of each.
-
-        Raises
-        ------
-        RecordingError
-            If this is no bag, or it is damaged.
-        """
+        """Return topics and types of messages; raise `RecordingError` if the bag is damaged."""
         # The connections are in the index; without an index, the whole bag is read.
         with self._path.open("rb") as file:
             try:
@@ -77,18 +68,11 @@ class Bag:
         return {}
 
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
-        """Yield time of recording (ns) and bytes of the messages of a topic.
-
-        Raises
-        ------
-        RecordingError
-            If this is no bag, or it is damaged.
-        """
+        """Yield time of recording (ns) and bytes of the messages of a topic (see `topics`)."""
         with self._path.open("rb") as file:
             at = 0
-            self._left = max(
-                MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * os.fstat(file.fileno()).st_size
-            )
+            size = os.fstat(file.fileno()).st_size
+            self._left = max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size)
             try:
                 self.unclosed = not self._start(file)
                 while True:
@@ -96,11 +80,8 @@ class Bag:
                     record = _read_record(file)
                     if record is None:
                         break
-                    header, data = record
-                    if header[b"op"] == _OP_CHUNK:
-                        yield from self._chunk(header, data, topic)
-                    else:
-                        yield from self._message(header, data, topic)
+                    is_chunk = record[0][b"op"] == _OP_CHUNK
+                    yield from (self._chunk if is_chunk else self._message)(*record, topic)
             except _TruncatedError:
                 self.unclosed = True
             except (ValueError, KeyError, struct.error, OSError, EOFError, RuntimeError) as error:
@@ -151,14 +132,19 @@ class Bag:
             raise ValueError(f"a chunk is not as long as the {size} bytes that it says")
         at = 0
         while at < len(data):
-            fields, body, at = _parse_record(data, at)
-            yield from self._message(fields, body, topic)
+            middle = at + 4 + _UINT32.unpack_from(data, at)[0]
+            end = middle + 4 + _UINT32.unpack_from(data, middle)[0]
+            if end > len(data):
+                raise ValueError("a record reaches beyond its chunk")
+            fields = _parse_fields(data[at + 4 : middle])
+            yield from self._message(fields, data[middle + 4 : end], topic)
+            at = end
 
     def _message(
         self, header: dict[bytes, bytes], data: bytes, topic: str
     ) -> Iterator[tuple[int, bytes]]:
         if header[b"op"] == _OP_MESSAGE:
-            if self._connections[_get_connection(header)][0] == topic:
+            if self._connections[_UINT32.unpack(header[b"conn"])[0]][0] == topic:
                 seconds, nanoseconds = _TIME_STRUCT.unpack(header[b"time"])
                 yield seconds * 10**9 + nanoseconds, data if len(data) <= MAX_MESSAGE else b""
         elif header[b"op"] == _OP_CONNECTION:
@@ -172,13 +158,7 @@ class Bag:
         if len(self._connections) >= MAX_TOPICS:
             raise ValueError(f"more than {MAX_TOPICS} connections, expected those of a vehicle")
         # The name of the same type in ROS 2.
-        self._connections[_get_connection(header)] = topic, kind.replace("/", "/msg/", 1)
-
-
-def _get_connection(header: dict[bytes, bytes]) -> int:
-    """Return the number of the connection of a record."""
-    (number,) = _UINT32.unpack(header[b"conn"])
-    return int(number)
+        self._connections[_UINT32.unpack(header[b"conn"])[0]] = topic, kind.replace("/", "/msg/", 1)
 
 
 class _TruncatedError(Exception):
@@ -207,15 +187,6 @@ def _read_exactly(file: BinaryIO, size: bytes) -> bytes:
     if count > MAX_BAG_CHUNK:
         raise ValueError(f"a record of {count} bytes, expected at most {MAX_BAG_CHUNK}")
     return file.read(count)
-
-
-def _parse_record(data: bytes, at: int) -> tuple[dict[bytes, bytes], bytes, int]:
-    """Return header and data of the record at a position of a chunk, and the next position."""
-    middle = at + 4 + _UINT32.unpack_from(data, at)[0]
-    end = middle + 4 + _UINT32.unpack_from(data, middle)[0]
-    if end > len(data):
-        raise ValueError("a record reaches beyond its chunk")
-    return _parse_fields(data[at + 4 : middle]), data[middle + 4 : end], end
 
 
 def _parse_fields(header: bytes) -> dict[bytes, bytes]:

@@ -28,21 +28,12 @@ from imubench_pipeline.readers.bounds import (
     MAX_TOPICS,
     MIN_CHECKED_EXPANSION,
 )
-from imubench_pipeline.readers.compressed import open_bytes
-from imubench_pipeline.readers.decompression import unpacked_zstd
+from imubench_pipeline.readers.compressed import open_bytes, unpacked_zstd
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 _DATABASE_TABLES = ("messages", "topics", "message_definitions", "schema", "metadata")
 _READ_BLOCK = 1 << 20
-
-
-def _unpack_lz4(data: bytes, size: int) -> bytes:
-    return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, _check_chunk_size(size) + 1))
-
-
-def _unpack_zstd(data: bytes, size: int) -> bytes:
-    return unpacked_zstd(data, _check_chunk_size(size) + 1)
 
 
 def _check_chunk_size(size: int) -> int:
@@ -52,20 +43,21 @@ def _check_chunk_size(size: int) -> int:
 
 
 # The decompressors of the library unpack a chunk before they check its size.
-storage_mcap.DECOMPRESSORS.update({"lz4": _unpack_lz4, "zstd": _unpack_zstd})
+storage_mcap.DECOMPRESSORS.update(
+    {
+        "lz4": lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(
+            data, _check_chunk_size(size) + 1
+        ),
+        "zstd": lambda data, size: unpacked_zstd(data, _check_chunk_size(size) + 1),
+    }
+)
 
 
 _Reader = Reader | McapReader | Sqlite3Reader
 
 
 class Bag2:
-    """A ROS 2 bag.
-
-    Parameters
-    ----------
-    reader : Reader, McapReader or Sqlite3Reader
-        Reader of the library, not yet opened.
-    """
+    """A ROS 2 bag, from a reader of the library that is not yet opened."""
 
     ros_1 = False
     unclosed = False
@@ -75,23 +67,21 @@ class Bag2:
         reader.open()
         try:
             self._connections: list[Connection] = list(reader.connections)
-            self._check()
+            if len(self._connections) > MAX_TOPICS:
+                raise ValueError(f"more than {MAX_TOPICS} topics, expected those of a vehicle")
+            if any(
+                len(str(c.topic) + str(c.msgtype)) > MAX_TOPIC_LENGTH for c in self._connections
+            ):
+                raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
+            storages = _list_storages(reader)
+            if len({storage.path for storage in storages}) < len(storages):
+                raise ValueError("metadata.yaml names a file twice, expected each once")
+            for storage in storages:
+                if isinstance(storage, McapReader):
+                    _check_index(storage)
         except BaseException:
             self.close()
             raise
-
-    def _check(self) -> None:
-        """Raise if the bag exceeds a resource limit."""
-        if len(self._connections) > MAX_TOPICS:
-            raise ValueError(f"more than {MAX_TOPICS} topics, expected those of a vehicle")
-        if any(len(str(c.topic) + str(c.msgtype)) > MAX_TOPIC_LENGTH for c in self._connections):
-            raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
-        storages = _list_storages(self._reader)
-        if len({storage.path for storage in storages}) < len(storages):
-            raise ValueError("metadata.yaml names a file twice, expected each once")
-        for storage in storages:
-            if isinstance(storage, McapReader):
-                _check_index(storage)
 
     def topics(self) -> dict[str, str]:
         """Return the topics, and the type of message of each."""
@@ -107,19 +97,15 @@ class Bag2:
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
         """Yield time of recording (ns) and bytes of the messages of a topic."""
         packed = isinstance(self._reader, Reader) and self._reader.compression_mode == "message"
-        for time, message in self._stored(topic, packed):
-            # A damaged database may contain any type.
-            data = message if isinstance(message, bytes) else b""
-            if packed:
-                data = unpacked_zstd(data, MAX_MESSAGE + 1)
-            yield time, data if len(data) <= MAX_MESSAGE else b""
-
-    def _stored(self, topic: str, packed: bool) -> Iterator[tuple[int, object]]:
-        """Yield messages as stored: the library would unpack packed ones without a limit."""
+        # The library would unpack packed messages without a limit.
         for reader in _list_storages(self._reader) if packed else [self._reader]:
             wanted = [connection for connection in reader.connections if connection.topic == topic]
             for _, time, message in reader.messages(wanted) if wanted else ():
-                yield time, message
+                # A damaged database may contain any type.
+                data = message if isinstance(message, bytes) else b""
+                if packed:
+                    data = unpacked_zstd(data, MAX_MESSAGE + 1)
+                yield time, data if len(data) <= MAX_MESSAGE else b""
 
     def close(self) -> None:
         """Close the bag."""
@@ -127,7 +113,6 @@ class Bag2:
 
 
 def _list_storages(reader: _Reader) -> list[Any]:
-    """Return the readers of the files of a bag."""
     if not isinstance(reader, Reader):
         return [reader]
     storage = reader.storage
@@ -135,10 +120,7 @@ def _list_storages(reader: _Reader) -> list[Any]:
 
 
 def _check_index(storage: McapReader) -> None:
-    """Raise if the chunks expand too far, or too many bytes of chunks overlap in time.
-
-    A damaged index may name the same chunk repeatedly.
-    """
+    """Raise if the chunks expand too far or overlap in time; a damaged index may repeat one."""
     size_of_file = Path(str(storage.path)).stat().st_size
     expanded = sum(chunk.uncompressed_size for chunk in storage.chunks)
     if expanded > max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size_of_file):
@@ -157,10 +139,7 @@ def _check_index(storage: McapReader) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Raise if the metadata of a bag are too long, or a packed file expands too far.
-
-    ``path``: folder of a ROS 2 bag; a device or a named pipe in it is an error.
-    """
+    """Raise if a folder has a device or pipe, long metadata, or a file that expands too far."""
     for file in sorted(path.iterdir()):
         if not file.is_file() and not file.is_dir():
             raise RecordingError(
@@ -182,7 +161,18 @@ def check_folder(path: Path) -> None:
 
 def check_database(path: Path) -> None:
     """Raise if a database is truncated, or if its tables are views or have computed columns."""
-    _check_whole(path)
+    # SQLite would read the missing part of a truncated file as zeros. Old libraries do not update
+    # the number of pages; then the two counters differ.
+    with path.open("rb") as file:
+        header = file.read(100)
+    page = int.from_bytes(header[16:18], "big")
+    expected = (1 << 16 if page == 1 else page) * int.from_bytes(header[28:32], "big")
+    size = path.stat().st_size
+    if header[24:28] == header[92:96] and size < expected:
+        raise RecordingError(
+            f"{path.name}: cut short: {size} of {expected} bytes; copy it again, or mend it with "
+            "'.recover' of sqlite3"
+        )
     location = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
     with closing(sqlite3.connect(location, uri=True)) as database:
         for name in _DATABASE_TABLES:
@@ -197,19 +187,3 @@ def check_database(path: Path) -> None:
                     f"{path.name}: {name} is computed, not recorded; expected a table of a ROS 2 "
                     "bag: record it again"
                 )
-
-
-def _check_whole(path: Path) -> None:
-    """Raise if a database is truncated: SQLite would read the missing part as zeros."""
-    with path.open("rb") as file:
-        header = file.read(100)
-    size = int.from_bytes(header[16:18], "big")
-    pages = int.from_bytes(header[28:32], "big")
-    # Old libraries do not update the number of pages; then the two counters differ.
-    has_count = header[24:28] == header[92:96]
-    expected = (1 << 16 if size == 1 else size) * pages
-    if has_count and path.stat().st_size < expected:
-        raise RecordingError(
-            f"{path.name}: cut short: {path.stat().st_size} of {expected} bytes; copy it again, or "
-            "mend it with '.recover' of sqlite3"
-        )

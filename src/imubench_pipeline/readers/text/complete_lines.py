@@ -1,12 +1,14 @@
-"""Read the text of a log as UTF-8 with line feeds, in blocks of complete lines."""
+"""Read the text of a log as UTF-8 in blocks of complete lines, and keep its records."""
 
 from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
+
+import numpy as np
 
 from imubench_pipeline.readers.bounds import MAX_LINE_LENGTH
 from imubench_pipeline.readers.compressed import ended_early, open_bytes
@@ -29,57 +31,44 @@ class _Text:
     """The decompressed bytes of a text log, in an encoding that contains ASCII.
 
     Carriage returns alone at the ends of lines become line feeds. A byte order mark is removed, and
-    each run of zero bytes is reduced to one.
+    each run of zero bytes is reduced to one. ``letter``: bytes of a letter in the file.
     """
 
     def __init__(self, path: Path, skipped: int, most: int | None) -> None:
-        self._bytes = open_bytes(path)
+        self.bytes = open_bytes(path)
         self._most = most
-        self._zeros = ZeroRuns()
+        self.zeros = ZeroRuns()
         self._returns = False
         try:
-            self._prepare(skipped)
+            begin = self.bytes.filled(_READ_BLOCK)
+            mark = next((mark for mark in _BYTE_ORDER_MARKS if begin.startswith(mark)), b"")
+            encoding = _BYTE_ORDER_MARKS.get(mark)
+            self._decoder = (
+                codecs.getincrementaldecoder(encoding)(errors="replace") if encoding else None
+            )
+            self.letter = len("\0".encode(encoding)) if encoding else 1
+            text = self._utf_8(begin.removeprefix(mark))
+            self._returns = b"\n" not in text and b"\r" in text[:-1]
+            self._begin = self._taken(text)
+            while skipped > 0 and (block := self.read(skipped)):
+                self._begin = block[skipped:]
+                skipped -= len(block)
         except BaseException:
             self.close()
             raise
 
-    def _prepare(self, skipped: int) -> None:
-        begin = self._bytes.filled(_READ_BLOCK)
-        mark = next((mark for mark in _BYTE_ORDER_MARKS if begin.startswith(mark)), b"")
-        encoding = _BYTE_ORDER_MARKS.get(mark)
-        self._decoder = (
-            codecs.getincrementaldecoder(encoding)(errors="replace") if encoding else None
-        )
-        self._letter = len("\0".encode(encoding)) if encoding else 1
-        text = self._utf_8(begin.removeprefix(mark))
-        self._returns = b"\n" not in text and b"\r" in text[:-1]
-        self._begin = self._taken(text)
-        while skipped > 0 and (block := self.read(skipped)):
-            self._begin = block[skipped:]
-            skipped -= len(block)
-
-    @property
-    def ended_early(self) -> bool:
-        """Whether the compressed data are truncated."""
-        return self._bytes.ended_early
-
     def read(self, size: int) -> bytes:
         """Return the next bytes, about ``size``; none at the end."""
         block, self._begin = self._begin, b""
-        while not block and (self._most is None or self._zeros.read <= self._most):
-            read = self._bytes.read(size)
+        while not block and (self._most is None or self.zeros.read <= self._most):
+            read = self.bytes.read(size)
             if not read:
                 return b""
             block = self._taken(self._utf_8(read))
         return block
 
-    def zeros(self, name: str, fate: str) -> Finding | None:
-        """Return the finding about zero bytes so far (see `ZeroRuns.finding`)."""
-        total = self._zeros.count * self._letter + self._bytes.omitted
-        return self._zeros.finding(name, f"line {self._zeros.first[1]}", total, fate)
-
     def close(self) -> None:
-        self._bytes.close()
+        self.bytes.close()
 
     def _utf_8(self, block: bytes) -> bytes:
         return self._decoder.decode(block).encode() if self._decoder else block
@@ -87,8 +76,8 @@ class _Text:
     def _taken(self, block: bytes) -> bytes:
         if self._returns:
             block = block.replace(b"\r", b"\n")
-        goes_on = self._zeros.at_end
-        self._zeros.add(block)
+        goes_on = self.zeros.at_end
+        self.zeros.add(block)
         if b"\0" not in block:
             return block
         if block == bytes(len(block)):
@@ -103,16 +92,8 @@ class CompleteLines:
     lack digits; it is left out with a finding. A truncated compressed file is read to its end, with
     a finding.
 
-    Parameters
-    ----------
-    findings : list of Finding
-        Receives the findings about omitted text.
-    skipped : int
-        Bytes of the text to skip.
-    records : callable
-        Converts complete lines to the text that is read.
-    most : int or None
-        Bytes of the text after which reading stops; None: the whole file.
+    ``skipped``: bytes of the text to skip. ``records``: converts complete lines to the text that is
+    read. ``most``: bytes of the text after which reading stops; None: the whole file.
     """
 
     closed = False
@@ -188,11 +169,10 @@ class CompleteLines:
         return lines
 
     def zeros(self, fate: str) -> Finding | None:
-        """Return the finding about zero bytes; None if there are none.
-
-        ``fate``: text about the lines with zero bytes.
-        """
-        return self._text.zeros(self._path.name, fate)
+        """Return the finding about zero bytes, if any; ``fate``: text on lines with them."""
+        zeros = self._text.zeros
+        total = zeros.count * self._text.letter + self._text.bytes.omitted
+        return zeros.finding(self._path.name, f"line {zeros.first[1]}", total, fate)
 
     def _end(self) -> bytes:
         """Return the lines after the last line feed that end in carriage returns."""
@@ -201,7 +181,7 @@ class CompleteLines:
         if cut and self.rest.endswith(b"\r"):
             cut = len(self.rest)
         lines, self.rest = self.rest[:cut].replace(b"\r", b"\n"), self.rest[cut:]
-        if self._text.ended_early:
+        if self._text.bytes.ended_early:
             self._findings.append(ended_early(self._path))
         if self.rest.strip(b"\0\r\n\t "):
             shown = self.rest.strip(b"\0")[:60].decode("utf-8", "replace")
@@ -229,12 +209,127 @@ def describe_missing_text(path: Path) -> str:
 
 
 def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
-    """Yield the lines of a text log from its beginning; the last one may lack its line break.
-
-    ``most``: approximate number of bytes to read; None: the whole file.
-    """
+    """Yield the lines of a log, the last perhaps without line break; ``most``: bytes to read."""
     with CompleteLines(path, [], most=most) as lines:
         while block := lines.read(_READ_BLOCK):
             yield from (line + b"\n" for line in block[:-1].split(b"\n"))
         if lines.rest.strip(b"\0"):
             yield lines.rest
+
+
+_NUMBER_BYTES = frozenset(b"0123456789+-.,;:|\t \"'eEnNaAiIfFtT/\r")
+_NOT_A_COMMENT = rb"(?!#(?i:n/a|na|value!|num!|div/0!)[;,|\t ])"
+"""Errors of a spreadsheet in a cell, which may be the first cell of a line and begin with #."""
+
+_BLANK_BYTES = b" \t\r\n"
+_BLANK_LINES = re.compile(rb"^[ \t\r]*+\n", re.MULTILINE)
+_MISSING_CELL = b"nan\n"
+_LINE_WITH_ZEROS = re.compile(rb"^[^\0\n]*+\0[^\0\n]*+\n", re.MULTILINE)
+"""A line with one run of zero bytes. A line with several runs may be UTF-16."""
+_MAX_BLANK_LINES = 1 << 24  # consecutive blank lines, limited for memory
+
+_TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
+
+
+class Records:
+    """Removes from the lines of a file all that are no records.
+
+    ``preamble``: the lines before the first record, which a restarted logger repeats.
+    ``runs``: columns are separated by runs of spaces or tabs, which become one space.
+    ``blank_is_missing``: a blank line between two records is a record with one empty cell.
+    """
+
+    def __init__(
+        self,
+        comments: Collection[bytes],
+        header: bytes,
+        preamble: Sequence[bytes],
+        runs: bool,
+        blank_is_missing: bool = False,
+    ) -> None:
+        self._comments = tuple(comments)
+        alternatives = b"|".join(re.escape(sign) for sign in self._comments)
+        # A pattern that begins with the line break is five times as fast as one with ^.
+        self._comment_lines = re.compile(
+            rb"\n" + _NOT_A_COMMENT + rb"(?:" + alternatives + rb")[^\n]*"
+        )
+        self._header = header
+        # The search for one byte is ten times as fast as for several.
+        self._telling = bytes(b for b in header if b not in _NUMBER_BYTES)[:1] or header[:1]
+        self._preamble = frozenset(preamble)
+        self._begins = tuple({*preamble[:1], header})
+        self._runs = runs
+        self._blank_is_missing = blank_is_missing
+        self._blank = 0
+        self.restarts = 0  # number of headers among the records
+        self.cut = 0  # incomplete records with a restart of the log in the same line
+        self.damaged = 0  # records that contain a run of zero bytes
+
+    def __call__(self, lines: bytes) -> bytes:
+        """Return the records of complete lines."""
+        # Before the comments, since the header may be a comment.
+        if self._header and self._telling in lines and self._header in lines:
+            lines = self._without_headers(lines)
+        if b"\0" in lines:
+            lines = _LINE_WITH_ZEROS.sub(self._left_out, lines)
+        for sign in self._comments:
+            if sign[:1] in lines and (lines.startswith(sign) or b"\n" + sign in lines):
+                lines = self._comment_lines.sub(b"", b"\n" + lines)[1:]
+                break
+        if self._runs:
+            lines = _merge_spaces(lines)
+        if self._blank_is_missing and lines:
+            lines = self._with_missing(lines)
+        # pyarrow reports a record of wrong width only if it is valid UTF-8.
+        return lines if lines.isascii() else lines.decode("utf-8", "replace").encode()
+
+    def _left_out(self, line: re.Match[bytes]) -> bytes:
+        """Count a line with zero bytes; digits may be missing from it."""
+        self.damaged += bool(line[0].strip(b"\0 \t\r\n"))
+        return b""
+
+    def _with_missing(self, lines: bytes) -> bytes:
+        """Return the lines with missing cells for blank lines; final blank lines are held back."""
+        ended = lines.rstrip(_BLANK_BYTES)
+        after = lines[len(ended) :].count(b"\n")
+        if not ended:
+            self._blank += after
+            return b""
+        if self._blank > _MAX_BLANK_LINES:
+            raise RecordingError(
+                f"{self._blank} blank lines follow each other among the records; expected a log "
+                "without: cut the file there"
+            )
+        before = _MISSING_CELL * self._blank
+        self._blank = after - 1
+        return before + _BLANK_LINES.sub(_MISSING_CELL, ended) + b"\n"
+
+    def _without_headers(self, lines: bytes) -> bytes:
+        records = []
+        for line in lines[:-1].split(b"\n"):
+            text = line.rstrip(b"\r").lstrip(b"\0")
+            if text == self._header:
+                self.restarts += 1
+            elif text in self._preamble:
+                continue
+            elif text.endswith(self._begins):
+                self.restarts += text.endswith(self._header)
+                self.cut += 1
+            else:
+                records.append(line + b"\n")
+        return b"".join(records)
+
+
+def _merge_spaces(lines: bytes) -> bytes:
+    if not lines:
+        return lines
+    if b"\t" in lines:
+        lines = lines.translate(_TAB_TO_SPACE)
+    signs = np.frombuffer(lines, np.uint8)
+    is_space = signs == ord(" ")
+    before = np.concatenate(([True], (is_space | (signs == ord("\n")))[:-1]))
+    signs = signs[~(is_space & before)]
+    at_end = (signs[1:] == ord("\n")) | (signs[1:] == ord("\r"))
+    keep = np.ones(len(signs), bool)
+    keep[:-1] = ~((signs[:-1] == ord(" ")) & at_end)
+    return signs[keep].tobytes()

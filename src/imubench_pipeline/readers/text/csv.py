@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
-from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.bounds import MAX_SEARCHED_COLUMNS
@@ -21,9 +20,9 @@ from imubench_pipeline.readers.file_format import (
     LogColumn,
     LogTable,
 )
-from imubench_pipeline.readers.stated_units import StatedUnit, stated
-from imubench_pipeline.readers.text.cells import MISSING_CELLS, Decimal, is_missing, is_number
-from imubench_pipeline.readers.text.complete_lines import CompleteLines, first_lines
+from imubench_pipeline.readers.stated_units import stated
+from imubench_pipeline.readers.text.cells import MISSING_CELLS, is_missing, is_number
+from imubench_pipeline.readers.text.complete_lines import CompleteLines, Records, first_lines
 from imubench_pipeline.readers.text.header import (
     completed,
     says_units,
@@ -32,7 +31,6 @@ from imubench_pipeline.readers.text.header import (
     states_simulated,
 )
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
-from imubench_pipeline.readers.text.records import Records
 from imubench_pipeline.readers.text.stamps import (
     StampError,
     TextTime,
@@ -69,7 +67,6 @@ class CsvFile(LogFile):
         columns = {
             name: layout.position(source.column, name) for name, source in self.sources.items()
         }
-        self.units = text_units(layout, columns)
         preamble, skipped = (
             [line.decode("utf-8", "replace") for line in lines]
             for lines in (layout.preamble, layout.skipped)
@@ -77,7 +74,12 @@ class CsvFile(LogFile):
         self.rate, self.started = stated_rate(preamble), stated_start(preamble)
         self.simulated = states_simulated([*preamble, *skipped])
         time = None if self.log.time is None else TextTime(self, layout)
+        beside, _ = line_of_units(layout)
         for name, at in columns.items():
+            label = layout.names[at] if layout.header else ""
+            where = f"the line of units, column {at + 1}"
+            if unit := stated(name, beside.get(at), where, label):
+                self.units[name] = unit
             if time is not None and at in time.types:
                 raise RecordingError(
                     f"{self.path.name}: column {layout.names[at]!r} is taken for time and for "
@@ -113,10 +115,11 @@ class CsvFile(LogFile):
                 column = layout.names[time.position]
                 raise self._bad_cell(line, column, error.text, time.expected) from None
             rows += len(part)
-            yield Batch(
-                stamps,
-                {name: self.to_si(name, _take_numbers(part, at)) for name, at in columns.items()},
-            )
+            figures = {
+                name: part.column(str(at)).to_numpy(zero_copy_only=False)
+                for name, at in columns.items()
+            }
+            yield Batch(stamps, {name: self.to_si(name, raw) for name, raw in figures.items()})
         if rows == 0:
             raise RecordingError(f"{self.path.name}: no complete record; expected at least one")
         self._report(layout, records)
@@ -182,8 +185,6 @@ class CsvFile(LogFile):
                 1,
                 "note",
             )
-
-    # ------------------------------------------------------------------- findings, faults
 
     def _report(self, layout: TextLayout, records: Records) -> None:
         if layout.passed_over:
@@ -281,13 +282,6 @@ class _WrongWidth:
         return "skip"
 
 
-def _take_numbers(part: pa.RecordBatch, position: int) -> NDArray[np.float64]:
-    return np.asarray(part.column(str(position)).to_numpy(zero_copy_only=False), np.float64)
-
-
-# ------------------------------------------------------------------------ stated units
-
-
 def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
     """Return the units in a line before the records, by column position, and the line."""
     for raw in layout.preamble:
@@ -301,51 +295,43 @@ def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
     return {}, b""
 
 
-def text_units(layout: TextLayout, columns: Mapping[str, int]) -> dict[str, StatedUnit]:
-    """Return the units that a log states for its channels.
-
-    ``columns``: position of the column of each channel and additional column.
-    """
-    beside, _ = line_of_units(layout)
-    units = {}
-    for channel, place in columns.items():
-        label = layout.names[place] if layout.header else ""
-        where = f"the line of units, column {place + 1}"
-        if unit := stated(channel, beside.get(place), where, label):
-            units[channel] = unit
-    return units
-
-
-# ------------------------------------------------------------------------- inspection
-
 _MAX_NOTES = 12
 
 
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
-    """Return the only table of a text log, as a list.
-
-    ``path``: a file, compressed or not, or a member of a zip archive.
-
-    Raises
-    ------
-    RecordingError
-        If it is no text, or has no records.
-    """
+    """Return the only table of a text log; raise `RecordingError` if it has no records."""
     layout = find_layout(path, NOTHING_STATED, [], [])
     before = [line.decode("utf-8", "replace") for line in layout.preamble]
     units, units_line = line_of_units(layout)
     rows = [row for row in layout.rows[:MAX_EXAMINED_RECORDS] if len(row) >= len(layout.names)]
     rows = rows[:-1] or rows  # the last one may be cut short
     named = layout.names != [str(number) for number in range(1, len(layout.names) + 1)]
-    columns = tuple(
-        _describe_column(layout, place, [row[place] for row in rows], named, units.get(place))
-        for place in range(min(len(layout.names), MAX_SEARCHED_COLUMNS))
-    )
+    columns = []
+    for place, label in enumerate(layout.names[:MAX_SEARCHED_COLUMNS]):
+        name = label if named else ""
+        addressed = name and layout.names.count(name) == 1 and name.isprintable()
+        source = name if addressed else place + 1
+        unit = units.get(place)
+        unit = None if unit is None or is_missing(unit) else unit
+        cells = [row[place] for row in rows]
+        first = tuple(cell.strip() for cell in cells[:MAX_SHOWN_VALUES])
+        present = [cell for cell in cells if not is_missing(cell)]
+        if present and all(is_number(cell, layout.decimal) for cell in present):
+            figures = [
+                np.nan if is_missing(cell) else float(cell.strip().replace(layout.decimal, "."))
+                for cell in cells
+            ]
+            columns.append(LogColumn(source, name, "number", first, np.array(figures), unit))
+        elif forms := stamp_forms(present):
+            values = stamps_of(forms[0], cells)
+            columns.append(LogColumn(source, name, "date", first, values, None, forms))
+        else:
+            columns.append(LogColumn(source, name, "text", first, unit=unit))
     names = "with names" if named else "without names"
     return [
         LogTable(
             file_format,
-            columns=columns,
+            columns=tuple(columns),
             rate=stated_rate(before),
             started=stated_start(before),
             about=f"delimiter {layout.split}, decimal sign {layout.decimal!r}, {names}",
@@ -356,27 +342,3 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
             )[:_MAX_NOTES],
         )
     ]
-
-
-def _describe_column(
-    layout: TextLayout, place: int, cells: list[str], named: bool, unit: str | None
-) -> LogColumn:
-    name = layout.names[place] if named else ""
-    source: str | int = name
-    if not name or layout.names.count(name) > 1 or not name.isprintable():
-        source = place + 1
-    first = tuple(cell.strip() for cell in cells[:MAX_SHOWN_VALUES])
-    unit = None if unit is None or is_missing(unit) else unit
-    present = [cell for cell in cells if not is_missing(cell)]
-    if present and all(is_number(cell, layout.decimal) for cell in present):
-        values = np.array([_parse_number(cell, layout.decimal) for cell in cells])
-        return LogColumn(source, name, "number", first, values, unit)
-    if forms := stamp_forms(present):
-        return LogColumn(source, name, "date", first, stamps_of(forms[0], cells), None, forms)
-    return LogColumn(source, name, "text", first, unit=unit)
-
-
-def _parse_number(cell: str, decimal: Decimal) -> float:
-    if is_missing(cell):
-        return np.nan
-    return float(cell.strip().replace(decimal, "."))

@@ -21,16 +21,10 @@ _WORDS_ONLY = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
     """Return the index of the line with the names of the columns, as opposed to units.
 
-    Parameters
-    ----------
-    lines : sequence of sequence of str
-        The cells of the lines before the first record, in order; empty for a line that is not
-        split like the record.
+    The line with the most names is returned, the first of equals; None if no line has names.
 
-    Returns
-    -------
-    int or None
-        The line with the most names; the first of equals. None: no line has names.
+    ``lines``: the cells of the lines before the first record; empty for a line that is not split
+    like the record.
     """
     best, header = 0, None
     for index, cells in enumerate(lines):
@@ -51,10 +45,7 @@ def says_units(cells: Sequence[str]) -> bool:
 
 
 def completed(names: list[str], record: list[str]) -> list[str]:
-    """Return a name for each cell of a record; empty if the numbers differ.
-
-    One of the two lines may have an additional delimiter at its end.
-    """
+    """Return a name for each cell of a record, or nothing; one may end with a delimiter."""
     if len(names) == len(record) + 1 and not names[-1]:
         return names[:-1]
     if len(names) + 1 == len(record) and not record[-1].strip():
@@ -86,10 +77,7 @@ _SIMULATED_MARKS = {SIMULATED, "SIMULATED, not measured"}
 
 
 def states_simulated(lines: Iterable[str]) -> bool:
-    """Return whether one of the lines is exactly the mark of a simulated log.
-
-    Quotes and empty cells, which a spreadsheet may add, are ignored.
-    """
+    """Return whether a line is the mark of a simulated log, but for quotes and empty cells."""
     return any(
         line.strip().strip("\"',;\t").lstrip("#%;!/ ").rstrip() in _SIMULATED_MARKS
         for line in lines
@@ -109,10 +97,7 @@ _START_STATEMENT = re.compile(
 
 
 def stated_rate(lines: Iterable[str]) -> float | None:
-    """Return the sampling rate that lines such as ``// Update Rate: 100.0Hz`` state, Hz.
-
-    None if no rate is stated, or different ones, such as one for each sensor.
-    """
+    """Return the only rate that lines such as ``// Update Rate: 100.0Hz`` state, Hz, or None."""
     rates = set()
     for line in lines:
         for match in _RATE_STATEMENT.finditer(line):

@@ -1,13 +1,15 @@
-"""How a text log is laid out: delimiter, decimal sign, comments, header and first record.
+"""Find the layout of a text log: delimiter, decimal sign, comments, header and first record.
 
-All is found from the first lines; what the sensor file states is taken as stated.
+All is found from the first lines; statements of the sensor file are used as they are.
 """
 
 from __future__ import annotations
 
+import re
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from imubench_pipeline.readers import bounds
@@ -20,15 +22,12 @@ from imubench_pipeline.readers.text.cells import (
     is_datum,
     is_number,
 )
-from imubench_pipeline.readers.text.complete_lines import describe_missing_text, first_lines
-from imubench_pipeline.readers.text.header import are_units, completed, is_heading, likely_header
-from imubench_pipeline.readers.text.records import Records, are_apart
-from imubench_pipeline.readers.text.refusals import (
-    refuse_binary,
-    refuse_control_characters,
-    refuse_decimals_apart,
-    refuse_other_formats,
+from imubench_pipeline.readers.text.complete_lines import (
+    Records,
+    describe_missing_text,
+    first_lines,
 )
+from imubench_pipeline.readers.text.header import are_units, completed, is_heading, likely_header
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -70,13 +69,7 @@ class TextLayout:
     """A blank line among the records is a record with one empty cell."""
 
     def position(self, column: Column, key: str) -> int:
-        """Return the position, from 0, of a column that the sensor file names.
-
-        Raises
-        ------
-        RecordingError
-            If the file has no such column, or two with this name.
-        """
+        """Return the position, from 0, of a column; raise `RecordingError` if none, or two."""
         shown = [name[:_MAX_SHOWN_LENGTH] for name in self.names[:_MAX_SHOWN_NAMES]]
         present = ", ".join(shown) + (", ..." if len(self.names) > _MAX_SHOWN_NAMES else "")
         if isinstance(column, int):
@@ -119,16 +112,10 @@ class _Line:
 def find_layout(
     path: Path, log: LogFormat, figures: Sequence[Column], times: Sequence[Column]
 ) -> TextLayout:
-    """Return the layout of a text log.
+    """Return the layout of a text log; raise `RecordingError` if it is no text.
 
-    ``log``: the stated format.
     ``figures`` and ``times``: the required columns of numbers and of time stamps, by name or
     position. If there are none, the most plausible layout is returned.
-
-    Raises
-    ------
-    RecordingError
-        If there is no record, or the file is no text.
     """
     return _Search(path, log, figures, times).layout()
 
@@ -195,10 +182,8 @@ class _Search:
             ),
             passed_over=tuple((line.number, line.text) for line in passed_over),
             blank_is_missing=len(names) == 1
-            and not are_apart([line.number for line in lines[first:]]),
+            and any(after.number == line.number + 1 for line, after in pairwise(lines[first:])),
         )
-
-    # --------------------------------------------------------------------- the first lines
 
     def _signs(self, split: Split | None) -> tuple[str, ...]:
         """Return the prefixes of comments, without the delimiter."""
@@ -222,7 +207,12 @@ class _Search:
                 self._skipped.append(raw.rstrip(b"\r\n"))
             if number <= self._log.skip_lines or not raw.strip(b"\0 \t\r\n"):
                 continue
-            line = _Line(number, here, raw.rstrip(b"\r\n"), _decode(raw.rstrip(b"\r\n")))
+            stripped = raw.rstrip(b"\r\n")
+            try:
+                text = stripped.decode()
+            except UnicodeDecodeError:
+                text = stripped.decode("latin-1")
+            line = _Line(number, here, stripped, text)
             if line.text.startswith(signs):
                 comments.append(line)
                 comment_bytes += len(line.raw)
@@ -252,8 +242,6 @@ class _Search:
         comments = [line for line in self._lines if line.text.startswith(";")]
         lines = [line for line in self._lines if not line.text.startswith(";")]
         return self._comments + comments, lines
-
-    # ------------------------------------------------------------------------- delimiter
 
     def _splits(self) -> Sequence[Split]:
         """Return the candidate rules for splitting lines."""
@@ -294,8 +282,6 @@ class _Search:
         alike = len(even) / len(rows) * sum(map(is_datum, cells)) / max(len(cells), 1)
         return (shown, fits, width > 1, round(alike, 2))
 
-    # ---------------------------------------------------------------------- header, record
-
     def _names_in(self, split: Split, line: _Line, width: int | None = None) -> list[str]:
         """Return the names in a line, without the sign of a comment."""
         names = split.names(line.text, width)
@@ -325,13 +311,31 @@ class _Search:
         width = widths.most_common(1)[0][0] if widths else 0
         first = next((index for index in alike if len(rows[index]) == width), 1)
         if not self._wanted:
-            return self._likely_header(split, comments, lines[: first + 1] if alike else []), first
+            if not alike:
+                raise RecordingError(
+                    f"{self._file}: no line of figures; expected the text of a log"
+                )
+            record = rows[first]
+            near = [line for line in comments if line.number < lines[first].number] + lines[:first]
+            place = likely_header(
+                [completed(self._names_in(split, line, len(record)), record) for line in near]
+            )
+            return (None if place is None else near[place]), first
         if self._names:
-            header = self._named(split, [*lines, *reversed(comments)], width)
+            wanted = set(self._names)
+            candidates = [*lines, *reversed(comments)]
+            named = (x for x in candidates if wanted.issubset(self._names_in(split, x, width)))
+            header = next(named, None)
             if header is not None and header in comments:
                 return header, 0
             if header is not None:
-                first = self._after_units(split, header, rows, lines.index(header) + 1)
+                first = end = lines.index(header) + 1
+                names = self._names_in(split, header, len(rows[first])) if first < len(rows) else []
+                places = self._places(names)
+                while first < min(end + _MAX_UNIT_LINES, len(rows)) and are_units(
+                    rows[first], places
+                ):
+                    first += 1
         else:
             header = None
         if self._log.header and header is None and first == 0:
@@ -347,39 +351,12 @@ class _Search:
             header = lines[max(first - 1, 0)]
         return header, first
 
-    def _likely_header(
-        self, split: Split, comments: list[_Line], lines: list[_Line]
-    ) -> _Line | None:
-        """Return the line of names before the first record, which is the last of the lines."""
-        if not lines:
-            raise RecordingError(f"{self._file}: no line of figures; expected the text of a log")
-        record = split.cells(lines[-1].text)
-        near = [line for line in comments if line.number < lines[-1].number] + lines[:-1]
-        named = [completed(self._names_in(split, line, len(record)), record) for line in near]
-        place = likely_header(named)
-        return None if place is None else near[place]
-
-    def _named(self, split: Split, lines: list[_Line], width: int) -> _Line | None:
-        """Return the first line with all required names."""
-        return next(
-            (x for x in lines if set(self._names).issubset(self._names_in(split, x, width))), None
-        )
-
     def _is_record(self, row: list[str]) -> bool:
         """Return whether a line may be a record: numbers in the required columns, or in most."""
         if self._names or not self._wanted:
             return 2 * sum(map(is_datum, row)) >= len(row)
         cells = [row[int(column) - 1] for column in self._figures if int(column) <= len(row)]
         return len(row) >= self._last and are_figures(cells)
-
-    def _after_units(self, split: Split, header: _Line, rows: list[list[str]], index: int) -> int:
-        """Return the index of the first line below the header that is no line of units."""
-        if index < len(rows):
-            places = self._places(self._names_in(split, header, len(rows[index])))
-            end = index + _MAX_UNIT_LINES
-            while index < min(end, len(rows)) and are_units(rows[index], places):
-                index += 1
-        return index
 
     def _passed_over(self, split: Split, header: _Line | None, before: list[_Line]) -> list[_Line]:
         """Return the lines directly before the first record that are neither names nor units."""
@@ -413,9 +390,85 @@ class _Search:
         return "."
 
 
-def _decode(raw: bytes) -> str:
-    """Decode text as UTF-8, or else as Latin-1."""
-    try:
-        return raw.decode()
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
+_MARKUP_PREFIXES = (b"<!doctype", b"<html", b"<head", b"<?xml", b"<svg")
+_JSON_PREFIXES = (b'{"', b"[{", b"[[", b"{'")
+_JSON_BRACKETS = (b"{", b"[")
+_MIN_ZERO_SHARE_UTF_16 = 0.4  # least share of zero bytes of a line of UTF-16
+_CONTROL_CHARACTERS = bytes({*range(1, 32)} - set(b"\t\n\r\f\x1a\x1b"))
+_MAX_CONTROLS, _MAX_CONTROL_SHARE = 4, 0.05
+"""Largest number and share of control characters of a text; random bytes have a share of 0.1."""
+
+_INTEGER = re.compile(r"\s*[-+]?\d+")
+
+
+def refuse_other_formats(file: str, line: bytes) -> None:
+    """Raise `RecordingError` if the first line of a log is one of a web page or JSON."""
+    begin = line.strip().lower()
+    shown = line.strip()[:40].decode("utf-8", "replace")
+    if begin.startswith(_MARKUP_PREFIXES):
+        raise RecordingError(
+            f"{file}: is a page of HTML or XML, which begins with {shown!r}; expected the lines of "
+            "a log: download it again, perhaps after a login"
+        )
+    if begin.startswith(_JSON_PREFIXES) or begin in _JSON_BRACKETS:
+        raise RecordingError(
+            f"{file}: is JSON, which begins with {shown!r}; expected a line a record: export the "
+            "log as CSV"
+        )
+
+
+def refuse_control_characters(file: str, number: int, begin: bytes) -> None:
+    """Raise `RecordingError` if a log begins with many control characters, unlike text."""
+    controls = len(begin) - len(begin.translate(None, _CONTROL_CHARACTERS))
+    if controls > max(_MAX_CONTROLS, _MAX_CONTROL_SHARE * len(begin)):
+        raise RecordingError(
+            f"{file}, line {number}: holds binary data of no known format, the bytes "
+            f"{begin[:8].hex(' ')} (hexadecimal) and so on; expected text, or a log of a format "
+            "that 'imubench formats' lists: export it as CSV"
+        )
+
+
+def refuse_binary(file: str, number: int, line: bytes) -> None:
+    """Raise `RecordingError` if a line contains zero bytes; ``number``: its number, from 1."""
+    zeros = line.count(b"\0")
+    if not zeros:
+        return
+    if (
+        line.isascii()
+        and _MIN_ZERO_SHARE_UTF_16 * len(line)
+        < zeros
+        < (1 - _MIN_ZERO_SHARE_UTF_16) * len(line) + 2
+    ):
+        raise RecordingError(
+            f"{file}, line {number}: looks like UTF-16 without the mark that says so; expected "
+            "UTF-8, or UTF-16 with its mark: save the text so"
+        )
+    raise RecordingError(
+        f"{file}, line {number}: holds {zeros} zero byte{'s' if zeros > 1 else ''}, as binary data "
+        "do; expected text: state the 'reader' of the file, or, if zeros hide the beginning of a "
+        "log, cut the file behind that line"
+    )
+
+
+def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequence[str]]) -> None:
+    """Raise `RecordingError` if commas may be delimiters as well as decimal signs.
+
+    Decimals have no sign and sometimes begin with 0, unlike integers, unless all integers are
+    padded with zeros. ``number``, ``line``, ``rows``: line number of the first record, its text,
+    and the cells of the first records, split at commas.
+    """
+    if {len(row) % 2 for row in rows} != {0}:
+        return
+    pairs = [pair for row in rows for pair in zip(row[::2], row[1::2], strict=True)]
+    if not all(_INTEGER.fullmatch(whole) and part.isdecimal() for whole, part in pairs):
+        return
+    if _are_padded(part for _, part in pairs) and not _are_padded(whole for whole, _ in pairs):
+        raise RecordingError(
+            f"{file}, line {number}: {line[:60]!r} is whole numbers between commas, or has decimal "
+            "commas; expected 'decimal: \",\"' in the sensor file for these, and "
+            "'delimiter: \",\"' for those"
+        )
+
+
+def _are_padded(figures: Iterable[str]) -> bool:
+    return any(len(figure) > 1 and figure.startswith("0") for figure in figures)

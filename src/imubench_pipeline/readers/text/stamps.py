@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from itertools import chain, product
 from typing import Any
 
@@ -29,21 +30,12 @@ _ISO_PATTERN = (
     r"(?::(?P<S>\d\d)(?:[.,](?P<f>\d{1,9})\d*)?)?\s*(?P<z>Z|UTC|[+-]\d\d(?::?\d\d)?)?)?"
 )
 _FIELD_PATTERNS: Mapping[str, str] = {
-    "Y": r"(?P<Y>\d{4})",
-    "y": r"(?P<y>\d\d)",
-    "m": r"(?P<m>\d{1,2})",
-    "b": r"(?P<b>[A-Za-z]{3})",
-    "d": r"(?P<d>\d{1,2})",
-    "j": r"(?P<j>\d{1,3})",
-    "H": r"(?P<H>\d{1,2})",
-    "I": r"(?P<I>\d{1,2})",
-    "p": r"(?P<p>[AaPp][Mm])",
-    "M": r"(?P<M>\d{1,2})",
-    "S": r"(?P<S>\d{1,2})",
-    "f": r"(?P<f>\d{1,9})\d*",
+    "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d\d)", "m": r"(?P<m>\d{1,2})", "b": r"(?P<b>[A-Za-z]{3})",
+    "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})", "H": r"(?P<H>\d{1,2})",
+    "I": r"(?P<I>\d{1,2})", "p": r"(?P<p>[AaPp][Mm])", "M": r"(?P<M>\d{1,2})",
+    "S": r"(?P<S>\d{1,2})", "f": r"(?P<f>\d{1,9})\d*", "%": "%",
     "z": r"(?P<z>Z|UTC|[+-]\d\d(?::?\d\d)?)",
-    "%": "%",
-}
+}  # fmt: skip
 _MONTH_NAMES = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 
 
@@ -56,26 +48,8 @@ class StampError(Exception):
         self.text = text
 
 
-def arrow_type(texts: Collection[str]) -> pa.DataType | None:
-    """Return the type of ISO 8601 stamps that pyarrow itself reads, which is much faster.
-
-    None if pyarrow cannot read them: decimal commas, spaces around the stamp or before the zone.
-    """
-    stamps = [_ISO_STAMP.fullmatch(text) for text in texts]
-    zones = {bool(stamp["zone"]) for stamp in stamps if stamp}
-    if not all(stamps) or len(zones) != 1:
-        return None
-    return pa.timestamp("ns", "UTC" if zones.pop() else None)
-
-
 class TextStamps:
-    """Reads stamps in text.
-
-    Parameters
-    ----------
-    form : str
-        ``iso8601`` or a ``strptime`` pattern.
-    """
+    """Reads stamps in text; ``form``: ``iso8601`` or a ``strptime`` pattern."""
 
     def __init__(self, form: str) -> None:
         pattern = _ISO_PATTERN if form == "iso8601" else _convert_to_regex(form)
@@ -89,12 +63,9 @@ class TextStamps:
         self._last: tuple[int, bool] = (0, False)
 
     def nanoseconds(self, texts: pa.Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return ns since 1970 or since midnight, and a mask of the stamps that are present.
+        """Return ns since 1970 or midnight, and a mask of the stamps that are present.
 
-        Raises
-        ------
-        StampError
-            If a stamp does not match the pattern and is not missing.
+        Raise `StampError` if a stamp does not match the pattern and is not missing.
         """
         texts = pc.fill_null(texts, "")
         fields = pc.extract_regex(texts, self._expression)
@@ -166,28 +137,20 @@ class TextStamps:
         sound &= (hour < 24) & (minute < 60) & (second <= 60)
         sound &= (year > 1700) & (year < 2200)  # otherwise ns overflow
         days = first + day - 1 + figures("j", 1) - 1
-        seconds = days * 86_400 + hour * 3600 + minute * 60 + second - self._zone(fields)
+        seconds = days * 86_400 + hour * 3600 + minute * 60 + second
+        if "z" in self._fields:
+            zones = pc.fill_null(fields.field("z"), "").dictionary_encode()
+            offsets = np.zeros(len(zones.dictionary), np.int64)  # from UTC, s
+            for place, zone in enumerate(zones.dictionary.to_pylist()):
+                digits = zone.lstrip("+-").replace(":", "")
+                if digits.isdigit():
+                    offset = int(digits[:2]) * 3600 + int(digits[2:] or 0) * 60
+                    offsets[place] = -offset if zone.startswith("-") else offset
+            seconds -= offsets[np.asarray(zones.indices)]
         return seconds * 10**9 + figures("f", 0), sound
-
-    def _zone(self, fields: pa.StructArray) -> NDArray[Any] | int:
-        """Return the offset of the zone from UTC, s."""
-        if "z" not in self._fields:
-            return 0
-        zones = pc.fill_null(fields.field("z"), "").dictionary_encode()
-        offsets = np.array([_parse_offset(zone) for zone in zones.dictionary.to_pylist()], np.int64)
-        return offsets[np.asarray(zones.indices)] if len(offsets) else 0
-
-
-def _parse_offset(zone: str) -> int:
-    digits = zone.lstrip("+-").replace(":", "")
-    if not digits.isdigit():
-        return 0
-    offset = int(digits[:2]) * 3600 + int(digits[2:] or 0) * 60
-    return -offset if zone.startswith("-") else offset
 
 
 def _convert_to_regex(form: str) -> str:
-    """Return the regular expression of a ``strptime`` pattern."""
     form = form.replace("%T", "%H:%M:%S").replace("%F", "%Y-%m-%d").replace("%R", "%H:%M")
     expression = ""
     for part in re.findall(r"[.,]%f|%.|\s+|[^%\s]", form):
@@ -199,8 +162,6 @@ def _convert_to_regex(form: str) -> str:
             expression += r"\s+" if part.isspace() else re.escape(part)
     return expression
 
-
-# ----------------------------------------------------------------------------------------- patterns
 
 _DATE_FORMS = (
     *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y:%m:%d", "%Y%m%d"),
@@ -233,9 +194,7 @@ def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
     """Return the patterns that all stamps match, the most plausible first; empty if there are none.
 
     A pattern may have a date only or a time of day only. If day and month are ambiguous, the
-    patterns with the shortest time span are returned.
-
-    ``texts``: stamps as written; missing ones are ignored.
+    patterns with the shortest time span are returned. Missing stamps are ignored.
     """
     stamps = [text.strip() for text in texts if not is_missing(text)]
     if not stamps or not all(
@@ -248,9 +207,13 @@ def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
     if ":" in stamps[0]:
         forms = ["iso8601", *forms]
     written = pa.array(stamps)
-    fitting = {form: times for form in forms if (times := _try_form(form, written)) is not None}
-    spans = {form: np.ptp(times) for form, times in fitting.items()}
-    return tuple(form for form in fitting if spans[form] == min(spans.values()))
+    spans = {}
+    for form in forms:
+        with suppress(StampError):
+            times, present = TextStamps(form).nanoseconds(written)
+            if present.all():
+                spans[form] = np.ptp(times)
+    return tuple(form for form, span in spans.items() if span == min(spans.values()))
 
 
 def stamps_of(form: str, texts: Sequence[str]) -> NDArray[np.float64]:
@@ -258,17 +221,6 @@ def stamps_of(form: str, texts: Sequence[str]) -> NDArray[np.float64]:
     times, present = TextStamps(form).nanoseconds(pa.array(texts))
     return np.where(present, times, np.nan)
 
-
-def _try_form(form: str, texts: pa.Array) -> NDArray[np.int64] | None:
-    """Return stamps in a pattern, ns; None if one does not match it."""
-    try:
-        times, present = TextStamps(form).nanoseconds(texts)
-    except StampError:
-        return None
-    return times if present.all() else None
-
-
-# ----------------------------------------------------------------------------------------- of a log
 
 _INTEGER = re.compile(r"-?\d{1,19}")
 
@@ -304,9 +256,12 @@ class TextTime:
             whole = self._source.unit == "ns" and all(_INTEGER.fullmatch(s.strip()) for s in stamps)
             return pa.int64() if whole else pa.float64()
         if self._source.format == "iso8601" and self._source.date is None and not as_text:
-            kind = arrow_type(stamps)
-            if kind is not None:
-                return kind
+            # pyarrow itself is much faster, but reads no decimal commas, and no spaces around the
+            # stamp or before the zone.
+            matches = [_ISO_STAMP.fullmatch(text) for text in stamps]
+            zones = {bool(match["zone"]) for match in matches if match}
+            if all(matches) and len(zones) == 1:
+                return pa.timestamp("ns", "UTC" if zones.pop() else None)
         self._text = TextStamps(self._source.format)
         return pa.string()
 
@@ -316,23 +271,11 @@ class TextTime:
         return 0 if self._text is None else self._text.leap_seconds
 
     def seconds(self, part: pa.RecordBatch) -> NDArray[np.float64]:
-        """Return s since the first stamp of the file; NaN where the stamp is missing.
-
-        Raises
-        ------
-        StampError
-            If a stamp cannot be read.
-        RecordingError
-            If the first records have no stamp.
-        """
+        """Return s since the first stamp of the file, NaN where missing; raise `StampError`."""
         columns = [part.column(str(position)) for position in self.types]
-        return self._clock.seconds(*self._stamps(columns))
-
-    def _stamps(self, columns: list[pa.Array]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Return the stamps as numbers, and a mask of the stamps that are present."""
         if self._text is not None:
             texts = columns[0] if len(columns) == 1 else pc.binary_join_element_wise(*columns, " ")
-            return self._text.nanoseconds(texts)
+            return self._clock.seconds(*self._text.nanoseconds(texts))
         (column,) = columns
         present = np.asarray(column.is_valid())
         if pa.types.is_timestamp(column.type):
@@ -340,7 +283,7 @@ class TextTime:
         stamps = np.asarray(column.fill_null(0) if column.null_count else column)
         if stamps.dtype.kind == "f":
             present &= np.isfinite(stamps)
-        return stamps, present
+        return self._clock.seconds(stamps, present)
 
     def _started(self, first: Any) -> str | None:
         if self._source.format is not None:
