@@ -162,9 +162,9 @@ def limits(estimate: Estimate, how: ErrorBudgetSettings) -> dict[Place, Array]:
     names = {"sensor": "own", "recording": "log"}
     rows = error_rows(names, {CHANNEL: estimate}, questions(how), draws=how.draws, seed=how.seed)
     return {
-        (row["error"], row["time"]): np.array([row["sigma"], row["lower"], row["upper"]])
+        (row.error, row.time): np.array([row.sigma, row.lower, row.upper], dtype=float)
         for row in rows
-        if row["source"] == "total"
+        if row.source == "total"
     }
 
 

@@ -228,21 +228,21 @@ def claim(results: Path, sensors: list[str], how: NavigateSettings, simulated: s
         )
         print("|---" * 11 + "|")
         for row in navigate.navigate(folders, sensor, json.dumps(sections)):
-            begun = [row.get("signals") or "–", row["trajectory"]]
-            if row.get("position") is None:
-                print("| " + " | ".join([*begun, "", f"{row['tuning']}: {row['reason']}"]) + " |")
+            begun = [row.signals or "–", row.trajectory or "–"]
+            if row.position is None:
+                print("| " + " | ".join([*begun, "", f"{row.tuning}: {row.reason}"]) + " |")
                 continue
             cells = [
                 *begun,
-                "none" if row["outage"] is None else f"{row['outage']:g} s",
-                row["tuning"],
-                str(row["states"]),
+                "none" if row.outage is None else f"{row.outage:g} s",
+                row.tuning,
+                str(row.states),
                 figure(row, "position", 1.0),
                 figure(row, "position_ratio", 1.0),
                 figure(row, "heading", 180.0 / math.pi),
                 figure(row, "heading_ratio", 1.0),
-                f"{row['position_predicted']:.3g}",
-                f"{row['nees_inside']:.3f} ± {row['nees_error']:.3f}",
+                f"{row.position_predicted:.3g}",
+                f"{row.nees_inside:.3f} ± {row.nees_error:.3f}",
             ]
             print("| " + " | ".join(cells) + " |", flush=True)
     return 0
@@ -250,9 +250,9 @@ def claim(results: Path, sensors: list[str], how: NavigateSettings, simulated: s
 
 def figure(row: TableRow, name: str, factor: float) -> str:
     """Return a figure of a row with its limits."""
-    if row.get(name) is None:
+    if getattr(row, name) is None:
         return "–"
-    value, low, high = (factor * row[f"{name}{end}"] for end in ("", "_lower", "_upper"))
+    value, low, high = (factor * getattr(row, f"{name}{end}") for end in ("", "_lower", "_upper"))
     return f"{value:.3g} ({low:.3g}–{high:.3g})"
 
 

@@ -271,14 +271,14 @@ def estimated(made: Case, log: ChannelLog) -> Found:
     rows = Estimation()
     key = Key("random", str(made.number), made.channel)
     estimate_channel(key, log, curve_of(log), SETTINGS, None, rows)
-    methods = {str(row["method"]) for row in rows.parameters}
+    methods = {row.method for row in rows.parameters}
     method = "compensated" if "compensated" in methods else "likelihood"
     own = [row for row in rows.parameters if row.method == method]
     return Found(
         estimate_of(method, own),
-        {str(row["parameter"]): _parameter(row) for row in rows.temperature},
-        {str(row["parameter"]): _parameter(row) for row in rows.low_pass},
-        rows.low_pass[0]["order"],
+        {row.parameter: _parameter(row) for row in rows.temperature},
+        {row.parameter: _parameter(row) for row in rows.low_pass},
+        rows.low_pass[0].order,
     )
 
 

@@ -145,6 +145,8 @@ def estimate_of(method: str, rows: Iterable[ParameterRow]) -> Estimate:
         name = row.parameter
         group = lines if name in ("amplitude", "frequency") else components
         place = of_curve if name in CURVE else group.setdefault(row.component, {})
-        place[name] = Parameter(**{field.name: row[field.name] for field in fields(Parameter)})
+        place[name] = Parameter(
+            **{field.name: getattr(row, field.name) for field in fields(Parameter)}
+        )
     first = components.pop(1, {})
     return Estimate(method, first, list(components.values()), list(lines.values()), of_curve)

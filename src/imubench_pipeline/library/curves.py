@@ -168,7 +168,7 @@ def _make_table(curves: Iterable[Curve]) -> pd.DataFrame:
     for curve in curves:
         unit = None if curve.channel is None else SI_UNITS[dimension_of(curve.channel)]
         for row in allan_rows(Key("", "", curve.channel or ""), curve):
-            kept = {key: row[key] for key in _TABLE_COLUMNS}
+            kept = {key: getattr(row, key) for key in _TABLE_COLUMNS}
             rows.append(({"channel": curve.channel, "unit": unit} if unit else {}) | kept)
     table = pd.DataFrame(rows)
     table.attrs["units"] = {"tau": "s"}

@@ -353,11 +353,12 @@ def _make_table(estimates: Any, units: System) -> pd.DataFrame:
         sensor, _, recording = estimate.log.partition("/")
         key = Key(sensor, recording, estimate.channel)
         for row in parameter_rows(key, estimate, recommended=True):
-            kept = {name: value for name, value in row.items() if name != "recommended"}
+            kept = {name: value for name, value in row.columns().items() if name != "recommended"}
             if units == "practical" and row.parameter in SHOWN:
                 unit = page_unit(estimate.quantity, row.parameter, "practical")
                 for name in ("value", "lower", "upper", "fitted"):
-                    kept[name] = None if row[name] is None else row[name] * unit.per_si
+                    value = getattr(row, name)
+                    kept[name] = None if value is None else value * unit.per_si
                 kept["unit"] = unit.sign
             rows.append(kept)
     return pd.DataFrame(rows)

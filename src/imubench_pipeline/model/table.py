@@ -14,11 +14,11 @@ frozen dataclass a struct.
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
 from types import ModuleType
 from typing import (
+    TYPE_CHECKING,
     Annotated,
     Any,
     ClassVar,
@@ -102,26 +102,40 @@ class TypedColumn:
         return [tuple(_make_struct(self.parts, part) for part in value or ()) for value in values]
 
 
-class TableRow(Mapping[str, Any]):
+if TYPE_CHECKING:
+
+    class _Attributes:
+        """Rows have attributes alone for mypy, so that it finds each misspelt column."""
+
+else:
+    _Attributes = Mapping  # templates and tests may also take a column by its name
+
+
+class TableRow(_Attributes):
     """A row of a table; its columns are its attributes."""
 
     __slots__ = ()
     table: ClassVar[str]
 
-    def __getitem__(self, name: str) -> Any:
-        try:
-            return getattr(self, name)
-        except AttributeError:
-            raise KeyError(name) from None
+    def columns(self) -> dict[str, Any]:
+        """Return the values by the names of the columns."""
+        return {name: getattr(self, name) for name in names_of(type(self))}
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(names_of(type(self)))
+    if not TYPE_CHECKING:
 
-    def __len__(self) -> int:
-        return len(names_of(type(self)))
+        def __getitem__(self, name):  # noqa: ANN001, ANN204 - not for typed code
+            if name in names_of(type(self)):
+                return getattr(self, name)
+            raise KeyError(name)
 
-    def __or__(self, other: Mapping[str, Any]) -> dict[str, Any]:
-        return {**self, **other}
+        def __iter__(self):  # noqa: ANN204 - not for typed code
+            return iter(names_of(type(self)))
+
+        def __len__(self):  # noqa: ANN204 - not for typed code
+            return len(names_of(type(self)))
+
+        def __or__(self, other):  # noqa: ANN001, ANN204 - not for typed code
+            return {**self, **other}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
@@ -143,6 +157,9 @@ class TableRow(Mapping[str, Any]):
 
 
 R = TypeVar("R", bound=TableRow)
+
+AnyRow = TableRow | Mapping[str, Any]
+"""A row of a table: typed, or a mapping of its columns."""
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, eq_default=False)
@@ -170,17 +187,23 @@ def rows_in(module: ModuleType) -> list[type[TableRow]]:
     return [cls for cls in found if issubclass(cls, TableRow) and hasattr(cls, "table")]
 
 
-@cache
+_NAMES: dict[type, tuple[str, ...]] = {}
+_COLUMNS: dict[type, tuple[TypedColumn, ...]] = {}
+
+
 def names_of(cls: type[TableRow]) -> tuple[str, ...]:
     """Return the columns of a table by the class of its rows."""
-    return tuple(field.name for field in fields(cls))  # type: ignore[arg-type]  # a dataclass
+    if cls not in _NAMES:
+        _NAMES[cls] = tuple(field.name for field in fields(cls))  # type: ignore[arg-type]  # a dataclass
+    return _NAMES[cls]
 
 
-@cache
 def columns_of(cls: type[TableRow]) -> tuple[TypedColumn, ...]:
     """Return the columns of a table by the class of its rows, with their Arrow types."""
-    hints = get_type_hints(cls, include_extras=True)
-    return tuple(_typed(name, hints[name]) for name in names_of(cls))
+    if cls not in _COLUMNS:
+        hints = get_type_hints(cls, include_extras=True)
+        _COLUMNS[cls] = tuple(_typed(name, hints[name]) for name in names_of(cls))
+    return _COLUMNS[cls]
 
 
 def _typed(name: str, hint: Any) -> TypedColumn:

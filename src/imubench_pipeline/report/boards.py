@@ -102,7 +102,7 @@ def published_lines(rows: Sequence[PublishedFigureRow]) -> Iterator[dict[str, An
         ours = row.datasheet if row.of == "datasheet" else row.value
         ratio = ours / row.means if ours and row.means else None
         yield {
-            **row,
+            **row.columns(),
             "unit": f"{quantity}.{_UNIT.get(row.parameter, row.parameter)}",
             "digits": limit_digits(row.lower, row.upper, 4),
             "ratio": "–" if ratio is None else number_text(ratio, 3),

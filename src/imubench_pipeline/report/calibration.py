@@ -98,7 +98,7 @@ def lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
         if row.status == "not_observable" and row.parameter in ("earth_rate", "heading"):
             continue
         line = {
-            **row,
+            **row.columns(),
             "words": WORDS[row.parameter],
             "digits": limit_digits(row.lower, row.upper, 4),
             "is_rate": row.unit == "rad/s",
@@ -134,7 +134,7 @@ def _texts(row: CalibrationRow) -> dict[str, str]:
 def not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
     """Return what a recording cannot tell, each with the reason."""
     return [
-        {"words": WORDS[row.parameter], "why": sentence(row.reason), **row}
+        {"words": WORDS[row.parameter], "why": sentence(row.reason), **row.columns()}
         for row in rows
         if row.status == "not_observable"
     ]

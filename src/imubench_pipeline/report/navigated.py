@@ -60,7 +60,7 @@ def _context(site: Site) -> dict[str, Any]:
             if (key := (row.sensor, row.recording)) in apart
         },
         "lines": [line_of(row) for row in shown],
-        "lacking": [dict(row) | {"tuning": TUNINGS[row.tuning]} for row in rows if row.reason],
+        "lacking": [row.columns() | {"tuning": TUNINGS[row.tuning]} for row in rows if row.reason],
         "filters": {
             "trajectory": list(dict.fromkeys(row.trajectory for row in shown)),
             "outage": list(dict.fromkeys(_outage(row) for row in shown)),

@@ -126,7 +126,7 @@ def _paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[
         "about": paper,
         "lines": [
             {
-                **row,
+                **row.columns(),
                 "page": row.page if (row.page or "").split("#")[0] in there else None,
                 **cells(row),
             }

@@ -86,7 +86,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     channels = view.channels()
     names = {channel.channel for channel in channels}
     numbered = [
-        {**row, "number": i, "linked": row.channel in names}
+        {**row.columns(), "number": i, "linked": row.channel in names}
         for i, row in enumerate(sorted(view.findings, key=lambda r: order[r.severity]), start=1)
     ]
     samples = samples_payload(envelope, histogram, arrays)

@@ -104,7 +104,7 @@ def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
 def _pooled(row: PooledRow) -> dict[str, Any]:
     quantity = row.channel.split("_", maxsplit=1)[0]
     symbol = "signal" if row.parameter == "bias" else row.parameter
-    return row | {
+    return row.columns() | {
         "axis": row.channel.replace("_", " "),
         "digits": limit_digits(row.lower, row.upper, 4),
         "ref": f"{quantity}.{symbol}",

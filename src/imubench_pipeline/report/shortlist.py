@@ -35,7 +35,7 @@ SHORTLIST = Entry(
 def _line(site: Site, row: ShortlistRow) -> dict[str, Any]:
     sensor, verdict, best, worst, measured, _ = cells(row)
     return {
-        **row,
+        **row.columns(),
         "code": row.verdict,
         "shortfalls": list(map(shortfall_text, row.shortfalls)),
         "measured_verdict": SHORT_VERDICTS[row.measured_verdict] if row.measured_verdict else "",

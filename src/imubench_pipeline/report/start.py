@@ -91,7 +91,7 @@ def _failures(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the steps that failed, with the recording that is left out for it."""
     views = {view.full_name: view for view in site.views}
     for row in site.rows(FailureRow):
-        yield {**row, "view": views.get((row.sensor, row.recording or ""))}
+        yield {**row.columns(), "view": views.get((row.sensor, row.recording or ""))}
 
 
 def _without_result(

@@ -122,7 +122,7 @@ def answer(rows: Sequence[EarthRateRow], system: System) -> str:
     if best.value is None:
         return sentence(best.reason)
     unit = page_unit("gyro", "adev", system)
-    value, truth = (unit.text(best[name], 4) for name in ("value", "truth"))
+    value, truth = (unit.text(number, 4) for number in (best.value, best.truth))
     size = None if best.upper is None else best.upper - best.value
     away = None if best.off_sigma is None else abs(best.off_sigma)
     text = (
@@ -169,7 +169,7 @@ _FAR = 4.0
 def line(row: EarthRateRow) -> dict[str, Any]:
     """Return a line of the table of estimates, of a row of ``earth_rate``."""
     return {
-        **row,
+        **row.columns(),
         "term": METHOD_TERMS[row.method],
         "words": METHOD_WORDS[row.method],
         "digits": limit_digits(row.lower, row.upper, 4),
@@ -183,7 +183,7 @@ def published_lines(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str,
     """Yield the lines of the table of what a source prints of its runs."""
     for row in rows:
         yield {
-            **row,
+            **row.columns(),
             "length": duration_text(row.duration),
             "off": off_words(row),
         }
@@ -260,7 +260,7 @@ def _stretches(turning: Sequence[TurningRow]) -> Iterator[dict[str, Any]]:
     listed = [row for row in turning if row.start is not None]
     for row in sorted(listed, key=lambda row: (row.start, row.what)):
         position = {1: "north", -1: "south"}.get(row.sense or 0, "")
-        yield {**row, "position": position}
+        yield {**row.columns(), "position": position}
 
 
 def _payload(

@@ -34,7 +34,6 @@ def run(options: argparse.Namespace) -> int:
     # Only this command draws and computes: the others answer at once.
     from rich.console import Console
 
-    from imubench_pipeline.model.comparisons import ShortlistRow
     from imubench_pipeline.report.shortlist import cells, notes
     from imubench_pipeline.report.terminal_table import fitting
     from imubench_pipeline.settings.config import Run
@@ -62,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         tables = {}
         if options.results is not None:
             tables = tables_of_run(options.results, NEEDED)
-        rows = [ShortlistRow(**row) for row in rows_of_run({name: asked}, sensors, tables)]
+        rows = [*rows_of_run({name: asked}, sensors, tables)]
     except (ConfigError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 2

@@ -281,7 +281,7 @@ def _parts(declared: TwoPosition, duration: float) -> Iterator[tuple[str, float]
 def _later(rows: Iterator[_Timed], begins: float) -> Iterator[_Timed]:
     """Yield rows with their times counted from the first sample of the recording."""
     for row in rows:
-        times = {name: row.get(name) for name in ("start", "stop", "time")}
+        times = {name: getattr(row, name, None) for name in ("start", "stop", "time")}
         later = {name: time + begins for name, time in times.items() if time is not None}
         yield replace(row, **later)
 

@@ -173,8 +173,8 @@ def with_failures(
 
 def with_new(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
     """Return rows of a table, and after them those of others that are not among them."""
-    known = {tuple(row.values()) for row in listed}
-    return [*listed, *(row for row in rows if tuple(row.values()) not in known)]
+    known = {tuple(row.columns().values()) for row in listed}
+    return [*listed, *(row for row in rows if tuple(row.columns().values()) not in known)]
 
 
 def without(

@@ -7,7 +7,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv as pacsv
 
-from imubench_pipeline.model.table import TypedColumn
+from imubench_pipeline.model.table import AnyRow, TableRow, TypedColumn
 from imubench_pipeline.tables.parquet import SEAL, checked_parquet, seal_broken, write_sealed
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 from imubench_pipeline.tables.texts import printable, with_safe_cells
@@ -50,7 +50,7 @@ def schema(table: str) -> pa.Schema:
     )
 
 
-def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
+def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
     """Make an Arrow table of rows and check it against the schema.
 
     Parameters
@@ -66,7 +66,7 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
     TableError
         If a row has a column that the table does not, or lacks a required value.
     """
-    listed = list(rows)
+    listed = [row.columns() if isinstance(row, TableRow) else row for row in rows]
     columns = columns_of(table)
     unknown = {name for row in listed for name in row} - {column.name for column in columns}
     if unknown:
@@ -160,7 +160,7 @@ def making(folder: Path) -> Iterator[Path]:
         shutil.rmtree(scratch)
 
 
-def write(table: str, rows: Iterable[Mapping[str, Any]], path: Path) -> None:
+def write(table: str, rows: Iterable[AnyRow], path: Path) -> None:
     """Check rows against the schema of their table and write them as Parquet, atomically."""
     write_arrow(build(table, rows), path)
 

@@ -81,7 +81,7 @@ def find(
 
 def finding_of(row: FindingRow) -> Finding:
     """Return the finding that a row of the table ``findings`` stands for."""
-    return Finding(**{field.name: row[field.name] for field in fields(Finding)})
+    return Finding(**{field.name: getattr(row, field.name) for field in fields(Finding)})
 
 
 def without_addresses(reason: str) -> str:

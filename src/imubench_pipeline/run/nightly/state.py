@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from itertools import chain
 from pathlib import Path
@@ -234,5 +234,7 @@ def _digest_recordings(tables: RunRows) -> dict[str, str]:
         tables.recordings, tables.parameters, tables.fixed_bias
     )
     for row in rows:
-        digests[name_in(row)].update(json.dumps(dict(row), sort_keys=True).encode())
+        digests[name_in(row)].update(
+            json.dumps(row.columns(), sort_keys=True, default=asdict).encode()
+        )
     return {name: digest.hexdigest()[:16] for name, digest in digests.items()}

@@ -160,7 +160,7 @@ def compared(
         ],
         "removed": [name for name in was.recordings if name not in after.recordings],
         "failed": [
-            Failed(**row)
+            Failed(**row.columns())
             for row in tables.failures
             if row.recording is None or name_in(row) not in written_to
         ],
@@ -174,12 +174,12 @@ def compared(
             if outcome.rejected is not None
         ],
         "warnings": [
-            NewWarning.model_validate({**row, "recording": name_in(row)})
+            NewWarning.model_validate({**row.columns(), "recording": name_in(row)})
             for row in serious(tables.findings)
             if name_in(row) not in written_to and warned(row) not in known_warnings
         ],
         "drift": [
-            Drift.model_validate(dict(row))
+            Drift.model_validate(row.columns())
             for row in changes(tables.drift)
             if name_in(row) not in written_to and drifted(row) not in known_drift
         ],
