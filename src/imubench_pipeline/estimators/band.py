@@ -71,18 +71,14 @@ def find_band(
         cap = bandwidth / _MIN_BANDWIDTH_RATIO
     limit = _find_unbent_limit(spectrum, clear, cap)
     if limit is not None and limit < cap:
-        return Band(
-            limit, f"found: beyond {limit:.4g} Hz the spectrum bends, as by the sensor's filter"
-        )
+        source = f"found: beyond {limit:.4g} Hz the spectrum bends, as by the sensor's filter"
+        return Band(limit, source)
     if cap < nyquist:
         return Band(cap, f"a tenth of the stated bandwidth: {cap:.4g} Hz")
     if limit is None:
         limit = _DEFAULT_BAND * spectrum.rate
-        return Band(
-            limit,
-            f"default: a twentieth of the rate, {limit:.4g} Hz; the spectrum follows no model "
-            "beyond any frequency",
-        )
+        source = f"default: a twentieth of the rate, {limit:.4g} Hz; the spectrum follows no model"
+        return Band(limit, f"{source} beyond any frequency")
     return Band(nyquist, "found: the spectrum follows its model up to Nyquist")
 
 
@@ -94,7 +90,14 @@ def _find_unbent_limit(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float)
         if below.sum() < _MIN_BINS or limit < _MIN_BAND * spectrum.rate:
             # The log is too short, or the deviation does not decrease.
             return cap if step == 0 else None
-        departure = _find_departure(spectrum, clear, below, cap, _FLEXIBLE_TERMS)
+        whittle = _make_whittle(spectrum.select(below))
+        maximum = whittle.maximum(_FLEXIBLE_TERMS)
+        if _is_filter_like(whittle, maximum):
+            maximum = whittle.maximum(replace(_FLEXIBLE_TERMS, gauss_markov=0))
+        beyond = clear & ~below & (spectrum.upper <= cap * (1 + 1e-9))
+        departure = None
+        if beyond.any():
+            departure = _find_first_departure(spectrum.select(beyond), whittle, maximum)
         if departure is None or (step == 0 and _is_quantized(spectrum, clear, cap)):
             return cap if step == 0 else limit
         frequency, size = departure
@@ -104,21 +107,6 @@ def _find_unbent_limit(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float)
             return min(faded, frequency) if step == 0 else limit
         limit = faded
     return limit
-
-
-def _find_departure(
-    spectrum: Spectrum, clear: NDArray[np.bool_], below: NDArray[np.bool_], cap: float, terms: Terms
-) -> tuple[float, float] | None:
-    """Return frequency and relative size of the first deviation above some bins, or None."""
-    chosen = spectrum.select(below)
-    whittle = _make_whittle(chosen)
-    maximum = whittle.maximum(terms)
-    if _is_filter_like(whittle, maximum):
-        maximum = whittle.maximum(replace(terms, gauss_markov=0))
-    beyond = clear & ~below & (spectrum.upper <= cap * (1 + 1e-9))
-    if not beyond.any():
-        return None
-    return _find_first_departure(spectrum.select(beyond), whittle, maximum)
 
 
 def _is_filter_like(whittle: Whittle, maximum: Maximum) -> bool:
@@ -159,8 +147,7 @@ def _find_first_departure(
 
 def _is_quantized(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float) -> bool:
     """Return whether quantization noise explains the spectrum up to Nyquist."""
-    inside = clear & (spectrum.upper <= cap * (1 + 1e-9))
-    chosen = spectrum.select(inside)
+    chosen = spectrum.select(clear & (spectrum.upper <= cap * (1 + 1e-9)))
     whittle = _make_whittle(chosen)
     maximum = whittle.maximum(Terms("QNFK"))
     if maximum.parameter("Q") == 0.0:

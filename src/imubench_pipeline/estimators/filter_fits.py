@@ -18,25 +18,19 @@ from imubench_pipeline.estimators.whittle_kernels import TOLERANCE, best_powers
 from imubench_pipeline.typing import Array
 
 _POINTS_PER_BIN = 6
-"""Frequencies per bin over which a density is averaged."""
 
 _SCAN_CUTOFFS, _COARSE_SCAN_CUTOFFS = 24, 8
 """Cut-offs of the scan before optimisation, and of the test whether a filter is possible."""
 
 _MAX_BOXCAR_SAMPLES = 20
-"""Maximum whole number of samples whose mean is tried: near its nulls the likelihood is narrow."""
+"""Maximum whole number of samples whose mean is tried."""
 
 _MIN_CUTOFF = 1 / 500
 
 _MAX_CUTOFFS: Mapping[tuple[Kind, int], float] = {
     ("analogue", 1): 4.0,
-    ("analogue", 2): 1.0,
-    ("analogue", 3): 1.0,
-    ("analogue", 4): 1.0,
-    ("bilinear", 1): 0.42,
-    ("bilinear", 2): 0.42,
-    ("bilinear", 3): 0.42,
-    ("bilinear", 4): 0.42,
+    **{("analogue", order): 1.0 for order in (2, 3, 4)},
+    **{("bilinear", order): 0.42 for order in (1, 2, 3, 4)},
     ("boxcar", 1): 0.222,
 }
 """Filters that are tried, and their highest cut-off over the sampling rate; the lowest is 1/500.
@@ -55,14 +49,10 @@ _MIN_CORRELATION_RATIO = 4.0
 """Minimum ratio of the correlation time of slow noise to the filter's, 1 / (2 pi f_c)."""
 
 _MAX_FILTER_SAMPLES, MIN_PROCESS_SAMPLES = 2.0, 10.0
-"""Limits of the correlation in sampling intervals, 1 / (2 pi f_c T).
-
-Below the first, additional white noise is attributed to a filter of first order; processes are at
-least as long as the second.
-"""
+"""Limits of the correlation in sampling intervals: below the first, additional white noise is
+attributed to a filter of first order; processes are at least as long as the second."""
 
 _TIMES_PER_DECADE = 6
-"""Correlation times per decade that are tried."""
 
 _ANALOGUE_PREFERENCE = 0.01
 
@@ -70,7 +60,6 @@ _MIN_SCAN_GAIN = 1.0
 """Minimum gain of log likelihood in the coarse scan for a full search."""
 
 _MAX_SLOW_TERMS = 4
-"""Maximum number of terms of slow noise."""
 
 MAX_UNALIASED_CUTOFF = 0.3
 """Cut-off over the sampling rate below which the likelihood has one maximum: little aliasing."""
@@ -91,8 +80,7 @@ _MIN_CUTOFF_RATIO = 1.01
 MIN_BINS = 24
 
 _DIGITAL_TWIN_WEIGHT = 0.1
-"""Weight of the same first-order filter applied after sampling: its spectrum has the same shape as
-before sampling, but N then has no aliases."""
+"""Weight of a first-order filter applied after sampling, whose spectrum has the same shape."""
 
 
 class BinGains:
@@ -268,19 +256,16 @@ class FilterFits:
     def try_filters(self, within: float = 1e-5) -> list[FilterTrial]:
         """Return the maxima of the likelihood over all filters, sorted by BIC, best first.
 
-        ``within`` is the relative tolerance of the cut-off.
+        ``within`` is the relative tolerance of the cut-off. Trials without a floor are preferred.
+        First-order digital and analogue filters with a floor differ only in N: the analogue one is
+        preferred.
         """
-        maxima = [
-            trial for kind, order in FAMILY for trial in self._find_maxima(kind, order, within)
-        ]
-        # Prefer trials without a floor. First-order digital and analogue filters with a floor
-        # differ only in N: prefer the analogue one.
-        return sorted(
-            maxima,
-            key=lambda trial: (
-                trial.score + trial.floor + _ANALOGUE_PREFERENCE * (trial.kind != "analogue")
-            ),
-        )
+
+        def score(trial: FilterTrial) -> float:
+            return trial.score + trial.floor + _ANALOGUE_PREFERENCE * (trial.kind != "analogue")
+
+        maxima = [trial for filters in FAMILY for trial in self._find_maxima(*filters, within)]
+        return sorted(maxima, key=score)
 
     def _find_maxima(self, kind: Kind, order: int, within: float) -> Iterator[FilterTrial]:
         """Yield the maxima of the likelihood over the cut-off, without and with a floor."""
@@ -297,20 +282,13 @@ class FilterFits:
             for place in np.flatnonzero((costs <= beside[:-2]) & (costs < beside[2:])).tolist():
                 best = minimize_scalar(
                     lambda x, floor=floor: self.cost(at(x, floor)),
-                    bounds=(
-                        float(scan[max(place - 1, 0)]),
-                        float(scan[min(place + 1, len(scan) - 1)]),
-                    ),
+                    bounds=scan[[max(place - 1, 0), min(place + 1, len(scan) - 1)]].tolist(),
                     method="bounded",
                     options={"xatol": within},
                 )
                 trial = replace(at(best.x, floor), cost=float(best.fun))
-                if (
-                    floor
-                    and order == 1
-                    and kind != "boxcar"
-                    and trial.correlation(self.rate) > _MAX_FILTER_SAMPLES
-                ):
+                slow = order == 1 and trial.correlation(self.rate) > _MAX_FILTER_SAMPLES
+                if floor and slow and kind != "boxcar":
                     continue  # white noise plus a process
                 before, after = self.density(trial)
                 # If the floor exceeds the filtered noise, the latter is a slow process.
@@ -445,15 +423,8 @@ def read_as_digital(reading: Reading, trial: FilterTrial, rate: float) -> Readin
 def compute_density_in_log(low_pass: Filter, N: float, beside: float, rate: float) -> float:
     """Return the density of white noise in a log far below the cut-off of a filter.
 
-    Parameters
-    ----------
-    low_pass : Filter
-    N : float
-        Density before the filter, SI.
-    beside : float
-        Squared density of the white noise added after the filter, SI.
-    rate : float
-        Hz.
+    ``N`` is the density before the filter, SI, ``beside`` the squared density of the white noise
+    added after it, SI, and ``rate`` in Hz.
     """
     return math.sqrt(N**2 * float(low_pass.white(Frequencies(0.0, rate))) + beside)
 

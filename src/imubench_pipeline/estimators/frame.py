@@ -88,7 +88,7 @@ class FitSelection:
     def needs_cutoff_per_model(self, spectrum: Spectrum, times: Array) -> bool:
         """Return whether the cut-off must be fitted for each noise model separately.
 
-        It must if the filter bends the spectrum well below Nyquist, or if a process (``times``:
+        So it must if the filter bends the spectrum well below Nyquist, or if a process (``times``:
         T_B, s) is nearly as fast as the filter. Near Nyquist, aliasing determines the cut-off.
         """
         if self.low_pass is None or self.low_pass.behind is None:
@@ -121,8 +121,7 @@ class FitSelection:
     def in_the_log(self, posterior: Posterior, terms: Terms, rng: np.random.Generator) -> Posterior:
         """Return draws of a model with N as in the log at its lowest frequencies.
 
-        An uncertain filter bends the spectrum down to these frequencies, so N includes the
-        uncertainty of the filter.
+        They include the uncertainty of the filter, which bends the spectrum down to these.
         """
         factors = np.array(math.sqrt(self.folding))
         if self.low_pass is not None and self.low_pass.readings:
@@ -136,9 +135,8 @@ class FitSelection:
         """Return draws of a model with N before the filter, including the filter's uncertainty."""
         if self.low_pass is None or not self.low_pass.readings:
             return posterior
-        return _scale_white_noise(
-            posterior, terms, self.low_pass.factors(len(posterior.parameters), rng, terms)
-        )
+        factors = self.low_pass.factors(len(posterior.parameters), rng, terms)
+        return _scale_white_noise(posterior, terms, factors)
 
     def shows_quantization(self, rate: float) -> bool:
         """Return whether quantization noise is visible: no filter, and a sufficient band."""

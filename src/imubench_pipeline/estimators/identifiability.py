@@ -32,11 +32,6 @@ def relative_errors(whittle: Whittle, maximum: Maximum) -> Array:
     sensitivity = whittle.sensitivity(maximum)
     if maximum.terms.ramp:
         sensitivity[-1] *= maximum.ramp
-    return _invert_information(sensitivity)
-
-
-def _invert_information(sensitivity: Array) -> Array:
-    """Return the square roots of the diagonal of the inverse of the information."""
     bounds = np.full(len(sensitivity), np.inf)
     size = np.linalg.norm(sensitivity, axis=1)
     sensitive = size > 1e-9
@@ -91,13 +86,17 @@ def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -
     The keys are the names of `parameter_names`; spectral lines are not included. Rate
     and highest frequency used are in Hz.
     """
-    maximum = _convert_to_maximum(model)
-    spectrum = ideal_spectrum(rate, duration, highest)
-    return dict(
-        zip(
-            parameter_names(maximum.terms), _compute_relative_errors(spectrum, maximum), strict=True
-        )
-    )
+    values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
+    letters = "".join(letter for letter, value in values.items() if value > 0)
+    processes = [(model.B, model.T_B)] if model.B > 0 and model.T_B else []
+    processes += [(process.B, process.T_B) for process in model.further_processes]
+    processes.sort(key=lambda process: process[1])
+    powers = [values[letter] ** 2 for letter in letters] + [B**2 for B, _ in processes]
+    times = np.array([time for _, time in processes], dtype=np.float64)
+    terms = Terms(letters, len(processes), model.R != 0)
+    maximum = Maximum(terms, np.array(powers), times, model.R, 0.0)
+    errors = _compute_relative_errors(ideal_spectrum(rate, duration, highest), maximum)
+    return dict(zip(parameter_names(terms), errors, strict=True))
 
 
 def parameter_names(terms: Terms) -> list[str]:
@@ -209,19 +208,3 @@ class _UntabulatedWhittle(Whittle):
     def gauss_markov(self, time: float) -> Array:
         """Return the density of a Gauss-Markov process of B = 1 in each bin."""
         return self.shape_of.gauss_markov(time)
-
-
-def _convert_to_maximum(model: NoiseModel) -> Maximum:
-    values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
-    letters = "".join(letter for letter in "QNFK" if values[letter] > 0)
-    processes = [(model.B, model.T_B)] if model.B > 0 and model.T_B else []
-    processes += [(process.B, process.T_B) for process in model.further_processes]
-    processes.sort(key=lambda process: process[1])
-    powers = [values[letter] ** 2 for letter in letters] + [B**2 for B, _ in processes]
-    return Maximum(
-        Terms(letters, len(processes), model.R != 0),
-        np.array(powers),
-        np.array([time for _, time in processes], dtype=np.float64),
-        model.R,
-        0.0,
-    )

@@ -1,7 +1,7 @@
 """Joint fit of the cut-off of a low-pass filter and the parameters of a noise model.
 
-The filtered noise bends the spectrum too: the slope of a process or of flicker noise affects the
-fitted cut-off. Each noise model therefore has its own cut-off, and its own N before the filter.
+The slope of a process or of flicker noise affects the fitted cut-off: each noise model has its own
+cut-off, and its own N before the filter.
 """
 
 from __future__ import annotations
@@ -100,6 +100,7 @@ def refine_cutoff(
             bic[terms], aic[terms] = candidate.bic - 2.0 * gained, candidate.aic - 2.0 * gained
     chosen = min(bic, key=lambda terms: bic[terms])
     fit = tried[chosen][0]
+    best, state = fit.allowed.at(fit.x), joint.at(fit.allowed, fit.x, chosen)
     models = {terms: joint.of_model(fits, fit) for terms, fits in tried.items()}
     likely = {terms: math.exp(0.5 * (aic[chosen] - aic[terms])) for terms in aic}
     least = _MIN_INTERVAL_WEIGHT * sum(likely.values())
@@ -110,12 +111,18 @@ def refine_cutoff(
         for each in fits
         for x in joint.limits(each)
     ]
-    best, state = fit.allowed.at(fit.x), joint.at(fit.allowed, fit.x, chosen)
+    shown, lower, upper = best.low_pass.half_power(spectrum.rate), min(ends), max(ends)
+    reason = None
+    if upper > MAX_LIMIT_RATIO * lower:
+        reason = ALLOWED_CUTOFFS_REASON.format(lower, upper)
+    elif not joint.explains(fit):
+        reason = UNKNOWN_BEND_REASON
+    frequency = Parameter(shown, lower=lower, upper=upper)
+    if reason is not None:
+        frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
     return replace(
         low_pass,
-        frequency=_make_parameter(
-            best.low_pass.half_power(spectrum.rate), ends, joint.explains(fit)
-        ),
+        frequency=frequency,
         kind=best.kind,
         order=best.order,
         floor=math.sqrt(state.floor + low_pass.rounded * state.N**2),
@@ -126,18 +133,6 @@ def refine_cutoff(
         ],
         models=models,
     )
-
-
-def _make_parameter(shown: float, ends: Sequence[float], explains: bool) -> Parameter:
-    """Return a cut-off with its limits, or the reason why it is not identified."""
-    lower, upper = min(ends), max(ends)
-    if upper > MAX_LIMIT_RATIO * lower:
-        reason = ALLOWED_CUTOFFS_REASON.format(lower, upper)
-    elif not explains:
-        reason = UNKNOWN_BEND_REASON
-    else:
-        return Parameter(shown, lower=lower, upper=upper)
-    return Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
 
 
 @dataclass(frozen=True)
@@ -177,7 +172,19 @@ class _Joint:
 
     def fits(self, terms: Terms) -> list[_Fit]:
         """Return the fits of a model with the allowed filters, best first."""
-        fits = [self._fit_best(allowed, terms) for allowed in self._low_pass.allowed]
+        fits = []
+        for allowed in self._low_pass.allowed:
+            around = math.log(allowed.filter.cutoff)
+            for reach in (_SEARCH_HALF_WIDTHS * allowed.half_width, _MAX_LOG_SHIFT):
+                best = minimize_scalar(
+                    lambda x, allowed=allowed: self.at(allowed, x, terms).cost,
+                    bounds=(around - reach, min(around + reach, self._get_highest(allowed))),
+                    method="bounded",
+                    options={"xatol": _RELATIVE_TOLERANCE * allowed.half_width},
+                )
+                if abs(best.x - around) < 0.9 * reach:
+                    break
+            fits.append(_Fit(allowed, terms, float(best.x), float(best.fun)))
         fits.sort(key=lambda fit: fit.cost + fit.allowed.filter.floor)
         return [fit for fit in fits if fit.cost < fits[0].cost + DELTA_LOG_LIKELIHOOD_EXCLUDED]
 
@@ -262,16 +269,3 @@ class _Joint:
     def _get_highest(self, allowed: Allowed) -> float:
         trial = allowed.filter
         return math.log(get_highest_cutoff(trial.kind, trial.order, self._spectrum.rate))
-
-    def _fit_best(self, allowed: Allowed, terms: Terms) -> _Fit:
-        around = math.log(allowed.filter.cutoff)
-        for reach in (_SEARCH_HALF_WIDTHS * allowed.half_width, _MAX_LOG_SHIFT):
-            best = minimize_scalar(
-                lambda x: self.at(allowed, x, terms).cost,
-                bounds=(around - reach, min(around + reach, self._get_highest(allowed))),
-                method="bounded",
-                options={"xatol": _RELATIVE_TOLERANCE * allowed.half_width},
-            )
-            if abs(best.x - around) < 0.9 * reach:
-                break
-        return _Fit(allowed, terms, float(best.x), float(best.fun))

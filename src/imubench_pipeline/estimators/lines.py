@@ -5,14 +5,12 @@ Audio Electroacoust. 15, 1967), so a line need not be phase-coherent over the wh
 model the density of a bin over its expectation is chi-squared with two degrees of freedom per
 segment.
 
-Each line adds two states to a Kalman filter and an integral to an error budget, and some steps cost
-the square or the cube of their number. The strongest lines are therefore used individually. The
-weaker ones are combined in a few groups of neighbours with the same power: of n sinusoids A_i at
-f_i,
+The cost of filters and error budgets grows with the number of lines. The strongest are used
+individually, the weaker ones in a few groups of neighbours. Of n sinusoids A_i at f_i,
 
-    A^2 = sum A_i^2,   f^2 = A^2 / sum (A_i / f_i)^2,
+    A^2 = sum A_i^2,   f^2 = A^2 / sum (A_i / f_i)^2
 
-which preserves the variance of the signal, and of its integral.
+preserves the variance of the signal, and of its integral.
 """
 
 from __future__ import annotations
@@ -40,8 +38,7 @@ _MEDIAN_BINS = 129
 """Bins of the median filter that corrects the model around a bin."""
 
 _MEDIAN_EFFICIENCY = 1.0 / (1.94 * 1.57)
-"""Independent bins per bin of the median: neighbours are correlated, and a median is less efficient
-than a mean."""
+"""Independent bins per bin of the median of correlated neighbours."""
 
 _MAX_FOUND = 1000
 """Maximum number of lines of a spectrum; the cost of comparing them is quadratic."""
@@ -81,37 +78,23 @@ MAX_LINES = MAX_SINGLE_LINES + LINE_GROUPS
 
 @dataclass(frozen=True)
 class Line:
-    """A detected spectral line.
+    """A detected spectral line, with 95 % limits.
 
-    Attributes
-    ----------
-    frequency, frequency_lower, frequency_upper : float
-        Hz, with 95 % limits.
-    amplitude, amplitude_lower, amplitude_upper : float
-        Omega_0, rad/s or m/s², with 95 % limits.
-    ratio : float
-        Its ratio of the highest density to the noise there.
-    false_alarm : float
-        Probability of such a ratio anywhere in the spectrum of a channel without lines.
-    width : float
-        Width, Hz; a sinusoid is not wider than the resolution.
-    resolution : float
-        Distance of the bins, Hz.
-    kind : {"sinusoid", "band", "alias"}
-        A band of noise is wider, or is not significantly above its neighbourhood; an alias is the
-        image of a faster line in block means.
+    A band of noise is wider than a sinusoid, or not significantly above its neighbourhood; an alias
+    is the image of a faster line in block means.
     """
 
-    frequency: float
+    frequency: float  # Hz
     frequency_lower: float
     frequency_upper: float
-    amplitude: float
+    amplitude: float  # Omega_0, rad/s or m/s²
     amplitude_lower: float
     amplitude_upper: float
-    ratio: float
+    ratio: float  # its highest density over the noise there
     false_alarm: float
-    width: float
-    resolution: float
+    """Probability of such a ratio anywhere in the spectrum of a channel without lines."""
+    width: float  # Hz; a sinusoid is not wider than the resolution
+    resolution: float  # distance of the bins, Hz
     kind: Literal["sinusoid", "band", "alias"]
 
     @property
@@ -137,8 +120,11 @@ def find_lines(
     model : NoiseModel
         Fit to the spectrum; a median over neighbouring bins corrects it where it deviates.
     """
-    divided = crossover if len(spectra) > 1 else 0.0
-    searched = [_get_search_range(spectrum, divided) for spectrum in spectra]
+    searched = []
+    for spectrum in spectra:
+        between = int(crossover / spectrum.frequency[1]) if len(spectra) > 1 else 0
+        above = max(_FIRST_BIN, between), len(spectrum.frequency) - 1
+        searched.append((_FIRST_BIN, between) if spectrum.block > 1 else above)
     total = sum(max(0, high - low) for low, high in searched)
     lines: list[Line] = []
     for spectrum, (low, high) in zip(spectra, searched, strict=True):
@@ -156,9 +142,14 @@ def _merge_spectra(lines: list[Line], new: list[Line]) -> list[Line]:
 
     Of a strong line above the crossover the first spectrum has the skirt only.
     """
+
+    def is_same(line: Line, other: Line) -> bool:
+        wide = _LINE_HALF_WIDTH * line.resolution + 0.5 * other.width
+        return abs(line.frequency - other.frequency) <= wide
+
     joined = list(lines)
     for line in new:
-        same = [other for other in joined if _is_same(line, other)]
+        same = [other for other in joined if is_same(line, other)]
         if all(line.amplitude > _MIN_AMPLITUDE_RATIO * other.amplitude for other in same):
             joined = [other for other in joined if other not in same] + [line]
     return joined
@@ -188,22 +179,10 @@ def _compute_block_gain(frequency: float, block: int, rate: float) -> float:
     return abs(math.sin(block * half) / (block * math.sin(half))) if block > 1 else 1.0
 
 
-def _get_search_range(spectrum: LineSpectrum, crossover: float) -> tuple[int, int]:
-    """Return the first bin to search, and the one past the last."""
-    between = int(crossover / spectrum.frequency[1])
-    if spectrum.block > 1:
-        return _FIRST_BIN, between
-    return max(_FIRST_BIN, between), len(spectrum.frequency) - 1
-
-
-def _is_same(line: Line, other: Line) -> bool:
-    wide = _LINE_HALF_WIDTH * line.resolution + 0.5 * other.width
-    return abs(line.frequency - other.frequency) <= wide
-
-
 def _find_in_spectrum(
     spectrum: LineSpectrum, model: NoiseModel, rate: float, low: int, high: int, total: int
 ) -> list[Line]:
+    """Return the lines between two bins; ``total`` bins are tested in all spectra."""
     n = spectrum.segments
     omega = 2.0 * np.pi * spectrum.frequency / rate
     omega[0] = omega[1]
@@ -228,35 +207,27 @@ def _find_in_spectrum(
 
 def _merge_bands(lines: list[Line]) -> list[Line]:
     """Merge neighbouring pieces of a band of noise."""
-    merged: list[Line] = []
-    for line in lines:
-        last = merged[-1] if merged else None
-        near = _NEIGHBOUR_END * line.resolution + 0.5 * ((last.width if last else 0.0) + line.width)
-        both_wide = last and not (last.narrow or line.narrow)
-        if last and both_wide and line.frequency - last.frequency < near:
-            merged[-1] = _merge_two_bands(last, line)
-        else:
+    merged = lines[:1]
+    for line in lines[1:]:
+        last = merged[-1]
+        near = _NEIGHBOUR_END * line.resolution + 0.5 * (last.width + line.width)
+        if last.narrow or line.narrow or line.frequency - last.frequency >= near:
             merged.append(line)
+            continue
+        power = last.amplitude**2 + line.amplitude**2
+        share = last.amplitude**2 / power
+        merged[-1] = replace(
+            last if last.ratio > line.ratio else line,
+            frequency=share * last.frequency + (1.0 - share) * line.frequency,
+            frequency_lower=last.frequency_lower,
+            frequency_upper=line.frequency_upper,
+            amplitude=math.sqrt(power),
+            amplitude_lower=math.hypot(last.amplitude_lower, line.amplitude_lower),
+            amplitude_upper=math.hypot(last.amplitude_upper, line.amplitude_upper),
+            false_alarm=min(last.false_alarm, line.false_alarm),
+            width=line.frequency - last.frequency + 0.5 * (last.width + line.width),
+        )
     return merged
-
-
-def _merge_two_bands(first: Line, second: Line) -> Line:
-    """Return a band of noise that contains two."""
-    power = first.amplitude**2 + second.amplitude**2
-    share = first.amplitude**2 / power
-    grown = math.sqrt(power)
-    stronger = first if first.ratio > second.ratio else second
-    return replace(
-        stronger,
-        frequency=share * first.frequency + (1.0 - share) * second.frequency,
-        frequency_lower=first.frequency_lower,
-        frequency_upper=second.frequency_upper,
-        amplitude=grown,
-        amplitude_lower=math.hypot(first.amplitude_lower, second.amplitude_lower),
-        amplitude_upper=math.hypot(first.amplitude_upper, second.amplitude_upper),
-        false_alarm=min(first.false_alarm, second.false_alarm),
-        width=second.frequency - first.frequency + 0.5 * (first.width + second.width),
-    )
 
 
 def _estimate_line(
@@ -267,6 +238,7 @@ def _estimate_line(
     group: NDArray[np.int64],
     rate: float,
 ) -> Line:
+    """Return the line of a group of significant bins."""
     step = float(spectrum.frequency[1])
     n = spectrum.segments
     peak = int(group[np.argmax(standing[group])])
@@ -345,21 +317,28 @@ def select_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
     ``lines`` are all detected lines, sorted by frequency; bands of noise and aliases are excluded.
     """
     narrow = [line for line in lines if line.narrow]
-    if len(narrow) <= MAX_LINES:
-        return [_make_parameters(line) for line in narrow]
-    single = set(select_strongest([line.amplitude for line in narrow]))
-    weaker = [line for place, line in enumerate(narrow) if place not in single]
-    sinusoids = [_make_parameters(narrow[place]) for place in single]
-    groups = np.array_split(np.arange(len(weaker)), LINE_GROUPS)
-    sinusoids += [_group_lines([weaker[i] for i in group]) for group in groups]
+    single = _find_single_lines(narrow) if len(narrow) > MAX_LINES else narrow
+    sinusoids = [
+        {
+            "amplitude": Parameter(
+                line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper
+            ),
+            "frequency": Parameter(
+                line.frequency, lower=line.frequency_lower, upper=line.frequency_upper
+            ),
+        }
+        for line in single
+    ]
+    weaker = [line for line in narrow if line not in single]
+    if weaker:
+        groups = np.array_split(np.arange(len(weaker)), LINE_GROUPS)
+        sinusoids += [_group_lines([weaker[i] for i in group]) for group in groups]
     return sorted(sinusoids, key=lambda sinusoid: sinusoid["frequency"].value or 0.0)
 
 
-def select_strongest(amplitudes: Sequence[float]) -> list[int]:
-    """Return the indices of the lines that are used individually, all if they are few."""
-    number = len(amplitudes) if len(amplitudes) <= MAX_LINES else MAX_SINGLE_LINES
-    order = sorted(range(len(amplitudes)), key=lambda place: -amplitudes[place])
-    return sorted(order[:number])
+def _find_single_lines(lines: Sequence[Line]) -> list[Line]:
+    """Return the lines that are used individually where there are too many."""
+    return sorted(lines, key=lambda line: -line.amplitude)[:MAX_SINGLE_LINES]
 
 
 def describe_grouping(channel: str, quantity: str, sinusoids: Sequence[Line]) -> Finding:
@@ -367,10 +346,9 @@ def describe_grouping(channel: str, quantity: str, sinusoids: Sequence[Line]) ->
 
     The quantity is gyro or accel.
     """
-    single = set(select_strongest([sinusoid.amplitude for sinusoid in sinusoids]))
-    powers = [0.5 * sinusoid.amplitude**2 for sinusoid in sinusoids]
-    rest = math.fsum(power for place, power in enumerate(powers) if place not in single)
-    share = rest / math.fsum(powers)
+    single = _find_single_lines(sinusoids)
+    rest = math.fsum(0.5 * line.amplitude**2 for line in sinusoids if line not in single)
+    share = rest / math.fsum(0.5 * line.amplitude**2 for line in sinusoids)
     number = len(sinusoids) - len(single)
     detail = (
         f"{channel} has {len(sinusoids)} sinusoids: the {len(single)} strongest go into error "
@@ -381,26 +359,11 @@ def describe_grouping(channel: str, quantity: str, sinusoids: Sequence[Line]) ->
     return Finding("too_many_lines", "warning", detail, float(len(sinusoids)), channel)
 
 
-def _make_parameters(line: Line) -> dict[str, Parameter]:
-    return {
-        "amplitude": Parameter(
-            line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper
-        ),
-        "frequency": Parameter(
-            line.frequency, lower=line.frequency_lower, upper=line.frequency_upper
-        ),
-    }
-
-
 def _group_lines(lines: Sequence[Line]) -> dict[str, Parameter]:
-    amplitude, low, high = (
-        math.hypot(*values)
-        for values in (
-            [line.amplitude for line in lines],
-            [line.amplitude_lower for line in lines],
-            [line.amplitude_upper for line in lines],
-        )
-    )
+    """Return one sinusoid with the power, and the power of the integral, of several."""
+    amplitude = math.hypot(*(line.amplitude for line in lines))
+    low = math.hypot(*(line.amplitude_lower for line in lines))
+    high = math.hypot(*(line.amplitude_upper for line in lines))
     frequency = amplitude / math.hypot(*(line.amplitude / line.frequency for line in lines))
     first, last = lines[0].frequency, lines[-1].frequency
     reason = f"{len(lines)} weak lines from {first:.4g} to {last:.4g} Hz together"

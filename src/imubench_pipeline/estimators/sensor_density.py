@@ -1,7 +1,6 @@
 """N_sensor: the density of a sensor's white noise before its low-pass, or an interpolation.
 
-N is the density in the log, aliases included. The density before the filter is another quantity,
-for comparisons of sensors at other settings of their filters.
+N is the density in the log, aliases included; N_sensor compares sensors at other filter settings.
 """
 
 from __future__ import annotations
@@ -36,10 +35,8 @@ def sensor_density(
     Parameters
     ----------
     frame : FitSelection
-    maximum : Maximum
-        The best fit with the filter of ``frame``.
-    posterior : Posterior
-        Its draws, with that filter.
+    maximum, posterior : Maximum, Posterior
+        The best fit with the filter of ``frame``, and its draws.
     spectrum : Spectrum
         The whole spectrum of the log.
     rng : numpy.random.Generator
@@ -47,9 +44,9 @@ def sensor_density(
     Returns
     -------
     Parameter or None
-        rad/s/sqrt(Hz) or m/s²/sqrt(Hz), with the filters that the log does not rule out in the
-        interval. ``not_identified`` where the filter may be a process; ``doubtful`` where a part of
-        the noise did not pass it.
+        rad/s/sqrt(Hz) or m/s²/sqrt(Hz); the interval covers the filters that the log does not rule
+        out. ``not_identified`` where the filter may be a process; ``doubtful`` where a part of the
+        noise did not pass it.
     """
     low_pass, terms = frame.low_pass, maximum.terms
     if low_pass is None or "N" not in terms.linear:
@@ -84,6 +81,6 @@ def sensor_density(
 
 
 def _describe_interval(reason: str, drawn: Array, other: float) -> Parameter:
-    """Return that N_sensor lies between the limits of draws of N and another density, SI."""
+    """Return N_sensor between the limits of draws of N and another density, SI."""
     lower, upper = np.quantile(drawn, (0.025, 0.975)).tolist()
     return Parameter(None, "not_identified", reason, min(lower, other), max(upper, other))

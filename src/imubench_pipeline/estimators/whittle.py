@@ -2,7 +2,7 @@
 
 -log L = 1/2 sum_i nu_i (log S_i + I_i / S_i) up to a constant, with nu ordinates of mean density
 I in bin i. For given correlation times S is linear in the squared parameters, which are at least
-0: iteratively reweighted non-negative least squares. A ramp R is a mean, not a variance: it moves
+0: iteratively reweighted non-negative least squares. A ramp R is a mean, not a variance: it changes
 I to I - 2 R cross + R^2 ramp, and is profiled out.
 """
 
@@ -34,12 +34,12 @@ SHAPES = 192
 """Correlation times at which the shape of a Gauss-Markov process is tabulated."""
 
 COARSE = 48
-"""So many are enough to look for lines and for the band."""
+"""Correlation times that suffice to detect lines and the band."""
 
 
 @dataclass(frozen=True)
 class Terms:
-    """Which terms a model has: letters of Q, N, F, K, Gauss-Markov processes, and a ramp."""
+    """Terms of a model: letters of Q, N, F and K, Gauss-Markov processes, and a ramp."""
 
     linear: str
     gauss_markov: int = 0
@@ -92,41 +92,27 @@ class Maximum:
 
 @dataclass(frozen=True)
 class Behind:
-    """What a low-pass leaves of the noise in each bin of a spectrum."""
+    """Power gains of a low-pass in each bin of a spectrum, each of shape (b,)."""
 
-    white: Array
-    """(b,): of white noise of N = 1, sampled, with what stands behind the filter in proportion to
-    it."""
-    flicker: Array
-    slow: Array
-    """(b,): gain of the power of flicker noise, whose folds show, and of slower noise."""
+    white: Array  # of sampled white noise, with white noise after the filter over N^2
+    flicker: Array  # of flicker noise, with its aliases
+    slow: Array  # of slower noise
 
     def select(self, chosen: NDArray[np.bool_]) -> Behind:
-        """Return that of chosen bins."""
+        """Return the gains in chosen bins."""
         return Behind(self.white[chosen], self.flicker[chosen], self.slow[chosen])
 
 
 @dataclass
 class Whittle:
-    """The likelihood of one spectrum.
+    """The likelihood of one spectrum."""
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        The bins to use.
-    shortest, longest : float
-        Correlation times between which a Gauss-Markov process is looked for, s.
-    shapes : int
-        Correlation times at which its shape is tabulated.
-    behind : Behind, optional
-        The sensor's low-pass, behind which the noise stands; quantization noise does not.
-    """
-
-    spectrum: Spectrum
+    spectrum: Spectrum  # the bins to use
     shortest: float
     longest: float
-    shapes: int = SHAPES
-    behind: Behind | None = None
+    """Correlation times between which a Gauss-Markov process is searched, s."""
+    shapes: int = SHAPES  # correlation times at which its shape is tabulated
+    behind: Behind | None = None  # the sensor's low-pass; quantization noise does not pass it
     scale: float = field(init=False)
     columns: dict[str, Array] = field(init=False)
     shape_of: Shapes = field(init=False)
@@ -154,16 +140,16 @@ class Whittle:
         return other
 
     def standing(self, behind: Behind) -> Whittle:
-        """Return the likelihood of the same data behind a low-pass; this one stands behind none."""
+        """Return the likelihood of the same data behind a low-pass; here there is none."""
         other = copy.copy(self)
         other.columns, other.behind = {}, behind
         vars(other)["table"] = self.table + np.log(behind.slow)
         return other
 
     def with_column(self, letter: str, shape: Array) -> Whittle:
-        """Return the likelihood with another density in the place of a linear term.
+        """Return the likelihood with another density for a linear term, Q, N, F or K.
 
-        The letter is Q, N, F or K; ``shape``, (b,), is the density for a parameter of 1.
+        ``shape``, (b,), is the density for a parameter of 1.
         """
         _ = self.table  # made once for both
         other = copy.copy(self)
@@ -182,17 +168,15 @@ class Whittle:
     def column(self, letter: str) -> Array:
         """Return the density of a unit linear term (Q, N, F or K) in each bin."""
         if letter not in self.columns:
-            make = {
-                "Q": self.shape_of.quantization,
-                "N": self.shape_of.white,
-                "F": self.shape_of.flicker,
-                "K": self.shape_of.random_walk,
-            }
-            shape = make[letter]()
-            if self.behind is not None and letter == "N":
-                shape = self.behind.white
-            elif self.behind is not None and letter in "FK":
-                shape = shape * (self.behind.flicker if letter == "F" else self.behind.slow)
+            shapes, behind = self.shape_of, self.behind
+            if letter == "Q":
+                shape = shapes.quantization()
+            elif letter == "N":
+                shape = shapes.white() if behind is None else behind.white
+            elif letter == "F":
+                shape = shapes.flicker() * (1.0 if behind is None else behind.flicker)
+            else:
+                shape = shapes.random_walk() * (1.0 if behind is None else behind.slow)
             self.columns[letter] = shape
         return self.columns[letter]
 
@@ -256,7 +240,7 @@ class Whittle:
         """Return S with S S^T the Fisher information of (log parameter ..., log T_B ..., R).
 
         Shape (m, b), or (m, 2 b) with a ramp, which shares no information with the others; the
-        parameters stand in the order of `Maximum.powers`, then `times`.
+        order is `Maximum.powers`, then `times`.
         """
         matrix = self.matrix(maximum.terms, maximum.times)
         total = matrix @ maximum.powers
@@ -266,10 +250,8 @@ class Whittle:
         ]
         step = 0.05
         for power, time in zip(maximum.process_powers, maximum.times, strict=True):
-            low, high = (
-                max(time / (1 + step), self.times[0]),
-                min(time * (1 + step), self.times[-1]),
-            )
+            low = max(time / (1 + step), self.times[0])
+            high = min(time * (1 + step), self.times[-1])
             change = self.gauss_markov(high) - self.gauss_markov(low)
             rows.append(power * change / np.log(high / low) / total)
         noise = np.array(rows) * np.sqrt(self._nu / 2.0)
@@ -298,8 +280,8 @@ def whittle_of(
     """Return the likelihood of a spectrum, with the correlation times that it can show.
 
     ``highest`` is the frequency up to which its bins reach, Hz; ``shortest`` the shortest
-    correlation time, s, by default twenty sampling intervals. ``shapes`` and ``behind``: as of
-    `Whittle`.
+    correlation time, s, by default twenty sampling intervals; ``shapes`` and ``behind`` are those
+    of `Whittle`.
     """
     longest = CORRELATION_TIMES.of_log * float(spectrum.length.max())
     least = CORRELATION_TIMES.samples / spectrum.rate if shortest is None else shortest
