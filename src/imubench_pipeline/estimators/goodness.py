@@ -69,9 +69,9 @@ def _describe_worst_band(residual: Array, frequency: Array) -> str:
         total = float(residual[inside].sum()) / math.sqrt(float(inside.sum()))
         if abs(total) > best:
             best = abs(total)
-            side = "above" if total > 0 else "below"
+            first, last = frequency[inside][[0, -1]]
             text = (
-                f"furthest from the model from {frequency[inside][0]:.3g} to "
-                f"{frequency[inside][-1]:.3g} Hz: {side} it by {best:.1f} standard errors"
+                f"furthest from the model from {first:.3g} to {last:.3g} Hz: "
+                f"{'above' if total > 0 else 'below'} it by {best:.1f} standard errors"
             )
     return text

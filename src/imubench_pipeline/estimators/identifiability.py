@@ -155,8 +155,20 @@ def _find_crossing(
     steps = 0
     while high - low > 1:
         place = (low + high) // 2
-        if steps % 3 < 2 and excesses:
-            place = _guess_crossing(log_lengths, excesses, number, low, high)
+        left = excesses[low][number] if low >= 0 else np.inf
+        right = excesses[high][number] if high < len(log_lengths) else -np.inf
+        if steps % 3 < 2 and (np.isfinite(left) or np.isfinite(right)):
+            # Interpolate, or extrapolate with error ~ length^(-1/2) where one end is known.
+            if not np.isfinite(left):
+                where = log_lengths[high] + 2.0 * right
+            elif not np.isfinite(right):
+                where = log_lengths[low] + 2.0 * left
+            else:
+                part = left / (left - right)
+                where = log_lengths[low] + part * (log_lengths[high] - log_lengths[low])
+            guess = int(np.searchsorted(log_lengths, where))
+            # First the index before the crossing, then the one after it.
+            place = min(max(guess - (low < guess - 1), low + 1), high - 1)
         if excess(place)[number] > 0.0:
             low = place
         else:
@@ -166,40 +178,16 @@ def _find_crossing(
         return None
     if low < 0 or not np.isfinite(excesses[low][number]):
         return float(np.exp(log_lengths[high]))
-    falling = excesses[low][number], excesses[high][number]
-    part = falling[0] / (falling[0] - falling[1])
+    left, right = excesses[low][number], excesses[high][number]
+    part = left / (left - right)
     return float(np.exp(log_lengths[low] + part * (log_lengths[high] - log_lengths[low])))
-
-
-def _guess_crossing(
-    log_lengths: Array, excesses: dict[int, Array], number: int, low: int, high: int
-) -> int:
-    """Return an index between two where the error may be `TARGET_RELATIVE_ERROR`.
-
-    It is interpolated, or extrapolated with error ~ length^(-1/2) where only one end is known.
-    """
-    left = excesses[low][number] if low >= 0 else np.inf
-    right = excesses[high][number] if high < len(log_lengths) else -np.inf
-    if np.isfinite(left) and np.isfinite(right):
-        part = left / (left - right)
-        where = log_lengths[low] + part * (log_lengths[high] - log_lengths[low])
-    elif np.isfinite(left):
-        where = log_lengths[low] + 2.0 * left
-    elif np.isfinite(right):
-        where = log_lengths[high] + 2.0 * right
-    else:
-        return (low + high) // 2
-    place = int(np.searchsorted(log_lengths, where))
-    # First the index before the crossing, then the one after it.
-    return min(max(place - (low < place - 1), low + 1), high - 1)
 
 
 def _compute_relative_errors(spectrum: Spectrum, maximum: Maximum) -> Array:
     """Return the relative Cramér-Rao bounds of a model, given the bins of a spectrum."""
     times = maximum.times if len(maximum.times) else np.array([1.0])
-    return relative_errors(
-        _UntabulatedWhittle(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0), maximum
-    )
+    whittle = _UntabulatedWhittle(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0)
+    return relative_errors(whittle, maximum)
 
 
 class _UntabulatedWhittle(Whittle):

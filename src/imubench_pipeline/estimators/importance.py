@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,8 @@ _LEARNING_POINTS = 2048
 """Number of points to which a mixture is fitted."""
 
 _CLIPPED_POINTS = 8
-"""Number of highest weights that are clipped to one value when a mixture is fitted.
-
-Otherwise a few points in the tails of the first mixtures would determine the next one (E. Koblents
-and J. Míguez, Statistics and Computing 25, 2015).
-"""
+"""Number of highest weights that are clipped to one value when a mixture is fitted (E. Koblents and
+J. Míguez, Statistics and Computing 25, 2015): a few points in the tails must not determine it."""
 
 _EM_STEPS = 3
 """Expectation-maximisation steps between two rounds."""
@@ -58,22 +56,23 @@ class Mixture:
 
     def densities(self, points: Array) -> Array:
         """Return weight times density of each component, up to a constant, shape (n, c)."""
-        return self._evaluate_densities(points, np.linalg.inv(np.linalg.cholesky(self.scales)))
-
-    def _evaluate_densities(self, points: Array, inverses: Array) -> Array:
         densities = np.empty((len(points), len(self.weights)))
         freedom = _get_degrees(points.shape[1])
-        set_densities(points, self.weights, self.means, inverses, freedom, densities)
+        set_densities(points, self.weights, self.means, self._inverses, freedom, densities)
         return densities
+
+    @cached_property
+    def _inverses(self) -> Array:
+        """Inverses of the roots of the scales."""
+        return np.linalg.inv(np.linalg.cholesky(self.scales))
 
     def fitted(self, points: Array) -> Mixture:
         """Return the mixture after one expectation-maximisation step on points."""
-        inverses = np.linalg.inv(np.linalg.cholesky(self.scales))
-        parts, freedom = self._evaluate_densities(points, inverses), _get_degrees(points.shape[1])
+        parts, freedom = self.densities(points), _get_degrees(points.shape[1])
         weights, means = np.empty_like(self.weights), np.empty_like(self.means)
         scales = np.zeros_like(self.scales)
-        new = (weights, means, scales)
-        number = fit(points, parts, self.means, inverses, freedom, _MIN_COMPONENT_MASS, *new)
+        old = (points, parts, self.means, self._inverses, freedom, _MIN_COMPONENT_MASS)
+        number = fit(*old, weights, means, scales)
         if not number:
             return self
         return Mixture(weights[:number] / weights[:number].sum(), means[:number], scales[:number])

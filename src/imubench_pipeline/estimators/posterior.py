@@ -1,13 +1,12 @@
 """Draws from the posterior of a model, for the intervals of its parameters.
 
 The prior is uniform in the amplitudes Q, N, B and K, in R, and in log T_B up to a fifth of the log.
-(A uniform prior in log N is improper towards 0: if another term explains the spectrum without N,
-all the posterior mass would go there.)
+(A uniform prior in log N would put all mass at 0 if another term explains the spectrum without N.)
 
 The draws are by importance sampling: for each correlation time of a grid the posterior of the
 amplitudes is nearly normal, and a few Newton steps find its mode. If the effective sample size is
-too small, as along thin curved ridges between terms that can replace each other, an adaptive
-Metropolis chain is used instead.
+too small, as along thin curved ridges between interchangeable terms, an adaptive Metropolis chain
+is used instead.
 """
 
 from __future__ import annotations
@@ -36,14 +35,11 @@ _MAX_ROUNDS = 4
 _GRID_SIZES = (0, 20, 9)
 """Correlation times of the first mixture along each axis, for 0, 1 and 2 processes."""
 
-_COMPONENT_SIGMA = 0.7
-"""Standard deviation of its components in log T_B, in grid spacings."""
+_COMPONENT_SIGMA = 0.7  # of its components in log T_B, in grid spacings
 
-_MAX_SIGMA = 2.0
-"""Largest standard deviation in log T_B, about the best fit."""
+_MAX_SIGMA = 2.0  # standard deviation in log T_B about the best fit
 
 _MIN_BEST_FIT_WEIGHT = 0.3
-"""Minimum weight of the component at the best fit."""
 
 _NEGLIGIBLE_WEIGHT, _MIN_WEIGHT = 1e-6, 5e-3
 _WEAK_TERM_ERROR = 0.15
@@ -98,8 +94,8 @@ def sample(
 class _Target:
     """The posterior of a model, in coordinates in which it is nearly normal.
 
-    They are log T_B, and z with amplitude = unit sinh z > 0: linear where an amplitude may be 0,
-    and logarithmic where it is well known.
+    They are log T_B, and z with amplitude = unit sinh z > 0: linear near amplitude 0, and
+    logarithmic where it is well known.
     """
 
     def __init__(self, whittle: Whittle, maximum: Maximum) -> None:
@@ -225,27 +221,21 @@ class _Target:
         information = np.zeros((p + g, p + g))
         information[:p, :p] = curvature
         if g:
-            slopes = np.column_stack(
-                [
-                    0.5 * parts[:, linear + k] * self._differentiate_shape(float(place))
-                    for k, place in enumerate(places)
-                ]
-            )
+            table = self.problem.table
+            last = table.first + table.step * (len(table.logarithms) - 1)
+            slopes, ends = np.empty((len(parts), g)), np.empty((2, len(parts)))
+            for k, place in enumerate(places.tolist()):
+                low = max(place - 0.5 * table.step, table.first)
+                high = min(place + 0.5 * table.step, last)
+                shape_at(low, table, ends[0])
+                shape_at(high, table, ends[1])
+                slope = np.log(ends[1] / ends[0]) / (high - low)
+                slopes[:, k] = 0.5 * parts[:, linear + k] * slope
             half = 0.5 * self.problem.bins.nu[:, None]
             information[p:, :p] = slopes.T @ (half * parts)
             information[:p, p:] = information[p:, :p].T
             information[p:, p:] = slopes.T @ (half * slopes) + np.eye(g) / width**2
         return np.append(log_amplitudes, places), np.asarray(np.linalg.inv(information))
-
-    def _differentiate_shape(self, place: float) -> Array:
-        """Return the change of the logarithm of a shape with log T_B."""
-        first, step, logarithms = self.problem.table
-        last = first + step * (len(logarithms) - 1)
-        low, high = max(place - 0.5 * step, first), min(place + 0.5 * step, last)
-        ends = np.empty((2, len(self.problem.bins.nu)))
-        shape_at(low, self.problem.table, ends[0])
-        shape_at(high, self.problem.table, ends[1])
-        return np.asarray(np.log(ends[1] / ends[0]) / (high - low))
 
     def posterior(self, amplitudes: Array, effective: float, rng: np.random.Generator) -> Posterior:
         """Return equally weighted points as draws of the parameters."""
