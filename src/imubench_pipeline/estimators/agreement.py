@@ -15,8 +15,7 @@ from imubench_pipeline.tables.findings import Finding
 _MAX_FACTOR_BEYOND_LIMITS = 1.25
 """Maximum factor by which a value without limits may lie outside the likelihood's limits."""
 
-_MAX_VALUE_RATIO = 1.8
-"""Ratio of two values above which they differ, whatever their limits."""
+_MAX_VALUE_RATIO = 1.8  # Ratio of two values above which they differ, whatever their limits
 
 
 def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
 
-_DEFAULT_BAND = 1 / 20
-"""Frequency over sampling rate below which filters are assumed to be flat."""
-
+_DEFAULT_BAND = 1 / 20  # Frequency over sampling rate below which filters are assumed to be flat
 _MIN_BAND = 1 / 1000
 _MIN_BANDWIDTH_RATIO = 10.0
 """A first-order filter lowers the density by 1 % at a tenth of its cut-off."""

@@ -16,12 +16,8 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter, not_shown
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 from imubench_pipeline.typing import Array
 
-_SLOPE_WINDOW = 0.5
-"""Width of the window for a local slope, decades of tau."""
-
-_OCTAVE = math.log10(2.0)
-"""Distance of tau, in decades, below which estimates are correlated."""
-
+_SLOPE_WINDOW = 0.5  # Width of the window for a local slope, decades of tau
+_OCTAVE = math.log10(2.0)  # Distance of tau, in decades, below which estimates are correlated
 _WHITE_TOLERANCE = 0.06
 _WALK_TOLERANCE = 0.06
 _WALK_MAX_TOLERANCE = 0.2

@@ -32,8 +32,7 @@ MAX_TAU_FRACTION = 1 / 9
 _POINTS_PER_DECADE = 16
 """Averaging times per decade for the search of the lowest point, before interpolation."""
 
-_POINTS_BETWEEN_PEAKS = 49
-"""Averaging times between the peaks of several processes."""
+_POINTS_BETWEEN_PEAKS = 49  # Averaging times between the peaks of several processes
 
 _MAX_DRAWS = 16_000
 """Maximum number of draws of a model if each is evaluated at many averaging times."""

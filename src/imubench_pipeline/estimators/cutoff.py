@@ -38,8 +38,7 @@ from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Behind, Terms
 from imubench_pipeline.typing import Array
 
-_MIN_WHITE_GAIN = 2.0
-"""Minimum gain of log likelihood by white noise in addition to a process."""
+_MIN_WHITE_GAIN = 2.0  # Minimum gain of log likelihood by white noise in addition to a process
 
 _MAX_LEAKAGE_FRACTION = 0.01
 """Maximum spectral leakage over density in a bin; bins with more are not fitted."""
@@ -54,8 +53,7 @@ distributed and exceeds this in 1 of 20,000."""
 _MAX_PASSES = 3
 """Maximum number of fits; each excludes the bins with leakage under the previous filter."""
 
-_COARSE_TOLERANCE = 1e-3
-"""Relative tolerance of the cut-off in the first fit."""
+_COARSE_TOLERANCE = 1e-3  # Relative tolerance of the cut-off in the first fit
 
 _MIN_FREQUENCY_RATIO = 1 / 300
 """Minimum frequency over cut-off that is fitted: drift does not follow the noise models."""
@@ -77,8 +75,7 @@ _MIN_N_RATIO = 1e-6
 MAX_LIMIT_RATIO = 1.2
 """Ratio of the limits of a cut-off above which it is not identified."""
 
-_MIN_HALF_WIDTH = 1e-5
-"""Minimum half width of the interval of a log cut-off."""
+_MIN_HALF_WIDTH = 1e-5  # Minimum half width of the interval of a log cut-off
 
 ALLOWED_CUTOFFS_REASON = "the log allows cut-offs from {:.4g} to {:.4g} Hz"
 UNKNOWN_BEND_REASON = (

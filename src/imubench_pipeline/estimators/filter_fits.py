@@ -22,9 +22,7 @@ _POINTS_PER_BIN = 6
 _SCAN_CUTOFFS, _COARSE_SCAN_CUTOFFS = 24, 8
 """Cut-offs of the scan before optimisation, and of the test whether a filter is possible."""
 
-_MAX_BOXCAR_SAMPLES = 20
-"""Maximum whole number of samples whose mean is tried."""
-
+_MAX_BOXCAR_SAMPLES = 20  # Maximum whole number of samples whose mean is tried
 _MIN_CUTOFF = 1 / 500
 
 _MAX_CUTOFFS: Mapping[tuple[Kind, int], float] = {
@@ -55,10 +53,7 @@ attributed to a filter of first order; processes are at least as long as the sec
 _TIMES_PER_DECADE = 6
 
 _ANALOGUE_PREFERENCE = 0.01
-
-_MIN_SCAN_GAIN = 1.0
-"""Minimum gain of log likelihood in the coarse scan for a full search."""
-
+_MIN_SCAN_GAIN = 1.0  # Minimum gain of log likelihood in the coarse scan for a full search
 _MAX_SLOW_TERMS = 4
 
 MAX_UNALIASED_CUTOFF = 0.3

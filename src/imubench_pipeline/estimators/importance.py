@@ -23,15 +23,13 @@ _FIRST_MIXTURE_WEIGHT = 0.15
 """Weight of the first mixture in all later ones, which keeps its support covered."""
 
 _MIN_COMPONENT_MASS = 0.01
-_LEARNING_POINTS = 2048
-"""Number of points to which a mixture is fitted."""
+_LEARNING_POINTS = 2048  # Number of points to which a mixture is fitted
 
 _CLIPPED_POINTS = 8
 """Number of highest weights that are clipped to one value when a mixture is fitted (E. Koblents and
 J. Míguez, Statistics and Computing 25, 2015): a few points in the tails must not determine it."""
 
-_EM_STEPS = 3
-"""Expectation-maximisation steps between two rounds."""
+_EM_STEPS = 3  # Expectation-maximisation steps between two rounds
 
 
 @dataclass(frozen=True)

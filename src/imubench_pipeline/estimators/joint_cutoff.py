@@ -39,14 +39,9 @@ from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Maximum, Terms, Whittle, whittle_of
 
-_MAX_LOG_SHIFT = math.log(2.0)
-"""Maximum change of log f_c by a joint fit."""
-
-_SEARCH_HALF_WIDTHS = 6.0
-"""Range of the first search for a cut-off, in half widths of its interval."""
-
-_RELATIVE_TOLERANCE = 0.04
-"""Tolerance of a cut-off over the half width of its interval."""
+_MAX_LOG_SHIFT = math.log(2.0)  # Maximum change of log f_c by a joint fit
+_SEARCH_HALF_WIDTHS = 6.0  # Range of the first search for a cut-off, in half widths of its interval
+_RELATIVE_TOLERANCE = 0.04  # Tolerance of a cut-off over the half width of its interval
 
 _MAX_DELTA_BIC = 6.0
 """Maximum BIC above the best model at which a joint fit may make a model the best."""
@@ -54,8 +49,7 @@ _MAX_DELTA_BIC = 6.0
 _MIN_AKAIKE_WEIGHT = 0.03
 """Akaike weight from which a model is fitted jointly; lower than the one for intervals."""
 
-_MIN_N_RATIO = 1e-6
-"""Minimum N over the density of the log, instead of 0."""
+_MIN_N_RATIO = 1e-6  # Minimum N over the density of the log, instead of 0
 
 _MIN_INTERVAL_WEIGHT = 0.05
 """Akaike weight of a joint fit from which its limits enter the interval of the cut-off."""

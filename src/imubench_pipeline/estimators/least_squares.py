@@ -31,15 +31,12 @@ from imubench_pipeline.typing import Array
 Method = Literal["weighted", "paper"]
 
 _MIN_POINTS = 4
-_UNFILTERED_CLUSTER = 16
-"""Cluster size above which the effect of the sensor's filter is small."""
-
+_UNFILTERED_CLUSTER = 16  # Cluster size above which the effect of the sensor's filter is small
 _MIN_BEND_SIGMAS = 4.0
 _MAX_REFITS = 5
 _MAX_FADED_BEND = 0.1
 _MAX_SAMPLING_SIGMAS = 0.02
-_SCAN_TIMES = 160
-"""Number of correlation times of the scan before optimisation."""
+_SCAN_TIMES = 160  # Number of correlation times of the scan before optimisation
 
 _ACTIVE_SETS = [list(chosen) for p in (1, 2, 3) for chosen in combinations(range(3), p)]
 """Sets of nonzero columns among N, B and K."""
@@ -47,8 +44,7 @@ _ACTIVE_SETS = [list(chosen) for p in (1, 2, 3) for chosen in combinations(range
 _RIDGE, _MIN_NORM = 1e-13, 1e-300
 """Ridge for collinear columns of unit norm, and minimum norm of a column."""
 
-_MIN_VARIANCE_FRACTION = 1e-9
-"""A term below this fraction of the variance at every tau is absent."""
+_MIN_VARIANCE_FRACTION = 1e-9  # A term below this fraction of the variance at every tau is absent
 
 
 class UnfitCurveError(ValueError):

@@ -30,8 +30,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
 
-_MAX_RELATIVE_ERROR = 0.5
-"""Relative standard error beyond which a parameter is not identified."""
+_MAX_RELATIVE_ERROR = 0.5  # Relative standard error beyond which a parameter is not identified
 
 _MAX_RELATIVE_ERROR_TIME = 0.75
 """Relative standard error of T_B beyond which B is not identified either.
@@ -49,8 +48,7 @@ B^2 or K^2 is then two standard errors from 0.
 _CLIP_RELATIVE_ERROR = 10.0
 """Upper bound of reported relative standard errors; larger ones would overflow in the limits."""
 
-_LOG_TIME_STEP = 1e-3
-"""Step of log T_B in the finite difference."""
+_LOG_TIME_STEP = 1e-3  # Step of log T_B in the finite difference
 
 _LOG_PARAMETER_STEP = 0.05
 """Step of a log parameter in the finite differences of the lowest point of the curve."""

@@ -34,23 +34,17 @@ from imubench_pipeline.typing import Array
 FALSE_ALARM_PROBABILITY = 0.005
 """Probability that a line is detected in a channel without lines."""
 
-_MEDIAN_BINS = 129
-"""Bins of the median filter that corrects the model around a bin."""
+_MEDIAN_BINS = 129  # Bins of the median filter that corrects the model around a bin
 
 _MEDIAN_EFFICIENCY = 1.0 / (1.94 * 1.57)
 """Independent bins per bin of the median of correlated neighbours."""
 
-_MAX_FOUND = 1000
-"""Maximum number of lines of a spectrum; the cost of comparing them is quadratic."""
-
+_MAX_FOUND = 1000  # Maximum number of lines of a spectrum; the cost of comparing them is quadratic
 _SKIPPED_BINS = 2
 _FIRST_BIN = 4
-_LINE_HALF_WIDTH = 3
-"""Bins on each side of a line that contain its power."""
-
+_LINE_HALF_WIDTH = 3  # Bins on each side of a line that contain its power
 _MAX_SINUSOID_BINS = 8
-_WIDTH_LEVEL = 0.1
-"""Fraction of the highest excess at which the width of a line is measured."""
+_WIDTH_LEVEL = 0.1  # Fraction of the highest excess at which the width of a line is measured
 
 _NEIGHBOUR_START, _NEIGHBOUR_END = 5, 20
 """Distances, in bins, of the neighbourhood with which a sinusoid is compared."""

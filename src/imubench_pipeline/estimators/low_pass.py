@@ -36,8 +36,7 @@ _FLICKER_ALIASES = 3
 _MIN_ALIASES = 2
 """Aliases on each side that are summed, in addition to those up to four times the cut-off."""
 
-_GRID_SIZE = 512
-"""Frequencies of the numerical integral over G."""
+_GRID_SIZE = 512  # Frequencies of the numerical integral over G
 
 
 class Frequencies:

@@ -50,9 +50,7 @@ _WEAK_AMPLITUDE, _WEAK_LOG_SIGMA = 0.7, 0.8
 a term near 0."""
 
 _MIN_WEAK_WEIGHT = 0.03
-_RIDGE = 1e-4
-"""Ridge on the information matrix, against collinear terms."""
-
+_RIDGE = 1e-4  # Ridge on the information matrix, against collinear terms
 _MIN_START_SIGMAS = 0.3
 
 

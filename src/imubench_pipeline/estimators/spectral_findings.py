@@ -21,19 +21,11 @@ _MIN_SINUSOID_RATIO = 0.5
 _MAX_SLOW_FREQUENCY = 0.05
 """Frequency over sampling rate up to which the test for missing slow noise extends."""
 
-_MIN_FLAT_RATIO = 0.95
-"""Minimum fitted density over N^2, below the effect of a low-pass filter."""
-
+_MIN_FLAT_RATIO = 0.95  # Minimum fitted density over N^2, below the effect of a low-pass filter
 _MIN_ORDINATES = 4.0
-
-_MAX_DENSITY_RATIO = 0.7
-"""Density over N^2 below which slow noise is missing."""
-
-_MAX_CHANCE = 1e-4
-"""Maximum false-alarm probability over all sums of a channel."""
-
-_SPACING_RATIO = 1.4
-"""Ratio of the numbers of ordinates in successive sums."""
+_MAX_DENSITY_RATIO = 0.7  # Density over N^2 below which slow noise is missing
+_MAX_CHANCE = 1e-4  # Maximum false-alarm probability over all sums of a channel
+_SPACING_RATIO = 1.4  # Ratio of the numbers of ordinates in successive sums
 
 
 def spectral_findings(channel: str, frame: FitSelection, white: float | None) -> list[Finding]:

@@ -19,8 +19,7 @@ TOLERANCE = 1e-7
 """Of the cost."""
 
 _MOST_STEPS = 60
-_NEAR = 0.1
-"""Gain of the cost by a step from which the next ones are Newton's."""
+_NEAR = 0.1  # Gain of the cost by a step from which the next ones are Newton's
 
 
 class Bins(NamedTuple):

@@ -16,16 +16,10 @@ from imubench_pipeline.typing import Array
 
 _SCAN_STEP = 4
 _PAIR_STEP = 12
-_MIN_TIME_RATIO = 2.5
-"""Minimum ratio of two correlation times of one model."""
-
-_SCAN_TOLERANCE = 1e-2
-"""Tolerance of the cost when correlation times are only compared."""
-
+_MIN_TIME_RATIO = 2.5  # Minimum ratio of two correlation times of one model
+_SCAN_TOLERANCE = 1e-2  # Tolerance of the cost when correlation times are only compared
 _POLISH_TOLERANCE = 1e-6
-_LOG_TIME_TOLERANCE = 5e-4
-"""Tolerance of the logarithm of a correlation time."""
-
+_LOG_TIME_TOLERANCE = 5e-4  # Tolerance of the logarithm of a correlation time
 _MAX_TURNS = 8
 
 
