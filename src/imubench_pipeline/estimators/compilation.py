@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from imubench_pipeline.estimators.importance_kernels import fit, set_densities
-from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
+from imubench_pipeline.estimators.posterior_kernels import (
+    fit_mixture,
+    log_posteriors,
+    mode_at,
+    set_densities,
+)
 from imubench_pipeline.estimators.whittle_kernels import (
     Bins,
     Problem,
@@ -32,4 +36,4 @@ def compile_kernels() -> None:
     weights, means, scales = np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1))
     points, densities = np.arange(3.0)[:, None], np.empty((3, 1))
     set_densities(points, weights, means, scales, 5, densities)
-    fit(points, densities, means, scales, 5, 0.0, weights, means.copy(), scales.copy())
+    fit_mixture(points, densities, means, scales, 5, 0.0, weights, means.copy(), scales.copy())

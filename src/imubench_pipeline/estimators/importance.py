@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri
 from scipy.stats import qmc
 
-from imubench_pipeline.estimators.importance_kernels import fit, set_densities
+from imubench_pipeline.estimators.posterior_kernels import fit_mixture, set_densities
 from imubench_pipeline.typing import Array
 
 _MIN_DEGREES = 5
@@ -70,7 +70,7 @@ class Mixture:
         weights, means = np.empty_like(self.weights), np.empty_like(self.means)
         scales = np.zeros_like(self.scales)
         old = (points, parts, self.means, self._inverses, freedom, _MIN_COMPONENT_MASS)
-        number = fit(*old, weights, means, scales)
+        number = fit_mixture(*old, weights, means, scales)
         if not number:
             return self
         return Mixture(weights[:number] / weights[:number].sum(), means[:number], scales[:number])

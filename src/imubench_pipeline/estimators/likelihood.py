@@ -20,7 +20,6 @@ from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, averaging_times
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
-from imubench_pipeline.estimators.draws import compute_draw_weight, draw_jointly
 from imubench_pipeline.estimators.estimate import (
     BROADBAND_TIME,
     CURVE,
@@ -32,7 +31,12 @@ from imubench_pipeline.estimators.estimate import (
     Parameter,
     not_shown,
 )
-from imubench_pipeline.estimators.frame import MIN_BINS, FitSelection, select_for_fit
+from imubench_pipeline.estimators.frame import (
+    MIN_BINS,
+    FitSelection,
+    select_for_fit,
+    sensor_density,
+)
 from imubench_pipeline.estimators.intervals import describe, with_upper_limits
 from imubench_pipeline.estimators.joint_cutoff import select_joint_models
 from imubench_pipeline.estimators.lines import Line, select_sinusoids
@@ -48,8 +52,12 @@ from imubench_pipeline.estimators.model_choice import (
     Candidate,
     compare_models,
 )
-from imubench_pipeline.estimators.posterior import Posterior, sample
-from imubench_pipeline.estimators.sensor_density import sensor_density
+from imubench_pipeline.estimators.posterior import (
+    Posterior,
+    compute_draw_weight,
+    draw_jointly,
+    sample,
+)
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.white_level import (
     WhiteStretch,
