@@ -20,11 +20,10 @@ from imubench_pipeline.estimators.whittle_kernels import (
 
 
 def compile_kernels() -> None:
-    """Compile them, or load what was compiled before.
+    """Compile the kernels, or load them from numba's cache.
 
-    It imports numba alone, so that a process of its own can begin with it while others import all
-    else. What it calls has the types of what an estimate calls: `tests/estimators/test_compilation`
-    holds that nothing is left to compile.
+    Only numba is imported, so that a separate process can begin while others import everything
+    else. The calls have the types of an estimate (see `tests/estimators/test_compilation`).
     """
     bins = Bins(*np.ones((4, 8)))
     problem = Problem(np.ones((8, 1)), bins, False, ShapeTable(0.0, 1.0, np.zeros((2, 8))))

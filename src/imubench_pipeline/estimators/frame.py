@@ -194,16 +194,10 @@ def select_for_fit(
 ) -> FitSelection:
     """Find the spectral lines and the low-pass filter, and select the bins to fit.
 
-    Parameters
-    ----------
-    line_spectra : sequence of LineSpectrum
-        As returned by `imubench_pipeline.estimators.spectrum.spectra`.
-    band : float, optional
-        Highest frequency to use, Hz; by default all, behind the low-pass filter if one is found.
-    bandwidth : float, optional
-        Configured cut-off of the sensor's filter, Hz, if known.
-    resolution : float
-        Resolution of the register, SI; 0 if it is not visible.
+    ``line_spectra`` are those of `imubench_pipeline.estimators.spectrum.spectra`; ``band`` is the
+    highest frequency to use, Hz, by default all, behind the low-pass filter if one is found;
+    ``bandwidth`` the configured cut-off of the sensor's filter, Hz, if known; ``resolution`` the
+    step of the register, SI, or 0.
     """
     lines, clear = _find_lines(spectrum, line_spectra, band)
     nyquist = 0.5 * spectrum.rate

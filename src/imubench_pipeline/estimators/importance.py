@@ -129,12 +129,10 @@ def sample_adaptively(
         Logarithm of the density at points, shape (n, d), up to a constant; -inf where it is 0.
     first : Mixture
         Proposal of the first round.
-    size : int
-        Points of a round, a power of 2.
+    size, most : int
+        Points of a round, a power of 2, and of all rounds.
     wanted : float
-        Effective sample size to reach.
-    most : int
-        Maximum number of points; the effective sample size may then be less than ``wanted``.
+        Effective sample size to reach before ``most`` points.
 
     References
     ----------

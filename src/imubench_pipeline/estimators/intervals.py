@@ -126,12 +126,7 @@ def describe(
 
 
 def _parameter(
-    name: str,
-    value: float,
-    lower: float,
-    upper: float,
-    needed: float | None,
-    whittle: Whittle,
+    name: str, value: float, lower: float, upper: float, needed: float | None, whittle: Whittle
 ) -> Parameter:
     """Return a parameter with its interval, absent if it is 0, or at a bound of its search."""
     if value == 0.0:

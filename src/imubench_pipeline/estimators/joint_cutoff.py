@@ -84,13 +84,15 @@ def refine_cutoff(
         return low_pass
     joint = _Joint(spectrum, clear, low_pass)
     tried: dict[Terms, list[_Fit]] = {}
+    present = low_pass.allowed[0]
     bic: dict[Terms, float] = {}
     aic: dict[Terms, float] = {}
     for candidate in candidates:
         terms = replace(candidate.terms, ramp=False)
         if terms not in tried:
             tried[terms] = joint.fits(terms)
-            gained = joint.common(terms) - tried[terms][0].cost
+            common = joint.at(present, math.log(present.filter.cutoff), terms)
+            gained = common.cost - tried[terms][0].cost
             bic[terms], aic[terms] = candidate.bic - 2.0 * gained, candidate.aic - 2.0 * gained
     chosen = min(bic, key=lambda terms: bic[terms])
     fit = tried[chosen][0]
@@ -181,11 +183,6 @@ class _Joint:
             fits.append(_Fit(allowed, terms, float(best.x), float(best.fun)))
         fits.sort(key=lambda fit: fit.cost + fit.allowed.filter.floor)
         return [fit for fit in fits if fit.cost < fits[0].cost + DELTA_LOG_LIKELIHOOD_EXCLUDED]
-
-    def common(self, terms: Terms) -> float:
-        """Return -log L of a model at the present cut-off, common to all models."""
-        chosen = self._low_pass.allowed[0]
-        return self.at(chosen, math.log(chosen.filter.cutoff), terms).cost
 
     def of_model(self, fits: Sequence[_Fit], chosen: _Fit) -> OfModel:
         """Return N under the filters in a model, relative to N at the selected cut-off."""

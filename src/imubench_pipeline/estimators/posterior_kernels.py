@@ -1,8 +1,8 @@
-"""The compiled inner loops of the posterior: its logarithm, its modes for given T_B, and a chain.
+"""The compiled inner loops of the posterior, and of importance sampling from it.
 
 A point is (log amplitude of each term ..., log T_B of each process ...). The posterior is flat in
 the amplitudes and in R, over which it is integrated, and flat in log T_B within the table of
-shapes. The chain is an adaptive Metropolis one, for where importance sampling fails.
+shapes. An adaptive Metropolis chain is used where importance sampling fails.
 """
 
 from __future__ import annotations
@@ -24,28 +24,6 @@ _ADAPT_EVERY = 250
 
 
 @njit(cache=True)
-def _model_at(point: Array, problem: Problem, model: Array, shape: Array) -> bool:
-    """Set the density of a point; return whether its correlation times lie in the table."""
-    fixed, table = problem.fixed, problem.table
-    bins, linear = fixed.shape
-    processes = (point.size - linear) // 2
-    last = table.first + table.step * (table.logarithms.shape[0] - 1)
-    for j in range(linear):
-        power = math.exp(2.0 * point[j])
-        for i in range(bins):
-            model[i] = power * fixed[i, j] + (model[i] if j else 0.0)
-    for g in range(processes):
-        where = point[linear + processes + g]
-        if where < table.first or where > last:
-            return False
-        shape_at(where, table, shape)
-        power = math.exp(2.0 * point[linear + g])
-        for i in range(bins):
-            model[i] += power * shape[i]
-    return True
-
-
-@njit(cache=True)
 def _ramp_at(bins: Bins, model: Array) -> tuple[float, float]:
     """Return the best R given the noise, and its information."""
     nu, _, cross, ramp = bins
@@ -64,13 +42,26 @@ def log_posterior(
 
     ``model`` and ``shape`` are working memory, shape (b,).
     """
-    if not _model_at(point, problem, model, shape):
-        return -np.inf, 0.0, 0.0
-    bins, linear = problem.bins, problem.fixed.shape[1]
+    fixed, bins, with_ramp, table = problem
+    b, linear = fixed.shape
+    processes = (point.size - linear) // 2
+    last = table.first + table.step * (table.logarithms.shape[0] - 1)
+    for j in range(linear):
+        power = math.exp(2.0 * point[j])
+        for i in range(b):
+            model[i] = power * fixed[i, j] + (model[i] if j else 0.0)
+    for g in range(processes):
+        where = point[linear + processes + g]
+        if where < table.first or where > last:
+            return -np.inf, 0.0, 0.0
+        shape_at(where, table, shape)
+        power = math.exp(2.0 * point[linear + g])
+        for i in range(b):
+            model[i] += power * shape[i]
     value = -cost_of(bins.nu, bins.density, model)
-    for j in range((point.size + linear) // 2):
+    for j in range(linear + processes):
         value += point[j]  # flat in the amplitude a is e^x in x = log a
-    if not problem.with_ramp:
+    if not with_ramp:
         return value, 0.0, 0.0
     best, information = _ramp_at(bins, model)
     if information > 0.0:
@@ -80,7 +71,7 @@ def log_posterior(
 
 @njit(cache=True)
 def log_posteriors(points: Array, problem: Problem) -> tuple[Array, Array, Array]:
-    """Return those of points, each of shape (n,)."""
+    """Return `log_posterior` at points, each of shape (n,)."""
     n = points.shape[0]
     values, best, information = np.empty(n), np.empty(n), np.empty(n)
     model, shape = np.empty(problem.bins.nu.size), np.empty(problem.bins.nu.size)
@@ -92,9 +83,9 @@ def log_posteriors(points: Array, problem: Problem) -> tuple[Array, Array, Array
 def mode_at(start: Array, times: Array, problem: Problem) -> tuple[Array, Array, Array]:
     """Return the mode of the log amplitudes for given log T_B, the curvature and D there.
 
-    ``start`` holds log amplitudes; D_j, shape (b, p), is the density of a term over that of the
-    model, times 2. The curvature of the posterior is sum nu D_j D_k / 2, and 2 from a flat
-    amplitude: it keeps a term that is absent from running off to 0.
+    ``start`` holds log amplitudes; D_j, shape (b, p), is the density of a term over the density of
+    the model, times 2. The curvature of the posterior is sum nu D_j D_k / 2, and 2 from a flat
+    amplitude, which bounds an absent term away from 0.
 
     Raises
     ------
@@ -139,9 +130,9 @@ def _climb(
     curvature: Array,
     parts: Array,
 ) -> float:
-    """Go a step, or a part of it, that leads no lower than ``best``, and set what the next needs.
+    """Take a step, or a part of it, to no lower posterior than ``best``; prepare the next.
 
-    Returned is the logarithm of the posterior there; NaN, and nothing is set, if no part does.
+    Return the logarithm of the posterior there; NaN, and nothing is set, if there is no such part.
     """
     nu, density, cross, ramp = bins
     b, p = columns.shape
@@ -195,8 +186,8 @@ def chain(
 ) -> Array:
     """Return draws of a point, shape (draws, d).
 
-    ``covariance``, shape (d, d), is that of the first proposals; the draws in which the chain
-    learns are not kept.
+    ``covariance``, shape (d, d), is the covariance of the first proposals. It is adapted during the
+    burn-in, which is not returned.
 
     References
     ----------
@@ -235,9 +226,10 @@ def _walk(
     points: Array,
     problem: Problem,
 ) -> tuple[int, float]:
-    """Take or refuse one proposal after the other, and set the points; return how many were taken.
+    """Accept or reject one proposal after the other, and set the points.
 
-    ``current`` is the logarithm of the posterior at ``x``; so is what is returned beside it.
+    ``current`` is the logarithm of the posterior at ``x``. Return the number accepted, and its last
+    value.
     """
     n, d = normals.shape
     model, shape = np.empty(problem.bins.nu.size), np.empty(problem.bins.nu.size)
@@ -260,7 +252,7 @@ def _walk(
 
 @njit(cache=True)
 def _learn(mean: Array, covariance: Array, points: Array, first: int) -> None:
-    """Move mean and covariance towards points, of which ``first`` came before."""
+    """Update mean and covariance with points; ``first`` points came before."""
     n, d = points.shape
     change = np.empty(d)
     for k in range(n):

@@ -78,10 +78,7 @@ class LineSpectrum:
 
 
 def spectra(
-    blocks: Iterable[Array],
-    samples: int,
-    rate: float,
-    segments: Sequence[Span] | None = None,
+    blocks: Iterable[Array], samples: int, rate: float, segments: Sequence[Span] | None = None
 ) -> tuple[Spectrum, list[LineSpectrum]]:
     """Return the spectrum of a log, and the spectra for the detection of lines.
 

@@ -1,8 +1,7 @@
 """The compiled inner loops of the Whittle likelihood; data and densities are in units near 1.
 
-Loops over scalars, where NumPy has a word for it: what numba compiles of NumPy's functions (`max`,
-`flatnonzero`, `@`, assignments of slices) takes longer than the kernel, and is waited for at the
-first use.
+They loop over scalars: numba takes longer to compile NumPy's functions (`max`, `flatnonzero`, `@`,
+assignments of slices) than the kernel.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ class ShapeTable(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """What is fitted to bins: densities of linear terms, shape (b, p), a ramp, processes."""
+    """Terms to fit to bins: densities of linear terms, shape (b, p), a ramp, processes."""
 
     fixed: Array
     bins: Bins
@@ -75,7 +74,7 @@ def cost_of(nu: Array, data: Array, density: Array) -> float:
 
 @njit(cache=True)
 def _solved(gram: Array, target: Array, free: NDArray[np.bool_]) -> Array:
-    """Return x with gram x = target over what is free, 0 elsewhere (Cholesky's root)."""
+    """Return x with gram x = target over the free variables, 0 elsewhere (Cholesky)."""
     p = target.size
     chosen = np.empty(p, dtype=np.int64)
     m = 0
@@ -116,7 +115,7 @@ def _solved(gram: Array, target: Array, free: NDArray[np.bool_]) -> Array:
 def _non_negative(gram: Array, target: Array, guess: Array) -> Array:
     """Minimise x' gram x / 2 - target' x over x >= 0 (Lawson and Hanson's active sets).
 
-    ``guess`` is above 0 where x may be: mostly that is right.
+    ``guess`` is positive where x probably is.
     """
     p = target.size
     free = np.empty(p, dtype=np.bool_)
@@ -178,8 +177,8 @@ def best_powers(
 ) -> tuple[Array, float, float]:
     """Return the squared parameters, R and the cost that fit best, to a tolerance of the cost.
 
-    Scoring, with the expected information, which never leads astray; where little is left to gain,
-    Newton's steps, with the observed one: scoring creeps where the data are not as the model says.
+    Fisher scoring, with the expected information, is robust, but slow near the end where the data
+    deviate from the model; there the observed information is used (Newton steps).
     """
     nu, density, cross, ramp = bins
     b, p = columns.shape
