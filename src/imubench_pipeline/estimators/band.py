@@ -23,7 +23,6 @@ _MAX_FILTER_SAMPLES = 100
 """Correlation, in samples; shorter processes need white noise that is visible in addition."""
 
 _MAX_PROCESS_OVER_WHITE = 0.3
-
 _MIN_BINS = 24
 _CONVERGED_RATIO = 0.95
 _FLEXIBLE_TERMS = Terms("NFK", 1)

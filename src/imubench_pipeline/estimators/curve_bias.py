@@ -26,8 +26,7 @@ from imubench_pipeline.noise import FLOOR, PEAK_TAU, GaussMarkov, NoiseModel
 from imubench_pipeline.noise.terms import gauss_markov_shape
 from imubench_pipeline.typing import Array
 
-MAX_TAU_FRACTION = 1 / 9
-"""Maximum tau over the duration of the log."""
+MAX_TAU_FRACTION = 1 / 9  # Maximum tau over the duration of the log
 
 _POINTS_PER_DECADE = 16
 """Averaging times per decade for the search of the lowest point, before interpolation."""

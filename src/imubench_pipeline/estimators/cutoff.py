@@ -72,9 +72,7 @@ _NO_FILTER_WEIGHT = 0.1
 _MIN_N_RATIO = 1e-6
 """Minimum N at an end of the interval of the cut-off, over N at the best cut-off."""
 
-MAX_LIMIT_RATIO = 1.2
-"""Ratio of the limits of a cut-off above which it is not identified."""
-
+MAX_LIMIT_RATIO = 1.2  # Ratio of the limits of a cut-off above which it is not identified
 _MIN_HALF_WIDTH = 1e-5  # Minimum half width of the interval of a log cut-off
 
 ALLOWED_CUTOFFS_REASON = "the log allows cut-offs from {:.4g} to {:.4g} Hz"
@@ -97,13 +95,10 @@ class Cutoff:
     gained: float  # BIC of the noise without a filter, less that with it
     or_quantization: bool = False  # quantization noise would explain the spectrum as well
     kind: Kind | None = None  # ``analogue``, ``bilinear`` or ``boxcar``; None without a filter
-    or_process: str | None = None
-    """Reason why process and filter are not distinguishable, or None."""
+    or_process: str | None = None  # reason why process and filter are not distinguishable, or None
     N_behind: float | None = None  # N before the filter, if it is one, in this case; SI
-    behind: Behind | None = None
-    """Power gains of the filter in each bin of the whole spectrum."""
-    ruled: NDArray[np.bool_] | None = None
-    """(b,): bins that spectral leakage dominates."""
+    behind: Behind | None = None  # power gains of the filter in each bin of the whole spectrum
+    ruled: NDArray[np.bool_] | None = None  # (b,): bins that spectral leakage dominates
     readings: Sequence[Reading] = ()  # for all filters that the log does not exclude
     allowed: Sequence[Allowed] = ()  # those filters, the chosen one first
     rounded: float = 0.0  # density of rounding over N^2

@@ -51,7 +51,6 @@ _MAX_FILTER_SAMPLES, MIN_PROCESS_SAMPLES = 2.0, 10.0
 attributed to a filter of first order; processes are at least as long as the second."""
 
 _TIMES_PER_DECADE = 6
-
 _ANALOGUE_PREFERENCE = 0.01
 _MIN_SCAN_GAIN = 1.0  # Minimum gain of log likelihood in the coarse scan for a full search
 _MAX_SLOW_TERMS = 4
@@ -62,16 +61,13 @@ MAX_UNALIASED_CUTOFF = 0.3
 _LIMIT_SCAN_CUTOFFS = 24
 """Cut-offs on each side that are scanned for further maxima within the interval."""
 
-HALF_CHI_SQUARED = 1.9207
-"""Decrease of the log likelihood at the ends of a 95 % interval."""
+HALF_CHI_SQUARED = 1.9207  # Decrease of the log likelihood at the ends of a 95 % interval
 
 _UNFILTERED_MODELS = (("N", 0), ("NK", 0), ("NFK", 0), ("NK", 1), ("NFK", 1), ("NK", 2))
 """Linear terms and number of processes of the unfiltered noise models."""
 
 _QUANTIZATION_MODELS = (Terms("N"), Terms("NK"), Terms("NF"), Terms("NFK"), Terms("NK", 1))
-
 _MIN_CUTOFF_RATIO = 1.01
-
 MIN_BINS = 24
 
 _DIGITAL_TWIN_WEIGHT = 0.1
@@ -401,8 +397,7 @@ class OfModel:
     """N under the allowed filters, each fitted jointly with a noise model."""
 
     readings: Sequence[Reading]  # relative to N at the selected cut-off in the same model
-    gained: float
-    """Gain of log likelihood by fitting the cut-off to this model."""
+    gained: float  # gain of log likelihood by fitting the cut-off to this model
 
 
 def read_as_digital(reading: Reading, trial: FilterTrial, rate: float) -> Reading:

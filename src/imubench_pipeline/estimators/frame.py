@@ -49,8 +49,7 @@ _SEPARATE_BEND_RATIO = 60.0
 _MIN_QUANTIZATION_BAND = 1 / 10
 """Fraction of the sampling rate that the band must reach to make quantization noise visible."""
 
-MIN_BINS = 20
-"""Bins that a fit needs; the papers' model has four parameters."""
+MIN_BINS = 20  # Bins that a fit needs; the papers' model has four parameters
 
 _MAX_FILTER_SAMPLES = 10.0
 """Correlation, in samples, up to which a process may be the sensor's filter."""
@@ -64,9 +63,8 @@ class FitSelection:
     """The part of a spectrum that is fitted."""
 
     lines: Sequence[Line]
-    clear: Mask
-    used: Mask
-    """(b,): the bins without lines, and the subset that is fitted."""
+    clear: Mask  # (b,): the bins without lines
+    used: Mask  # (b,): the subset that is fitted
     band: Band  # highest frequency that is fitted, and why
     low_pass: Cutoff | None = None
     """The sensor's low-pass filter; None where the user sets the band."""
@@ -85,13 +83,9 @@ class FitSelection:
 
     def _whittle(self, spectrum: Spectrum, bins: Mask, shapes: int) -> Whittle:
         behind = self.low_pass.behind if self.low_pass is not None else None
-        return whittle_of(
-            spectrum.select(bins),
-            self.band.highest,
-            shapes,
-            shortest=self.shortest,
-            behind=behind.select(bins) if behind is not None else None,
-        )
+        behind = behind.select(bins) if behind is not None else None
+        highest, shortest = self.band.highest, self.shortest
+        return whittle_of(spectrum.select(bins), highest, shapes, shortest=shortest, behind=behind)
 
     def needs_cutoff_per_model(self, spectrum: Spectrum, times: Array) -> bool:
         """Return whether the cut-off must be fitted for each noise model separately.
@@ -199,34 +193,6 @@ def select_for_fit(
     ``bandwidth`` the configured cut-off of the sensor's filter, Hz, if known; ``resolution`` the
     step of the register, SI, or 0.
     """
-    lines, clear = _find_lines(spectrum, line_spectra, band)
-    nyquist = 0.5 * spectrum.rate
-    if band is not None:
-        limit = find_band(spectrum, clear, asked=band)
-        used = clear & (spectrum.upper <= limit.highest * (1.0 + 1e-9))
-        return FitSelection(lines, clear, used, limit, shortest=MIN_PROCESS_SAMPLES / spectrum.rate)
-    low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
-    if low_pass.or_quantization:
-        low_pass = replace(low_pass, behind=None, readings=())
-    used, source = clear, _SOURCE_UP_TO_NYQUIST
-    if low_pass.behind is not None and low_pass.ruled is not None:
-        used = clear & ~low_pass.ruled
-        source = f"found: behind a {low_pass.words}, {source.removeprefix('found: ')}"
-    highest = nyquist
-    if used.any() and not used[clear][-1]:
-        highest = float(spectrum.upper[used].max())
-        source = (
-            f"{source.removesuffix(' up to Nyquist')} up to {highest:.4g} Hz; beyond, the filter "
-            "leaves nothing of it"
-        )
-    shortest = MIN_PROCESS_SAMPLES / spectrum.rate
-    return FitSelection(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
-
-
-def _find_lines(
-    spectrum: Spectrum, line_spectra: Sequence[LineSpectrum], band: float | None
-) -> tuple[list[Line], Mask]:
-    """Return the lines, and a mask of the bins without lines."""
     all_bins = np.ones(len(spectrum.frequency), dtype=np.bool_)
     start = min(band or np.inf, _LINE_MODEL_BAND * spectrum.rate)
     below = spectrum.upper <= start
@@ -235,11 +201,30 @@ def _find_lines(
     maximum = whittle_of(spectrum.select(below), start, COARSE).maximum(Terms("NFK", 1))
     low = spectrum.block > 1
     crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
-    lines = find_lines(line_spectra, model_of(maximum), spectrum.rate, crossover)
-    if not lines:
-        return lines, all_bins
-    density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
-    return lines, mask_lines(spectrum, lines, density)
+    lines, clear = find_lines(line_spectra, model_of(maximum), spectrum.rate, crossover), all_bins
+    if lines:
+        density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
+        clear = mask_lines(spectrum, lines, density)
+    shortest = MIN_PROCESS_SAMPLES / spectrum.rate
+    if band is not None:
+        limit = find_band(spectrum, clear, asked=band)
+        used = clear & (spectrum.upper <= limit.highest * (1.0 + 1e-9))
+        return FitSelection(lines, clear, used, limit, shortest=shortest)
+    low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
+    if low_pass.or_quantization:
+        low_pass = replace(low_pass, behind=None, readings=())
+    used, source = clear, _SOURCE_UP_TO_NYQUIST
+    if low_pass.behind is not None and low_pass.ruled is not None:
+        used = clear & ~low_pass.ruled
+        source = f"found: behind a {low_pass.words}, {source.removeprefix('found: ')}"
+    highest = 0.5 * spectrum.rate
+    if used.any() and not used[clear][-1]:
+        highest = float(spectrum.upper[used].max())
+        source = (
+            f"{source.removesuffix(' up to Nyquist')} up to {highest:.4g} Hz; beyond, the filter "
+            "leaves nothing of it"
+        )
+    return FitSelection(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
 
 
 def sensor_density(

@@ -10,8 +10,7 @@ from scipy.special import erfc, polygamma, psi
 
 from imubench_pipeline.typing import Array
 
-MIN_FIT_CHANCE = 1e-3
-"""Probability below which a fit is rejected."""
+MIN_FIT_CHANCE = 1e-3  # Probability below which a fit is rejected
 
 
 @dataclass(frozen=True)
@@ -47,17 +46,13 @@ def goodness(nu: Array, data: Array, density: Array, frequency: Array, parameter
     residual = residual - residual.mean()
     spread = max(float(residual @ residual), 1e-300)
     correlation = float(residual[1:] @ residual[:-1]) / spread * math.sqrt(bins)
-    chance = min(1.0, 2.0 * min(_compute_upper_tail(far), _compute_upper_tail(correlation)))
+    chance = min(1.0, 2.0 * min(0.5 * float(erfc(z / math.sqrt(2.0))) for z in (far, correlation)))
     return Goodness(
         deviance=float(deviance.sum() / expected.sum() * bins / free),
         chance=chance,
         verdict="explained" if chance >= MIN_FIT_CHANCE else "not explained",
         where=_describe_worst_band(residual, frequency),
     )
-
-
-def _compute_upper_tail(z: float) -> float:
-    return 0.5 * float(erfc(z / math.sqrt(2.0)))
 
 
 def _describe_worst_band(residual: Array, frequency: Array) -> str:

@@ -18,7 +18,6 @@ from imubench_pipeline.typing import Array
 
 _AT_BOUND = 0.985
 _ABOUT_AS_GOOD = 2.0
-
 _ABSENT = "the data do not ask for it"
 _ABSENT_BELOW = f"{_ABSENT}; with 95 % it is below the upper limit"
 

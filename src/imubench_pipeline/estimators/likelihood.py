@@ -294,18 +294,9 @@ def fit_spectrum(
         lines=sinusoids,
         draws=of_papers.draw_jointly(),
     )
-    return Likelihood(
-        (estimate, gauss_markov),
-        candidates,
-        frame.lines,
-        frame.band,
-        spectrum,
-        frame.clear,
-        frame.used,
-        fitted,
-        frame,
-        stretch,
-    )
+    lines, band, clear, used = frame.lines, frame.band, frame.clear, frame.used
+    both = (estimate, gauss_markov)
+    return Likelihood(both, candidates, lines, band, spectrum, clear, used, fitted, frame, stretch)
 
 
 class _InTheLog:
@@ -387,17 +378,10 @@ def _too_short(spectrum: Spectrum, frame: FitSelection) -> Likelihood:
     estimate = Estimate(
         "likelihood", dict.fromkeys(FAMILY, nothing), curve=dict.fromkeys(CURVE, nothing)
     )
-    return Likelihood(
-        (estimate, not_shown("likelihood_gm", reason)),
-        (),
-        frame.lines,
-        None,
-        spectrum,
-        frame.clear,
-        frame.used,
-        np.full(len(frame.used), np.nan),
-        frame,
-    )
+    both = estimate, not_shown("likelihood_gm", reason)
+    lines, clear, used = frame.lines, frame.clear, frame.used
+    fitted = np.full(len(used), np.nan)
+    return Likelihood(both, (), lines, None, spectrum, clear, used, fitted, frame)
 
 
 def fit_models(

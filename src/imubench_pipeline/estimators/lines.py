@@ -31,9 +31,7 @@ from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-FALSE_ALARM_PROBABILITY = 0.005
-"""Probability that a line is detected in a channel without lines."""
-
+FALSE_ALARM_PROBABILITY = 0.005  # Probability that a line is detected in a channel without lines
 _MEDIAN_BINS = 129  # Bins of the median filter that corrects the model around a bin
 
 _MEDIAN_EFFICIENCY = 1.0 / (1.94 * 1.57)
@@ -59,15 +57,9 @@ _MAX_LINE_LEAKAGE = 0.3
 # the cross terms of line and noise; and the minimum error.
 _POWER_ERROR_TERMS = (12.6, 35.0 / 18.0, 4e-3)
 _PLACE_ERROR_TERMS = (50.0, 5.0 / 18.0, 5e-3)
-
-MAX_SINGLE_LINES = 12
-"""Lines that are used individually if there are too many."""
-
-LINE_GROUPS = 4
-"""Groups of the weaker lines."""
-
-MAX_LINES = MAX_SINGLE_LINES + LINE_GROUPS
-"""Maximum number of lines that are used without grouping."""
+MAX_SINGLE_LINES = 12  # Lines that are used individually if there are too many
+LINE_GROUPS = 4  # Groups of the weaker lines
+MAX_LINES = MAX_SINGLE_LINES + LINE_GROUPS  # Maximum number of lines that are used without grouping
 
 
 @dataclass(frozen=True)
@@ -312,17 +304,11 @@ def select_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
     """
     narrow = [line for line in lines if line.narrow]
     single = _find_single_lines(narrow) if len(narrow) > MAX_LINES else narrow
-    sinusoids = [
-        {
-            "amplitude": Parameter(
-                line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper
-            ),
-            "frequency": Parameter(
-                line.frequency, lower=line.frequency_lower, upper=line.frequency_upper
-            ),
-        }
-        for line in single
-    ]
+    sinusoids = []
+    for line in single:
+        A = Parameter(line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper)
+        f = Parameter(line.frequency, lower=line.frequency_lower, upper=line.frequency_upper)
+        sinusoids.append({"amplitude": A, "frequency": f})
     weaker = [line for line in narrow if line not in single]
     if weaker:
         groups = np.array_split(np.arange(len(weaker)), LINE_GROUPS)

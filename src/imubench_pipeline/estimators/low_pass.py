@@ -27,8 +27,7 @@ from imubench_pipeline.typing import Array
 
 Kind = Literal["analogue", "bilinear", "boxcar"]
 
-BOXCAR_CUTOFF_LENGTH = 0.442946
-"""Cut-off of a boxcar times its length, where sinc^2 is one half."""
+BOXCAR_CUTOFF_LENGTH = 0.442946  # Cut-off of a boxcar times its length, where sinc^2 is one half
 
 _FLICKER_ALIASES = 3
 """Aliases of flicker noise on each side; the filter leaves little of the others."""
@@ -101,20 +100,11 @@ def _make_integration_grid(rate: float) -> Frequencies:
 
 @dataclass(frozen=True)
 class Filter:
-    """A low-pass filter; results have the shape of the frequencies.
-
-    Parameters
-    ----------
-    kind : {"analogue", "bilinear", "boxcar"}
-    order : int
-        n of the Butterworth filter; 1 for the boxcar.
-    cutoff : float
-        f_c, Hz.
-    """
+    """A low-pass filter; results have the shape of the frequencies."""
 
     kind: Kind
-    order: int
-    cutoff: float
+    order: int  # n of the Butterworth filter; 1 for the boxcar
+    cutoff: float  # f_c, Hz
 
     @property
     def name(self) -> str:
@@ -128,16 +118,29 @@ class Filter:
         if self.kind == "bilinear":
             return self._evaluate_bilinear(at)
         if self.kind == "boxcar":
-            return self._evaluate_boxcar(at)
-        if self.order == 1:
-            return self._evaluate_sampled_process(at)
-        return self._sum_aliases(at, self._evaluate_aliases(at))
+            length = BOXCAR_CUTOFF_LENGTH / self.cutoff * at.rate  # in samples
+            whole = math.ceil(length)
+            # Split 1 - k / length into 1 - k / whole and a constant: Fejer and Dirichlet kernels.
+            half, sine = at.half_angle
+            fejer = (np.sin(whole * half) / sine) ** 2 / whole
+            dirichlet = np.sin((2 * whole - 1) * half) / sine
+            part = whole / length
+            total = part * fejer + (1.0 - part) * dirichlet
+            return np.asarray(np.maximum(total, 1e-12) / length)
+        if self.order > 1:
+            return self._sum_aliases(at, self._evaluate_aliases(at))
+        # The spectrum of a sampled Gauss-Markov process, the sum over the aliases for n = 1:
+        # (h / 2) sinh(h) / (cosh(h) - cos w). Both are divided by e^h, which may overflow.
+        h = 2.0 * np.pi * self.cutoff / at.rate
+        decay = math.exp(-h)
+        sinh, cosh = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
+        return np.asarray(0.5 * h * sinh / (cosh - decay * at.cosine))
 
     def slow(self, at: Frequencies) -> Array:
         """Return the power gain for noise that is slow against the rate, without aliases."""
-        return (
-            self._evaluate_bilinear(at) if self.kind == "bilinear" else self._evaluate_power(at.f)
-        )
+        if self.kind == "bilinear":
+            return self._evaluate_bilinear(at)
+        return self._evaluate_power(at.f)
 
     def gains(self, at: Frequencies) -> tuple[Array, Array, Array]:
         """Return the gains for white noise, G, for flicker noise, and for slow noise.
@@ -194,9 +197,8 @@ class Filter:
         return LowPass(self.cutoff, self.order).power(f)
 
     def _evaluate_aliases(self, at: Frequencies) -> Array:
-        return self._evaluate_power(
-            at.aliases(_MIN_ALIASES + math.ceil(4.0 * self.cutoff / at.rate))
-        )
+        further = math.ceil(4.0 * self.cutoff / at.rate)
+        return self._evaluate_power(at.aliases(_MIN_ALIASES + further))
 
     def _sum_aliases(self, at: Frequencies, powers: Array) -> Array:
         """Return the sum over all aliases, from the powers of the nearest, shape (k, ...)."""
@@ -211,29 +213,7 @@ class Filter:
             total += rest * (1.0 - steep * (steep - 1) / 24.0 / end**2)
         return np.asarray(total)
 
-    def _evaluate_sampled_process(self, at: Frequencies) -> Array:
-        """Return (pi f_c / f_s) sinh(2 pi f_c / f_s) / (cosh(2 pi f_c / f_s) - cos w).
-
-        The sum over the aliases for n = 1: the spectrum of a sampled Gauss-Markov process.
-        """
-        h = 2.0 * np.pi * self.cutoff / at.rate
-        # Both are divided by e^h, which may overflow.
-        decay = math.exp(-h)
-        sine, cosine = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
-        return np.asarray(0.5 * h * sine / (cosine - decay * at.cosine))
-
     def _evaluate_bilinear(self, at: Frequencies) -> Array:
         warped = at.tangent / math.tan(math.pi * min(self.cutoff / at.rate, 0.4999))
         logarithm = np.minimum(2.0 * self.order * np.log(np.maximum(warped, 1e-30)), 600.0)
         return np.asarray(1.0 / (1.0 + np.exp(logarithm)))
-
-    def _evaluate_boxcar(self, at: Frequencies) -> Array:
-        length = BOXCAR_CUTOFF_LENGTH / self.cutoff * at.rate  # in samples
-        whole = math.ceil(length)
-        # Split 1 - k / length into 1 - k / whole and a constant: Fejer and Dirichlet kernels.
-        half, sine = at.half_angle
-        fejer = (np.sin(whole * half) / sine) ** 2 / whole
-        dirichlet = np.sin((2 * whole - 1) * half) / sine
-        part = whole / length
-        total = part * fejer + (1.0 - part) * dirichlet
-        return np.asarray(np.maximum(total, 1e-12) / length)

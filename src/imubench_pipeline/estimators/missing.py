@@ -27,9 +27,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.typing import Array
 
-BLOCK_SAMPLES = 64
-"""Samples whose mean is one measurement of the slow part."""
-
+BLOCK_SAMPLES = 64  # Samples whose mean is one measurement of the slow part
 _WINDOW_BLOCKS = 4096
 _MAX_GAP_BLOCKS = 1024
 """Longest gap, in blocks; a longer one splits the log, because both sides are independent."""

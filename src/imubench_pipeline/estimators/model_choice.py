@@ -13,8 +13,7 @@ from imubench_pipeline.estimators.goodness import Goodness, goodness
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.typing import Array
 
-PAPERS_MODEL = Terms("NK", 1)
-"""Model of the papers: N, B, T_B and K."""
+PAPERS_MODEL = Terms("NK", 1)  # Model of the papers: N, B, T_B and K
 
 CANDIDATE_MODELS = (
     Terms("N"),
@@ -142,8 +141,7 @@ def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> l
     ]
 
 
-MIN_AKAIKE_WEIGHT = 0.05
-"""Candidates with a smaller Akaike weight do not enter the intervals."""
+MIN_AKAIKE_WEIGHT = 0.05  # Candidates with a smaller Akaike weight do not enter the intervals
 
 
 def information_weights(scores: Array) -> Array:

@@ -31,8 +31,7 @@ from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.estimators.whittle_kernels import Problem, shape_at
 from imubench_pipeline.typing import Array
 
-MAX_DRAWS = 80_000
-"""Default number of draws; a tail of 2.5 % has 2,000 of them."""
+MAX_DRAWS = 80_000  # Default number of draws; a tail of 2.5 % has 2,000 of them
 
 _DRAWS_PER_POINT = 6
 """Target number of draws per independent point: limits of two seeds then agree within 3 %."""
@@ -45,11 +44,8 @@ _GRID_SIZES = (0, 20, 9)
 """Correlation times of the first mixture along each axis, for 0, 1 and 2 processes."""
 
 _COMPONENT_SIGMA = 0.7  # of its components in log T_B, in grid spacings
-
 _MAX_SIGMA = 2.0  # standard deviation in log T_B about the best fit
-
 _MIN_BEST_FIT_WEIGHT = 0.3
-
 _NEGLIGIBLE_WEIGHT, _MIN_WEIGHT = 1e-6, 5e-3
 _WEAK_TERM_ERROR = 0.15
 """Relative standard deviation of a squared amplitude above which it may be near 0."""
@@ -61,9 +57,7 @@ a term near 0."""
 _MIN_WEAK_WEIGHT = 0.03
 _RIDGE = 1e-4  # Ridge on the information matrix, against collinear terms
 _MIN_START_SIGMAS = 0.3
-
-KEPT_DRAWS = 200
-"""Number of draws that are kept for an estimate."""
+KEPT_DRAWS = 200  # Number of draws that are kept for an estimate
 
 
 @dataclass(frozen=True)

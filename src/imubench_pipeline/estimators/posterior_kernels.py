@@ -18,7 +18,6 @@ from imubench_pipeline.typing import Array
 _MOST_STEPS = 40
 _TOLERANCE = 1e-3
 _LONGEST_STEP = 1.5
-
 _BURN_IN = 4_000
 _ADAPT_EVERY = 250
 

@@ -65,14 +65,8 @@ def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterat
             model=estimate.model.name,
             component=component,
             parameter=name,
-            value=parameter.value,
-            lower=parameter.lower,
-            upper=parameter.upper,
             unit=units[name],
-            status=parameter.status,
-            reason=parameter.reason,
-            duration_needed=parameter.duration_needed,
-            fitted=parameter.fitted,
+            **asdict(parameter),
         )
 
 

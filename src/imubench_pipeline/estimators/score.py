@@ -14,7 +14,7 @@ import numpy as np
 from imubench_pipeline.typing import Array
 
 SUREST = 0.02
-"""Relative error below which the weight of a tau is constant: else only the shortest would count."""
+"""Relative error below which the weight is constant: else the shortest tau alone would count."""
 
 
 @dataclass(frozen=True)

@@ -20,20 +20,14 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.phase import Span, spans_of, split
 from imubench_pipeline.typing import Array
 
-SINGLE = 64
-"""Number of lowest ordinates that are not binned."""
-
-WIDTH = 1.05
-"""Upper over lower frequency of the other bins."""
-
+SINGLE = 64  # Number of lowest ordinates that are not binned
+WIDTH = 1.05  # Upper over lower frequency of the other bins
 _MAX_WHOLE_SAMPLES = 1 << 18  # Maximum number of samples of a log that is transformed as a whole
 _MAX_SEGMENT = 1 << 15
 _MIN_SEGMENT = 1 << 9
 _SEGMENT_OVER_BLOCK = 512
 _ENOUGH_SEGMENTS = 0.75
-BLOCK_BAND = 0.25
-"""Highest frequency taken from block means, rad a block."""
-
+BLOCK_BAND = 0.25  # Highest frequency taken from block means, rad a block
 _MIN_AVERAGED_SEGMENTS = 8  # Minimum number of segments that a spectrum for lines averages
 _MIN_LINE_SEGMENT = 256
 

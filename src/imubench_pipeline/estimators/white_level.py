@@ -24,8 +24,7 @@ from imubench_pipeline.estimators.whittle import Maximum, Terms
 from imubench_pipeline.noise.terms import driving_density
 from imubench_pipeline.typing import Array
 
-MIN_DECADES = 0.7
-"""Length of a stretch."""
+MIN_DECADES = 0.7  # Length of a stretch
 
 MIN_CLUSTER = 3
 """Samples in the first cluster of a stretch: fewer show the register and the sensor's filter."""
@@ -43,9 +42,8 @@ class WhiteStretch:
     """The first stretch of slope -1/2 of an Allan deviation."""
 
     level: float  # median of sigma sqrt(tau), SI
-    first: float
-    last: float
-    """Its tau, s."""
+    first: float  # shortest tau, s
+    last: float  # longest tau, s
 
 
 def find_white_stretch(curve: AllanCurve) -> WhiteStretch | None:

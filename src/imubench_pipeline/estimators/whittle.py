@@ -32,12 +32,8 @@ from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
 from imubench_pipeline.typing import Array
 
-SHAPES = 192
-"""Correlation times at which the shape of a Gauss-Markov process is tabulated."""
-
-COARSE = 48
-"""Correlation times that suffice to detect lines and the band."""
-
+SHAPES = 192  # Correlation times at which the shape of a Gauss-Markov process is tabulated
+COARSE = 48  # Correlation times that suffice to detect lines and the band
 _SCAN_STEP = 4
 _PAIR_STEP = 12
 _MIN_TIME_RATIO = 2.5  # Minimum ratio of two correlation times of one model
@@ -118,9 +114,8 @@ class Whittle:
     """The likelihood of one spectrum."""
 
     spectrum: Spectrum  # the bins to use
-    shortest: float
+    shortest: float  # correlation time of a Gauss-Markov process that is searched, s
     longest: float
-    """Correlation times between which a Gauss-Markov process is searched, s."""
     shapes: int = SHAPES  # correlation times at which its shape is tabulated
     behind: Behind | None = None  # the sensor's low-pass; quantization noise does not pass it
     scale: float = field(init=False)

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.typing import Array
 
-TOLERANCE = 1e-7
-"""Of the cost."""
-
+TOLERANCE = 1e-7  # Of the cost
 _MOST_STEPS = 60
 _NEAR = 0.1  # Gain of the cost by a step from which the next ones are Newton's
 
