@@ -12,17 +12,12 @@ from dataclasses import replace
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.tables.findings import Finding
 
-_MAX_FACTOR_BEYOND_LIMITS = 1.25
-"""Maximum factor by which a value without limits may lie outside the likelihood's limits."""
-
+_MAX_FACTOR_BEYOND_LIMITS = 1.25  # Of a value without limits outside the limits of the likelihood
 _MAX_VALUE_RATIO = 1.8  # Ratio of two values above which they differ, whatever their limits
 
 
 def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
-    """Return an estimate in which the values that the likelihood excludes are doubtful.
-
-    ``reference`` is the estimate by the likelihood for the same channel.
-    """
+    """Return an estimate whose values are doubtful where the likelihood excludes them."""
     references = dict(reference.parameters)
     if reference.further and "B_curve" in reference.curve:
         # With several terms, each has its own B: compare with the B of the curve.

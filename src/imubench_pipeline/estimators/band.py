@@ -13,15 +13,11 @@ from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle
 
 _DEFAULT_BAND = 1 / 20  # Frequency over sampling rate below which filters are assumed to be flat
 _MIN_BAND = 1 / 1000
-_MIN_BANDWIDTH_RATIO = 10.0
-"""A first-order filter lowers the density by 1 % at a tenth of its cut-off."""
-
+_MIN_BANDWIDTH_RATIO = 10.0  # There a first-order filter lowers the density by 1 %
 _MIN_DEPARTURE_SIGMAS = 4.0
 _GROUP_BINS = 4
 _MAX_STEPS = 8
-_MAX_FILTER_SAMPLES = 100
-"""Correlation, in samples; shorter processes need white noise that is visible in addition."""
-
+_MAX_FILTER_SAMPLES = 100  # Correlation; shorter processes need visible white noise in addition
 _MAX_PROCESS_OVER_WHITE = 0.3
 _MIN_BINS = 24
 _CONVERGED_RATIO = 0.95
@@ -107,10 +103,7 @@ def _find_unbent_limit(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float)
 
 
 def _is_filter_like(whittle: Whittle, maximum: Maximum) -> bool:
-    """Return whether a fast process leaves no visible white noise above its corner frequency.
-
-    White noise behind a first-order filter is a Gauss-Markov process.
-    """
+    """Return whether a fast process, without visible white noise above it, may be a filter."""
     if not len(maximum.times) or maximum.times[0] > _MAX_FILTER_SAMPLES / whittle.spectrum.rate:
         return False
     process = maximum.process_powers[-1] * whittle.gauss_markov(float(maximum.times[0]))[-1]
@@ -121,10 +114,7 @@ def _is_filter_like(whittle: Whittle, maximum: Maximum) -> bool:
 def _find_first_departure(
     rest: Spectrum, whittle: Whittle, maximum: Maximum
 ) -> tuple[float, float] | None:
-    """Return frequency and relative size of the first deviation from a fit, or None.
-
-    Deviations are compared with the errors of the bins and of the extrapolated fit.
-    """
+    """Return frequency and relative size of the first significant deviation from a fit, or None."""
     sensitivity = whittle.sensitivity(maximum)
     _, strength, directions = np.linalg.svd(sensitivity.T, full_matrices=False)
     carried = Whittle(rest, whittle.shortest, whittle.longest, len(whittle.times))

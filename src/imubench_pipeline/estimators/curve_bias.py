@@ -27,15 +27,9 @@ from imubench_pipeline.noise.terms import gauss_markov_shape
 from imubench_pipeline.typing import Array
 
 MAX_TAU_FRACTION = 1 / 9  # Maximum tau over the duration of the log
-
-_POINTS_PER_DECADE = 16
-"""Averaging times per decade for the search of the lowest point, before interpolation."""
-
+_POINTS_PER_DECADE = 16  # Averaging times for the search of the lowest point
 _POINTS_BETWEEN_PEAKS = 49  # Averaging times between the peaks of several processes
-
-_MAX_DRAWS = 16_000
-"""Maximum number of draws of a model if each is evaluated at many averaging times."""
-
+_MAX_DRAWS = 16_000  # Draws of a model that are evaluated at many averaging times
 _PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
 
@@ -243,10 +237,7 @@ def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
 
 
 def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dict[str, Parameter]:
-    """Return ``sigma_min`` and ``tau_min`` of a fitted model, at `averaging_times`.
-
-    ``drawn`` are draws of the models that the log does not rule out; empty without limits.
-    """
+    """Return ``sigma_min`` and ``tau_min`` of a model, with limits if draws of models are given."""
     (sigma,), (time,), (inside,) = (part.tolist() for part in lowest_point(model, tau))
     points = [lowest_point(models.fewer(), tau) for models in drawn]
     weights = [models.weight for models in drawn]

@@ -23,9 +23,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.spectral_degrees import Degrees, degrees_of_model
 
 _MIN_CLUSTERS = 100
-
-_MIN_TAU_TIMES_BAND = 1.0
-"""Tau times the highest fitted frequency; below it the curve contains noise that was not fitted."""
+_MIN_TAU_TIMES_BAND = 1.0  # Below it the curve contains frequencies that were not fitted
 
 
 def with_fitted_limits(

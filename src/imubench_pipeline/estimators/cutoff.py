@@ -39,39 +39,20 @@ from imubench_pipeline.estimators.whittle import Behind, Terms
 from imubench_pipeline.typing import Array
 
 _MIN_WHITE_GAIN = 2.0  # Minimum gain of log likelihood by white noise in addition to a process
-
-_MAX_LEAKAGE_FRACTION = 0.01
-"""Maximum spectral leakage over density in a bin; bins with more are not fitted."""
-
-_MIN_GAIN_RATIO = 0.4
-"""Minimum over maximum gain in a bin; below it, one end of the bin dominates its mean."""
-
-_MAX_DENSITY_RATIO = 10.0
-"""Measured over expected density above which the excess is not leakage, which is exponentially
-distributed and exceeds this in 1 of 20,000."""
-
-_MAX_PASSES = 3
-"""Maximum number of fits; each excludes the bins with leakage under the previous filter."""
-
+_MAX_LEAKAGE_FRACTION = 0.01  # Maximum spectral leakage over density in a fitted bin
+_MIN_GAIN_RATIO = 0.4  # Minimum over maximum gain within a fitted bin
+_MAX_DENSITY_RATIO = 10.0  # Measured over expected density; leakage exceeds it in 1 of 20,000
+_MAX_PASSES = 3  # Fits; each excludes the bins with leakage under the previous filter
 _COARSE_TOLERANCE = 1e-3  # Relative tolerance of the cut-off in the first fit
-
-_MIN_FREQUENCY_RATIO = 1 / 300
-"""Minimum frequency over cut-off that is fitted: drift does not follow the noise models."""
-
-DELTA_LOG_LIKELIHOOD_EXCLUDED = 3.0
-"""Log likelihood below the best at which another filter is excluded: its weight is 5 %."""
+_MIN_FREQUENCY_RATIO = 1 / 300  # Minimum fitted frequency over cut-off: below, drift may dominate
+DELTA_LOG_LIKELIHOOD_EXCLUDED = 3.0  # Below the best, another filter is excluded: weight 5 %
 
 _MIN_DELTA_BIC = 6.0
 """Minimum gain of BIC by a filter: "strong" evidence (Kass and Raftery, J. Am. Stat. Assoc. 90)."""
 
-_CERTAIN_DELTA_BIC = 20.0
-"""Gain of BIC below which the interval includes N without a filter (`_NO_FILTER_WEIGHT`)."""
-
+_CERTAIN_DELTA_BIC = 20.0  # Below it, the interval includes N without a filter
 _NO_FILTER_WEIGHT = 0.1
-
-_MIN_N_RATIO = 1e-6
-"""Minimum N at an end of the interval of the cut-off, over N at the best cut-off."""
-
+_MIN_N_RATIO = 1e-6  # Minimum N at an end of the interval over N at the best cut-off
 MAX_LIMIT_RATIO = 1.2  # Ratio of the limits of a cut-off above which it is not identified
 _MIN_HALF_WIDTH = 1e-5  # Minimum half width of the interval of a log cut-off
 
@@ -80,8 +61,7 @@ UNKNOWN_BEND_REASON = (
     f"the spectrum bends, but not as behind any of {len(FAMILY)} filters that were tried"
 )
 
-_MAX_STATED_RATIO = 1.6
-"""Maximum ratio of a cut-off to the configured one at which both are the same filter."""
+_MAX_STATED_RATIO = 1.6  # Ratio of found to configured cut-off of the same filter
 
 
 @dataclass(frozen=True)
@@ -124,10 +104,7 @@ class Cutoff:
     def factors(
         self, number: int, rng: np.random.Generator, terms: Terms, *, in_the_log: bool = False
     ) -> Array:
-        """Return draws of N over its value for the chosen filter in a model, shape (number,).
-
-        N is the density before the filter, or with ``in_the_log`` the density in the log.
-        """
+        """Return draws of N over its value, before the filter or in the log, shape (number,)."""
         of_model = self.models.get(replace(terms, ramp=False))
         readings = self.readings if of_model is None else of_model.readings
         if not readings:
@@ -210,10 +187,7 @@ def _describe_filter(
     gained: float,
     beside_rounding: float,
 ) -> Cutoff:
-    """Return the result with the best filter, without rounding, and the others that are allowed.
-
-    ``gained`` and ``beside_rounding``: gain of BIC over no filter, and over quantization noise.
-    """
+    """Return the best filter, without rounding; the gains are over none, and quantization noise."""
     best = tried[0]
     # Trials with a floor count only if the best has one: with a floor no high cut-off is known.
     alike = [
@@ -320,10 +294,7 @@ def _compute_readings(
 def _find_leaky_bins(
     spectrum: Spectrum, fits: FilterFits, best: FilterTrial, rounding: float
 ) -> NDArray[np.bool_]:
-    """Return the bins that leakage dominates, or in which the gain of the filter varies strongly.
-
-    Bins with a density far above both noise and leakage are not included.
-    """
+    """Return the bins that leakage dominates, or in which the gain of the filter varies."""
     N = fits.density(best)[0]
     gains, low_pass = BinGains(spectrum), best.low_pass
     within = gains.white(low_pass) + rounding / N**2
@@ -341,10 +312,7 @@ def _explain_ambiguity(
     gained: float,
     stated: float | None,
 ) -> tuple[str, float] | None:
-    """Return why process and filter are ambiguous, and N before the filter; None if they are not.
-
-    Only a filter of first order looks like a process, and only without visible white noise.
-    """
+    """Return why a process may be a first-order filter, and N before it; None if it may not."""
     first = next(
         (trial for trial in tried if trial.is_first_order_analogue and not trial.floor), None
     )

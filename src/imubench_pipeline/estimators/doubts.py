@@ -17,46 +17,17 @@ from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 
-_DELTA_BIC_AGAINST_PAPERS = 6.0
-"""BIC difference to the best model above which values of the papers' model are doubtful."""
-
-_DELTA_AIC_WITHOUT_WALK = 2.5
-"""Advantage in AIC of a model without a random walk at which K is
-doubtful; 2 % of true random walks exceed it, and three quarters of processes of a twentieth of the
-log that are fitted as a walk."""
-
-_MIN_WALK_BESIDE_RAMP = 0.25
-"""K fitted with a ramp over K without it, at or below which the ramp may replace the walk (1 % of
-true random walks)."""
-
-_DELTA_BIC_EXTRA_TERM = 9.0
-"""Disadvantage in BIC up to which a model with fewer terms may be the true one: in one of a few
-hundred logs, flicker noise fitted together with a process gains as much by chance."""
-
-_DELTA_BIC_RARE_TERM = 8.0
-"""Gain in BIC up to which quantization noise or a ramp may be chance, or part of a walk."""
-
-_DELTA_AIC_OTHER_BIAS_TERMS = 4.0
-"""Advantage in AIC, over Gauss-Markov processes alone, at which other terms of bias instability
-make B and T_B doubtful."""
-
-_DELTA_BIC_WITHOUT_BIAS = 4.0
-"""Disadvantage in BIC up to which a model without bias instability is about as good."""
-
-_DRIFT_COSINES = 5
-"""Number of lowest cosines, half a period to two and a half per log, that a drift may explain."""
-
-_MIN_WALK_GAIN = 3.0
-"""Twice the gain in log likelihood from which a walk is needed above these
-cosines: 97 % of the walks with K known to 14 to 20 % reach it, and one in seven of the smooth
-drifts fitted as a walk."""
-
-_DELTA_AIC_SMOOTH_DRIFT = 8.0
-"""Advantage in AIC of a spectrum of f^-4 over f^-2 at which K is
-doubtful; 1 % of walks exceed it."""
-
-_EXCLUDED_COSINES = (0, 4)
-"""Numbers of lowest cosines that are excluded from the slope test: their scatter can hide it."""
+_DELTA_BIC_AGAINST_PAPERS = 6.0  # Above it, values of the papers' model are doubtful
+_DELTA_AIC_WITHOUT_WALK = 2.5  # 2 % of true random walks exceed it, and 3/4 of slow processes
+_MIN_WALK_BESIDE_RAMP = 0.25  # K with a ramp over K without it; 1 % of true walks are below
+_DELTA_BIC_EXTRA_TERM = 9.0  # Up to it, a model with fewer terms may be the true one
+_DELTA_BIC_RARE_TERM = 8.0  # Up to it, quantization noise or a ramp may be chance
+_DELTA_AIC_OTHER_BIAS_TERMS = 4.0  # Above it, other terms make B and T_B doubtful
+_DELTA_BIC_WITHOUT_BIAS = 4.0  # Up to it, a model without bias instability is as good
+_DRIFT_COSINES = 5  # Lowest cosines that a drift may explain: 0.5 to 2.5 periods per log
+_MIN_WALK_GAIN = 3.0  # Twice the gain in log L by a walk above them; 97 % of true walks reach it
+_DELTA_AIC_SMOOTH_DRIFT = 8.0  # Of f^-4 over f^-2; 1 % of true walks exceed it
+_EXCLUDED_COSINES = (0, 4)  # Numbers of lowest cosines that are excluded from the slope test
 
 
 def add_doubts(
@@ -99,10 +70,7 @@ def add_doubts(
 
 
 def _doubt_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Return a reason if AIC clearly prefers another model without, or with little, random walk.
-
-    A slow process looks like a walk: BIC, which penalises such processes, selects the walk.
-    """
+    """Return a reason if AIC, which permits slow processes, prefers little or no walk."""
     terms = chosen.terms
     if "K" not in terms.linear:
         return None
@@ -182,10 +150,7 @@ def _equate_bias_statuses(estimate: Estimate) -> Estimate:
 def cast_doubt(
     estimate: Estimate, names: Sequence[str], reason: str, *, of_curve: bool = True
 ) -> Estimate:
-    """Return an estimate with parameters of status ``ok`` made doubtful.
-
-    With B, the figures of the curve become doubtful too, unless ``of_curve`` is False.
-    """
+    """Make parameters of status ``ok`` doubtful; with B the figures of the curve too."""
 
     def doubt(group: Mapping[str, Parameter], names: Sequence[str]) -> dict[str, Parameter]:
         doubtful = {

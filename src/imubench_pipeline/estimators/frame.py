@@ -35,27 +35,14 @@ from imubench_pipeline.typing import Array
 
 Mask = NDArray[np.bool_]
 
-_LINE_MODEL_BAND = 0.05
-"""Fraction of the sampling rate: the noise model for line detection is fitted below it."""
-
+_LINE_MODEL_BAND = 0.05  # Fraction of the rate below which the model for line detection is fitted
 _SOURCE_UP_TO_NYQUIST = "found: the spectrum follows its model up to Nyquist"
-
-_MIN_CORRELATION_SAMPLES = 3.0
-"""Shortest correlation time, in samples, that is tried where longer ones do not fit."""
-
-_SEPARATE_BEND_RATIO = 60.0
-"""Ratio of the correlation times of a process and a filter above which their bends are separate."""
-
-_MIN_QUANTIZATION_BAND = 1 / 10
-"""Fraction of the sampling rate that the band must reach to make quantization noise visible."""
-
+_MIN_CORRELATION_SAMPLES = 3.0  # Shortest process that is tried where longer ones do not fit
+_SEPARATE_BEND_RATIO = 60.0  # Correlation time of a process over the filter's with separate bends
+_MIN_QUANTIZATION_BAND = 1 / 10  # Fraction of the rate at which quantization noise is visible
 MIN_BINS = 20  # Bins that a fit needs; the papers' model has four parameters
-
-_MAX_FILTER_SAMPLES = 10.0
-"""Correlation, in samples, up to which a process may be the sensor's filter."""
-
-_MIN_FLOOR_RATIO = 0.03
-"""Power of unfiltered over filtered white noise above which the former matters."""
+_MAX_FILTER_SAMPLES = 10.0  # Correlation up to which a process may be the sensor's filter
+_MIN_FLOOR_RATIO = 0.03  # Power of unfiltered over filtered white noise that matters
 
 
 @dataclass(frozen=True)
@@ -121,10 +108,7 @@ class FitSelection:
         return float(self.low_pass.behind.white[0])
 
     def in_the_log(self, posterior: Posterior, terms: Terms, rng: np.random.Generator) -> Posterior:
-        """Return draws of a model with N as in the log at its lowest frequencies.
-
-        They include the uncertainty of the filter, which bends the spectrum down to these.
-        """
+        """Return draws of a model with N as in the log, including the uncertainty of the filter."""
         factors = np.array(math.sqrt(self.folding))
         if self.low_pass is not None and self.low_pass.readings:
             number = len(posterior.parameters)

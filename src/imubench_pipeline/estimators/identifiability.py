@@ -83,8 +83,7 @@ def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
 def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -> dict[str, float]:
     """Return the Cramér-Rao bounds of a model's parameters in a log, relative to their values.
 
-    The keys are the names of `parameter_names`; spectral lines are not included. Rate
-    and highest frequency used are in Hz.
+    The keys are those of `parameter_names`. Rate and highest frequency used are in Hz.
     """
     values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
     letters = "".join(letter for letter, value in values.items() if value > 0)

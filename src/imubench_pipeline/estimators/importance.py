@@ -19,15 +19,12 @@ from imubench_pipeline.estimators.posterior_kernels import fit_mixture, set_dens
 from imubench_pipeline.typing import Array
 
 _MIN_DEGREES = 5
-_FIRST_MIXTURE_WEIGHT = 0.15
-"""Weight of the first mixture in all later ones, which keeps its support covered."""
-
+_FIRST_MIXTURE_WEIGHT = 0.15  # Of the first mixture in later ones, which keeps its support covered
 _MIN_COMPONENT_MASS = 0.01
 _LEARNING_POINTS = 2048  # Number of points to which a mixture is fitted
 
 _CLIPPED_POINTS = 8
-"""Number of highest weights that are clipped to one value when a mixture is fitted (E. Koblents and
-J. Míguez, Statistics and Computing 25, 2015): a few points in the tails must not determine it."""
+"""Highest weights that are clipped before a fit (Koblents and Míguez, Stat. Comput. 25, 2015)."""
 
 _EM_STEPS = 3  # Expectation-maximisation steps between two rounds
 

@@ -42,24 +42,16 @@ from imubench_pipeline.estimators.whittle import COARSE, Behind, Maximum, Terms,
 _MAX_LOG_SHIFT = math.log(2.0)  # Maximum change of log f_c by a joint fit
 _SEARCH_HALF_WIDTHS = 6.0  # Range of the first search for a cut-off, in half widths of its interval
 _RELATIVE_TOLERANCE = 0.04  # Tolerance of a cut-off over the half width of its interval
-
-_MAX_DELTA_BIC = 6.0
-"""Maximum BIC above the best model at which a joint fit may make a model the best."""
-
-_MIN_AKAIKE_WEIGHT = 0.03
-"""Akaike weight from which a model is fitted jointly; lower than the one for intervals."""
-
+_MAX_DELTA_BIC = 6.0  # Above the best model, up to which a joint fit may change the order
+_MIN_AKAIKE_WEIGHT = 0.03  # From which a model is fitted jointly; less than for intervals
 _MIN_N_RATIO = 1e-6  # Minimum N over the density of the log, instead of 0
 
 _MIN_INTERVAL_WEIGHT = 0.05
-"""Akaike weight of a joint fit from which its limits enter the interval of the cut-off."""
+"""Akaike weight from which a joint fit enters the interval of the cut-off."""
 
 
 def select_joint_models(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
-    """Return the models that are fitted jointly with a cut-off, in the order of ``candidates``.
-
-    ``always`` is included in any case. The first candidate must be the best.
-    """
+    """Return the models that are fitted jointly with a cut-off, and the one of ``always``."""
     best = candidates[0]
     return [
         candidate
@@ -75,10 +67,9 @@ def refine_cutoff(
 ) -> Cutoff:
     """Return a low-pass whose cut-off is fitted together with all parameters of a model.
 
-    The model is the best by BIC after joint fits. N under the other models, and under other allowed
-    filters, is in ``models``. ``clear``, shape (b,), are the bins without lines and without
-    dominant leakage. The candidates are fits with the present cut-off, best first; ramps are
-    ignored.
+    The model is the best by BIC after joint fits; N under the others, and other allowed filters, is
+    in ``models``. ``clear``, shape (b,), are the bins to fit. The candidates are fits with the
+    present cut-off, best first; ramps are ignored.
     """
     if low_pass.kind is None or low_pass.behind is None or not candidates:
         return low_pass

@@ -41,9 +41,7 @@ _SCAN_TIMES = 160  # Number of correlation times of the scan before optimisation
 _ACTIVE_SETS = [list(chosen) for p in (1, 2, 3) for chosen in combinations(range(3), p)]
 """Sets of nonzero columns among N, B and K."""
 
-_RIDGE, _MIN_NORM = 1e-13, 1e-300
-"""Ridge for collinear columns of unit norm, and minimum norm of a column."""
-
+_RIDGE, _MIN_NORM = 1e-13, 1e-300  # For collinear columns, and of a column
 _MIN_VARIANCE_FRACTION = 1e-9  # A term below this fraction of the variance at every tau is absent
 
 
@@ -138,9 +136,8 @@ def _solved(
 def _find_first_unbent(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> int:
     """Return the smallest cluster size from which the curve follows a model of its longer tau.
 
-    The sensor's own low-pass filter, and coarse steps of its output, bend the curve at the
-    shortest tau, which weigh most in a fit. The bend fades as 1/n: the fit begins where it is
-    below the standard error of the curve.
+    Filter and coarse steps bend the curve at the shortest tau, which weigh most. The bend fades as
+    1/n: the fit begins where it is below the standard error of the curve.
     """
     n = curve.cluster_size
     error = np.sqrt(2.0 / curve.edf)
@@ -242,11 +239,7 @@ class _Search:
         return solution / size, float(residual)
 
     def _costs(self, shapes: Array) -> Array:
-        """Return the squared costs of `_solved` for processes of shapes (t, m), shape (t,).
-
-        All at once, in a fifth of the time: the best of the fits with some of the three columns
-        whose densities are all non-negative.
-        """
+        """Return the squared costs of `_solved` for shapes (t, m), over all active sets at once."""
         columns = np.empty((len(shapes), 3, len(self._tau)))
         columns[:, 0], columns[:, 1], columns[:, 2] = self._white, shapes, self._walk
         columns *= self._root_weight

@@ -253,10 +253,7 @@ def fit_spectrum(
     rng: np.random.Generator,
     stretch: WhiteStretch | None,
 ) -> Likelihood:
-    """Estimate the noise parameters from the selected bins of a spectrum (see `fit`).
-
-    ``stretch`` is the stretch of the Allan deviation with the slope -1/2.
-    """
+    """Estimate the noise parameters from the selected bins of a spectrum (see `fit`)."""
     if frame.used.sum() < MIN_BINS:
         return _too_short(spectrum, frame)
     frame, whittle, candidates = fit_models(spectrum, frame)
@@ -300,11 +297,7 @@ def fit_spectrum(
 
 
 class _InTheLog:
-    """Models that the log does not rule out, with N as its Allan deviation shows it.
-
-    This N is the density below any low-pass, and includes fast processes. ``posteriors`` are draws
-    of each model with that N; ``alike`` and ``wider`` are the arguments of `with_upper_limits`.
-    """
+    """Models that the log does not rule out, with N as its Allan deviation shows it."""
 
     def __init__(
         self,
@@ -424,10 +417,7 @@ def _explains(fitted: tuple[FitSelection, Whittle, list[Candidate]]) -> bool:
 
 
 def _with_one_more(terms: Terms, number: int = 0) -> list[Terms]:
-    """Return the models with a random walk, or a bias instability, that a model does not have.
-
-    ``number`` of its processes count into N, and are no bias instability.
-    """
+    """Return the models with one more walk or bias instability; ``number`` processes are none."""
     wider: list[Terms] = []
     terms = replace(terms, ramp=False, gauss_markov=terms.gauss_markov - number)
     if "K" not in terms.linear:

@@ -33,25 +33,12 @@ from imubench_pipeline.typing import Array
 _MAX_RELATIVE_ERROR = 0.5  # Relative standard error beyond which a parameter is not identified
 
 _MAX_RELATIVE_ERROR_TIME = 0.75
-"""Relative standard error of T_B beyond which B is not identified either.
+"""Beyond it B is not identified either: in white logs B often seems known, T_B in 1 of 200."""
 
-The best of many T_B fits the random undulations of any curve. In white logs B alone often has a
-relative standard error below 0.5, but T_B has one of 0.75 or less in fewer than 1 of 200 logs.
-"""
-
-_MAX_RELATIVE_ERROR_HELD = 0.25
-"""Maximum relative standard error of B with T_B fixed at its bound, and of N and K with B fixed.
-
-B^2 or K^2 is then two standard errors from 0.
-"""
-
-_CLIP_RELATIVE_ERROR = 10.0
-"""Upper bound of reported relative standard errors; larger ones would overflow in the limits."""
-
+_MAX_RELATIVE_ERROR_HELD = 0.25  # Of B with T_B fixed, and of N and K with B fixed
+_CLIP_RELATIVE_ERROR = 10.0  # Larger ones would overflow in the limits
 _LOG_TIME_STEP = 1e-3  # Step of log T_B in the finite difference
-
-_LOG_PARAMETER_STEP = 0.05
-"""Step of a log parameter in the finite differences of the lowest point of the curve."""
+_LOG_PARAMETER_STEP = 0.05  # Of the finite differences of the lowest point
 
 
 @dataclass(frozen=True)

@@ -33,24 +33,17 @@ from imubench_pipeline.typing import Array
 
 FALSE_ALARM_PROBABILITY = 0.005  # Probability that a line is detected in a channel without lines
 _MEDIAN_BINS = 129  # Bins of the median filter that corrects the model around a bin
-
-_MEDIAN_EFFICIENCY = 1.0 / (1.94 * 1.57)
-"""Independent bins per bin of the median of correlated neighbours."""
-
+_MEDIAN_EFFICIENCY = 1.0 / (1.94 * 1.57)  # Independent bins per bin of a median of correlated ones
 _MAX_FOUND = 1000  # Maximum number of lines of a spectrum; the cost of comparing them is quadratic
 _SKIPPED_BINS = 2
 _FIRST_BIN = 4
 _LINE_HALF_WIDTH = 3  # Bins on each side of a line that contain its power
 _MAX_SINUSOID_BINS = 8
 _WIDTH_LEVEL = 0.1  # Fraction of the highest excess at which the width of a line is measured
-
-_NEIGHBOUR_START, _NEIGHBOUR_END = 5, 20
-"""Distances, in bins, of the neighbourhood with which a sinusoid is compared."""
-
+_NEIGHBOUR_START, _NEIGHBOUR_END = 5, 20  # Bins from a sinusoid to its neighbourhood
 _MAX_NEIGHBOUR_CHANCE = 1e-4
 _MIN_AMPLITUDE_RATIO = 1.1
-_MAX_LINE_LEAKAGE = 0.3
-"""Maximum leakage of a line into a bin of the likelihood, in standard errors of the bin."""
+_MAX_LINE_LEAKAGE = 0.3  # Into a bin of the likelihood, in standard errors of the bin
 
 # Sums over the bins of a line of the squared correlations of Hann-windowed Fourier coefficients
 # (1, 2/3 and 1/6 at a distance of 0, 1 and 2 bins), without and with the distances as weights;
@@ -124,10 +117,7 @@ def find_lines(
 
 
 def _merge_spectra(lines: list[Line], new: list[Line]) -> list[Line]:
-    """Merge the lines of two spectra: a line near the crossover is in both, sharper in the first.
-
-    Of a strong line above the crossover the first spectrum has the skirt only.
-    """
+    """Merge the lines of two spectra; the first has only skirts of strong lines above its band."""
 
     def is_same(line: Line, other: Line) -> bool:
         wide = _LINE_HALF_WIDTH * line.resolution + 0.5 * other.width
@@ -280,11 +270,7 @@ def _is_above_neighbours(spectrum: LineSpectrum, peak: int) -> bool:
 
 
 def mask_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDArray[np.bool_]:
-    """Return a mask of the bins of a spectrum without leakage from lines.
-
-    ``density``, shape (b,), is the fit in each bin. Leakage falls as 1/f², so that a strong line
-    masks more bins than a weak one.
-    """
+    """Return the bins without leakage from lines, given the fitted density, shape (b,)."""
     clear = np.ones(len(spectrum.frequency), dtype=np.bool_)
     allowed = _MAX_LINE_LEAKAGE * density * np.minimum(np.sqrt(2.0 / spectrum.ordinates), 1.0)
     for line in lines:
@@ -298,10 +284,7 @@ def mask_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDA
 
 
 def select_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
-    """Return amplitude and frequency of the sinusoids of a noise model, sorted by frequency.
-
-    ``lines`` are all detected lines, sorted by frequency; bands of noise and aliases are excluded.
-    """
+    """Return amplitude and frequency of the sinusoids among detected lines, sorted by frequency."""
     narrow = [line for line in lines if line.narrow]
     single = _find_single_lines(narrow) if len(narrow) > MAX_LINES else narrow
     sinusoids = []
@@ -322,10 +305,7 @@ def _find_single_lines(lines: Sequence[Line]) -> list[Line]:
 
 
 def describe_grouping(channel: str, quantity: str, sinusoids: Sequence[Line]) -> Finding:
-    """Return the warning for a channel with more than `MAX_LINES` sinusoids.
-
-    The quantity is gyro or accel.
-    """
+    """Return the warning for a channel of gyro or accel with more than `MAX_LINES` sinusoids."""
     single = _find_single_lines(sinusoids)
     rest = math.fsum(0.5 * line.amplitude**2 for line in sinusoids if line not in single)
     share = rest / math.fsum(0.5 * line.amplitude**2 for line in sinusoids)

@@ -28,21 +28,13 @@ from imubench_pipeline.typing import Array
 Kind = Literal["analogue", "bilinear", "boxcar"]
 
 BOXCAR_CUTOFF_LENGTH = 0.442946  # Cut-off of a boxcar times its length, where sinc^2 is one half
-
-_FLICKER_ALIASES = 3
-"""Aliases of flicker noise on each side; the filter leaves little of the others."""
-
-_MIN_ALIASES = 2
-"""Aliases on each side that are summed, in addition to those up to four times the cut-off."""
-
+_FLICKER_ALIASES = 3  # On each side; the filter leaves little of the others
+_MIN_ALIASES = 2  # On each side, in addition to those up to four times the cut-off
 _GRID_SIZE = 512  # Frequencies of the numerical integral over G
 
 
 class Frequencies:
-    """Frequencies f up to Nyquist (Hz) of samples at a rate (Hz).
-
-    Functions of frequency that all filters share are cached.
-    """
+    """Frequencies f up to Nyquist (Hz) of samples at a rate (Hz), and cached functions of them."""
 
     def __init__(self, frequency: ArrayLike, rate: float) -> None:
         self.f = np.asarray(frequency, dtype=np.float64)
@@ -143,10 +135,7 @@ class Filter:
         return self._evaluate_power(at.f)
 
     def gains(self, at: Frequencies) -> tuple[Array, Array, Array]:
-        """Return the gains for white noise, G, for flicker noise, and for slow noise.
-
-        The gain for flicker noise is relative to unfiltered, sampled flicker noise with aliases.
-        """
+        """Return the gains for white noise, G, flicker noise with aliases, and slow noise."""
         if self.kind == "bilinear":
             same = self._evaluate_bilinear(at)
             return same, same, same
@@ -179,9 +168,8 @@ class Filter:
         """Return the spectral leakage of the DCT-II of filtered white noise, as a density.
 
         The even continuation of a smooth signal has discontinuous slopes at its ends. They add the
-        density (4 V T / n) cos^2(w/2) / (2 - 2 cos w)^2, V the variance of first differences. Near
-        Nyquist it exceeds the filtered noise. ``length`` is the duration of the transform at each
-        frequency, s.
+        density (4 V T / n) cos^2(w/2) / (2 - 2 cos w)^2, V the variance of first differences.
+        ``length`` is the duration of the transform at each frequency, s.
         """
         rate, grid = at.rate, _make_integration_grid(at.rate)
         variance = float(np.mean(self.white(grid) * grid.difference_gain)) * rate

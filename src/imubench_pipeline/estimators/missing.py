@@ -29,9 +29,7 @@ from imubench_pipeline.typing import Array
 
 BLOCK_SAMPLES = 64  # Samples whose mean is one measurement of the slow part
 _WINDOW_BLOCKS = 4096
-_MAX_GAP_BLOCKS = 1024
-"""Longest gap, in blocks; a longer one splits the log, because both sides are independent."""
-
+_MAX_GAP_BLOCKS = 1024  # A longer gap splits the log: both sides are independent
 _DIFFUSE_RATIO = 1e4
 
 
@@ -63,10 +61,7 @@ class SlowPath:
 
 
 def block_means(blocks: Iterable[Array], segments: Sequence[Span]) -> BlockMeans:
-    """Return the means of blocks of a log with missing samples (NaN), in one pass.
-
-    ``segments`` are first and one-past-last sample of each, in order.
-    """
+    """Return the means of blocks of a log with missing samples (NaN), in one pass."""
     begin = np.concatenate([np.arange(start, stop, BLOCK_SAMPLES) for start, stop in segments])
     ends = np.concatenate([np.full(-(-(b - a) // BLOCK_SAMPLES), b) for a, b in segments])
     end = np.minimum(begin + BLOCK_SAMPLES, ends)
@@ -86,7 +81,7 @@ def yield_present_samples(
 
     The parts are the log in order, NaN where a sample is missing; ``begin`` and ``end``, shape
     (b,), first and one-past-last sample of each block, rising. Samples outside the blocks are left
-    out. Yielded are the block of each sample, rising, and the samples, at least one.
+    out.
     """
     reached = 0
     for values in parts:
@@ -99,10 +94,7 @@ def yield_present_samples(
 
 
 def split_at_gaps(means: BlockMeans, segments: Sequence[Span]) -> tuple[Span, ...]:
-    """Divide the segments of `block_means` at gaps that are too long to fill, and trim their ends.
-
-    Each part goes from the beginning of a block to the end of one.
-    """
+    """Divide the segments of `block_means` at gaps that are too long to fill; trim their ends."""
     parts: list[Span] = []
     for start, stop in segments:
         chosen = means.within(start, stop)
@@ -123,10 +115,7 @@ def draw_slow_part(
     rate: float,
     rng: np.random.Generator,
 ) -> SlowPath:
-    """Draw the slow part of the noise, given the means of blocks in parts (`split_at_gaps`).
-
-    It is discontinuous between the parts.
-    """
+    """Draw the slow part of the noise, given the means of blocks in parts (`split_at_gaps`)."""
     interval = BLOCK_SAMPLES / rate
     white = max(model.N**2 * rate, 1e-300)
     places, values = [], []
@@ -169,10 +158,7 @@ def fill_missing(
     rate: float,
     rng: np.random.Generator,
 ) -> Iterator[Array]:
-    """Yield the blocks of a log with each missing sample (NaN) replaced by a draw.
-
-    The white noise of the model is added to the path.
-    """
+    """Yield the blocks of a log with missing samples (NaN) drawn: path plus white noise."""
     reached = 0
     for values in blocks:
         missing = np.flatnonzero(~np.isfinite(values))

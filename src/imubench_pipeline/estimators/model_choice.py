@@ -30,8 +30,7 @@ CANDIDATE_MODELS = (
 """Models that are always fitted. A ramp and quantization noise are then added to the best one; if
 BIC favours quantization noise, it is added to all of them."""
 
-WALK_LIKE_TIME_FRACTION = 1 / 10
-"""Fraction of the longest correlation time above which a process looks like a random walk."""
+WALK_LIKE_TIME_FRACTION = 1 / 10  # Of the longest T_B; a slower process looks like a walk
 
 BIC_PENALTY_UNIT_ROOT = 4.0
 """Added to the BIC of a model with such a process, or with a ramp, but without a random walk, which
@@ -66,11 +65,7 @@ class Candidate:
 
 
 def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
-    """Return all candidates, fitted and sorted by BIC, best first.
-
-    ``quantization`` adds models with quantization noise; the band must then reach frequencies at
-    which this noise is visible.
-    """
+    """Return all candidates, with quantization noise if it is visible, sorted by BIC."""
     bins = len(whittle.spectrum.density)
     tried: dict[Terms, Maximum] = {}
     bic = partial(_penalised_bic, bins=bins, longest=whittle.longest)
@@ -120,11 +115,7 @@ def _penalised_bic(maximum: Maximum, bins: int, longest: float) -> float:
 
 
 def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
-    """Return the candidates with updated scores, sorted by BIC.
-
-    ``gained`` is the gain of log likelihood of each model without a ramp; the model with a ramp
-    gains as much.
-    """
+    """Return the candidates, sorted by BIC, with gains of log likelihood without a ramp."""
     gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
     bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
     aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)

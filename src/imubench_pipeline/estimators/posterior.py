@@ -32,27 +32,18 @@ from imubench_pipeline.estimators.whittle_kernels import Problem, shape_at
 from imubench_pipeline.typing import Array
 
 MAX_DRAWS = 80_000  # Default number of draws; a tail of 2.5 % has 2,000 of them
-
-_DRAWS_PER_POINT = 6
-"""Target number of draws per independent point: limits of two seeds then agree within 3 %."""
-
-_MAX_DRAWS_PER_POINT = 80
-"""Maximum number of draws per independent point; above it, a chain is about as good."""
-
+_DRAWS_PER_POINT = 6  # Draws per independent point; limits of two seeds agree within 3 %
+_MAX_DRAWS_PER_POINT = 80  # Above it, a chain is about as good
 _MAX_ROUNDS = 4
-_GRID_SIZES = (0, 20, 9)
-"""Correlation times of the first mixture along each axis, for 0, 1 and 2 processes."""
-
+_GRID_SIZES = (0, 20, 9)  # T_B of the first mixture along each axis, for 0, 1 and 2 processes
 _COMPONENT_SIGMA = 0.7  # of its components in log T_B, in grid spacings
 _MAX_SIGMA = 2.0  # standard deviation in log T_B about the best fit
 _MIN_BEST_FIT_WEIGHT = 0.3
 _NEGLIGIBLE_WEIGHT, _MIN_WEIGHT = 1e-6, 5e-3
-_WEAK_TERM_ERROR = 0.15
-"""Relative standard deviation of a squared amplitude above which it may be near 0."""
+_WEAK_TERM_ERROR = 0.15  # Relative SD of a squared amplitude above which it may be near 0
 
 _WEAK_AMPLITUDE, _WEAK_LOG_SIGMA = 0.7, 0.8
-"""Asinh of the amplitude over its unit, and standard deviation of its logarithm, in components for
-a term near 0."""
+"""Asinh of an amplitude near 0 over its unit, and standard deviation of its logarithm."""
 
 _MIN_WEAK_WEIGHT = 0.03
 _RIDGE = 1e-4  # Ridge on the information matrix, against collinear terms
@@ -74,10 +65,7 @@ class Posterior:
 def sample(
     whittle: Whittle, maximum: Maximum, rng: np.random.Generator, draws: int = MAX_DRAWS
 ) -> Posterior:
-    """Draw from the posterior of a model around its best fit.
-
-    Terms that are 0 in the best fit are drawn too.
-    """
+    """Draw from the posterior of a model around its best fit, also terms that are 0 there."""
     target = _Target(whittle, maximum)
     wanted = draws / _DRAWS_PER_POINT
     size = 1 << max(9, math.ceil(math.log2(wanted)))
@@ -96,11 +84,7 @@ def sample(
 
 
 class _Target:
-    """The posterior of a model, in coordinates in which it is nearly normal.
-
-    They are log T_B, and z with amplitude = unit sinh z > 0: linear near amplitude 0, and
-    logarithmic where it is well known.
-    """
+    """The posterior in log T_B and z, amplitude = unit sinh z, in which it is nearly normal."""
 
     def __init__(self, whittle: Whittle, maximum: Maximum) -> None:
         terms = maximum.terms

@@ -37,10 +37,7 @@ def _ramp_at(bins: Bins, model: Array) -> tuple[float, float]:
 def log_posterior(
     point: Array, problem: Problem, model: Array, shape: Array
 ) -> tuple[float, float, float]:
-    """Return the logarithm of the posterior at a point, the best R there and its information.
-
-    ``model`` and ``shape`` are working memory, shape (b,).
-    """
+    """Return the log posterior at a point, the best R and its information; model is set."""
     fixed, bins, with_ramp, table = problem
     b, linear = fixed.shape
     processes = (point.size - linear) // 2
@@ -129,10 +126,7 @@ def _climb(
     curvature: Array,
     parts: Array,
 ) -> float:
-    """Take a step, or a part of it, to no lower posterior than ``best``; prepare the next.
-
-    Return the logarithm of the posterior there; NaN, and nothing is set, if there is no such part.
-    """
+    """Take a step, or a part of it, to no lower a log posterior; return it, or NaN if none."""
     nu, density, cross, ramp = bins
     b, p = columns.shape
     proposal, powers = np.empty(p), np.empty(p)
@@ -225,11 +219,7 @@ def _walk(
     points: Array,
     problem: Problem,
 ) -> tuple[int, float]:
-    """Accept or reject one proposal after the other, and set the points.
-
-    ``current`` is the logarithm of the posterior at ``x``. Return the number accepted, and its last
-    value.
-    """
+    """Accept or reject proposals; return the number accepted and the log posterior."""
     n, d = normals.shape
     model, shape = np.empty(problem.bins.nu.size), np.empty(problem.bins.nu.size)
     away, proposal = np.empty(d), np.empty(d)

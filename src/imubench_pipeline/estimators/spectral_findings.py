@@ -15,12 +15,8 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-_MIN_SINUSOID_RATIO = 0.5
-"""Ratio of the integrals of a sinusoid and of white noise after 1 s, above which it is reported."""
-
-_MAX_SLOW_FREQUENCY = 0.05
-"""Frequency over sampling rate up to which the test for missing slow noise extends."""
-
+_MIN_SINUSOID_RATIO = 0.5  # Integral of a sinusoid over that of white noise after 1 s
+_MAX_SLOW_FREQUENCY = 0.05  # Over the rate, of the test for missing slow noise
 _MIN_FLAT_RATIO = 0.95  # Minimum fitted density over N^2, below the effect of a low-pass filter
 _MIN_ORDINATES = 4.0
 _MAX_DENSITY_RATIO = 0.7  # Density over N^2 below which slow noise is missing
@@ -29,10 +25,7 @@ _SPACING_RATIO = 1.4  # Ratio of the numbers of ordinates in successive sums
 
 
 def spectral_findings(channel: str, frame: FitSelection, white: float | None) -> list[Finding]:
-    """Return the findings on the spectrum of a channel: its lines, and the limit of its band.
-
-    ``frame`` is the part of the spectrum that was fitted, ``white`` N, SI, or None if unknown.
-    """
+    """Return the findings on the lines and the band of a channel; ``white`` is N, SI, if known."""
     band = frame.band
     findings = line_findings(channel, frame.lines, white)
     if band.source.startswith(("found: beyond", "default")):
@@ -42,11 +35,7 @@ def spectral_findings(channel: str, frame: FitSelection, white: float | None) ->
 
 
 def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> list[Finding]:
-    """Return a note on a channel with lines.
-
-    A warning is added if there are too many lines for the noise model, and if a line contributes
-    much to an error budget, relative to N: the sensor itself seldom causes such a line.
-    """
+    """Return a note on lines, and warnings if they are too many, or strong relative to N."""
     group = [line for line in lines if line.kind != "alias"]
     if not group:
         return []

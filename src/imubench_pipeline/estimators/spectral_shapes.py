@@ -16,9 +16,7 @@ from imubench_pipeline.noise.terms import driving_density
 from imubench_pipeline.typing import Array
 
 _POINTS_PER_BIN = 6  # Frequencies per bin at which a density is evaluated
-
-_MAX_BLOCK_OVER_TIME = 1e-3
-"""Block duration over T_B below which a Gauss-Markov process looks like a random walk."""
+_MAX_BLOCK_OVER_TIME = 1e-3  # Below this block duration over T_B, a process looks like a walk
 
 
 class Shapes:

@@ -137,11 +137,7 @@ def block_of(segments: Sequence[Span]) -> int:
 def _sum_segments(
     blocks: Iterable[Array], spans: Sequence[Span], segment: int, block: int
 ) -> tuple[float, list[Array], Array, Array, int]:
-    """Return a level, the block means of each part less it, and sums over segments.
-
-    Summed are the squared coefficients of the DCT-II and the Hann-windowed power; the last is the
-    number of segments.
-    """
+    """Return a level, block means less it, summed DCT-II and Hann power, their number."""
     window = _hann(segment)
     rests: list[Array] = [np.empty(0) for _ in spans]
     means: list[list[Array]] = [[] for _ in spans]

@@ -25,16 +25,11 @@ from imubench_pipeline.noise.terms import driving_density
 from imubench_pipeline.typing import Array
 
 MIN_DECADES = 0.7  # Length of a stretch
-
-MIN_CLUSTER = 3
-"""Samples in the first cluster of a stretch: fewer show the register and the sensor's filter."""
-
-MAX_ERROR = 0.03
-"""Relative standard error of the deviation up to which a point belongs to a stretch."""
+MIN_CLUSTER = 3  # Samples; fewer show the register and the sensor's filter
+MAX_ERROR = 0.03  # Relative standard error of the deviation within a stretch
 
 FLAT_WITHIN, MAX_FLAT_WITHIN = 0.03, 0.06
-"""Largest relative distance of a point from the median of its stretch: the first, or two standard
-errors up to the second."""
+"""Maximum distance of a point from the median: the first, or two standard errors up to the second."""
 
 
 @dataclass(frozen=True)
@@ -88,10 +83,7 @@ def count_fast_processes(maximum: Maximum, folding: float, stretch: WhiteStretch
 
 
 def merged_maximum(maximum: Maximum, number: int, folding: float, level: float = 1.0) -> Maximum:
-    """Return a fit whose ``number`` fastest processes are part of its white noise.
-
-    N is multiplied by ``level``: the curve may not have reached the sum of all densities yet.
-    """
+    """Return a fit whose ``number`` fastest processes are white noise; N is multiplied by ``level``."""
     if (number, level) == (0, 1.0):
         return maximum
     linear, powers = len(maximum.terms.linear), maximum.powers.copy()
@@ -132,10 +124,7 @@ def merged_posterior(
 
 
 def describe_white_level(stretch: WhiteStretch | None, times: Sequence[float]) -> str | None:
-    """Return a description of N where it is not the white noise of the model on a stretch.
-
-    ``times`` are the correlation times of the processes that count into it, s.
-    """
+    """Return a description of an N with processes of correlation times, s, or without a stretch."""
     if stretch is None:
         return (
             "the Allan deviation has no -1/2 stretch of 0.7 decade: N is the white noise of the "

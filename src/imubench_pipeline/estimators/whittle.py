@@ -152,10 +152,7 @@ class Whittle:
         return other
 
     def with_column(self, letter: str, shape: Array) -> Whittle:
-        """Return the likelihood with another density for a linear term, Q, N, F or K.
-
-        ``shape``, (b,), is the density for a parameter of 1.
-        """
+        """Return the likelihood with another density, shape (b,), for Q, N, F or K of 1."""
         _ = self.table  # made once for both
         other = copy.copy(self)
         other.columns = self.columns | {letter: shape}
@@ -363,11 +360,7 @@ def _fit_one_process(problem: Problem) -> Array:
 
 
 def _fit_two_processes(problem: Problem) -> Array:
-    """Polish the best pair of a coarse grid and the best single process with another beside it.
-
-    A strong process has a sharp correlation time, beside which no pair of a coarse grid shows that
-    it needs another. A first turn tells which of them leads lowest.
-    """
+    """Polish the best pair of a coarse grid, and the best process with another one."""
     begun = [_descend(pair, cost, problem, turns=1) for pair, cost in _pairs(problem)]
     pair, cost = min(begun, key=lambda one: one[1])
     return _descend(pair, cost, problem, turns=_MAX_TURNS)[0]

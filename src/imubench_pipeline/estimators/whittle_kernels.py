@@ -29,10 +29,7 @@ class Bins(NamedTuple):
 
 
 class ShapeTable(NamedTuple):
-    """Logarithms of the density of a Gauss-Markov process, shape (t, b).
-
-    The logarithms of the correlation times (s) begin at ``first`` and are ``step`` apart.
-    """
+    """Logarithms of process densities, shape (t, b), at log T_B (s) from ``first`` by ``step``."""
 
     first: float
     step: float
@@ -111,10 +108,7 @@ def _solved(gram: Array, target: Array, free: NDArray[np.bool_]) -> Array:
 
 @njit(cache=True)
 def _non_negative(gram: Array, target: Array, guess: Array) -> Array:
-    """Minimise x' gram x / 2 - target' x over x >= 0 (Lawson and Hanson's active sets).
-
-    ``guess`` is positive where x probably is.
-    """
+    """Minimise x' gram x / 2 - target' x over x >= 0 (active sets of Lawson and Hanson)."""
     p = target.size
     free = np.empty(p, dtype=np.bool_)
     made = np.empty(p)  # gram x
