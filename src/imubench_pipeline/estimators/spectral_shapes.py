@@ -42,14 +42,9 @@ class Shapes:
             2.0 * spectrum.frequency[self._single] * spectrum.length[self._single]
         )
 
-    @property
-    def bins(self) -> int:
-        """Number of bins."""
-        return len(self._length)
-
     def white(self) -> Array:
         """Return the density of N = 1: 1 in every bin."""
-        return np.ones(self.bins)
+        return np.ones(len(self._length))
 
     def quantization(self) -> Array:
         """Return the density of Q = 1: (2 - 2 cos(omega)) / (m T)."""

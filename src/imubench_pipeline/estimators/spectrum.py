@@ -66,8 +66,6 @@ class LineSpectrum:
     frequency: Array  # (f,): Hz, equally spaced
     density: Array  # (f,): two-sided, (rad/s)²/Hz or (m/s²)²/Hz
     segments: int  # averaged
-    points: int  # samples, or block means, in a segment
-    interval: float  # between them, s
     block: int  # samples in a block
 
 
@@ -116,7 +114,7 @@ def spectra(
     if block > 1:
         low = tuple(column[2.0 * np.pi * low[0] * interval <= BLOCK_BAND] for column in low)
         frequency = np.arange(len(hann)) * rate / segment
-        lines.append(LineSpectrum(frequency, hann / number / rate, number, segment, 1.0 / rate, 1))
+        lines.append(LineSpectrum(frequency, hann / number / rate, number, 1))
     bins = [_binned(low, block)]
     if block > 1:
         bins.append(_high_bins(squares, number, rate, float(bins[0]["upper"][-1])))
@@ -277,14 +275,8 @@ def _lines_of_means(series: Sequence[Array], interval: float, block: int) -> Lin
     power = np.zeros(points // 2 + 1)
     for values in series:
         power += _hann_power(values[: len(values) // points * points].reshape(-1, points), window)
-    return LineSpectrum(
-        np.arange(points // 2 + 1) / (points * interval),
-        power / number * interval,
-        number,
-        points,
-        interval,
-        block,
-    )
+    frequency = np.arange(points // 2 + 1) / (points * interval)
+    return LineSpectrum(frequency, power / number * interval, number, block)
 
 
 def _hann(points: int) -> Array:

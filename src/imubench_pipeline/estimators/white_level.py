@@ -29,7 +29,7 @@ MIN_CLUSTER = 3  # Samples; fewer show the register and the sensor's filter
 MAX_ERROR = 0.03  # Relative standard error of the deviation within a stretch
 
 FLAT_WITHIN, MAX_FLAT_WITHIN = 0.03, 0.06
-"""Maximum distance of a point from the median: the first, or two standard errors up to the second."""
+"""Maximum distance from the median: the first, or two standard errors up to the second."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def count_fast_processes(maximum: Maximum, folding: float, stretch: WhiteStretch
 
 
 def merged_maximum(maximum: Maximum, number: int, folding: float, level: float = 1.0) -> Maximum:
-    """Return a fit whose ``number`` fastest processes are white noise; N is multiplied by ``level``."""
+    """Return a fit whose ``number`` fastest processes are white noise, N times ``level``."""
     if (number, level) == (0, 1.0):
         return maximum
     linear, powers = len(maximum.terms.linear), maximum.powers.copy()

@@ -265,11 +265,6 @@ class Whittle:
         full[-1, bins:] = np.sqrt(self._nu * self.spectrum.ramp / total)
         return full
 
-    def information(self, maximum: Maximum) -> Array:
-        """Return the Fisher information of (log of each parameter ..., log T_B ..., R)."""
-        sensitivity = self.sensitivity(maximum)
-        return np.asarray(sensitivity @ sensitivity.T)
-
 
 def whittle_of(
     spectrum: Spectrum,
