@@ -59,7 +59,8 @@ def with_fitted_limits(
 
     degrees = degrees_at(model, np.ones(len(curve.tau), dtype=np.bool_))
     upper = degrees.upper
-    most_walk = likelihood.estimates[0].parameters["K"].upper
+    walk = likelihood.estimates[0].parameters.get("K")
+    most_walk = walk.upper if walk is not None else None
     few = curve.cluster_size * _MIN_CLUSTERS > curve.samples
     if most_walk is not None and most_walk > model.K and few.any():
         walking = replace(model, K=(model.K + most_walk) / 2.0)

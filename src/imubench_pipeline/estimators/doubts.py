@@ -55,9 +55,21 @@ def add_doubts(
     if other is not None:
         estimate = cast_doubt(estimate, ("B", "T_B"), other, of_curve=False)
     for name in ("Q", "R"):
-        needless = _doubt_rare_term(name, chosen, candidates)
-        if needless is not None:
-            estimate = cast_doubt(estimate, (name,), needless)
+        # The model without it may be hardly worse.
+        terms = chosen.terms
+        linear, ramp = terms.linear.replace(name, ""), terms.ramp and name != "R"
+        without = replace(terms, linear=linear, ramp=ramp)
+        plain = next((c for c in candidates if c.terms == without), None)
+        if (
+            without != terms
+            and plain is not None
+            and plain.bic <= chosen.bic + _DELTA_BIC_RARE_TERM
+        ):
+            worse = f"{plain.bic - chosen.bic:.1f} in BIC"
+            reason = (
+                f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
+            )
+            estimate = cast_doubt(estimate, (name,), reason)
     estimate = _equate_bias_statuses(estimate)
     against = papers_candidate.bic - chosen.bic
     if against > _DELTA_BIC_AGAINST_PAPERS:
@@ -117,17 +129,6 @@ def _doubt_bias(chosen: Candidate, candidates: Sequence[Candidate]) -> str | Non
         return None
     name = other.terms.name
     return f"{name}, with other terms of bias instability, is better by {better:.1f} in AIC"
-
-
-def _doubt_rare_term(name: str, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Return a reason if the model without quantization noise (Q) or ramp (R) is hardly worse."""
-    terms = chosen.terms
-    without = replace(terms, linear=terms.linear.replace(name, ""), ramp=terms.ramp and name != "R")
-    other = next((candidate for candidate in candidates if candidate.terms == without), None)
-    if without == terms or other is None or other.bic > chosen.bic + _DELTA_BIC_RARE_TERM:
-        return None
-    worse = f"{other.bic - chosen.bic:.1f} in BIC"
-    return f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
 
 
 def _equate_bias_statuses(estimate: Estimate) -> Estimate:

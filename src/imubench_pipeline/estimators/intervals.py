@@ -102,7 +102,18 @@ def describe(
         # prefers a process as slow as a walk to the walk.
         own = [(_draws_of(name, chosen.terms, draws), 1.0)]
         lower, upper = mixture_limits(_over_models(name, chosen, alike, draws), own)
-        described[name] = _parameter(name, float(value), lower, upper, needed[i], whittle)
+        if value == 0.0:
+            described[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
+            continue
+        # At the end of a search, or where draws are few, the best value lies at the edge.
+        limits = min(lower, float(value)), max(upper, float(value))
+        described[name] = Parameter(float(value), "ok", None, *limits, needed[i])
+        longest, shortest = whittle.longest, whittle.shortest
+        at_longest, at_shortest = value > longest * _AT_BOUND, value < shortest / _AT_BOUND
+        if name.startswith("T_B") and (at_longest or at_shortest):
+            end, bound = ("longest", longest) if at_longest else ("shortest", shortest)
+            reason = f"the {end} correlation time that the log can show is {bound:.4g} s"
+            described[name] = replace(described[name], status="at_bound", reason=reason)
     if "K" in described and described["K"].checked().status == "ok":
         weighted_draws = _over_models("K", chosen, alike, draws)
         if len(weighted_draws) > 1:
@@ -110,9 +121,8 @@ def describe(
             described["K"] = replace(described["K"], value=median)
     for number in ("", " 2"):
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
-            described[f"T_B{number}"] = replace(
-                described[f"B{number}"], lower=None, upper=None, duration_needed=None
-            )
+            bias = described[f"B{number}"]
+            described[f"T_B{number}"] = replace(bias, lower=None, upper=None, duration_needed=None)
     absent = Parameter(None, "absent", _ABSENT)
     parameters = {name: described.get(name, absent) for name in FAMILY}
     if "B" in described and "T_B" not in described:
@@ -122,23 +132,6 @@ def describe(
     second = "B 2" in described
     further = [{"B": described["B 2"], "T_B": described["T_B 2"]}] if second else []
     return Estimate(method, parameters, further)
-
-
-def _parameter(
-    name: str, value: float, lower: float, upper: float, needed: float | None, whittle: Whittle
-) -> Parameter:
-    """Return a parameter with its interval, absent if it is 0, or at a bound of its search."""
-    if value == 0.0:
-        return Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
-    # At the end of a search, or where draws are few, the best value lies at the edge.
-    lower, upper = min(lower, value), max(upper, value)
-    if name.startswith("T_B"):
-        for bound, end in ((whittle.longest, "longest"), (whittle.shortest, "shortest")):
-            near = value > bound * _AT_BOUND if end == "longest" else value < bound / _AT_BOUND
-            if near:
-                reason = f"the {end} correlation time that the log can show is {bound:.4g} s"
-                return Parameter(value, "at_bound", reason, lower, upper, needed)
-    return Parameter(value, "ok", None, lower, upper, needed)
 
 
 def _over_models(

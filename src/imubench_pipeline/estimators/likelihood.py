@@ -204,14 +204,12 @@ def fit_blocks(
     ----------
     blocks : callable
         Returns the log in order, in SI, at every call; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
-    rate, segments, band, bandwidth, resolution, rng
-        As in `fit`.
-    holes : bool
-        Samples may be missing.
+    samples, holes : int, bool
+        L, the length of all blocks together; whether samples may be missing.
     stretch : WhiteStretch or None
         The stretch of the Allan deviation with the slope -1/2, whose white noise is N.
+    rate, segments, band, bandwidth, resolution, rng
+        As in `fit`.
     """
     spans = spans_of(segments, samples)
     select = partial(select_for_fit, band=band, bandwidth=bandwidth, resolution=resolution)
