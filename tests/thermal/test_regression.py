@@ -8,13 +8,12 @@ from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged
-from imubench_pipeline.estimators.thermal.path_errors import compute_path_errors
-from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
-from imubench_pipeline.estimators.thermal.regression import Regressors
+from imubench_pipeline.estimators.thermal.regression import BlockSeries, Coefficients, Regressors
 from imubench_pipeline.estimators.thermal.uncertainty import (
     _compute_explained_fraction,
     assess_fit,
     compute_mean_error,
+    compute_path_errors,
     lag_parameter,
     weigh_models,
 )
