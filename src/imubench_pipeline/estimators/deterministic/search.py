@@ -1,20 +1,14 @@
 """Search for deterministic signals: forward selection by likelihood ratios, then elimination.
 
-Noise and signals compete. A step increases the fitted random walk, and noise fitted to a signal
+Noise and signals compete: a step increases the fitted random walk, and noise fitted to a signal
 hides it. Signals are therefore searched above the noise as fitted, and slow signals also above the
 noise as extrapolated from higher frequencies. A candidate above its threshold is tested by the
-likelihood ratio of the models with and without it, the noise refitted. A signal that a random walk
-hides completely is found by replacing the walk. If it is not significantly better than the walk, it
-is not removed from the log, but reported as the walk's rival.
+likelihood ratio of the models with and without it, the noise refitted.
 
-A walk and a signal both model a rise of the spectrum towards low frequencies. The test compares
-noise without a walk plus the signal with noise including the walk. A signal that needs a walk in
-addition is no evidence against the walk. The gain of the signal includes the choice of its kind,
-place, time constant or period; it must come near the threshold, which allows for this choice. The
-single parameter of the walk is not searched for, and is not penalised.
-
-A sensor that restarted at the pauses of a log has another bias after each pause. The places of
-these steps are known, so the threshold depends on their number only.
+A signal that a random walk hides completely is found by comparing noise without a walk plus the
+signal with noise including the walk. If it is not significantly better, it is not removed from the
+log, but reported as the walk's rival. The places of steps at the pauses of a log are known, so
+their threshold depends on their number only.
 """
 
 from __future__ import annotations
@@ -37,12 +31,8 @@ from imubench_pipeline.estimators.deterministic.scores import (
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.typing import Array
 
-_HELD_OUT_ORDINATES = 16
-"""Lowest ordinates to which the noise is extrapolated instead of fitted."""
-
-_MAX_PAUSE_DISTANCE = 2.0
-"""Distance, in blocks, from a pause within which a step may belong to it."""
-
+_HELD_OUT_ORDINATES = 16  # lowest ordinates to which the noise is extrapolated instead of fitted
+_MAX_PAUSE_DISTANCE = 2.0  # distance, in blocks, from a pause within which a step may belong to it
 _REFIT_MARGIN = 6.0
 """A candidate is tested with refitted noise if its gain is at most this below the threshold."""
 
@@ -74,9 +64,7 @@ _DELTA_AIC_STEPS = 0.5
 
 _TERMS_WITHOUT_WALK = Terms("NF", NOISE_TERMS.gauss_markov)
 
-MAX_REGRESSORS = 16
-"""Maximum number of regressors; a log with more steps has telegraph noise."""
-
+MAX_REGRESSORS = 16  # maximum number of regressors; a log with more steps has telegraph noise
 _MIN_KEPT_GAIN: dict[Kind, float] = {
     "step": 16.0,
     "restart": 4.0,  # its place is known
@@ -94,9 +82,12 @@ _CERTAIN_GAIN_FACTOR = 3.0
 def find_candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
     """Return candidates to add to a fit, each with the noise density that it was detected in."""
     scores: dict[Regressor, tuple[Score, Array]] = {}
-    pauses = list_restarts(ordinates)
-    for seen in find_best_scores(ordinates, fit, fit.density):
-        score = _move_to_pause(seen, pauses, fit)
+    pauses = [x for x in list_restarts(ordinates) if x not in fit.regressors]
+    for score in find_best_scores(ordinates, fit, fit.density):
+        if score.regressor.kind == "step":
+            # A step in a pause is a restart there: the means across the pause are interpolated.
+            restarts = (x for x in pauses if is_at_pause(score.regressor, x))
+            score = replace(score, regressor=next(restarts, score.regressor))
         slow = score.regressor.kind in _SLOW_KINDS
         if score.gain > (_MIN_SLOW_GAIN if slow else score.threshold - _REFIT_MARGIN):
             scores[score.regressor] = score, fit.density
@@ -122,15 +113,6 @@ def is_at_pause(regressor: Regressor, pause: Regressor) -> bool:
     return regressor.part == pause.part and near
 
 
-def _move_to_pause(score: Score, pauses: Sequence[Regressor], fit: Fit) -> Score:
-    """Replace a step in a pause by a restart there: the means across the pause are interpolated."""
-    if score.regressor.kind == "step":
-        for pause in pauses:
-            if pause not in fit.regressors and is_at_pause(score.regressor, pause):
-                return replace(score, regressor=pause)
-    return score
-
-
 def fit_with_candidate(
     ordinates: Ordinates, fit: Fit, score: Score, density: Array
 ) -> tuple[Fit, float]:
@@ -145,17 +127,25 @@ def fit_with_candidate(
     tried = ordinates.fit(regressors, fit.density, fit.noise.terms)
     gain = 2.0 * (tried.log_likelihood - fit.log_likelihood)
     if score.regressor.kind == "sinusoid":
-        gain /= _measure_level_beside(ordinates, tried, regressors[-1])
+        # An oscillating noise process is a broad peak of the spectrum, not a sinusoid: divide by
+        # the mean power of the neighbouring ordinates over that of the model, if above 1.
+        sinusoid = regressors[-1]
+        of_part = ordinates.part(sinusoid.part)
+        ratio = tried.residual[of_part] ** 2 * ordinates.weights(tried.density)[of_part]
+        centre = 2.0 * sinusoid.where * ordinates.sizes[sinusoid.part]
+        away = np.abs(np.arange(1, len(ratio) + 1) - centre)
+        beside = ratio[(away >= _NEIGHBOUR_ORDINATES[0]) & (away <= _NEIGHBOUR_ORDINATES[1])]
+        if len(beside):
+            # Allow for two standard errors of the mean of so many chi-squared ordinates.
+            error = float(np.sqrt(2.0 / len(beside)))
+            gain /= max(float(beside.mean()) - 2.0 * error, 1.0)
     return tried, gain
 
 
 def polish(
     ordinates: Ordinates, regressors: Sequence[Regressor], which: int, density: Array
 ) -> tuple[Regressor, ...]:
-    """Optimise the place, time constant or frequency of one regressor.
-
-    ``density``, shape (k,), is the density of the noise, SI²/Hz.
-    """
+    """Optimise the place, time constant or frequency of one regressor, in given noise."""
     best = regressors[which]
     if best.kind in ("ramp", "pulse", "restart"):
         return tuple(regressors)
@@ -177,22 +167,6 @@ def polish(
 def leave_out(regressors: Sequence[Regressor], left_out: int) -> tuple[Regressor, ...]:
     """Return all regressors but one."""
     return tuple(x for i, x in enumerate(regressors) if i != left_out)
-
-
-def _measure_level_beside(ordinates: Ordinates, fit: Fit, sinusoid: Regressor) -> float:
-    """Return the mean power of the ordinates beside a sinusoid over that of the model, at least 1.
-
-    An oscillating noise process is a broad peak of the spectrum, not a sinusoid.
-    """
-    of_part = ordinates.part(sinusoid.part)
-    ratio = fit.residual[of_part] ** 2 * ordinates.weights(fit.density)[of_part]
-    centre = 2.0 * sinusoid.where * ordinates.sizes[sinusoid.part]
-    away = np.abs(np.arange(1, len(ratio) + 1) - centre)
-    beside = ratio[(away >= _NEIGHBOUR_ORDINATES[0]) & (away <= _NEIGHBOUR_ORDINATES[1])]
-    if not len(beside):
-        return 1.0
-    # Allow for two standard errors of the mean of so many chi-squared ordinates.
-    return max(float(beside.mean()) - 2.0 * float(np.sqrt(2.0 / len(beside))), 1.0)
 
 
 @dataclass(frozen=True)
@@ -275,8 +249,7 @@ class SearchResult:
 
 def search(ordinates: Ordinates) -> SearchResult:
     """Find the deterministic signals that noise does not explain."""
-    without = ordinates.fit(())
-    fit = without
+    fit = without = ordinates.fit(())
     rival: Rival | None = None
     while len(fit.regressors) < MAX_REGRESSORS:
         extended = _extend_fit(ordinates, fit)
@@ -294,7 +267,10 @@ def search(ordinates: Ordinates) -> SearchResult:
     if len(fit.regressors) >= MAX_REGRESSORS:
         return SearchResult(fit, without, (), True)
     if len(fit.regressors) > 1:
-        fit = _polish_all(ordinates, fit)
+        moved = fit.regressors
+        for which in range(len(moved)):
+            moved = polish(ordinates, moved, which, fit.density)
+        fit = ordinates.fit(moved, fit.density)
     fit, gains = _eliminate(ordinates, fit)
     alike = rival if rival is not None and rival.as_good else None
     return SearchResult(fit, without, gains, False, alike)
@@ -321,14 +297,6 @@ def _extend_fit(ordinates: Ordinates, fit: Fit) -> Fit | None:
         return None
     moved = polish(ordinates, best.regressors, len(best.regressors) - 1, best.density)
     return ordinates.fit(moved, best.density)
-
-
-def _polish_all(ordinates: Ordinates, fit: Fit) -> Fit:
-    """Optimise each regressor in turn, given all others."""
-    moved = fit.regressors
-    for which in range(len(moved)):
-        moved = polish(ordinates, moved, which, fit.density)
-    return ordinates.fit(moved, fit.density)
 
 
 def _eliminate(ordinates: Ordinates, fit: Fit) -> tuple[Fit, tuple[float, ...]]:
