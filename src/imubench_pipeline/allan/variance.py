@@ -275,8 +275,7 @@ def of_blocks(
         See `allan_variance`.
     """
     spans = spans_of(segments, samples)
-    wanted = _check_arguments(rate, sizes, samples, spans)
-    wanted = octave_sizes(wanted)
+    wanted = octave_sizes(_check_arguments(rate, sizes, samples, spans))
     if samples < MIN_DECIMATED_SAMPLES:
         phase = integrate(blocks, samples, holes=holes, segments=spans)
         return of_phase(phase, rate, wanted, gaps=gaps, threads=threads)
@@ -364,43 +363,31 @@ def _make_curve(
     shown = sums[2] > 0
     n = sizes[shown]
     total, thinned, terms, possible = (column[shown] for column in sums)
-    exponent = np.array(_find_exponents(edges, n), dtype=np.int64)
-    edf = np.array(
-        [
-            _sum_degrees(segments, int(alpha), int(size)) * done / most
-            for alpha, size, done, most in zip(exponent, n, terms, possible, strict=True)
-        ]
-    )
-    return AllanCurve(
-        tau=n / rate,
-        cluster_size=n,
-        variance=total / (2.0 * terms),
-        edf=np.maximum(edf, 1.0),
-        exponent=exponent,
-        samples=samples,
-        averaged=terms / thinned,
-        share=terms / possible,
-    )
-
-
-def _find_exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
-    """Return the noise type at each size; with too few clusters, the type of the size before.
-
-    With few clusters white noise often looks blue. A bluer type than before is then not accepted.
-    """
     exponents: list[int] = []
-    for n in sizes:
-        theta, present, size = edges(int(n))
-        exponent = noise_exponent(theta, present, size)
-        before = exponents[-1] if exponents else 0
+    degrees: list[float] = []
+    before = 0
+    for size in n.tolist():
+        # With few clusters white noise often looks blue: a bluer type than at the size before is
+        # then not accepted. With too few, the type of the size before is taken.
+        theta, present, actual = edges(size)
+        exponent = noise_exponent(theta, present, actual)
         if exponent is None:
             exponent = before
         elif len(theta) <= _MAX_UNCERTAIN_CLUSTERS:
             exponent = min(exponent, max(before, 0))
+        before = exponent
         exponents.append(exponent)
-    return exponents
-
-
-def _sum_degrees(segments: Sequence[Span], exponent: int, n: int) -> float:
-    terms = [stop - start - 2 * n + 1 for start, stop in segments]
-    return sum(equivalent_degrees(exponent, n, term) for term in terms if term > 0)
+        counts = [stop - start - 2 * size + 1 for start, stop in segments]
+        degrees.append(
+            sum(equivalent_degrees(exponent, size, count) for count in counts if count > 0)
+        )
+    return AllanCurve(
+        tau=n / rate,
+        cluster_size=n,
+        variance=total / (2.0 * terms),
+        edf=np.maximum(np.array(degrees) * terms / possible, 1.0),
+        exponent=np.array(exponents, dtype=np.int64),
+        samples=samples,
+        averaged=terms / thinned,
+        share=terms / possible,
+    )

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve
-from imubench_pipeline.allan.phase import Span
-from imubench_pipeline.allan.presence import Presence
+from imubench_pipeline.allan.phase import Presence, Span
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.whittle import model_of
 from imubench_pipeline.noise import NoiseModel

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import Span, spans_of
-from imubench_pipeline.allan.presence import Presence
-from imubench_pipeline.allan.quadratic_forms import tail_degrees, variance_degrees
+from imubench_pipeline.allan.confidence import tail_degrees, variance_degrees
+from imubench_pipeline.allan.phase import Presence, Span, spans_of
 from imubench_pipeline.noise.model import NoiseModel
 from imubench_pipeline.noise.terms import Deterministic, Quantization
 from imubench_pipeline.typing import Array
