@@ -33,12 +33,11 @@ _MAX_SADDLEPOINT = 1e8  # largest magnitude of the saddlepoint in the search for
 
 
 def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: int) -> int | None:
-    """Return the noise type from the lag-1 autocorrelation of adjacent cluster means.
+    """Return the noise type, 2 to -2, from the lag-1 autocorrelation of adjacent cluster means.
 
-    ``theta``, shape (m + 1,): cumulative sums of the samples at the edges of m adjacent clusters of
-    n samples. ``present``: cumulative counts of samples there (None: no sample is missing). The
-    exponent is 2 to -2 (see `imubench_pipeline.allan.variance.AllanCurve`), or None if there are
-    fewer than 30 clusters.
+    ``theta``, shape (m + 1,): cumulative sums of the samples at the edges of m clusters of n
+    samples; ``present``: cumulative counts of samples there (None: no sample is missing). None if
+    there are fewer than 30 clusters.
 
     References
     ----------
@@ -95,8 +94,7 @@ def equivalent_degrees(exponent: int, n: int, terms: int) -> float:
     """Return the equivalent degrees of freedom of a fully overlapping Allan variance.
 
     edf = M / (1 + 2 sum_k (1 - k/M) r_k^2), where r_k is the autocorrelation at lag k of the second
-    differences of power-law noise, and M = L - 2n + 1 is the number of these ``terms``. The
-    exponent is the noise type, 2 to -2; ``n`` is the number of samples in a cluster.
+    differences of power-law noise, and M = L - 2n + 1 is the number of these ``terms``.
 
     References
     ----------
@@ -156,23 +154,13 @@ def _evaluate_square_log(t: Array) -> Array:
 def deviation_limits(
     deviation: Array, edf: Array, confidence: float, edf_upper: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return the chi-squared limits of an Allan deviation.
+    """Return the chi-squared limits of an Allan deviation, with equal tails; all have shape (m,).
 
-    Parameters
-    ----------
-    deviation, edf : ndarray, shape (m,)
-    confidence : float
-        Confidence level, such as 0.95; the two tails are equal.
-    edf_upper : ndarray, shape (m,), optional
-        Degrees of freedom of the upper limit at 95 %; by default ``edf``. With few differences an
-        Allan variance is less often far too small than a chi-squared variate with the same variance
-        (`tail_degrees`).
-
-    Notes
-    -----
-    At another confidence the degrees of freedom of the upper limit are interpolated: from ``edf``
-    to ``edf_upper`` by (z / 1.96)^1.4, with z the normal quantile. The coverage of 68 % limits is
-    then exact to 0.4 % for white, flicker, random walk and Gauss-Markov noise.
+    ``edf_upper`` are the degrees of freedom of the upper limit at 95 %; by default ``edf``. With
+    few differences an Allan variance is less often far too small than a chi-squared variate with
+    the same variance (`tail_degrees`). At another confidence they are interpolated: from ``edf`` to
+    ``edf_upper`` by (z / 1.96)^1.4, with z the normal quantile. The coverage of 68 % limits is then
+    exact to 0.4 % for white, flicker, random walk and Gauss-Markov noise.
     """
     tail = (1.0 - confidence) / 2.0
     below = edf

@@ -207,10 +207,9 @@ class OctaveSums:
     ) -> tuple[Array, Array, Array, Integers]:
         """Sum the clusters that begin in sections ``low`` to ``high``.
 
-        Returned are sums, shape (sections, 4, sizes), as `results`; totals, the sum of the samples
-        less the bias by section; edges, shape (sections, SECTION_SAMPLES / DECIMATION), cumulative
-        sums within the section; and counts, cumulative numbers of samples present at the edges, and
-        of the section (empty: all are).
+        Returns by section: sums, shape (4, sizes), as `results`; the total of the samples less the
+        bias; edges, cumulative sums at every `DECIMATION`-th sample; and counts, numbers of samples
+        present at the edges and in all (empty: all are).
         """
         theta, tail, present = room
         number, points = high - low, SECTION_SAMPLES // DECIMATION

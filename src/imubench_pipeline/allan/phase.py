@@ -135,14 +135,13 @@ def integrate(
 ) -> Phase:
     """Return the cumulative sums of consecutive blocks; memory beyond the result is bounded.
 
-    The blocks are the log in order, NaN where a sample is missing. Without ``holes`` no counts are
-    stored.
+    Without ``holes`` no sample may be missing (NaN), and no counts are stored.
 
     Raises
     ------
     ValueError
-        If the blocks are not ``samples`` long, a sample is infinite, or one is missing although
-        ``holes`` is False.
+        If the blocks are not ``samples`` long, or a sample is infinite, or missing without
+        ``holes``.
     """
     theta = np.empty(samples + 1)
     theta[0] = 0.0
@@ -287,10 +286,9 @@ def sum_present(
 ) -> tuple[float, float, int]:
     """Sum squared differences of adjacent means over the samples present.
 
-    ``theta`` and ``present`` are cumulative sums and numbers of samples at one stride. A cluster
-    has ``m`` strides, and must have ``enough`` samples. The first cluster of a pair begins at
-    points ``start`` to ``stop``. Returns the sum of squares, the sum of the mean inverse numbers of
-    samples, and the number of pairs.
+    ``theta`` and ``present`` are cumulative sums and counts at one stride. A cluster has ``m``
+    strides, and at least ``enough`` samples; the first of a pair begins at points ``start`` to
+    ``stop``. Returns the sum, the sum of the mean inverse counts, and the number of pairs.
     """
     total = thinned = 0.0
     number = 0

@@ -134,16 +134,9 @@ class AllanCurve:
 
 
 def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -> NDArray[np.int64]:
-    """Return log-spaced cluster sizes of a log, whole and distinct.
+    """Return log-spaced cluster sizes of a log of L samples, whole and distinct.
 
-    Parameters
-    ----------
-    samples : int
-        L.
-    per_decade : int
-        Sizes per decade, as far as integers allow.
-    longest : float
-        Largest size as a share of the log, at most 1/2.
+    ``per_decade`` sizes, as far as integers allow; ``longest`` is a share of the log, at most 1/2.
     """
     largest = int(samples * min(longest, 0.5) * (1 + 1e-12))
     if largest < 1:
@@ -172,11 +165,11 @@ def allan_variance(
     rate : float
         Sampling rate, Hz.
     cluster_sizes : array_like of int, optional
-        n of each tau; by default `cluster_sizes` of the length.
+        n of each tau; by default `cluster_sizes` of the length. Sizes without a difference are left
+        out.
     overlap : {"full", "octave"}
-        Use every cluster of every size; or clusters that start 1/48 of their length apart, or
-        closer, which is as accurate and many times faster (sizes are then rounded by up to 1 %, see
-        `imubench_pipeline.allan.octave.octave_sizes`).
+        Use every cluster; or clusters that start 1/48 of their length apart, or closer, which is as
+        accurate and many times faster (sizes are then rounded by up to 1 %).
     valid : array_like of bool, shape (L,), optional
         False where the sample is missing.
     segments : sequence of (int, int), optional
@@ -184,17 +177,11 @@ def allan_variance(
     threads : int, optional
         By default one for each core. The result has the same bits for any number.
 
-    Returns
-    -------
-    AllanCurve
-        At the sizes for which the log has at least one difference.
-
     Raises
     ------
     ValueError
-        If the log is not one-dimensional, the rate not positive, a size not positive, the segments
-        do not lie in the log one after the other, or so many samples are missing that no size has
-        a difference.
+        If an argument is not as above, the segments do not follow one another in the log, or so
+        many samples are missing that no size has a difference.
 
     References
     ----------
@@ -248,31 +235,12 @@ def of_blocks(
     segments: Sequence[Span] | None = None,
     threads: int = 1,
 ) -> AllanCurve:
-    """Return the multi-octave Allan variance of a log that is given in blocks.
+    """Return the multi-octave Allan variance of a log that is given in blocks, in order, SI.
 
     One pass; the memory grows with L/64 only. The result has the same bits for any number of
-    threads and any blocks.
-
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order, in SI; NaN where a sample is missing. Blocks of float32 are not copied.
-    samples : int
-        L, the total length of all blocks.
-    rate, sizes, segments : as in `allan_variance`
-        The sizes are rounded to the stride of their octave.
-    holes : bool
-        Samples may be missing.
-    gaps : Gaps
-        Gaps of the log (`imubench_pipeline.allan.phase.gaps_of`). With many short gaps, clusters
-        with the usual share of samples are valid.
-    threads : int
-        With more than one, the next block is computed while the last one is summed.
-
-    Raises
-    ------
-    ValueError
-        See `allan_variance`.
+    threads and any blocks. ``samples`` is L, the length of all blocks, and with ``holes`` samples
+    may be missing (NaN), as counted in ``gaps``. The sizes are rounded to the stride of their
+    octave. The other arguments and the errors are those of `allan_variance`.
     """
     spans = spans_of(segments, samples)
     wanted = octave_sizes(_check_arguments(rate, sizes, samples, spans))

@@ -40,7 +40,16 @@ def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray
     M. Hochbruck and A. Ostermann, "Exponential integrators", Acta Numerica 19, 2010.
     """
     if isinstance(z, np.ndarray):
-        return _evaluate_phi_array(order, z)
+        small = np.abs(z) < _MAX_ARGUMENT_FOR_SERIES
+        far = np.where(small, _MAX_ARGUMENT_FOR_SERIES, z)
+        values = np.exp(far)
+        for j in range(order):
+            values = (values - 1.0 / math.factorial(j)) / far
+        if small.any():
+            series = [1.0 / math.factorial(n + order) for n in range(_ARRAY_SERIES_TERMS)]
+            near = np.polynomial.polynomial.polyval(np.where(small, z, 0.0), series)
+            values = np.where(small, near, values)
+        return np.asarray(values, dtype=np.complex128)
     if abs(z) < _MAX_ARGUMENT_FOR_SERIES:
         term: complex = 1.0 / math.factorial(order)
         total = term
@@ -54,19 +63,6 @@ def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray
     for j in range(order):
         value = (value - 1.0 / math.factorial(j)) / z
     return value
-
-
-def _evaluate_phi_array(order: int, z: Array | ComplexArray) -> ComplexArray:
-    small = np.abs(z) < _MAX_ARGUMENT_FOR_SERIES
-    far = np.where(small, _MAX_ARGUMENT_FOR_SERIES, z)
-    value = np.exp(far)
-    for j in range(order):
-        value = (value - 1.0 / math.factorial(j)) / far
-    if small.any():
-        series = [1.0 / math.factorial(n + order) for n in range(_ARRAY_SERIES_TERMS)]
-        near = np.polynomial.polynomial.polyval(np.where(small, z, 0.0), series)
-        value = np.where(small, near, value)
-    return np.asarray(value, dtype=np.complex128)
 
 
 @overload

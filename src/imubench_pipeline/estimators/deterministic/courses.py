@@ -96,13 +96,7 @@ class DeterministicSignals:
         return total
 
     def without(self) -> Means:
-        """Return the block means less the signals.
-
-        Raises
-        ------
-        ValueError
-            If the log was too short for a search.
-        """
+        """Return the block means less the signals; the log must have been searched."""
         if self.means is None:
             raise ValueError("the log is too short to be searched")
         parts = []

@@ -3,11 +3,6 @@
 The coefficients c_k are independent with the variance S(omega_k) of the noise model, so that
 generalised least squares reduces to weighted sums. Removing regressors also removes noise from the
 lowest ordinates: an ordinate with leverage h_k counts as 1 - h_k of one.
-
-The uncertainty of the amplitudes depends on a poorly known random walk. A step is a difference of
-two long means, and its error comes from the slowest noise. A weak walk is often fitted as none, and
-with this fit the error of the amplitude would be too small. The covariance is therefore averaged
-over the walks that the log allows (`average_covariance`).
 """
 
 from __future__ import annotations
@@ -226,9 +221,9 @@ class Ordinates:
 def average_covariance(ordinates: Ordinates, fit: Fit) -> Array:
     """Return the covariance of the amplitudes of a fit, (p, p), averaged over K.
 
-    The prior of K is uniform; the weights are the restricted likelihood (REML), in which the
-    amplitudes are integrated out (D. A. Harville, J. Am. Stat. Assoc. 72, 1977). The other noise is
-    fixed.
+    A weak walk is often fitted as none, and the error of a step would be too small. The prior of K
+    is uniform, the weights are the restricted likelihood (REML; D. A. Harville, J. Am. Stat. Assoc.
+    72, 1977), and the other noise is fixed.
     """
     if not fit.regressors:
         return fit.covariance

@@ -192,11 +192,10 @@ class Rival:
 
 
 def find_walk_rival(ordinates: Ordinates, fit: Fit) -> Rival | None:
-    """Return the signal that fits a log best in place of a random walk.
+    """Return the signal that fits a log best in place of a random walk, or None.
 
-    Steps, also at all pauses together, warm-ups and periodic drift are tried in addition to the
-    signals of the fit. A ramp is a term of the noise models, whose comparison includes it. None
-    if there is no walk, or no candidate.
+    Steps, also at all pauses together, warm-ups and periodic drift are tried; a ramp is in the
+    noise models.
     """
     if fit.noise.parameter("K") == 0.0:
         return None
@@ -218,8 +217,7 @@ def find_walk_rival(ordinates: Ordinates, fit: Fit) -> Rival | None:
 def fit_steps_at_pauses(ordinates: Ordinates, fit: Fit, walk: float = 0.0) -> Rival | None:
     """Return a fit with a step at each pause that has none, or None where there are none.
 
-    ``walk`` is twice the log likelihood that a random walk gains over the fit. Steps with the same
-    AIC as the walk are as good.
+    ``walk`` is twice the log likelihood that a random walk gains. Steps with its AIC are as good.
     """
     steps_before = [x for x in fit.regressors if x.kind in ("step", "restart")]
     steps = tuple(

@@ -109,9 +109,8 @@ def fit_temperature(
 
     References
     ----------
-    A. C. Aitken, "On least squares and linear combinations of observations", Proc. R. Soc.
-    Edinburgh 55, 1935; H. D. Patterson and R. Thompson, "Recovery of inter-block information
-    when block sizes are unequal", Biometrika 58, 1971.
+    A. C. Aitken, Proc. R. Soc. Edinburgh 55, 1935 (generalised least squares); H. D. Patterson and
+    R. Thompson, Biometrika 58, 1971 (restricted likelihood).
     """
     spans = path.segments
     find_frame = partial(select_for_fit, band=band, bandwidth=bandwidth, resolution=resolution)

@@ -110,13 +110,8 @@ def temperature_path(
 ) -> TemperaturePath:
     """Return the path of a temperature from the readings of its register.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        Readings in order on the grid of the log, °C; NaN where missing.
-    segments : sequence of (int, int)
-        First and one-past-last sample of each part; the time between parts is unknown.
-    rng : numpy.random.Generator
+    The readings, °C, are on the grid of the log, NaN where missing; the time between segments is
+    unknown.
 
     Raises
     ------
@@ -313,12 +308,12 @@ def lagged(times: Array, values: Array, lag: float) -> Array:
     """Return a temperature, shape (k,), behind a first-order lag: L dT_lag/dt = T - T_lag.
 
     Exact at the ascending knots ``times``, s, for a temperature that is linear between them and in
-    equilibrium at the first. The lag is in s; 0: none.
+    equilibrium at the first.
 
     Raises
     ------
     ValueError
-        If the lag is below 0 or not finite.
+        If the lag, s, is below 0 or not finite.
     """
     if not (lag >= 0.0 and math.isfinite(lag)):
         raise ValueError(f"the lag is {lag} s, expected a time from 0")

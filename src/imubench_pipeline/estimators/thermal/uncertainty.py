@@ -282,8 +282,7 @@ def _draw_effect(
 def add_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
     """Return a model with the rms of K over its posterior, if K is absent from the fit.
 
-    The most likely walk is then often 0, and the error of the mean would be too small. The
-    posterior of K is half a normal distribution, and its rms follows from the upper limit.
+    The fit is often 0, and the error of the mean would be too small. The posterior is half normal.
     """
     if K.status != "absent" or K.upper is None:
         return model
@@ -293,11 +292,9 @@ def add_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
 def compute_mean_error(models: Iterable[tuple[NoiseModel, float]], spectrum: Spectrum) -> float:
     """Return the standard deviation of the mean of a log about the bias at its beginning, SI.
 
-    A random walk starts at 0 at the beginning of the log: sigma^2 = N^2 / D + K^2 D / 3 and, of a
-    process of variance v, 2 v T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long. The models are
-    those that the log does not exclude, with normalised weights: a walk too weak to be selected
-    may still move the mean. A ramp contributes R D / 2, because a random walk in one log may look
-    like a ramp.
+    A random walk starts at 0: sigma^2 = N^2 / D + K^2 D / 3 and, of a process of variance v, 2 v
+    T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long. A ramp contributes R D / 2, because a random
+    walk in one log may look like a ramp. The models have normalised weights.
     """
     T, whole = 1.0 / spectrum.rate, spectrum.duration
     total = 0.0
@@ -365,13 +362,9 @@ def subtract_path_errors(
     """Return the spectrum of the noise alone, without the residual of path errors.
 
     ``errors``, shape (b,), is the density P of the residual. A bin with the density S of the noise
-    has S / (S + P) of its density and (S / (S + P))^2 of its ordinates left. S and these fractions
-    are iterated. Bins that are not ``used`` are unchanged, and all bins if P is negligible.
-
-    References
-    ----------
-    D. A. Harville, "Maximum likelihood approaches to variance component estimation", J. Am. Stat.
-    Assoc. 72, 1977.
+    has S / (S + P) of its density and (S / (S + P))^2 of its ordinates left, iterated. Bins that
+    are not ``used`` are unchanged, and all bins if P is negligible. (D. A. Harville, "Maximum
+    likelihood approaches to variance component estimation", J. Am. Stat. Assoc. 72, 1977.)
     """
     fitted, added = left.select(used), errors[used]
     density = whittle.density(whittle.of(fitted).maximum(terms))

@@ -18,9 +18,9 @@ def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
     Raises
     ------
     TypeError
-        If a kind has an abstract method, lacks a class variable, or has parameters other than the
-        fields of its dataclass; if a time constant has no search range; or if two kinds share a
-        symbol or a word, or use one symbol for different parameters.
+        If a kind lacks a method, a class variable or a search range of a time constant, its
+        parameters are not its fields, or two kinds share a symbol or a word, or a symbol of
+        different parameters.
     """
     for kind in kinds:
         _check(kind)
