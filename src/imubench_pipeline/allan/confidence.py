@@ -23,8 +23,7 @@ _MIN_CLUSTERS = 30
 _MAX_CLUSTERS = 1 << 12
 _MAX_SINGLE_LAGS = 2048
 _CONFIDENCE_EXPONENT = 1.4
-_LOWER_TAIL = 0.025
-"""Probability of the quantile that defines the degrees of freedom of the lower tail."""
+_LOWER_TAIL = 0.025  # quantile that defines the degrees of freedom of the lower tail
 
 _MIN_DEGREES, _MAX_DEGREES = 1e-3, 1e4
 """Range of the search for the degrees of freedom of the lower tail."""
@@ -54,12 +53,19 @@ def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: in
     good = np.isfinite(means)
     if good.sum() < _MIN_CLUSTERS:
         return None
+    time = np.arange(len(means), dtype=np.float64)
+    time -= time[good].mean()
+    level = means[good].mean()
+    slope = (time[good] @ (means[good] - level)) / (time[good] @ time[good])
     # A missing mean is set to 0 after subtracting the line, and its products are not counted.
-    series = np.where(good, _subtract_line(means, good), 0.0)
+    series = np.where(good, means - level - slope * time, 0.0)
     for differenced in range(3):
-        correlation = _correlate_lag_one(series, good)
-        if correlation is None:
+        pairs, number = np.count_nonzero(good[1:] & good[:-1]), np.count_nonzero(good)
+        centred = np.where(good, series - series.sum() / number, 0.0)
+        power = float(centred @ centred) / number
+        if pairs < _MIN_CLUSTERS - 3 or not power > 0:
             return None
+        correlation = max(float(centred[1:] @ centred[:-1]) / pairs / power, -0.999)
         delta = correlation / (1.0 + correlation)
         if delta < 0.25 or differenced == 2:
             exponent = round(-2.0 * (delta + differenced))
@@ -67,26 +73,6 @@ def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: in
         good = good[1:] & good[:-1]
         series = np.where(good, np.diff(series), 0.0)
     raise AssertionError("the loop returns at its last turn")
-
-
-def _subtract_line(values: Array, good: NDArray[np.bool_]) -> Array:
-    time = np.arange(len(values), dtype=np.float64)
-    time -= time[good].mean()
-    level = values[good].mean()
-    slope = (time[good] @ (values[good] - level)) / (time[good] @ time[good])
-    return np.asarray(values - level - slope * time)
-
-
-def _correlate_lag_one(values: Array, good: NDArray[np.bool_]) -> float | None:
-    pairs = int(np.count_nonzero(good[1:] & good[:-1]))
-    number = int(np.count_nonzero(good))
-    if pairs < _MIN_CLUSTERS - 3:
-        return None
-    centred = np.where(good, values - values.sum() / number, 0.0)
-    power = float(centred @ centred) / number
-    if not power > 0:
-        return None
-    return max(float(centred[1:] @ centred[:-1]) / pairs / power, -0.999)
 
 
 @lru_cache(maxsize=4096)

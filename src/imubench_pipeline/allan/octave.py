@@ -42,12 +42,8 @@ Buffers = tuple[Array, Array, Integers]
 MIN_STARTS_PER_CLUSTER = 48  # least number of starts of clusters per cluster length
 DECIMATION = 64  # stride of the stored phase of the whole log
 SECTION_SAMPLES = 1 << 16  # samples that are summed together, so that their phase fits the L2 cache
-FULL_PHASE_SAMPLES = 1 << 17
-"""Samples at the beginning with a fully stored phase, for the noise type of short clusters."""
-
-MIN_DECIMATED_SAMPLES = 1 << 16
-"""Least length of a log that is decimated, samples; shorter logs use fully overlapping clusters."""
-
+FULL_PHASE_SAMPLES = 1 << 17  # with fully stored phase, for the noise type of short clusters
+MIN_DECIMATED_SAMPLES = 1 << 16  # shorter logs use fully overlapping clusters
 _LEVELS_IN_SECTION = 6  # strides 1, 2 ... 32 inside a section
 _POINTS_OF_LONGEST_PAIR = 4 * MIN_STARTS_PER_CLUSTER  # at any stride, of a pair of clusters
 _OVERLAP_SAMPLES = _POINTS_OF_LONGEST_PAIR * DECIMATION // 2
@@ -74,13 +70,7 @@ class OctaveSums:
     """
 
     def __init__(
-        self,
-        sizes: Integers,
-        samples: int,
-        *,
-        holes: bool,
-        gaps: Gaps = NO_GAPS,
-        threads: int = 1,
+        self, sizes: Integers, samples: int, *, holes: bool, gaps: Gaps = NO_GAPS, threads: int = 1
     ) -> None:
         self._sizes, self._holes, self._threads = sizes, holes, max(1, threads)
         self._short = _find_level(sizes) < _LEVELS_IN_SECTION

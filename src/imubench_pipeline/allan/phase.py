@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.threads import in_threads
 from imubench_pipeline.typing import Array
 
-BLOCK_DIFFERENCES = 1 << 14
-"""Differences that are summed together, so that three blocks of float64 stay in the L2 cache."""
-
+BLOCK_DIFFERENCES = 1 << 14  # summed together, so that three float64 blocks stay in the L2 cache
 MIN_PRESENT_SHARE = 0.9
 """Least share of the samples of a cluster for a valid mean; in a log with many short gaps, relative
 to the usual share."""
@@ -61,8 +59,7 @@ class Gaps:
         return np.maximum(np.ceil(MIN_PRESENT_SHARE * usual * sizes - 1e-9), 1).astype(np.int64)
 
 
-NO_GAPS = Gaps(0, np.zeros(64, dtype=np.int64))
-"""Gaps of a log without gaps, or with long gaps only."""
+NO_GAPS = Gaps(0, np.zeros(64, dtype=np.int64))  # no gaps, or long ones only
 
 
 @dataclass
@@ -314,12 +311,7 @@ def sum_present(
 
 
 def full_sums(
-    phase: Phase,
-    sizes: NDArray[np.int64],
-    threads: int,
-    *,
-    stride: int = 1,
-    gaps: Gaps = NO_GAPS,
+    phase: Phase, sizes: NDArray[np.int64], threads: int, *, stride: int = 1, gaps: Gaps = NO_GAPS
 ) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
     """Return sums over the differences of cluster means, by size in points of the phase.
 

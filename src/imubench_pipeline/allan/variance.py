@@ -70,16 +70,15 @@ class AllanCurve:
     samples : int
         L, samples in the log; by default twice the largest cluster.
     exponent : ndarray of int, shape (m,)
-        Noise type at each tau: the power of frequency, 2 to -2, in the spectrum of fractional
-        frequency (0: white noise of the samples, -1: flicker, -2: random walk). By default 0.
+        Noise type: the power of frequency, 2 to -2, in the spectrum of fractional frequency (0:
+        white noise of the samples, -1: flicker, -2: random walk). By default 0.
     averaged : ndarray, shape (m,)
-        Effective number of samples in a cluster: n by default, or the harmonic mean of the numbers
-        if samples are missing. The variance of white noise is proportional to 1 / averaged.
+        Samples in a cluster, or their harmonic mean if samples are missing. The variance of white
+        noise is proportional to 1 / averaged.
     edf_upper : ndarray, shape (m,)
-        Degrees of freedom of the upper limit, which are larger for few clusters. By default
-        ``edf``.
+        Degrees of freedom of the upper limit, larger for few clusters. By default ``edf``.
     edf_source : sequence of str
-        Source of the degrees of freedom at each tau: `POWER_LAW` or `FITTED`.
+        Source of the degrees of freedom: `POWER_LAW` or `FITTED`.
     share : ndarray, shape (m,)
         Share of the differences that are not lost to missing samples. By default 1.
     """
@@ -96,19 +95,18 @@ class AllanCurve:
     share: Array = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        # Defaults that depend on other fields; the class is frozen.
         if not self.samples:
             object.__setattr__(self, "samples", 2 * int(np.max(self.cluster_size)))
-        if not len(self.exponent):
-            object.__setattr__(self, "exponent", np.zeros(len(self.tau), dtype=np.int64))
-        if not len(self.averaged):
-            object.__setattr__(self, "averaged", np.asarray(self.cluster_size, dtype=np.float64))
-        if not len(self.edf_upper):
-            object.__setattr__(self, "edf_upper", self.edf)
-        if not self.edf_source:
-            object.__setattr__(self, "edf_source", (POWER_LAW,) * len(self.tau))
-        if not len(self.share):
-            object.__setattr__(self, "share", np.ones(len(self.tau)))
+        defaults = {
+            "exponent": np.zeros(len(self.tau), dtype=np.int64),
+            "averaged": np.asarray(self.cluster_size, dtype=np.float64),
+            "edf_upper": self.edf,
+            "edf_source": (POWER_LAW,) * len(self.tau),
+            "share": np.ones(len(self.tau)),
+        }
+        for name, default in defaults.items():
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, default)  # the class is frozen
 
     def __repr__(self) -> str:
         span = f", {self.tau[0]:.4g} to {self.tau[-1]:.4g} s" if len(self.tau) else ""

@@ -12,16 +12,10 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.typing import Array
 
-_MAX_ARGUMENT_FOR_SERIES = 2.0
-"""Series are used below this magnitude, where the recurrence of phi and the sum of
-`squared_response` cancel."""
-
+_MAX_ARGUMENT_FOR_SERIES = 2.0  # below it the recurrence of phi and the squared response cancel
 _MAX_SERIES_TERMS = 48
-_SERIES_TOLERANCE = 1e-18
-"""Relative size of a term at which a series is truncated, below the last digit."""
-
-_ARRAY_SERIES_TERMS = 28
-"""Number of terms for arrays; the next term is below 2^28 / 28! = 9e-22 of the first."""
+_SERIES_TOLERANCE = 1e-18  # relative size of the last term of a series, below the last digit
+_ARRAY_SERIES_TERMS = 28  # the next term is below 2^28 / 28! = 9e-22 of the first
 
 ComplexArray = NDArray[np.complex128]
 

@@ -12,15 +12,9 @@ weights of the integration on 0..t and -c/W on -W..0, and
 
     sigma^2 = integral of S(f) |H(f)|^2 df over all f,
 
-with H the Fourier transform of h. The same process acts in the window and in the motion: common
-parts cancel, and H(0) = 0. Flicker noise (1/f) and a random walk (1/f^2) have no variance, but this
-integral is finite. Each term has it in closed form (`Term.growth`), with t the time, W
-the window and A the time since switch-on.
-
-References
-----------
-IEEE Std 952-2020, for the densities. The closed forms follow from S(f) |H(f)|^2, Parseval's theorem
-and the state equation of each process.
+with H the Fourier transform of h. H(0) = 0, so that this integral is finite also for flicker noise
+(1/f) and a random walk (1/f^2). Each term has it in closed form (`Term.growth`), with t the time, W
+the window and A the time since switch-on, from the densities of IEEE Std 952-2020.
 """
 
 from __future__ import annotations

@@ -24,9 +24,7 @@ from imubench_pipeline.noise.terms import (
 )
 from imubench_pipeline.typing import Array
 
-_MAX_FLICKER_TAU = 1e5
-"""Default longest tau, s, up to which a state space approximates flicker noise."""
-
+_MAX_FLICKER_TAU = 1e5  # default longest tau of a bank for flicker noise, s
 _KINDS_WITH_PARAMETER = (Quantization, WhiteNoise, Flicker, RandomWalk, Deterministic)
 """Kinds of terms with a parameter of their own in a model."""
 

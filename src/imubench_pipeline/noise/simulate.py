@@ -23,13 +23,9 @@ from imubench_pipeline.noise.state_space import root_of
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
 
-_BLOCK_SAMPLES = 1 << 16
-"""Samples of a block, which fits the cache: a quarter faster than a million."""
-
+_BLOCK_SAMPLES = 1 << 16  # fits the cache: a quarter faster than a million
 _MAX_BLOCK_SUMS = 1 << 12  # largest number of blocks of a member of the ensemble
-_MIN_BLOCKS_IN_CLUSTER = 16
-"""Least number of blocks in a cluster; the Allan variances of shorter ones are drawn from their
-covariance."""
+_MIN_BLOCKS_IN_CLUSTER = 16  # for shorter clusters the covariance is used
 
 
 def channel_rng(seed: int, *names: str) -> np.random.Generator:

@@ -20,16 +20,10 @@ from imubench_pipeline.noise.model import NoiseModel
 from imubench_pipeline.noise.terms import Deterministic, Quantization
 from imubench_pipeline.typing import Array
 
-_LAGS_PER_CLUSTER = 32
-"""Lags per cluster length at which the covariance is evaluated; linear in between."""
-
-_MAX_LAG_CLUSTERS = 10
-"""Largest lag, in clusters; the differences of all noise types are nearly independent beyond it."""
-
+_LAGS_PER_CLUSTER = 32  # at which the covariance is evaluated; linear in between
+_MAX_LAG_CLUSTERS = 10  # beyond it differences are nearly independent for all noise types
 _TAIL_LAGS_PER_CLUSTER = 12
-_MAX_DEGREES_WITH_TAIL = 30.0
-"""Largest number of degrees of freedom for which the lower tail is computed from eigenvalues."""
-
+_MAX_DEGREES_WITH_TAIL = 30.0  # above it the lower tail is not computed from eigenvalues
 _MAX_EIGENVALUES = 320
 
 _ROUNDING_COVARIANCE = ((0, 6.0), (1, -4.0), (2, 1.0))

@@ -15,10 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.typing import Array
 
 _STRATA_PER_DECADE = 640
-_MIN_PHASE_OF_LARGEST = 1e-3
-"""Lowest frequency of the strata, rad per sample, times the largest cluster; all integrands are
-flat below it."""
-
+_MIN_PHASE_OF_LARGEST = 1e-3  # rad in the largest cluster; integrands are flat below it
 _GOLDEN_SECTION = (np.sqrt(5.0) - 1.0) / 2.0
 
 _CLUSTERS_LOST_AT_ENDS = 1.5

@@ -28,13 +28,10 @@ _KIND_NAMES: dict[str, Kind] = {
 }
 """Pulses are single bad blocks, and ramps a term of the noise model: neither is removed."""
 
-_MIN_STEP_SIGMAS = 8.0
-"""Size of a step, in standard errors of a block, above which it is placed to the sample."""
-
+_MIN_STEP_SIGMAS = 8.0  # in errors of a block; larger steps are placed to the sample
 _MAX_STEPS = 8  # more steps, when the search reaches its maximum of regressors, are telegraph noise
 _DELTA_LOG_LIKELIHOOD_95 = 1.92
-_MAX_WALK_LEVERAGE = 0.5
-"""Maximum fraction of the information on the random walk that the removed signals may take."""
+_MAX_WALK_LEVERAGE = 0.5  # fraction of the information on the random walk that signals may take
 
 
 @dataclass(frozen=True)

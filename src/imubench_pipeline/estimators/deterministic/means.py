@@ -14,12 +14,8 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.phase import Span, spans_of, split
 from imubench_pipeline.typing import Array
 
-_MAX_BLOCKS = 1 << 14
-"""Approximate number of blocks of a log; it is the resolution of the place of a small step."""
-
-_MIN_BLOCK_SAMPLES = 10
-"""Samples of a block; its mean is below the low-pass cut-off of most sensors."""
-
+_MAX_BLOCKS = 1 << 14  # approximate; it is the resolution of the place of a small step
+_MIN_BLOCK_SAMPLES = 10  # the mean is then below the low-pass cut-off of most sensors
 _MIN_BLOCKS = 512  # blocks of a short log, whose blocks have fewer samples
 _MIN_PART_BLOCKS = 64  # shorter parts are not analysed
 _SIGMA_OVER_MAD = 1.4826  # standard deviation over median absolute deviation of normal noise
@@ -30,15 +26,10 @@ _MAX_PAUSES = 48
 _SECTIONS = 16
 
 _MIN_SECTION_BLOCKS = 16  # blocks that each section needs for the test of stationarity
-_MIN_TREND_SIGMAS = 4.5
-"""Slope over its standard error with 14 degrees of freedom: false-alarm probability 1 in 2000."""
-
+_MIN_TREND_SIGMAS = 4.5  # 14 degrees of freedom: false-alarm probability 1 in 2000
 _MIN_RELATIVE_TREND = 0.02  # smallest relative change of N over the log that is reported
-_MIN_CHI_SQUARED = 45.0
-"""Chi-squared with 15 degrees of freedom: false-alarm probability 1 in 10,000."""
-
-_MIN_RELATIVE_SPREAD = 0.05
-"""Smallest relative standard deviation of N over the sections that is reported."""
+_MIN_CHI_SQUARED = 45.0  # 15 degrees of freedom: false-alarm probability 1 in 10,000
+_MIN_RELATIVE_SPREAD = 0.05  # smallest reported relative standard deviation of N over sections
 
 
 @dataclass(frozen=True)
@@ -78,10 +69,7 @@ class Means:
 
 
 def block_means(
-    blocks: Iterable[Array],
-    samples: int,
-    rate: float,
-    segments: Sequence[Span] | None = None,
+    blocks: Iterable[Array], samples: int, rate: float, segments: Sequence[Span] | None = None
 ) -> Means:
     """Return the block means of a log in one pass, in bounded memory.
 

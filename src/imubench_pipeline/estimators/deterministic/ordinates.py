@@ -22,9 +22,7 @@ from imubench_pipeline.estimators.spectrum import Spectrum, bin_edges
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.typing import Array
 
-NOISE_TERMS = Terms("NFK", 1)
-"""General noise model, which includes the models of logs without regressors."""
-
+NOISE_TERMS = Terms("NFK", 1)  # includes the models of logs without regressors
 _FIT_ROUNDS = 2
 _MIN_WEIGHT = 0.05  # weight of an ordinate that the regressors explain almost completely
 _WALK_GRID = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
@@ -32,8 +30,7 @@ _WALK_GRID = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
 
 _FITTED_WALK_FACTORS = np.geomspace(0.6, 1.6, 9)  # grid of K, relative to the fitted K
 _MIN_OTHER_NOISE = 1e-3  # minimum fraction of the density that is not random walk
-_MIN_INDEPENDENT_VARIANCE = 1e-9
-"""Ridge on the correlation matrix of the amplitudes, against collinear regressors."""
+_MIN_INDEPENDENT_VARIANCE = 1e-9  # ridge on the correlation matrix, against collinear regressors
 
 
 @dataclass(frozen=True)

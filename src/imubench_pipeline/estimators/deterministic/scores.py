@@ -39,11 +39,8 @@ _MIN_TIME_FRACTION, _MAX_TIME_FRACTION = 1 / 200, 1 / 2
 _EXPONENTIAL_ORDINATES = 2048  # number of lowest ordinates in which exponentials are searched
 _MAX_CYCLES = 64
 _CYCLE_STEP = 0.25  # spacing of the frequencies that are tried, cycles in the part
-MIN_CYCLES = 0.25
-"""Cycles in the part, e.g. a day in a log of six hours; fewer are a ramp and a bend."""
-
-_MIN_INDEPENDENT_POWER = 1e-3
-"""Minimum fraction of a regressor's power that is independent of others; less is rounding error."""
+MIN_CYCLES = 0.25  # in the part, e.g. a day in a log of six hours; fewer are a ramp and a bend
+_MIN_INDEPENDENT_POWER = 1e-3  # fraction of a regressor's power; less is rounding error
 
 
 @dataclass(frozen=True)

@@ -33,16 +33,10 @@ from imubench_pipeline.typing import Array
 
 _HELD_OUT_ORDINATES = 16  # lowest ordinates to which the noise is extrapolated instead of fitted
 _MAX_PAUSE_DISTANCE = 2.0  # distance, in blocks, from a pause within which a step may belong to it
-_REFIT_MARGIN = 6.0
-"""A candidate is tested with refitted noise if its gain is at most this below the threshold."""
-
+_REFIT_MARGIN = 6.0  # below the threshold; better candidates are tested with refitted noise
 _SLOW_KINDS: tuple[Kind, ...] = ("exponential", "sinusoid")
-_MIN_SLOW_GAIN = 6.0
-"""Gain above which a slow signal is tested: noise fitted without it hides most of it."""
-
-_NEIGHBOUR_ORDINATES = (3, 16)
-"""Distances of the ordinates beside a sinusoid that measure the noise relative to its model."""
-
+_MIN_SLOW_GAIN = 6.0  # of a slow signal to be tested: noise fitted without it hides most of it
+_NEIGHBOUR_ORDINATES = (3, 16)  # distances of ordinates that measure the noise beside a sinusoid
 THRESHOLD_FACTOR: dict[Kind, float] = {
     "step": 1.0,
     "restart": 1.0,
@@ -53,15 +47,9 @@ THRESHOLD_FACTOR: dict[Kind, float] = {
 }
 """Factor on the threshold, because the noise at few ordinates is poorly known."""
 
-_RIVAL_MARGIN = 4.0
-"""A signal at most this below its threshold, in twice the log likelihood, is about as good."""
-
-_MAX_REFIT_GAIN = 8.0
-"""Largest increase of a gain by refitting the noise; candidates further below are not tried."""
-
-_DELTA_AIC_STEPS = 0.5
-"""Disadvantage in AIC up to which steps at known places are as good as a walk."""
-
+_RIVAL_MARGIN = 4.0  # twice the log likelihood; a signal this near its threshold is as good
+_MAX_REFIT_GAIN = 8.0  # candidates further below their threshold are not refitted
+_DELTA_AIC_STEPS = 0.5  # up to which steps at known places are as good as a walk
 _TERMS_WITHOUT_WALK = Terms("NF", NOISE_TERMS.gauss_markov)
 
 MAX_REGRESSORS = 16  # maximum number of regressors; a log with more steps has telegraph noise
@@ -75,8 +63,7 @@ _MIN_KEPT_GAIN: dict[Kind, float] = {
 }
 """Minimum gain of a regressor in the final fit, given the regressors found later."""
 
-_CERTAIN_GAIN_FACTOR = 3.0
-"""Factor on the minimum gain above which the noise is not refitted to confirm it."""
+_CERTAIN_GAIN_FACTOR = 3.0  # on the minimum gain; above it the noise is not refitted
 
 
 def find_candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:

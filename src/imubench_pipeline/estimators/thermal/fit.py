@@ -47,19 +47,11 @@ from imubench_pipeline.typing import Array
 
 _MAX_ROUNDS = 10
 _TOLERANCE = 0.02
-_SETTLING_FRACTIONS = (1 / 64, 1 / 32, 1 / 16)
-"""Durations of settling that are tried, as fractions of the log."""
-
-_MIN_EXTRA_GAIN = 6.0
-"""Minimum gain of log likelihood, in addition to BIC, by the square or by settling."""
-
+_SETTLING_FRACTIONS = (1 / 64, 1 / 32, 1 / 16)  # durations of settling to try, over the log
+_MIN_EXTRA_GAIN = 6.0  # least gain of log likelihood beyond BIC, by the square or by settling
 _MIN_TRIAL_GAIN = 2.0
-_MAX_ERROR_GROWTH = 2.5
-"""Increase of the error of s above which the settling time has most information on s."""
-
-_MIN_ADDED_ERROR = 0.3
-"""Effect of temperature on a bin, in its standard errors, above which it matters."""
-
+_MAX_ERROR_GROWTH = 2.5  # of s; above it the settling time has most information on s
+_MIN_ADDED_ERROR = 0.3  # smallest significant change of a bin, in its standard errors
 _MIN_BINS = 24
 
 

@@ -34,9 +34,7 @@ from imubench_pipeline.estimators.thermal.register import (
 )
 from imubench_pipeline.typing import Array
 
-DRAWN_PATHS = 24
-"""Number of paths drawn from the distribution of the temperature, given the register."""
-
+DRAWN_PATHS = 24  # paths drawn from the posterior of the temperature
 _LOG_DENSITY_GRID = range(-14, 5, 2)
 _NOISE_GRID = (0.01, 0.1, 0.4)
 _MIN_NOISE = 1e-4
@@ -244,10 +242,10 @@ class _Evidence:
         off = np.zeros((DRAWN_PATHS, len(inside)))
         if not inside.any():
             return off
-        for dwell in find_cell_stays(inside, mean, float(np.median(half[inside])), q):
-            missing = np.maximum(half**2 / 3.0 - variance, 0.0)[dwell.blocks]
+        for blocks, taper in find_cell_stays(inside, mean, float(np.median(half[inside])), q):
+            missing = np.maximum(half**2 / 3.0 - variance, 0.0)[blocks]
             level = math.sqrt(3.0) * (2.0 * rng.random((DRAWN_PATHS, 1)) - 1.0)
-            off[:, dwell.blocks] = level * dwell.taper * np.sqrt(missing)
+            off[:, blocks] = level * taper * np.sqrt(missing)
         return off
 
     def best(self) -> tuple[float, float, float]:

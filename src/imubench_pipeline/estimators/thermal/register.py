@@ -29,11 +29,8 @@ _MIN_JUMP_BITS = 1.5  # minimum size of a jump in least significant bits
 _MIN_JUMP_RATIO = 8.0  # minimum ratio of a jump and the greatest change around it
 _NEIGHBOUR_BLOCKS = 16  # blocks on each side of a jump that are compared with it
 _MIN_LEVEL_BLOCKS = 5  # minimum number of blocks of a level between jumps
-_MAX_JUMPS = 64
-"""Maximum number of jumps in a segment; more are the normal variation of the temperature."""
-
-_MIN_STAY_CROSSINGS = 3.0
-"""Duration of a long stay in a cell, in times that the path takes to cross it."""
+_MAX_JUMPS = 64  # per segment; more are the normal variation of the temperature
+_MIN_STAY_CROSSINGS = 3.0  # duration of a long stay in a cell over the time to cross it
 
 
 @dataclass(frozen=True)
@@ -236,20 +233,13 @@ def _cut_blocks(
     return blocks, cuts
 
 
-@dataclass(frozen=True)
-class CellStay:
-    """A long stay in one cell of the register."""
-
-    blocks: slice  # of a segment
-    taper: Array
-    """(b,): from 0 where the path crosses an edge of the cell, and is therefore known, to 1 at a
-    distance of one crossing time."""
-
-
 def find_cell_stays(
     inside: NDArray[np.bool_], level: Array, half: float, q: float
-) -> Iterator[CellStay]:
-    """Yield the long stays in one cell of the register.
+) -> Iterator[tuple[slice, Array]]:
+    """Yield the blocks of a segment in long stays in one cell of the register, and their taper.
+
+    The taper, shape (b,), is from 0 where the path crosses an edge of the cell, and is therefore
+    known, to 1 at a distance of one crossing time.
 
     ``inside``, shape (k,): all readings of a block are of one cell; ``level``, shape (k,): mean
     reading of a block, K; ``half``: half the width of a cell, K; ``q``: density of the second
@@ -268,4 +258,4 @@ def find_cell_stays(
         before = place if begin > 0 else math.inf
         after = end - begin - place if end < len(inside) else math.inf
         away = np.minimum(np.minimum(before, after), crossing) / crossing
-        yield CellStay(slice(begin, end), np.asarray(away) * np.ones(end - begin))
+        yield slice(begin, end), np.asarray(away) * np.ones(end - begin)

@@ -23,9 +23,7 @@ from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged_pa
 from imubench_pipeline.typing import Array
 
 _LAG_GRID_SIZE = 16
-_MAX_LAG_FRACTION = 1 / 20
-"""Maximum lag over the duration of the log; a longer lag looks like drift."""
-
+_MAX_LAG_FRACTION = 1 / 20  # longest lag over the log; a longer lag looks like drift
 _MAX_LAG = 1800.0
 _MIN_ORDINATES = 0.02
 _LAGS_PER_BATCH = 8  # lags whose regressors are in memory at the same time
@@ -278,9 +276,8 @@ class Regressors:
         if lag not in self._products:
             self.prepare([lag])
             full, own = self._full[self._make_key(lag)], slice(None if self.ramp else self.thermal)
-            self._products[lag] = Products(
-                full.cross[self.used, own], full.gram[self.used, own, own]
-            )
+            cross, gram = full.cross[self.used, own], full.gram[self.used, own, own]
+            self._products[lag] = Products(cross, gram)
         return self._products[lag]
 
     def at(self, lag: float, weights: Array) -> Regression:

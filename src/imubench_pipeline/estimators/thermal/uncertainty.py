@@ -31,33 +31,20 @@ from imubench_pipeline.typing import Array
 _MAX_DRAWS = 1_000
 _NOISE_DRAWS = 250  # draws of the effect, and of the noise, over all models
 _LAG_GRID_SIZE = 48
-_MAX_DELTA_LOG_LIKELIHOOD = 8.0
-"""Log likelihood below the best at which lags are excluded from the grid."""
-
+_MAX_DELTA_LOG_LIKELIHOOD = 8.0  # below the best; less likely lags are not on the grid
 _MIN_AKAIKE_WEIGHT = 0.05
 _MIN_WALK_WEIGHT = 0.3  # minimum weight of a model with a random walk
-_MIN_DELTA_BIC = 4.0
-"""Minimum gain of BIC by temperature, because a random walk is easily fitted by it."""
-
-_MAX_RAMP_FRACTION = 0.95
-"""Fraction of the information on s that a ramp shares, above which both are indistinguishable."""
-
+_MIN_DELTA_BIC = 4.0  # least gain of BIC by temperature, which easily fits a random walk
+_MAX_RAMP_FRACTION = 0.95  # of the information on s that a ramp shares; above it they are confused
 _MIN_MONOTONE_RANGE = 0.9
 _MIN_EXPLAINED_FRACTION = 0.5
 _MAX_LAG_WIDTH = 0.5
-_MAX_WIDTH_RATIO = 1.02
-"""Ratio of the widths of the interval from 0 and the shortest one, below which the former is used,
-because draws are uneven."""
-
-_UPPER_LIMIT_OVER_RMS = 2.24
-"""The 97.5 % quantile of the absolute value of a normal variate over its standard deviation."""
-_MAX_NEGLIGIBLE_ERROR = 0.02
-"""Contribution of path errors to a bin, in its standard errors, below which it is ignored."""
-
+_MAX_WIDTH_RATIO = 1.02  # of an interval from 0 that is preferred to the shortest one
+_UPPER_LIMIT_OVER_RMS = 2.24  # 97.5 % quantile of |x| over its rms, x normal
+_MAX_NEGLIGIBLE_ERROR = 0.02  # contribution of path errors to a bin, in its standard errors
 _MAX_PATH_ROUNDS = 40
 _PATH_TOLERANCE = 1e-3
-_MIN_NOISE_FRACTION = 0.1
-"""Minimum fraction of the power of a bin that is noise, so that each bin keeps some weight."""
+_MIN_NOISE_FRACTION = 0.1  # of the power of a bin, so that each bin keeps some weight
 
 
 @dataclass(frozen=True)
@@ -92,7 +79,7 @@ def assess_fit(
     """
     weights = whittle.spectrum.ordinates / whittle.density(candidates[0].maximum)
     p = regressors.thermal
-    errors = compute_path_errors(regressors, regression, weights)
+    changes, residual = compute_path_errors(regressors, regression, weights)
     low, high = _bracket_likely_lags(regressors, weights, lags)
     fine = np.array([low])
     if high != low:
@@ -100,7 +87,7 @@ def assess_fit(
         low, high = _bracket_likely_lags(regressors, weights, coarse)
         fine = np.linspace(low, high, _LAG_GRID_SIZE)
     betas, drawn_lags = _draw_effect(regressors, whittle, candidates, fine, rng)
-    moved = np.sqrt(np.mean(errors.moved**2, axis=0))
+    moved = np.sqrt(np.mean(changes**2, axis=0))
     extra = rng.standard_normal((len(betas), 1)) * moved[None, :]
     betas, drawn_lags = betas[:, :p] + extra[:, :p], np.maximum(drawn_lags + extra[:, p], 0.0)
     lower, upper = np.quantile(betas, [0.025, 0.975], axis=0)
@@ -129,7 +116,7 @@ def assess_fit(
         compensated,
         reason,
         float(np.std(betas @ at_mean)),
-        errors.density,
+        residual,
     )
 
 
@@ -306,21 +293,13 @@ def compute_mean_error(models: Iterable[tuple[NoiseModel, float]], spectrum: Spe
     return math.sqrt(total)
 
 
-@dataclass(frozen=True)
-class PathErrors:
-    """Effects of the errors of the drawn paths of a temperature."""
-
-    moved: Array
-    """(d, p + 1): change of the p coefficients of temperature, SI per K and K², and the lag, s."""
-    density: Array  # (b,): mean density of the residual in each bin, (rad/s)²/Hz or (m/s²)²/Hz
-
-
 def compute_path_errors(
     regressors: Regressors, regression: Regression, weights: Array
-) -> PathErrors:
-    """Return the effect of the drawn paths on an estimate, to first order.
+) -> tuple[Array, Array]:
+    """Return the effect of the errors of the drawn paths on an estimate, to first order.
 
-    ``weights``, shape (b,): as for `Regressors.at`.
+    They are the changes of the p coefficients of temperature and the lag, (d, p + 1), and the mean
+    density of the residual in each bin, shape (b,). ``weights``: as for `Regressors.at`.
     """
     path, p = regressors.path, regressors.thermal
     knots, slope = regressors.knots(regression.lag), regressors.slope(regression)
@@ -351,9 +330,8 @@ def compute_path_errors(
         density += shared[:, -1] - 2.0 * shared[:, :-1] @ own
         density += np.einsum("i,bij,j->b", own, gram, own)
     at = np.array(moved)
-    return PathErrors(
-        np.column_stack([at[:, :p], at[:, -1]]), np.maximum(density / len(errors), 0.0)
-    )
+    changes = np.column_stack([at[:, :p], at[:, -1]])
+    return changes, np.maximum(density / len(errors), 0.0)
 
 
 def subtract_path_errors(

@@ -24,7 +24,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
 from imubench_pipeline.noise.growth import Calibrated, SensorStart
@@ -41,13 +40,8 @@ from imubench_pipeline.noise.terms.traits import Drive, Reading, Role, SampleBlo
 from imubench_pipeline.noise.terms.white_noise import WhiteNoise
 from imubench_pipeline.typing import Array
 
-_MIN_LAG_FOR_SERIES = 100
-"""Least lag, in blocks, at which the series of the covariance is used, since the closed form
-cancels."""
-
-_MIN_WINDOW_FOR_SERIES = 4.0
-"""Ratio of window to motion above which the series is used, since the closed form cancels."""
-
+_MIN_LAG_FOR_SERIES = 100  # blocks; at longer lags the closed form of the covariance cancels
+_MIN_WINDOW_FOR_SERIES = 4.0  # window over motion; above it the closed form cancels
 _MAX_SERIES_TERMS = 28
 
 _RESPONSE_COEFFICIENTS = ((2.0,), (1.0, 1.0 / 3.0), (1.0 / 3.0, 1.0 / 6.0, 1.0 / 30.0))
@@ -58,12 +52,8 @@ It is e^-a times a polynomial of e^-2a with these coefficients.
 
 _MEMBERS_PER_DECADE = 2.5
 _POINTS_PER_DECADE = 20
-_LAST_TIME_FACTOR = 4.0
-"""Ratio of the longest correlation time of the bank to the one with its peak at the end of the
-band."""
-
-_MAX_EXACT_SIZE = 1 << 12
-"""Largest cluster size with an exact sum for the Allan variance of sampled flicker noise."""
+_LAST_TIME_FACTOR = 4.0  # of the longest correlation time, over the one with its peak at the end
+_MAX_EXACT_SIZE = 1 << 12  # largest cluster with an exact sum for the Allan variance
 
 
 @dataclass(frozen=True)
@@ -92,7 +82,13 @@ class Flicker(Term):
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
         """2 B^2 / (pi n^2) times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2."""
-        return 2.0 / np.pi * self.B**2 * sampled_flicker_shape(n)
+        table = _tabulate_integrals()
+        # 1/sin^3(x) = 1/x^3 + 1/(2x) + ...: the second term adds (3/16) ln n and a constant.
+        most, growth = _MAX_EXACT_SIZE, 3.0 / 16.0
+        beyond = table[-1] - math.log(2.0) * most**2 - growth * math.log(most)
+        large = math.log(2.0) + (growth * np.log(n) + beyond) / n**2
+        index = np.clip(np.rint(n), 1, most).astype(np.int64)
+        return 2.0 / np.pi * self.B**2 * np.where(n <= most, table[index - 1] / index**2, large)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
         """B^2 / sqrt(2 - 2 cos(omega))."""
@@ -243,17 +239,6 @@ def _fit_unit_bank(decades: float) -> tuple[Array, Array, float]:
     ]
     powers, _ = nnls(np.column_stack([*shapes, 1.0 / n]) / wanted[:, None], np.ones_like(n))
     return times, np.sqrt(powers[:-1]), math.sqrt(powers[-1])
-
-
-def sampled_flicker_shape(n: ArrayLike) -> Array:
-    """Return n^-2 times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2; ln 2 for large n."""
-    sizes = np.asarray(n, dtype=np.float64)
-    table = _tabulate_integrals()
-    # 1/sin^3(x) = 1/x^3 + 1/(2x) + ...: the second term adds (3/16) ln n and a constant.
-    beyond = table[-1] - math.log(2.0) * _MAX_EXACT_SIZE**2 - 3.0 / 16.0 * math.log(_MAX_EXACT_SIZE)
-    index = np.clip(np.rint(sizes), 1, _MAX_EXACT_SIZE).astype(np.int64)
-    large = math.log(2.0) + (3.0 / 16.0 * np.log(sizes) + beyond) / sizes**2
-    return np.where(sizes <= _MAX_EXACT_SIZE, table[index - 1] / index**2, large)
 
 
 @lru_cache(maxsize=1)

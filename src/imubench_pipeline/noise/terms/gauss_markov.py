@@ -37,9 +37,7 @@ indistinguishable from a random walk."""
 
 _QUADRATURE_NODES, _QUADRATURE_WEIGHTS = np.polynomial.legendre.leggauss(24)
 
-_INTEGRATION_LIMITS = (0.0, 0.003, 0.03, 0.2, 1.0)
-"""Limits of the pieces of an integral; the response of a process with short T_B bends early."""
-
+_INTEGRATION_LIMITS = (0.0, 0.003, 0.03, 0.2, 1.0)  # dense at 0, where short T_B bend
 _MAX_RATIO_FOR_SERIES = 0.5
 _SERIES_COEFFICIENTS = [
     (-1) ** (k + 1) * (2.0**k - 4.0) / (2.0 * math.factorial(k)) for k in range(3, 24)
