@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.allan.presence import presence
+from imubench_pipeline.allan.phase import presence
 from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.likelihood import fit
 

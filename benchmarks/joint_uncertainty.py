@@ -36,9 +36,8 @@ from scipy.signal import lfilter
 from scipy.stats import binomtest
 
 from imubench_pipeline.allan import cluster_sizes, of_blocks
-from imubench_pipeline.estimators.draws import draw_jointly
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.posterior import sample
+from imubench_pipeline.estimators.posterior import draw_jointly, sample
 from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import Terms, model_of, whittle_of

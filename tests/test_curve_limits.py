@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve, allan_variance
-from imubench_pipeline.allan.presence import presence
+from imubench_pipeline.allan.phase import presence
 from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.noise.spectral_degrees import degrees_of_model

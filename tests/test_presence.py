@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import cluster_sizes
-from imubench_pipeline.allan.presence import presence
+from imubench_pipeline.allan.phase import presence
 from tests.test_allan import needed_in_cluster
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from imubench_pipeline.allan.quadratic_forms import lower_quantile, tail_degrees, variance_degrees
+from imubench_pipeline.allan.confidence import lower_quantile, tail_degrees, variance_degrees
 
 
 @pytest.mark.parametrize("number", [2, 3, 8, 40])

@@ -4,7 +4,7 @@ from scipy.stats import chi2
 
 from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.confidence import equivalent_degrees
-from imubench_pipeline.allan.presence import presence
+from imubench_pipeline.allan.phase import presence
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.spectral_degrees import degrees_of_model
 from tests.conftest import few

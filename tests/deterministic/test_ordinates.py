@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import scipy.fft
 
-from imubench_pipeline.estimators.deterministic.halves import compare_halves
 from imubench_pipeline.estimators.deterministic.means import Means, Part
 from imubench_pipeline.estimators.deterministic.ordinates import (
     Ordinates,
@@ -12,6 +11,7 @@ from imubench_pipeline.estimators.deterministic.ordinates import (
     average_covariance,
 )
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
+from imubench_pipeline.estimators.deterministic.verdict import compare_halves
 from imubench_pipeline.estimators.whittle import Maximum, Terms
 
 RATE, BLOCK = 100.0, 50

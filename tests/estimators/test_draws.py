@@ -3,12 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.draws import compute_draw_weight, draw_jointly
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import Candidate
-from imubench_pipeline.estimators.posterior import Posterior
+from imubench_pipeline.estimators.posterior import Posterior, compute_draw_weight, draw_jointly
 from imubench_pipeline.estimators.whittle import Maximum, Terms
 from imubench_pipeline.navigation.error_budget import Start, budget, draw_models
 from imubench_pipeline.noise import NoiseModel

@@ -28,7 +28,7 @@ def expected(*lines: tuple[float, float], segments: int = SEGMENTS, block: int =
         damped = np.sin(block * half) / (block * np.sin(half)) if block > 1 else 1.0
         wave = amplitude * damped * np.exp(2j * np.pi * frequency / rate * np.arange(POINTS)) / 2.0
         density += np.abs(np.fft.fft(wave * window)[: len(FREQUENCY)]) ** 2 / rate
-    return LineSpectrum(FREQUENCY / block, density, segments, POINTS, 1.0 / rate, block)
+    return LineSpectrum(FREQUENCY / block, density, segments, block)
 
 
 @pytest.mark.parametrize("beside", [0.0, 0.3, 0.5])

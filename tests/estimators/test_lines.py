@@ -165,7 +165,7 @@ def test_the_false_alarms_are_as_many_as_is_said(rng) -> None:
     for _ in range(logs):
         noise = DEVIATION * rng.standard_normal((segments, points))
         power = np.abs(np.fft.rfft(noise * window)) ** 2 / np.sum(window**2) / RATE
-        spectrum = LineSpectrum(frequency, power.mean(axis=0), segments, points, 1 / RATE, 1)
+        spectrum = LineSpectrum(frequency, power.mean(axis=0), segments, 1)
         alarms += bool(find_lines([spectrum], WHITE, RATE, 0.0))
     # Neighbouring bins of a Hann window are correlated, which leaves fewer than there are bins.
     assert alarms >= stats.binom(logs, FALSE_ALARM_PROBABILITY / 2).ppf(0.003) > 0

@@ -100,7 +100,8 @@ def test_what_is_proposed_has_the_covariance_of_the_fisher_information(whittle: 
     target = _Target(whittle, maximum_of(terms))
     mean, covariance = target.start()
     at_mode = replace(maximum_of(terms), powers=np.exp(2.0 * mean[:3]))
-    information = whittle.information(at_mode)
+    sensitivity = whittle.sensitivity(at_mode)
+    information = sensitivity @ sensitivity.T
     # Twice from flat amplitudes, and a width of 1 of the logarithm of T_B.
     expected = np.linalg.inv(information + np.diag([2.0, 2.0, 2.0, 1.0]))
     np.testing.assert_allclose(covariance, expected, rtol=0.05, atol=2e-4)

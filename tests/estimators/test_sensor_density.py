@@ -9,11 +9,10 @@ from scipy.signal import lfilter
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.estimators.frame import FitSelection
+from imubench_pipeline.estimators.frame import FitSelection, sensor_density
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.posterior import Posterior
-from imubench_pipeline.estimators.sensor_density import sensor_density
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
 from imubench_pipeline.typing import Array
 

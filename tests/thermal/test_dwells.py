@@ -20,13 +20,13 @@ def found(inside, level):
 def test_a_long_stay_is_found_and_its_crossings_say_where_it_is():
     level = np.concatenate([np.arange(10), np.full(60, 10.0), np.arange(11, 20)])
     (dwell,) = found(np.ones(len(level), dtype=bool), level)
-    assert (dwell.blocks.start, dwell.blocks.stop) == (10, 70)
-    np.testing.assert_allclose(dwell.taper[[0, 5, 30, -6, -1]], [0.05, 0.55, 1.0, 0.55, 0.05])
+    assert (dwell[0].start, dwell[0].stop) == (10, 70)
+    np.testing.assert_allclose(dwell[1][[0, 5, 30, -6, -1]], [0.05, 0.55, 1.0, 0.55, 0.05])
 
 
 def test_no_crossing_at_the_end_of_a_log_says_where_it_is():
     (dwell,) = found(np.ones(60, dtype=bool), np.zeros(60))
-    np.testing.assert_array_equal(dwell.taper, 1.0)
+    np.testing.assert_array_equal(dwell[1], 1.0)
 
 
 def test_a_path_that_passes_through_its_cells_dwells_in_none():

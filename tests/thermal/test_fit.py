@@ -10,8 +10,7 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators.spectrum import block_of, spectra
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import temperature_path
-from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
-from imubench_pipeline.estimators.thermal.regression import Regressors
+from imubench_pipeline.estimators.thermal.regression import BlockSeries, Coefficients, Regressors
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 

@@ -214,6 +214,6 @@ def test_a_piece_that_stays_in_a_cell_is_between_jumps(rng):
     assert [_Evidence(moved, 22.0, 5.0).stays_in_a_cell(piece) for piece in pieces] == [False, True]
     # Of ten readings in a cell the path keeps clear of its edges by the greatest of ten normals.
     greatest = np.median(np.max(rng.standard_normal((20_000, 10)), axis=1))
-    half = evidence._half(pieces[0], 0.1)
+    half = evidence._compute_half_width(pieces[0], 0.1)
     np.testing.assert_allclose(half, 0.5 - 0.1 * greatest, rtol=0.01)
-    np.testing.assert_allclose(evidence._half(pieces[0], 10.0), 0.05)
+    np.testing.assert_allclose(evidence._compute_half_width(pieces[0], 10.0), 0.05)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.spectrum import spectra
-from imubench_pipeline.estimators.thermal.path_errors import subtract_path_errors
+from imubench_pipeline.estimators.thermal.uncertainty import subtract_path_errors
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
 
 RATE, N, K = 1.0, 1e-3, 1e-5

@@ -145,7 +145,7 @@ def test_a_stay_is_long_from_three_crossing_times_on():
     outside = np.ones(120, dtype=bool)
     outside[60] = False
     first, last = find_cell_stays(outside, np.zeros(120), 0.5, q)
-    assert (first.blocks, last.blocks) == (slice(0, 60), slice(61, 120))
-    np.testing.assert_allclose(first.taper[-10:], 0.1 * np.arange(10)[::-1] + 0.05)
-    np.testing.assert_allclose(last.taper[:10], 0.1 * np.arange(10) + 0.05)
-    assert first.taper[0] == last.taper[-1] == 1.0
+    assert (first[0], last[0]) == (slice(0, 60), slice(61, 120))
+    np.testing.assert_allclose(first[1][-10:], 0.1 * np.arange(10)[::-1] + 0.05)
+    np.testing.assert_allclose(last[1][:10], 0.1 * np.arange(10) + 0.05)
+    assert first[1][0] == last[1][-1] == 1.0

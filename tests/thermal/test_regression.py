@@ -8,13 +8,12 @@ from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged
-from imubench_pipeline.estimators.thermal.path_errors import compute_path_errors
-from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
-from imubench_pipeline.estimators.thermal.regression import Regressors
+from imubench_pipeline.estimators.thermal.regression import BlockSeries, Coefficients, Regressors
 from imubench_pipeline.estimators.thermal.uncertainty import (
     _compute_explained_fraction,
     assess_fit,
     compute_mean_error,
+    compute_path_errors,
     lag_parameter,
     weigh_models,
 )
@@ -149,19 +148,19 @@ def test_errors_of_the_path_move_the_fit_and_stay_in_the_log():
     draws = SWING + 0.1 * rng.standard_normal((5, SAMPLES))
     log = Log(0.2 * (lagged(TIMES, SWING, 1.0) - REFERENCE), path_of(SWING, draws))
     found = log.regressors.at(1.0, WEIGHTS)
-    errors = compute_path_errors(log.regressors, found, WEIGHTS)
+    changes, residual = compute_path_errors(log.regressors, found, WEIGHTS)
     step = 0.25  # half of the distance of two knots
     by_lag = found.beta[0] * (lagged(TIMES, SWING, 1.0 + step) - lagged(TIMES, SWING, 1.0)) / step
     columns = [lagged(TIMES, SWING, 1.0) - REFERENCE, by_lag]
     root = np.sqrt(WEIGHTS)
     X = np.array([dct(means(column)) for column in columns])
     density = np.zeros(SAMPLES - 1)
-    for moved, draw in zip(errors.moved, draws, strict=True):
+    for moved, draw in zip(changes, draws, strict=True):
         error = dct(means(found.beta[0] * lagged(TIMES, draw - SWING, 1.0)))
         own = np.linalg.lstsq((X * root).T, error * root)[0]
         np.testing.assert_allclose(moved, own, rtol=1e-3)
         density += (error - own @ X) ** 2 * log.interval / len(draws)
-    np.testing.assert_allclose(errors.density, density, rtol=1e-3, atol=1e-3 * density.max())
+    np.testing.assert_allclose(residual, density, rtol=1e-3, atol=1e-3 * density.max())
 
 
 def candidate(terms, aic=0.0, share=1.0):

@@ -81,7 +81,7 @@ def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     rows = 'rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}'
     put_fault(copy / "steps/outlook.py", rows, IN_OUTLOOK)
     project.environment = os.environ | {"PYTHONPATH": str(place)}
-    kernels = ("whittle_kernels", "posterior_kernels", "importance_kernels")
+    kernels = ("whittle_kernels", "posterior_kernels")
     if not all(any(copy.glob(f"estimators/__pycache__/{name}.*.nbc")) for name in kernels):
         # They would take longer than a recording may.
         settings = project.settings.copy()

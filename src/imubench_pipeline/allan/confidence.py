@@ -1,30 +1,42 @@
-"""Confidence limits of an Allan variance: noise type, degrees of freedom, chi-squared limits."""
+"""Confidence limits of an Allan variance: noise type, degrees of freedom, chi-squared limits.
+
+An Allan variance over its mean is sum_i w_i x_i, where each x_i is chi-squared with one degree of
+freedom, and w_i are the eigenvalues of the covariance of its differences over their sum. For equal
+w_i it is chi-squared. Otherwise the chi-squared variate with the same variance, which has
+1 / sum w_i^2 degrees of freedom, has too long a lower tail, which determines the upper limit.
+"""
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincinv, ndtri
+from scipy.optimize import brentq
+from scipy.special import gammaincinv, ndtr, ndtri
 
-from imubench_pipeline.allan.quadratic_forms import LOWER_TAIL
 from imubench_pipeline.typing import Array
 
 _MIN_CLUSTERS = 30
 _MAX_CLUSTERS = 1 << 12
 _MAX_SINGLE_LAGS = 2048
 _CONFIDENCE_EXPONENT = 1.4
+_LOWER_TAIL = 0.025  # quantile that defines the degrees of freedom of the lower tail
+
+_MIN_DEGREES, _MAX_DEGREES = 1e-3, 1e4
+"""Range of the search for the degrees of freedom of the lower tail."""
+
+_MAX_SADDLEPOINT = 1e8  # largest magnitude of the saddlepoint in the search for a quantile
 
 
 def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: int) -> int | None:
-    """Return the noise type from the lag-1 autocorrelation of adjacent cluster means.
+    """Return the noise type, 2 to -2, from the lag-1 autocorrelation of adjacent cluster means.
 
-    ``theta``, shape (m + 1,): cumulative sums of the samples at the edges of m adjacent clusters of
-    n samples. ``present``: cumulative counts of samples there (None: no sample is missing). The
-    exponent is 2 to -2 (see `imubench_pipeline.allan.variance.AllanCurve`), or None if there are
-    fewer than 30 clusters.
+    ``theta``, shape (m + 1,): cumulative sums of the samples at the edges of m clusters of n
+    samples; ``present``: cumulative counts of samples there (None: no sample is missing). None if
+    there are fewer than 30 clusters.
 
     References
     ----------
@@ -41,12 +53,19 @@ def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: in
     good = np.isfinite(means)
     if good.sum() < _MIN_CLUSTERS:
         return None
+    time = np.arange(len(means), dtype=np.float64)
+    time -= time[good].mean()
+    level = means[good].mean()
+    slope = (time[good] @ (means[good] - level)) / (time[good] @ time[good])
     # A missing mean is set to 0 after subtracting the line, and its products are not counted.
-    series = np.where(good, _subtract_line(means, good), 0.0)
+    series = np.where(good, means - level - slope * time, 0.0)
     for differenced in range(3):
-        correlation = _correlate_lag_one(series, good)
-        if correlation is None:
+        pairs, number = np.count_nonzero(good[1:] & good[:-1]), np.count_nonzero(good)
+        centred = np.where(good, series - series.sum() / number, 0.0)
+        power = float(centred @ centred) / number
+        if pairs < _MIN_CLUSTERS - 3 or not power > 0:
             return None
+        correlation = max(float(centred[1:] @ centred[:-1]) / pairs / power, -0.999)
         delta = correlation / (1.0 + correlation)
         if delta < 0.25 or differenced == 2:
             exponent = round(-2.0 * (delta + differenced))
@@ -56,62 +75,35 @@ def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: in
     raise AssertionError("the loop returns at its last turn")
 
 
-def _subtract_line(values: Array, good: NDArray[np.bool_]) -> Array:
-    time = np.arange(len(values), dtype=np.float64)
-    time -= time[good].mean()
-    level = values[good].mean()
-    slope = (time[good] @ (values[good] - level)) / (time[good] @ time[good])
-    return np.asarray(values - level - slope * time)
-
-
-def _correlate_lag_one(values: Array, good: NDArray[np.bool_]) -> float | None:
-    pairs = int(np.count_nonzero(good[1:] & good[:-1]))
-    number = int(np.count_nonzero(good))
-    if pairs < _MIN_CLUSTERS - 3:
-        return None
-    centred = np.where(good, values - values.sum() / number, 0.0)
-    power = float(centred @ centred) / number
-    if not power > 0:
-        return None
-    return max(float(centred[1:] @ centred[:-1]) / pairs / power, -0.999)
-
-
 @lru_cache(maxsize=4096)
 def equivalent_degrees(exponent: int, n: int, terms: int) -> float:
     """Return the equivalent degrees of freedom of a fully overlapping Allan variance.
 
     edf = M / (1 + 2 sum_k (1 - k/M) r_k^2), where r_k is the autocorrelation at lag k of the second
-    differences of power-law noise, and M = L - 2n + 1 is the number of these ``terms``. The
-    exponent is the noise type, 2 to -2; ``n`` is the number of samples in a cluster.
+    differences of power-law noise, and M = L - 2n + 1 is the number of these ``terms``.
 
     References
     ----------
     C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
     differences", PTTI 2003 (with tables instead of the long sums).
     """
-    lags = _choose_lags(n, min(terms - 1, 3 * n))
-    if not len(lags):
+    longest = min(terms - 1, 3 * n)
+    if longest < 1:
         return 1.0
+    lags = np.arange(1, longest + 1, dtype=np.int64)
+    if longest > _MAX_SINGLE_LAGS:
+        # A grid that is refined where the correlation bends.
+        near = np.unique(np.rint(np.geomspace(1, n / 2 + 1, 160)).astype(np.int64))
+        offsets = np.concatenate((-near[::-1], [0], near))
+        lags = np.unique(np.concatenate([centre * n + offsets for centre in range(4)]))
+        lags = np.union1d(lags[(lags >= 1) & (lags <= longest)], [longest])
     at_zero = _evaluate_difference_covariance(np.zeros(1), exponent, n)[0]
     correlation = _evaluate_difference_covariance(lags.astype(np.float64), exponent, n) / at_zero
     weighted = (1.0 - lags / terms) * correlation**2
-    return float(terms / (1.0 + 2.0 * _sum_all_lags(lags, weighted)))
-
-
-def _choose_lags(n: int, longest: int) -> NDArray[np.int64]:
-    """Return lags from 1 to ``longest``: all, or a grid refined where the correlation bends."""
-    if longest <= _MAX_SINGLE_LAGS:
-        return np.arange(1, longest + 1, dtype=np.int64)
-    near = np.unique(np.rint(np.geomspace(1, n / 2 + 1, 160)).astype(np.int64))
-    offsets = np.concatenate((-near[::-1], [0], near))
-    lags = np.unique(np.concatenate([centre * n + offsets for centre in range(4)]))
-    return np.union1d(lags[(lags >= 1) & (lags <= longest)], [longest])
-
-
-def _sum_all_lags(lags: NDArray[np.int64], values: Array) -> float:
-    """Return the sum over all integer lags of a function with linear interpolation between lags."""
-    between = np.diff(lags) * (values[1:] + values[:-1]) / 2.0
-    return float(between.sum() + (values[0] + values[-1]) / 2.0)
+    # The sum over all lags of its linear interpolation.
+    between = np.diff(lags) * (weighted[1:] + weighted[:-1]) / 2.0
+    total = float(between.sum() + (weighted[0] + weighted[-1]) / 2.0)
+    return float(terms / (1.0 + 2.0 * total))
 
 
 def _evaluate_difference_covariance(lags: Array, exponent: int, n: int) -> Array:
@@ -130,11 +122,8 @@ def _evaluate_phase_covariance(lags: Array, exponent: int, n: int) -> Array:
     if exponent == 1:  # flicker phase, sampled: averaged over one sampling interval
         far = lags > 1000.0
         k = np.where(far, 1.0, lags)
-        near = -(
-            _evaluate_square_log(k + 1)
-            + _evaluate_square_log(np.abs(k - 1))
-            - 2 * _evaluate_square_log(k)
-        )
+        beside = _evaluate_square_log(k + 1) + _evaluate_square_log(np.abs(k - 1))
+        near = -(beside - 2 * _evaluate_square_log(k))
         return np.where(far, -2.0 * np.log(np.where(far, lags, 1.0)) - 3.0, near)
     if exponent == 0:
         return -t
@@ -151,30 +140,76 @@ def _evaluate_square_log(t: Array) -> Array:
 def deviation_limits(
     deviation: Array, edf: Array, confidence: float, edf_upper: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return the chi-squared limits of an Allan deviation.
+    """Return the chi-squared limits of an Allan deviation, with equal tails; all have shape (m,).
 
-    Parameters
-    ----------
-    deviation, edf : ndarray, shape (m,)
-    confidence : float
-        Confidence level, such as 0.95; the two tails are equal.
-    edf_upper : ndarray, shape (m,), optional
-        Degrees of freedom of the upper limit at 95 %; by default ``edf``. With few differences an
-        Allan variance is less often far too small than a chi-squared variate with the same variance
-        (`imubench_pipeline.allan.quadratic_forms`).
-
-    Notes
-    -----
-    At another confidence the degrees of freedom of the upper limit are interpolated: from ``edf``
-    to ``edf_upper`` by (z / 1.96)^1.4, with z the normal quantile. The coverage of 68 % limits is
-    then exact to 0.4 % for white, flicker, random walk and Gauss-Markov noise.
+    ``edf_upper`` are the degrees of freedom of the upper limit at 95 %; by default ``edf``. With
+    few differences an Allan variance is less often far too small than a chi-squared variate with
+    the same variance (`tail_degrees`). At another confidence they are interpolated: from ``edf`` to
+    ``edf_upper`` by (z / 1.96)^1.4, with z the normal quantile. The coverage of 68 % limits is then
+    exact to 0.4 % for white, flicker, random walk and Gauss-Markov noise.
     """
     tail = (1.0 - confidence) / 2.0
     below = edf
     if edf_upper is not None:
-        below = (
-            edf + (edf_upper - edf) * (-ndtri(tail) / -ndtri(LOWER_TAIL)) ** _CONFIDENCE_EXPONENT
-        )
+        quantiles = ndtri(tail) / ndtri(_LOWER_TAIL)
+        below = edf + (edf_upper - edf) * quantiles**_CONFIDENCE_EXPONENT
     high = 2.0 * gammaincinv(edf / 2.0, 1.0 - tail)
     low = 2.0 * gammaincinv(below / 2.0, tail)
     return deviation * np.sqrt(edf / high), deviation * np.sqrt(below / low)
+
+
+def variance_degrees(weights: Array) -> float:
+    """Return the degrees of freedom of the chi-squared variate with the same relative variance.
+
+    The weights have shape (m,).
+    """
+    return float(weights.sum() ** 2 / (weights @ weights))
+
+
+def tail_degrees(weights: Array) -> float:
+    """Return the degrees of freedom of the chi-squared variate with the same lower tail.
+
+    Relative to its mean it has the same 2.5 % quantile. The weights w_i >= 0, shape (m,), have any
+    common factor.
+    """
+    if len(weights) == 1:
+        return 1.0
+    quantile = lower_quantile(weights, _LOWER_TAIL)
+
+    def over(degrees: float) -> float:
+        return float(2.0 * gammaincinv(degrees / 2.0, _LOWER_TAIL) / degrees - quantile)
+
+    return float(brentq(over, _MIN_DEGREES, _MAX_DEGREES, rtol=1e-6))
+
+
+def lower_quantile(weights: Array, chance: float) -> float:
+    """Return a quantile below the mean of a weighted sum of chi-squared variates over its mean.
+
+    The relative error of the probability in the saddlepoint approximation is below a tenth, for
+    probabilities below a third. The error of the quantile is below 1 % if more than three weights
+    are significant. The weights w_i >= 0, shape (m,), have any common factor.
+
+    References
+    ----------
+    R. Lugannani and S. Rice, "Saddle point approximation for the distribution of the sum of
+    independent random variables", Advances in Applied Probability 12, 1980.
+    """
+    w = weights / weights.sum()
+
+    def below(log_s: float) -> float:
+        return _evaluate_lower_tail(w, -math.exp(log_s))[1] - chance
+
+    log_s = float(brentq(below, math.log(1e-2), math.log(_MAX_SADDLEPOINT), rtol=1e-8))
+    return _evaluate_lower_tail(w, -math.exp(log_s))[0]
+
+
+def _evaluate_lower_tail(w: Array, s: float) -> tuple[float, float]:
+    """Return the point with its saddlepoint at s < 0, and the probability below it."""
+    gap = 1.0 - 2.0 * s * w
+    share = w / gap
+    x = float(share.sum())
+    curvature = 2.0 * float(share @ share)
+    z = -math.sqrt(max(2.0 * (s * x + 0.5 * float(np.log(gap).sum())), 1e-300))
+    u = s * math.sqrt(curvature)
+    density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    return x, float(ndtr(z)) + density * (1.0 / z - 1.0 / u)

@@ -1,9 +1,8 @@
 """The multi-octave Allan variance: one pass over the log for all tau, in bounded memory.
 
-Clusters of n samples need not start at every sample: starts n/48 apart, or closer, cost no
-measurable efficiency. The phase (cumulative sum) is therefore decimated as n grows, and the work is
-O(L). Within a section of the log that fits the cache, the phase is decimated up to `DECIMATION`.
-Longer clusters use the phase of the whole log at that stride.
+Clusters of n samples that start n/48 apart, or closer, cost no measurable efficiency. The phase
+(cumulative sum) is therefore decimated as n grows: up to `DECIMATION` within a section of the log
+that fits the cache. Longer clusters use the phase of the whole log at that stride. It takes O(L).
 """
 
 from __future__ import annotations
@@ -38,27 +37,15 @@ Grid = tuple[Integers, Integers, Integers, Integers]
 lanes; and the index of the first size of each level."""
 
 Buffers = tuple[Array, Array, Integers]
-"""Arrays that a thread reuses."""
+"""Arrays that a thread reuses: the phase of a section, of the samples after it, and counts."""
 
-MIN_STARTS_PER_CLUSTER = 48
-"""Least number of starts of clusters per cluster length."""
-
-DECIMATION = 64
-"""Stride of the stored phase of the whole log."""
-
-SECTION_SAMPLES = 1 << 16
-"""Samples that are summed together, so that their phase fits the L2 cache."""
-
-FULL_PHASE_SAMPLES = 1 << 17
-"""Samples at the beginning with a fully stored phase, for the noise type of short clusters."""
-
-MIN_DECIMATED_SAMPLES = 1 << 16
-"""Least length of a log that is decimated, samples; shorter logs use fully overlapping clusters."""
-
+MIN_STARTS_PER_CLUSTER = 48  # least number of starts of clusters per cluster length
+DECIMATION = 64  # stride of the stored phase of the whole log
+SECTION_SAMPLES = 1 << 16  # samples that are summed together, so that their phase fits the L2 cache
+FULL_PHASE_SAMPLES = 1 << 17  # with fully stored phase, for the noise type of short clusters
+MIN_DECIMATED_SAMPLES = 1 << 16  # shorter logs use fully overlapping clusters
 _LEVELS_IN_SECTION = 6  # strides 1, 2 ... 32 inside a section
-_POINTS_OF_LONGEST_PAIR = (
-    4 * MIN_STARTS_PER_CLUSTER
-)  # points, at any stride, of the longest pair of clusters
+_POINTS_OF_LONGEST_PAIR = 4 * MIN_STARTS_PER_CLUSTER  # at any stride, of a pair of clusters
 _OVERLAP_SAMPLES = _POINTS_OF_LONGEST_PAIR * DECIMATION // 2
 _NUMBER_OF_LANES = 4  # parts of a section whose phases are interleaved
 _STARTS_PER_BLOCK = 1 << 11  # starts that are summed for all sizes while they are in the L1 cache
@@ -78,26 +65,12 @@ class OctaveSums:
     """Sums of squared differences of cluster means of one segment of a log.
 
     The sizes, shape (m,), equal `octave_sizes`; the sums have the same bits for any number
-    of threads. With ``holes`` samples may be missing (NaN); ``gaps`` are the lengths of the gaps.
-
-    Attributes
-    ----------
-    first : Phase
-        Cumulative sums of the first samples.
-    theta : ndarray
-        Cumulative sum of the samples less a constant, every `DECIMATION` samples.
-    present : ndarray of int, or None
-        Cumulative number of samples present at the same points; None: all are.
+    of threads. With ``holes`` samples may be missing (NaN). ``theta`` and ``present`` are the phase
+    at every `DECIMATION`-th sample, ``first`` is the phase of the first samples.
     """
 
     def __init__(
-        self,
-        sizes: Integers,
-        samples: int,
-        *,
-        holes: bool,
-        gaps: Gaps = NO_GAPS,
-        threads: int = 1,
+        self, sizes: Integers, samples: int, *, holes: bool, gaps: Gaps = NO_GAPS, threads: int = 1
     ) -> None:
         self._sizes, self._holes, self._threads = sizes, holes, max(1, threads)
         self._short = _find_level(sizes) < _LEVELS_IN_SECTION
@@ -122,8 +95,13 @@ class OctaveSums:
         self._bias = 0.0
         self._rest: Samples = np.empty(0, dtype=np.float32)
         self._rooms: SimpleQueue[Buffers] = SimpleQueue()
+        points = SECTION_SAMPLES + _OVERLAP_SAMPLES + 1
         for _ in range(self._threads):
-            self._rooms.put(_allocate_buffers(holes))
+            phase = np.empty(points + 8)
+            # Aligned to a cache line: a load across two lines takes twice the time.
+            start = -phase.ctypes.data % 64 // 8
+            tail, present = np.empty(_OVERLAP_SAMPLES + 1), np.empty(points * holes, dtype=np.int64)
+            self._rooms.put((phase[start : start + points], tail, present))
         self.received = 0
 
     def push(self, block: Samples) -> None:
@@ -219,10 +197,9 @@ class OctaveSums:
     ) -> tuple[Array, Array, Array, Integers]:
         """Sum the clusters that begin in sections ``low`` to ``high``.
 
-        Returned are sums, shape (sections, 4, sizes), as `results`; totals, the sum of the samples
-        less the bias by section; edges, shape (sections, SECTION_SAMPLES / DECIMATION), cumulative
-        sums within the section; and counts, cumulative numbers of samples present at the edges, and
-        of the section (empty: all are).
+        Returns by section: sums, shape (4, sizes), as `results`; the total of the samples less the
+        bias; edges, cumulative sums at every `DECIMATION`-th sample; and counts, numbers of samples
+        present at the edges and in all (empty: all are).
         """
         theta, tail, present = room
         number, points = high - low, SECTION_SAMPLES // DECIMATION
@@ -250,19 +227,6 @@ class OctaveSums:
         return sums, totals, edges, counts
 
 
-def _allocate_buffers(holes: bool) -> Buffers:
-    """Return buffers for the phase of a section, for the samples after it, and for counts."""
-    points = SECTION_SAMPLES + _OVERLAP_SAMPLES + 1
-    phase = np.empty(points + 8)
-    # Aligned to a cache line: a load across two lines takes twice the time.
-    start = -phase.ctypes.data % 64 // 8
-    return (
-        phase[start : start + points],
-        np.empty(_OVERLAP_SAMPLES + 1),
-        np.empty(points if holes else 0, dtype=np.int64),
-    )
-
-
 @njit(cache=True, nogil=True)
 def _sum_sections(
     low: int,
@@ -278,10 +242,7 @@ def _sum_sections(
     edges: Array,
     whole: NDArray[np.bool_],
 ) -> None:
-    """Do the work of `OctaveSums._sections` for sections without missing samples.
-
-    Sets ``whole`` for these sections.
-    """
+    """Sum sections without missing samples as `OctaveSums._sections`; set ``whole`` for them."""
     offsets = np.empty(_NUMBER_OF_LANES + 1)
     for section in range(totals.size):
         begin = (low + section) * SECTION_SAMPLES
@@ -347,10 +308,8 @@ def _sum_lanes(
             theta[(rows + i) * _NUMBER_OF_LANES + _NUMBER_OF_LANES - 1] = (
                 lengths[_NUMBER_OF_LANES - 1] + tail[i]
             )
-        starts, points = (
-            _NUMBER_OF_LANES * rows,
-            _NUMBER_OF_LANES * (rows + _POINTS_OF_LONGEST_PAIR),
-        )
+        starts = _NUMBER_OF_LANES * rows
+        points = starts + _NUMBER_OF_LANES * _POINTS_OF_LONGEST_PAIR
         _sum_level(theta, starts, points, sizes, steps, begins[level], begins[level + 1], sums)
         rows //= 2
         for i in range(rows):

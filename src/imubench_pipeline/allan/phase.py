@@ -1,4 +1,7 @@
-"""Cumulative sums of a log and sums of their squared differences, for the Allan variance."""
+"""Cumulative sums of a log and sums of their squared differences, for the Allan variance.
+
+The missing samples of a log are recorded at two resolutions, in bounded memory (`Presence`).
+"""
 
 from __future__ import annotations
 
@@ -14,16 +17,16 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.threads import in_threads
 from imubench_pipeline.typing import Array
 
-BLOCK_DIFFERENCES = 1 << 14
-"""Differences that are summed together, so that three blocks of float64 stay in the L2 cache."""
-
+BLOCK_DIFFERENCES = 1 << 14  # summed together, so that three float64 blocks stay in the L2 cache
 MIN_PRESENT_SHARE = 0.9
 """Least share of the samples of a cluster for a valid mean; in a log with many short gaps, relative
 to the usual share."""
 
-_MIN_CLUSTER_OVER_SHORT_GAP = 4
-"""Least ratio of a cluster to a gap that counts as short in it."""
+_MIN_CLUSTER_OVER_SHORT_GAP = 4  # least ratio of a cluster to a gap that counts as short in it
 
+_MAX_COARSE_POINTS = 1 << 15
+_MIN_CLUSTERS = 16
+_STARTS_PER_CLUSTER = 32
 
 Span = tuple[int, int]
 """First and one-past-last sample of a segment."""
@@ -38,15 +41,13 @@ def spans_of(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...]:
 class Gaps:
     """Numbers of missing samples of a log, by the length of their gap.
 
-    The mean of a cluster represents all of it if the missing samples are spread evenly over it, for
-    example if every fifth is lost. It does not if they are missing in one piece. Clusters are
-    therefore compared with the usual share of samples between gaps that are long for their size.
+    The mean of a cluster represents all of it if the missing samples are spread evenly over it, but
+    not if they are missing in one piece. Clusters are therefore compared with the usual share of
+    samples between gaps that are long for their size.
     """
 
-    samples: int
-    """Points of the grid."""
-    missing: NDArray[np.int64]
-    """Number of samples in gaps of length 1, 2 to 3, 4 to 7 and so on, shape (64,)."""
+    samples: int  # points of the grid
+    missing: NDArray[np.int64]  # (64,): samples in gaps of length 1, 2 to 3, 4 to 7 and so on
 
     def enough(self, sizes: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the least number of samples of a cluster with a valid mean, by size."""
@@ -58,8 +59,7 @@ class Gaps:
         return np.maximum(np.ceil(MIN_PRESENT_SHARE * usual * sizes - 1e-9), 1).astype(np.int64)
 
 
-NO_GAPS = Gaps(0, np.zeros(64, dtype=np.int64))
-"""Gaps of a log without gaps, or with long gaps only."""
+NO_GAPS = Gaps(0, np.zeros(64, dtype=np.int64))  # no gaps, or long ones only
 
 
 @dataclass
@@ -132,14 +132,13 @@ def integrate(
 ) -> Phase:
     """Return the cumulative sums of consecutive blocks; memory beyond the result is bounded.
 
-    The blocks are the log in order, NaN where a sample is missing. Without ``holes`` no counts are
-    stored.
+    Without ``holes`` no sample may be missing (NaN), and no counts are stored.
 
     Raises
     ------
     ValueError
-        If the blocks are not ``samples`` long, a sample is infinite, or one is missing although
-        ``holes`` is False.
+        If the blocks are not ``samples`` long, or a sample is infinite, or missing without
+        ``holes``.
     """
     theta = np.empty(samples + 1)
     theta[0] = 0.0
@@ -238,8 +237,7 @@ def _sum_squares_twice(
     first: Array, middle: Array, last: Array, longer_middle: Array, longer_last: Array
 ) -> tuple[float, float]:
     """Return the result of `_sum_squares` for two sizes at once, which saves loads."""
-    total = 0.0
-    longer_total = 0.0
+    total = longer_total = 0.0
     for i in range(first.size):
         begin = first[i]
         difference = last[i] - 2.0 * middle[i] + begin
@@ -260,11 +258,8 @@ def sum_sizes(theta: Array, start: int, stop: int, sizes: NDArray[np.int64], sum
         n = sizes[j]
         end = max(start, min(stop, theta.size - 2 * n))
         # Slices first: an index i + 2 n inside the loop would prevent vectorisation.
-        first, middle, last = (
-            theta[start:end],
-            theta[start + n : end + n],
-            theta[start + 2 * n : end + 2 * n],
-        )
+        first, middle = theta[start:end], theta[start + n : end + n]
+        last = theta[start + 2 * n : end + 2 * n]
         next_n = sizes[min(j + 1, sizes.size - 1)]
         if j + 1 < sizes.size and end == min(stop, theta.size - 2 * next_n):
             both = _sum_squares_twice(
@@ -288,13 +283,11 @@ def sum_present(
 ) -> tuple[float, float, int]:
     """Sum squared differences of adjacent means over the samples present.
 
-    ``theta`` and ``present`` are cumulative sums and numbers of samples at one stride. A cluster
-    has ``m`` strides, and must have ``enough`` samples. The first cluster of a pair begins at
-    points ``start`` to ``stop``. Returns the sum of squares, the sum of the mean inverse numbers of
-    samples, and the number of pairs.
+    ``theta`` and ``present`` are cumulative sums and counts at one stride. A cluster has ``m``
+    strides, and at least ``enough`` samples; the first of a pair begins at points ``start`` to
+    ``stop``. Returns the sum, the sum of the mean inverse counts, and the number of pairs.
     """
-    total = 0.0
-    thinned = 0.0
+    total = thinned = 0.0
     number = 0
     length = max(0, stop - start)
     # Slices first and no branches, so that the loop is vectorised.
@@ -318,38 +311,16 @@ def sum_present(
 
 
 def full_sums(
-    phase: Phase,
-    sizes: NDArray[np.int64],
-    threads: int,
-    *,
-    stride: int = 1,
-    gaps: Gaps = NO_GAPS,
+    phase: Phase, sizes: NDArray[np.int64], threads: int, *, stride: int = 1, gaps: Gaps = NO_GAPS
 ) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
-    """Return sums over the differences of cluster means, by size.
+    """Return sums over the differences of cluster means, by size in points of the phase.
 
-    Parameters
-    ----------
-    sizes : ndarray of int
-        Points of the phase in a cluster.
-    threads : int
-        Number of threads; the sums have the same bits for any number.
-    stride : int
-        Samples from one point of the phase to the next.
-    gaps : Gaps
-        Gaps of the log.
-
-    Returns
-    -------
-    total, thinned : ndarray
-        Sums of the squared differences, and of the mean inverse numbers of samples that the two
-        clusters average.
-    terms, possible : ndarray of int
-        Number of differences, and their number without missing samples.
+    They are the sum of the squared differences, the sum of the mean inverse numbers of samples of
+    both clusters, the number of differences, and their number without missing samples. They have
+    the same bits for any number of threads. ``stride``: samples from one point to the next.
     """
-    total = np.zeros(len(sizes))
-    thinned = np.zeros(len(sizes))
-    terms = np.zeros(len(sizes), dtype=np.int64)
-    possible = np.zeros(len(sizes), dtype=np.int64)
+    total, thinned = np.zeros(len(sizes)), np.zeros(len(sizes))
+    terms, possible = np.zeros((2, len(sizes)), dtype=np.int64)
     samples = sizes * stride
     sizes = sizes.copy()  # writable, since the kernels are compiled for writable arrays
     for start, stop in phase.segments:
@@ -358,13 +329,13 @@ def full_sums(
         most = np.maximum(stop - start - 2 * sizes + 1, 0)
         possible += most
         if phase.present is None:
-            (sums,) = in_threads(partial(_sum_full, theta, sizes), blocks, threads)
+            (sums,) = in_threads(partial(_sum_blocks, theta, sizes), blocks, threads)
             total += sums.sum(axis=0) / samples.astype(np.float64) ** 2
             thinned += most / samples
             terms += most
         else:
             counts = phase.present[start : stop + 1]
-            work = partial(_sum_full_with_holes, theta, counts, sizes, gaps.enough(samples))
+            work = partial(_sum_blocks_present, theta, counts, sizes, gaps.enough(samples))
             sums, inverse, numbers = in_threads(work, blocks, threads)
             total += sums.sum(axis=0)
             thinned += inverse.sum(axis=0)
@@ -372,33 +343,14 @@ def full_sums(
     return total, thinned, terms, possible
 
 
-def _sum_full(theta: Array, sizes: NDArray[np.int64], low: int, high: int) -> tuple[Array]:
-    """Return the sum of squared second differences of each block and size."""
-    sums = np.zeros((high - low, len(sizes)))
-    _sum_blocks(theta, sizes, low, sums)
-    return (sums,)
-
-
 @njit(cache=True, nogil=True)
-def _sum_blocks(theta: Array, sizes: NDArray[np.int64], low: int, sums: Array) -> None:
+def _sum_blocks(theta: Array, sizes: NDArray[np.int64], low: int, high: int) -> tuple[Array]:
+    """Return the sum of squared second differences of blocks ``low`` to ``high``, by size."""
+    sums = np.zeros((high - low, sizes.size))
     for block in range(sums.shape[0]):
         start = (low + block) * BLOCK_DIFFERENCES
         sum_sizes(theta, start, start + BLOCK_DIFFERENCES, sizes, sums[block])
-
-
-def _sum_full_with_holes(
-    theta: Array,
-    present: NDArray[np.integer[Any]],
-    sizes: NDArray[np.int64],
-    enough: NDArray[np.int64],
-    low: int,
-    high: int,
-) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return the terms of `full_sums` over the samples present, by block and size."""
-    shape = (high - low, len(sizes))
-    rows = np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.int64)
-    _sum_blocks_present(theta, present, sizes, enough, low, *rows)
-    return rows
+    return (sums,)
 
 
 @njit(cache=True, nogil=True)
@@ -408,10 +360,11 @@ def _sum_blocks_present(
     sizes: NDArray[np.int64],
     enough: NDArray[np.int64],
     low: int,
-    sums: Array,
-    inverse: Array,
-    numbers: NDArray[np.int64],
-) -> None:
+    high: int,
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Return the terms of `full_sums` over the samples present, by block and size."""
+    sums, inverse = np.zeros((high - low, sizes.size)), np.zeros((high - low, sizes.size))
+    numbers = np.zeros((high - low, sizes.size), dtype=np.int64)
     for block in range(sums.shape[0]):
         start = (low + block) * BLOCK_DIFFERENCES
         for j in range(sizes.size):
@@ -419,3 +372,69 @@ def _sum_blocks_present(
             stop = min(start + BLOCK_DIFFERENCES, theta.size - 2 * n)
             of_size = sum_present(theta, present, n, enough[j], start, stop)
             sums[block, j], inverse[block, j], numbers[block, j] = of_size
+    return sums, inverse, numbers
+
+
+@dataclass(frozen=True)
+class Presence:
+    """Cumulative numbers of samples present."""
+
+    samples: int  # L, the points of the grid
+    segments: tuple[Span, ...]  # grid points that begin and end each segment
+    first: NDArray[np.int64]  # samples present before each of the first points
+    stride: int
+    coarse: NDArray[np.int64]  # samples present before every ``stride``-th point of the log
+    gaps: Gaps
+
+    def differences(self, n: int) -> tuple[NDArray[np.bool_], int] | None:
+        """Return a mask of the valid differences of means of n samples, and their stride.
+
+        The mask is for differences that begin a stride apart, in the whole log, or in its beginning
+        if that has enough clusters. None: no resolution is enough.
+        """
+        if n >= _STARTS_PER_CLUSTER // 2 * self.stride:
+            counts, base = self.coarse, self.stride
+        elif len(self.first) - 1 >= min(2 * _MIN_CLUSTERS * n, self.samples):
+            counts, base = self.first, 1
+        else:
+            return None
+        size = round(n / base)
+        begin = np.arange(0, len(counts) - 2 * size, max(1, size // _STARTS_PER_CLUSTER))
+        if not len(begin):
+            return np.zeros(0, dtype=np.bool_), base
+        enough = self.gaps.enough(np.array([size * base]))[0]
+        complete = np.ones(len(begin), dtype=np.bool_)
+        for cluster in (begin, begin + size):
+            complete &= counts[cluster + size] - counts[cluster] >= enough
+        if len(self.segments) > 1:
+            starts, ends = np.array(self.segments).T
+            points = begin * base
+            which = np.minimum(np.searchsorted(ends, points, side="right"), len(ends) - 1)
+            complete &= (points >= starts[which]) & (points + 2 * size * base <= ends[which])
+        return complete, base * max(1, size // _STARTS_PER_CLUSTER)
+
+
+def presence(
+    blocks: Iterable[NDArray[np.floating[Any]]],
+    samples: int,
+    segments: Sequence[Span] | None = None,
+) -> Presence:
+    """Count the samples that are present in a log; NaN where one is missing."""
+    stride = 1
+    while samples // stride > _MAX_COARSE_POINTS:
+        stride *= 2
+    first = np.zeros(min(samples, 2 * _MAX_COARSE_POINTS) + 1, dtype=np.int64)
+    coarse = np.zeros(samples // stride + 1, dtype=np.int64)
+    gaps = GapCount()
+    reached = total = 0
+    for block in blocks:
+        counts = total + np.cumsum(np.isfinite(block), dtype=np.int64)
+        stop = reached + len(block)
+        gaps.add(block)
+        points = np.arange(reached // stride + 1, min(stop // stride, len(coarse) - 1) + 1)
+        coarse[points] = counts[points * stride - reached - 1]
+        if reached + 1 < len(first):
+            part = counts[: len(first) - 1 - reached]
+            first[reached + 1 : reached + 1 + len(part)] = part
+        reached, total = stop, int(counts[-1]) if len(counts) else total
+    return Presence(samples, spans_of(segments, samples), first, stride, coarse, gaps.gaps())

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_SHARES_PER_THREAD = 4
-"""Shares of the work per thread, so that no thread waits long for the last share."""
+_SHARES_PER_THREAD = 4  # so that no thread waits long for the last share
 
 
 def available(threads: int | None) -> int:

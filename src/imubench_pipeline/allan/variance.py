@@ -70,16 +70,15 @@ class AllanCurve:
     samples : int
         L, samples in the log; by default twice the largest cluster.
     exponent : ndarray of int, shape (m,)
-        Noise type at each tau: the power of frequency, 2 to -2, in the spectrum of fractional
-        frequency (0: white noise of the samples, -1: flicker, -2: random walk). By default 0.
+        Noise type: the power of frequency, 2 to -2, in the spectrum of fractional frequency (0:
+        white noise of the samples, -1: flicker, -2: random walk). By default 0.
     averaged : ndarray, shape (m,)
-        Effective number of samples in a cluster: n by default, or the harmonic mean of the numbers
-        if samples are missing. The variance of white noise is proportional to 1 / averaged.
+        Samples in a cluster, or their harmonic mean if samples are missing. The variance of white
+        noise is proportional to 1 / averaged.
     edf_upper : ndarray, shape (m,)
-        Degrees of freedom of the upper limit, which are larger for few clusters. By default
-        ``edf``.
+        Degrees of freedom of the upper limit, larger for few clusters. By default ``edf``.
     edf_source : sequence of str
-        Source of the degrees of freedom at each tau: `POWER_LAW` or `FITTED`.
+        Source of the degrees of freedom: `POWER_LAW` or `FITTED`.
     share : ndarray, shape (m,)
         Share of the differences that are not lost to missing samples. By default 1.
     """
@@ -96,19 +95,18 @@ class AllanCurve:
     share: Array = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        # Defaults that depend on other fields; the class is frozen.
         if not self.samples:
             object.__setattr__(self, "samples", 2 * int(np.max(self.cluster_size)))
-        if not len(self.exponent):
-            object.__setattr__(self, "exponent", np.zeros(len(self.tau), dtype=np.int64))
-        if not len(self.averaged):
-            object.__setattr__(self, "averaged", np.asarray(self.cluster_size, dtype=np.float64))
-        if not len(self.edf_upper):
-            object.__setattr__(self, "edf_upper", self.edf)
-        if not self.edf_source:
-            object.__setattr__(self, "edf_source", (POWER_LAW,) * len(self.tau))
-        if not len(self.share):
-            object.__setattr__(self, "share", np.ones(len(self.tau)))
+        defaults = {
+            "exponent": np.zeros(len(self.tau), dtype=np.int64),
+            "averaged": np.asarray(self.cluster_size, dtype=np.float64),
+            "edf_upper": self.edf,
+            "edf_source": (POWER_LAW,) * len(self.tau),
+            "share": np.ones(len(self.tau)),
+        }
+        for name, default in defaults.items():
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, default)  # the class is frozen
 
     def __repr__(self) -> str:
         span = f", {self.tau[0]:.4g} to {self.tau[-1]:.4g} s" if len(self.tau) else ""
@@ -134,16 +132,9 @@ class AllanCurve:
 
 
 def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -> NDArray[np.int64]:
-    """Return log-spaced cluster sizes of a log, whole and distinct.
+    """Return log-spaced cluster sizes of a log of L samples, whole and distinct.
 
-    Parameters
-    ----------
-    samples : int
-        L.
-    per_decade : int
-        Sizes per decade, as far as integers allow.
-    longest : float
-        Largest size as a share of the log, at most 1/2.
+    ``per_decade`` sizes, as far as integers allow; ``longest`` is a share of the log, at most 1/2.
     """
     largest = int(samples * min(longest, 0.5) * (1 + 1e-12))
     if largest < 1:
@@ -172,11 +163,11 @@ def allan_variance(
     rate : float
         Sampling rate, Hz.
     cluster_sizes : array_like of int, optional
-        n of each tau; by default `cluster_sizes` of the length.
+        n of each tau; by default `cluster_sizes` of the length. Sizes without a difference are left
+        out.
     overlap : {"full", "octave"}
-        Use every cluster of every size; or clusters that start 1/48 of their length apart, or
-        closer, which is as accurate and many times faster (sizes are then rounded by up to 1 %, see
-        `imubench_pipeline.allan.octave.octave_sizes`).
+        Use every cluster; or clusters that start 1/48 of their length apart, or closer, which is as
+        accurate and many times faster (sizes are then rounded by up to 1 %).
     valid : array_like of bool, shape (L,), optional
         False where the sample is missing.
     segments : sequence of (int, int), optional
@@ -184,17 +175,11 @@ def allan_variance(
     threads : int, optional
         By default one for each core. The result has the same bits for any number.
 
-    Returns
-    -------
-    AllanCurve
-        At the sizes for which the log has at least one difference.
-
     Raises
     ------
     ValueError
-        If the log is not one-dimensional, the rate not positive, a size not positive, the segments
-        do not lie in the log one after the other, or so many samples are missing that no size has
-        a difference.
+        If an argument is not as above, the segments do not follow one another in the log, or so
+        many samples are missing that no size has a difference.
 
     References
     ----------
@@ -248,35 +233,15 @@ def of_blocks(
     segments: Sequence[Span] | None = None,
     threads: int = 1,
 ) -> AllanCurve:
-    """Return the multi-octave Allan variance of a log that is given in blocks.
+    """Return the multi-octave Allan variance of a log that is given in blocks, in order, SI.
 
     One pass; the memory grows with L/64 only. The result has the same bits for any number of
-    threads and any blocks.
-
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order, in SI; NaN where a sample is missing. Blocks of float32 are not copied.
-    samples : int
-        L, the total length of all blocks.
-    rate, sizes, segments : as in `allan_variance`
-        The sizes are rounded to the stride of their octave.
-    holes : bool
-        Samples may be missing.
-    gaps : Gaps
-        Gaps of the log (`imubench_pipeline.allan.phase.gaps_of`). With many short gaps, clusters
-        with the usual share of samples are valid.
-    threads : int
-        With more than one, the next block is computed while the last one is summed.
-
-    Raises
-    ------
-    ValueError
-        See `allan_variance`.
+    threads and any blocks. ``samples`` is L, the length of all blocks, and with ``holes`` samples
+    may be missing (NaN), as counted in ``gaps``. The sizes are rounded to the stride of their
+    octave. The other arguments and the errors are those of `allan_variance`.
     """
     spans = spans_of(segments, samples)
-    wanted = _check_arguments(rate, sizes, samples, spans)
-    wanted = octave_sizes(wanted)
+    wanted = octave_sizes(_check_arguments(rate, sizes, samples, spans))
     if samples < MIN_DECIMATED_SAMPLES:
         phase = integrate(blocks, samples, holes=holes, segments=spans)
         return of_phase(phase, rate, wanted, gaps=gaps, threads=threads)
@@ -364,43 +329,31 @@ def _make_curve(
     shown = sums[2] > 0
     n = sizes[shown]
     total, thinned, terms, possible = (column[shown] for column in sums)
-    exponent = np.array(_find_exponents(edges, n), dtype=np.int64)
-    edf = np.array(
-        [
-            _sum_degrees(segments, int(alpha), int(size)) * done / most
-            for alpha, size, done, most in zip(exponent, n, terms, possible, strict=True)
-        ]
-    )
-    return AllanCurve(
-        tau=n / rate,
-        cluster_size=n,
-        variance=total / (2.0 * terms),
-        edf=np.maximum(edf, 1.0),
-        exponent=exponent,
-        samples=samples,
-        averaged=terms / thinned,
-        share=terms / possible,
-    )
-
-
-def _find_exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
-    """Return the noise type at each size; with too few clusters, the type of the size before.
-
-    With few clusters white noise often looks blue. A bluer type than before is then not accepted.
-    """
     exponents: list[int] = []
-    for n in sizes:
-        theta, present, size = edges(int(n))
-        exponent = noise_exponent(theta, present, size)
-        before = exponents[-1] if exponents else 0
+    degrees: list[float] = []
+    before = 0
+    for size in n.tolist():
+        # With few clusters white noise often looks blue: a bluer type than at the size before is
+        # then not accepted. With too few, the type of the size before is taken.
+        theta, present, actual = edges(size)
+        exponent = noise_exponent(theta, present, actual)
         if exponent is None:
             exponent = before
         elif len(theta) <= _MAX_UNCERTAIN_CLUSTERS:
             exponent = min(exponent, max(before, 0))
+        before = exponent
         exponents.append(exponent)
-    return exponents
-
-
-def _sum_degrees(segments: Sequence[Span], exponent: int, n: int) -> float:
-    terms = [stop - start - 2 * n + 1 for start, stop in segments]
-    return sum(equivalent_degrees(exponent, n, term) for term in terms if term > 0)
+        counts = [stop - start - 2 * size + 1 for start, stop in segments]
+        degrees.append(
+            sum(equivalent_degrees(exponent, size, count) for count in counts if count > 0)
+        )
+    return AllanCurve(
+        tau=n / rate,
+        cluster_size=n,
+        variance=total / (2.0 * terms),
+        edf=np.maximum(np.array(degrees) * terms / possible, 1.0),
+        exponent=np.array(exponents, dtype=np.int64),
+        samples=samples,
+        averaged=terms / thinned,
+        share=terms / possible,
+    )

@@ -12,18 +12,12 @@ from dataclasses import replace
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.tables.findings import Finding
 
-_MAX_FACTOR_BEYOND_LIMITS = 1.25
-"""Maximum factor by which a value without limits may lie outside the likelihood's limits."""
-
-_MAX_VALUE_RATIO = 1.8
-"""Ratio of two values above which they differ, whatever their limits."""
+_MAX_FACTOR_BEYOND_LIMITS = 1.25  # Of a value without limits outside the limits of the likelihood
+_MAX_VALUE_RATIO = 1.8  # Ratio of two values above which they differ, whatever their limits
 
 
 def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
-    """Return an estimate in which the values that the likelihood excludes are doubtful.
-
-    ``reference`` is the estimate by the likelihood for the same channel.
-    """
+    """Return an estimate whose values are doubtful where the likelihood excludes them."""
     references = dict(reference.parameters)
     if reference.further and "B_curve" in reference.curve:
         # With several terms, each has its own B: compare with the B of the curve.
@@ -38,35 +32,29 @@ def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
 def _doubt_group(
     parameters: Mapping[str, Parameter], references: Mapping[str, Parameter]
 ) -> dict[str, Parameter]:
+    """Return parameters in which the values that their references exclude are doubtful."""
     judged = dict(parameters)
     for name, parameter in parameters.items():
-        reference = references.get(name)
-        if parameter.value is None or parameter.status not in ("ok", "at_bound") or not reference:
+        reference, value = references.get(name), parameter.value
+        if value is None or parameter.status not in ("ok", "at_bound") or not reference:
             continue
-        reason = _describe_contradiction(name, parameter, reference)
-        if reason is not None:
+        if reference.value is None:
+            reason = f"the likelihood gives no {name}: {reference.reason or reference.status}"
+            judged[name] = replace(parameter, status="doubtful", reason=reason)
+            continue
+        lower, upper = reference.lower, reference.upper
+        if lower is None or upper is None:
+            continue
+        ratio = _MAX_VALUE_RATIO
+        apart = not 1.0 / ratio < value / reference.value < ratio
+        if parameter.lower is None or parameter.upper is None:
+            ratio = _MAX_FACTOR_BEYOND_LIMITS
+        else:
+            apart |= parameter.upper < lower or parameter.lower > upper
+        if apart or value < lower / ratio or value > upper * ratio:
+            reason = f"the likelihood has {name} between {lower:.3g} and {upper:.3g} (SI)"
             judged[name] = replace(parameter, status="doubtful", reason=reason)
     return judged
-
-
-def _describe_contradiction(name: str, parameter: Parameter, reference: Parameter) -> str | None:
-    """Return a description of how the likelihood contradicts a value, or None."""
-    value = parameter.value or 0.0
-    if reference.value is None:
-        return f"the likelihood gives no {name}: {reference.reason or reference.status}"
-    lower, upper = reference.lower, reference.upper
-    if lower is None or upper is None:
-        return None
-    between = f"the likelihood has {name} between {lower:.3g} and {upper:.3g} (SI)"
-    if parameter.lower is None or parameter.upper is None:
-        apart = (
-            value < lower / _MAX_FACTOR_BEYOND_LIMITS or value > upper * _MAX_FACTOR_BEYOND_LIMITS
-        )
-    else:
-        apart = parameter.upper < lower or parameter.lower > upper
-        apart |= value < lower / _MAX_VALUE_RATIO or value > upper * _MAX_VALUE_RATIO
-    apart |= not 1.0 / _MAX_VALUE_RATIO < value / reference.value < _MAX_VALUE_RATIO
-    return between if apart else None
 
 
 def disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[Finding]:

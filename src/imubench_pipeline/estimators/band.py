@@ -11,21 +11,14 @@ from numpy.typing import NDArray
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
 
-_DEFAULT_BAND = 1 / 20
-"""Frequency over sampling rate below which filters are assumed to be flat."""
-
+_DEFAULT_BAND = 1 / 20  # Frequency over sampling rate below which filters are assumed to be flat
 _MIN_BAND = 1 / 1000
-_MIN_BANDWIDTH_RATIO = 10.0
-"""A first-order filter lowers the density by 1 % at a tenth of its cut-off."""
-
+_MIN_BANDWIDTH_RATIO = 10.0  # There a first-order filter lowers the density by 1 %
 _MIN_DEPARTURE_SIGMAS = 4.0
 _GROUP_BINS = 4
 _MAX_STEPS = 8
-_MAX_FILTER_SAMPLES = 100
-"""Correlation, in samples; shorter processes need white noise that is visible in addition."""
-
+_MAX_FILTER_SAMPLES = 100  # Correlation; shorter processes need visible white noise in addition
 _MAX_PROCESS_OVER_WHITE = 0.3
-
 _MIN_BINS = 24
 _CONVERGED_RATIO = 0.95
 _FLEXIBLE_TERMS = Terms("NFK", 1)
@@ -71,18 +64,14 @@ def find_band(
         cap = bandwidth / _MIN_BANDWIDTH_RATIO
     limit = _find_unbent_limit(spectrum, clear, cap)
     if limit is not None and limit < cap:
-        return Band(
-            limit, f"found: beyond {limit:.4g} Hz the spectrum bends, as by the sensor's filter"
-        )
+        source = f"found: beyond {limit:.4g} Hz the spectrum bends, as by the sensor's filter"
+        return Band(limit, source)
     if cap < nyquist:
         return Band(cap, f"a tenth of the stated bandwidth: {cap:.4g} Hz")
     if limit is None:
         limit = _DEFAULT_BAND * spectrum.rate
-        return Band(
-            limit,
-            f"default: a twentieth of the rate, {limit:.4g} Hz; the spectrum follows no model "
-            "beyond any frequency",
-        )
+        source = f"default: a twentieth of the rate, {limit:.4g} Hz; the spectrum follows no model"
+        return Band(limit, f"{source} beyond any frequency")
     return Band(nyquist, "found: the spectrum follows its model up to Nyquist")
 
 
@@ -94,7 +83,14 @@ def _find_unbent_limit(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float)
         if below.sum() < _MIN_BINS or limit < _MIN_BAND * spectrum.rate:
             # The log is too short, or the deviation does not decrease.
             return cap if step == 0 else None
-        departure = _find_departure(spectrum, clear, below, cap, _FLEXIBLE_TERMS)
+        whittle = _make_whittle(spectrum.select(below))
+        maximum = whittle.maximum(_FLEXIBLE_TERMS)
+        if _is_filter_like(whittle, maximum):
+            maximum = whittle.maximum(replace(_FLEXIBLE_TERMS, gauss_markov=0))
+        beyond = clear & ~below & (spectrum.upper <= cap * (1 + 1e-9))
+        departure = None
+        if beyond.any():
+            departure = _find_first_departure(spectrum.select(beyond), whittle, maximum)
         if departure is None or (step == 0 and _is_quantized(spectrum, clear, cap)):
             return cap if step == 0 else limit
         frequency, size = departure
@@ -106,26 +102,8 @@ def _find_unbent_limit(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float)
     return limit
 
 
-def _find_departure(
-    spectrum: Spectrum, clear: NDArray[np.bool_], below: NDArray[np.bool_], cap: float, terms: Terms
-) -> tuple[float, float] | None:
-    """Return frequency and relative size of the first deviation above some bins, or None."""
-    chosen = spectrum.select(below)
-    whittle = _make_whittle(chosen)
-    maximum = whittle.maximum(terms)
-    if _is_filter_like(whittle, maximum):
-        maximum = whittle.maximum(replace(terms, gauss_markov=0))
-    beyond = clear & ~below & (spectrum.upper <= cap * (1 + 1e-9))
-    if not beyond.any():
-        return None
-    return _find_first_departure(spectrum.select(beyond), whittle, maximum)
-
-
 def _is_filter_like(whittle: Whittle, maximum: Maximum) -> bool:
-    """Return whether a fast process leaves no visible white noise above its corner frequency.
-
-    White noise behind a first-order filter is a Gauss-Markov process.
-    """
+    """Return whether a fast process, without visible white noise above it, may be a filter."""
     if not len(maximum.times) or maximum.times[0] > _MAX_FILTER_SAMPLES / whittle.spectrum.rate:
         return False
     process = maximum.process_powers[-1] * whittle.gauss_markov(float(maximum.times[0]))[-1]
@@ -136,10 +114,7 @@ def _is_filter_like(whittle: Whittle, maximum: Maximum) -> bool:
 def _find_first_departure(
     rest: Spectrum, whittle: Whittle, maximum: Maximum
 ) -> tuple[float, float] | None:
-    """Return frequency and relative size of the first deviation from a fit, or None.
-
-    Deviations are compared with the errors of the bins and of the extrapolated fit.
-    """
+    """Return frequency and relative size of the first significant deviation from a fit, or None."""
     sensitivity = whittle.sensitivity(maximum)
     _, strength, directions = np.linalg.svd(sensitivity.T, full_matrices=False)
     carried = Whittle(rest, whittle.shortest, whittle.longest, len(whittle.times))
@@ -159,8 +134,7 @@ def _find_first_departure(
 
 def _is_quantized(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float) -> bool:
     """Return whether quantization noise explains the spectrum up to Nyquist."""
-    inside = clear & (spectrum.upper <= cap * (1 + 1e-9))
-    chosen = spectrum.select(inside)
+    chosen = spectrum.select(clear & (spectrum.upper <= cap * (1 + 1e-9)))
     whittle = _make_whittle(chosen)
     maximum = whittle.maximum(Terms("QNFK"))
     if maximum.parameter("Q") == 0.0:

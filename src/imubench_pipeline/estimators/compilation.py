@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from imubench_pipeline.estimators.importance_kernels import fit, set_densities
-from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
+from imubench_pipeline.estimators.posterior_kernels import (
+    fit_mixture,
+    log_posteriors,
+    mode_at,
+    set_densities,
+)
 from imubench_pipeline.estimators.whittle_kernels import (
     Bins,
     Problem,
@@ -16,11 +20,10 @@ from imubench_pipeline.estimators.whittle_kernels import (
 
 
 def compile_kernels() -> None:
-    """Compile them, or load what was compiled before.
+    """Compile the kernels, or load them from numba's cache.
 
-    It imports numba alone, so that a process of its own can begin with it while others import all
-    else. What it calls has the types of what an estimate calls: `tests/estimators/test_compilation`
-    holds that nothing is left to compile.
+    Only numba is imported, so that a separate process can begin while others import everything
+    else. The calls have the types of an estimate (see `tests/estimators/test_compilation`).
     """
     bins = Bins(*np.ones((4, 8)))
     problem = Problem(np.ones((8, 1)), bins, False, ShapeTable(0.0, 1.0, np.zeros((2, 8))))
@@ -32,4 +35,4 @@ def compile_kernels() -> None:
     weights, means, scales = np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1))
     points, densities = np.arange(3.0)[:, None], np.empty((3, 1))
     set_densities(points, weights, means, scales, 5, densities)
-    fit(points, densities, means, scales, 5, 0.0, weights, means.copy(), scales.copy())
+    fit_mixture(points, densities, means, scales, 5, 0.0, weights, means.copy(), scales.copy())

@@ -16,12 +16,8 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter, not_shown
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 from imubench_pipeline.typing import Array
 
-_SLOPE_WINDOW = 0.5
-"""Width of the window for a local slope, decades of tau."""
-
-_OCTAVE = math.log10(2.0)
-"""Distance of tau, in decades, below which estimates are correlated."""
-
+_SLOPE_WINDOW = 0.5  # Width of the window for a local slope, decades of tau
+_OCTAVE = math.log10(2.0)  # Distance of tau, in decades, below which estimates are correlated
 _WHITE_TOLERANCE = 0.06
 _WALK_TOLERANCE = 0.06
 _WALK_MAX_TOLERANCE = 0.2
@@ -49,7 +45,7 @@ class _Curve:
         crowd = max(1.0, _OCTAVE / spacing)
         return slope, math.sqrt(crowd / moment)
 
-    def level(self, inside: NDArray[np.bool_], slope: float, tau: float) -> float:
+    def level(self, inside: NDArray[np.bool_] | slice, slope: float, tau: float) -> float:
         """Return the deviation at ``tau`` of a line of a given slope through the points inside."""
         weight = self.error[inside] ** -2
         offset = np.average(self.deviation[inside] - slope * self.tau[inside], weights=weight)
@@ -59,15 +55,14 @@ class _Curve:
 def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     """Read the parameters from the slopes of an Allan deviation.
 
-    N is the value at tau = 1 s of the fitted -1/2 line, K that at 3 s of the fitted +1/2
-    line at the end of the curve, B the minimum over 0.664 and T_B the tau of the minimum over
-    1.89.
+    N is the value at tau = 1 s of the fitted -1/2 line, K the value at 3 s of the fitted +1/2
+    line at the end of the curve, B the minimum over 0.664 and T_B the tau of the minimum over 1.89.
 
     Parameters
     ----------
     curve : AllanCurve
     longest : float
-        Longest tau that is read, as a part of the log: beyond, the curve is too unsure.
+        Longest tau that is read, as a part of the log: beyond, the curve is too uncertain.
 
     Returns
     -------
@@ -88,27 +83,16 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     if used.sum() < 4:
         reason = f"the curve has {used.sum()} points up to {longest:.3g} of the log"
         return not_shown("curve", reason)
-    bias, correlation_time = _read_minimum(points)
-    return Estimate(
-        "curve",
-        {
-            "N": _read_white(points, thinned),
-            "B": bias,
-            "T_B": correlation_time,
-            "K": _read_walk(points),
-        },
-        curve={
-            "B_curve": bias,
-            "sigma_min": _scale(bias, FLOOR),
-            "tau_min": _scale(correlation_time, PEAK_TAU),
-        },
-    )
-
-
-def _scale(parameter: Parameter, factor: float) -> Parameter:
-    if parameter.value is None:
-        return parameter
-    return Parameter(parameter.value * factor)
+    bias, time = _read_minimum(points)
+    N, K = _read_white(points, thinned), _read_walk(points)
+    lowest = {"sigma_min": bias, "tau_min": time}
+    if bias.value is not None and time.value is not None:
+        lowest = {
+            "sigma_min": Parameter(bias.value * FLOOR),
+            "tau_min": Parameter(time.value * PEAK_TAU),
+        }
+    parameters = {"N": N, "B": bias, "T_B": time, "K": K}
+    return Estimate("curve", parameters, curve={"B_curve": bias} | lowest)
 
 
 def _read_white(points: _Curve, thinned: Array) -> Parameter:
@@ -121,29 +105,19 @@ def _read_white(points: _Curve, thinned: Array) -> Parameter:
                 slopes[i] = slope
     if not np.isfinite(slopes).any():
         return Parameter(None, "not_shown", "the curve is too short to show a slope")
-    # The ends have one-sided windows; the first runs of the right slope is the white noise.
+    # The ends have one-sided windows; the first run of the right slope is the white noise.
     close = np.abs(slopes + 0.5) <= _WHITE_TOLERANCE
-    run = _find_first_run(close)
-    if run is None:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], close.astype(np.int8), [0]))))
+    runs = [slice(*ends) for ends in edges.reshape(-1, 2) if ends[1] - ends[0] >= 3]
+    if not runs:
         low, high = np.nanmin(slopes), np.nanmax(slopes)
         return Parameter(
             None,
             "not_shown",
             f"no stretch of the curve has the slope -1/2: slopes run from {low:.2f} to {high:.2f}",
         )
-    excess = float(np.average(thinned[run], weights=points.error[run] ** -2))
-    return Parameter(points.level(run, -0.5, 1.0) / excess)
-
-
-def _find_first_run(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-    """Return the first run of three and more points, as a mask."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        if stop - start >= 3:
-            run = np.zeros(len(mask), dtype=bool)
-            run[start:stop] = True
-            return run
-    return None
+    excess = float(np.average(thinned[runs[0]], weights=points.error[runs[0]] ** -2))
+    return Parameter(points.level(runs[0], -0.5, 1.0) / excess)
 
 
 def _read_minimum(points: _Curve) -> tuple[Parameter, Parameter]:

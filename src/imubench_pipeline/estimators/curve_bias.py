@@ -1,12 +1,9 @@
 """The bias instability of the curve: one quantity of every model, whatever its terms.
 
-B of flicker noise, of a Gauss-Markov process and of the first of two are different quantities, and
-the selection between them is poorly determined by a log. Their sum is better determined:
-
 - ``B_curve``: the largest Allan deviation of all flicker and Gauss-Markov terms together, over
-  0.664; of a single one it is its B;
-- ``sigma_min``, ``tau_min``: the lowest point of the Allan deviation of the whole noise, which is
-  what datasheets print, and its averaging time.
+  0.664; of a single one it is its B. A log determines it better than the B of each term.
+- ``sigma_min``, ``tau_min``: the lowest point of the Allan deviation of the whole noise, which
+  datasheets print, and its averaging time.
 
 Both are evaluated up to a ninth of the log; at longer tau the curve is too uncertain.
 """
@@ -29,18 +26,10 @@ from imubench_pipeline.noise import FLOOR, PEAK_TAU, GaussMarkov, NoiseModel
 from imubench_pipeline.noise.terms import gauss_markov_shape
 from imubench_pipeline.typing import Array
 
-MAX_TAU_FRACTION = 1 / 9
-"""Maximum tau over the duration of the log."""
-
-_POINTS_PER_DECADE = 16
-"""Averaging times per decade for the search of the lowest point, before interpolation."""
-
-_POINTS_BETWEEN_PEAKS = 49
-"""Averaging times between the peaks of several processes."""
-
-_MAX_DRAWS = 16_000
-"""Maximum number of draws of a model if each is evaluated at many averaging times."""
-
+MAX_TAU_FRACTION = 1 / 9  # Maximum tau over the duration of the log
+_POINTS_PER_DECADE = 16  # Averaging times for the search of the lowest point
+_POINTS_BETWEEN_PEAKS = 49  # Averaging times between the peaks of several processes
+_MAX_DRAWS = 16_000  # Draws of a model that are evaluated at many averaging times
 _PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
 
@@ -69,11 +58,6 @@ class Models:
         every = max(1, len(self.parameters) // _MAX_DRAWS)
         return replace(self, parameters=self.parameters[::every], times=self.times[::every])
 
-    @property
-    def has_bias(self) -> bool:
-        """Whether there is flicker noise or a Gauss-Markov process."""
-        return any(self.terms.biases)
-
 
 def models_of(model: NoiseModel) -> Models:
     """Return a noise model alone, without its ramp and lines, as `Models` of one."""
@@ -94,11 +78,10 @@ def models_of(model: NoiseModel) -> Models:
 
 
 def bias_of_curve(models: Models, longest: float) -> tuple[Array, Array]:
-    """Return the bias instability of the curve of models up to a tau in s, and where it is.
+    """Return the bias instability of the curve of models up to a tau in s, and its tau.
 
-    That is the largest Allan deviation of the flicker and Gauss-Markov terms over 0.664, rad/s or
-    m/s², and its tau, s, both of shape (d,); flicker noise alone has it everywhere, and the longest
-    is given.
+    The largest Allan deviation of the flicker and Gauss-Markov terms over 0.664, rad/s or m/s²,
+    and its tau, s, both of shape (d,); of flicker noise alone, the longest tau.
     """
     flicker, count = models.parameter("F"), models.terms.gauss_markov
     if count == 0:
@@ -169,37 +152,42 @@ def add_curve_figures(
     """Return an estimate by likelihood with the figures of its curve.
 
     Values follow from the model of the estimate, intervals from the draws of all models that the
-    log does not rule out, by their weights (BIC). (By AIC, two processes of which the
-    slower stands for the random walk count as much as the walk: limits are twice as wide as they
-    need be.)
+    log does not rule out, weighted by BIC. (By AIC, two processes of which the slower replaces the
+    random walk weigh as much as the walk: limits would be twice as wide as needed.)
 
     Parameters
     ----------
     alike : sequence of Candidate
         The models that the log does not rule out, the chosen one first.
     wider : sequence of Candidate
-        Models with one bias instability beside the terms of the chosen one: what is absent is
-        below their limits.
+        Models with one bias instability in addition: they limit an absent one.
     tau : ndarray, shape (m,)
-        As `averaging_times` gives them.
+        As returned by `averaging_times`.
     """
-    chosen = alike[0]
-    model = models_of(estimate.model)
-    drawn = [_select_draws(candidate, draws) for candidate in alike]
-    if not any(chosen.terms.biases):
-        having = [c for c in alike if as_good(c, chosen) and any(c.terms.biases)]
-        every = [c for c in wider if any(c.terms.biases)] + having
-        bias = _describe_weak_bias(
-            [_select_draws(c, draws) for c in every], bool(having), float(tau[-1])
-        )
+
+    def select(candidate: Candidate) -> Models:
+        posterior, terms = draws[candidate.terms], candidate.terms
+        models = Models(terms, posterior.parameters, posterior.times, candidate.weight)
+        # The highest point of several processes is searched at many tau.
+        return models.fewer() if terms.gauss_markov > 1 else models
+
+    model, longest = models_of(estimate.model), float(tau[-1])
+    drawn = [select(candidate) for candidate in alike]
+    if any(alike[0].terms.biases):
+        bias = _estimate_bias(model, drawn, longest, estimate)
     else:
-        bias = _estimate_bias(model, drawn, float(tau[-1]))
-        bias = unless_at_bound(bias, estimate)
+        having = [c for c in alike if as_good(c, alike[0]) and any(c.terms.biases)]
+        every = [select(c) for c in wider if any(c.terms.biases)] + [select(c) for c in having]
+        bias = _describe_weak_bias(every, bool(having), longest)
     return replace(estimate, curve={"B_curve": bias} | lowest_parameters(model, drawn, tau))
 
 
-def _estimate_bias(model: Models, drawn: Sequence[Models], longest: float) -> Parameter:
-    parts = [(bias_of_curve(each, longest)[0], each.weight) for each in drawn if each.has_bias]
+def _estimate_bias(
+    model: Models, drawn: Sequence[Models], longest: float, estimate: Estimate
+) -> Parameter:
+    """Return the bias instability of a curve, with limits from draws."""
+    biased = [models for models in drawn if any(models.terms.biases)]
+    parts = [(bias_of_curve(models, longest)[0], models.weight) for models in biased]
     value, at = (float(of_one[0]) for of_one in bias_of_curve(model, longest))
     lower, upper = _compute_limits(parts, value)
     if value == 0.0:
@@ -214,26 +202,18 @@ def _estimate_bias(model: Models, drawn: Sequence[Models], longest: float) -> Pa
         )
     if reason:
         reason += "; only its interval is given"
-        return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
-    return Parameter(value, "ok", None, lower, upper)
-
-
-def unless_at_bound(bias: Parameter, estimate: Estimate) -> Parameter:
-    """Return the bias instability of the curve, which is not identified where a T_B is at a bound.
-
-    The end of the search decides the amplitude of a process whose correlation time ran into it.
-    """
-    groups = [estimate.parameters, *estimate.further]
-    times = [group["T_B"] for group in groups if group.get("T_B")]
-    bounds = [time.reason for time in times if time.status == "at_bound"]
-    if bias.status != "ok" or not bounds:
-        return bias
-    reason = f"a correlation time is at the bound of its search: {bounds[0]}"
-    return replace(bias, value=None, status="not_identified", reason=reason, fitted=bias.in_model)
+    else:
+        # The end of the search decides the amplitude of a process whose T_B ran into it.
+        times = [group.get("T_B") for group in (estimate.parameters, *estimate.further)]
+        bounds = [time.reason for time in times if time and time.status == "at_bound"]
+        if not bounds:
+            return Parameter(value, "ok", None, lower, upper)
+        reason = f"a correlation time is at the bound of its search: {bounds[0]}"
+    return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
 
 
 def _describe_weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parameter:
-    """Return what is said where the chosen model has no bias instability."""
+    """Return the bias instability of a curve whose chosen model has none."""
     if not drawn:
         return Parameter(None, "absent", "the data do not ask for it")
     upper = max(float(np.quantile(bias_of_curve(models, longest)[0], 0.975)) for models in drawn)
@@ -251,25 +231,26 @@ def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
         nothing = Parameter(None, "not_shown", "there is no noise")
         return dict.fromkeys(CURVE, nothing)
     bias = Parameter(None, "absent", "no flicker noise and no Gauss-Markov process")
-    if models.has_bias:
+    if any(models.terms.biases):
         bias = Parameter(float(bias_of_curve(models, float(tau[-1]))[0][0]))
     return {"B_curve": bias} | lowest_parameters(models, [], tau)
 
 
 def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dict[str, Parameter]:
-    """Return ``sigma_min`` and ``tau_min``, at `averaging_times`.
-
-    ``model`` is the one that is fitted; ``drawn`` has draws of the sets of terms that the log does
-    not rule out, none where the fit gives no limits.
-    """
-    (sigma,), (time,), (inside,) = lowest_point(model, tau)
-    drawn_points = [lowest_point(models.fewer(), tau) for models in drawn]
+    """Return ``sigma_min`` and ``tau_min`` of a model, with limits if draws of models are given."""
+    (sigma,), (time,), (inside,) = (part.tolist() for part in lowest_point(model, tau))
+    points = [lowest_point(models.fewer(), tau) for models in drawn]
+    weights = [models.weight for models in drawn]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
     if drawn:
-        sizes = [models.weight for models in drawn]
-        lows = list(zip([point[0] for point in drawn_points], sizes, strict=True))
-        times = list(zip([point[1] for point in drawn_points], sizes, strict=True))
-        limits = [_compute_limits(lows, float(sigma)), _compute_limits(times, float(time))]
+        limits = [
+            _compute_limits(
+                list(zip([sigmas for sigmas, _, _ in points], weights, strict=True)), sigma
+            ),
+            _compute_limits(
+                list(zip([times for _, times, _ in points], weights, strict=True)), time
+            ),
+        ]
     if not inside:
         falls = time > tau[0]
         reason = (
@@ -279,39 +260,20 @@ def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dic
         upper = limits[0][1] if falls else None
         return {
             "sigma_min": Parameter(None, "not_shown", reason, 0.0 if upper else None, upper),
-            "tau_min": Parameter(None, "not_shown", reason, float(time) if falls else None),
+            "tau_min": Parameter(None, "not_shown", reason, time if falls else None),
         }
-    return {
-        "sigma_min": Parameter(float(sigma), "ok", None, *limits[0]),
-        "tau_min": _estimate_lowest_time(float(time), limits[1], drawn_points, drawn),
-    }
-
-
-def _estimate_lowest_time(
-    value: float,
-    limits: tuple[float | None, float | None],
-    points: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
-    drawn: Sequence[Models],
-) -> Parameter:
-    weight = sum(models.weight for models in drawn)
+    lowest_time = Parameter(time, "ok", None, *limits[1])
     outside = sum(
-        models.weight * float(np.mean(~point[2]))
-        for models, point in zip(drawn, points, strict=True)
+        weight * float(np.mean(~minimum))
+        for weight, (_, _, minimum) in zip(weights, points, strict=True)
     )
-    if outside > 0.025 * weight:
+    if outside > 0.025 * sum(weights):
         reason = "models that the log does not rule out have no minimum within a ninth of it"
-        return Parameter(None, "not_identified", reason, limits[0], None, fitted=value)
-    return Parameter(value, "ok", None, *limits)
+        lowest_time = Parameter(None, "not_identified", reason, limits[1][0], None, fitted=time)
+    return {"sigma_min": Parameter(sigma, "ok", None, *limits[0]), "tau_min": lowest_time}
 
 
 def _compute_limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; those of the first lie inside."""
     lower, upper = mixture_limits(parts, [(parts[0][0], 1.0)])
     return min(lower, value), max(upper, value)
-
-
-def _select_draws(candidate: Candidate, draws: Mapping[Terms, Posterior]) -> Models:
-    posterior, terms = draws[candidate.terms], candidate.terms
-    models = Models(terms, posterior.parameters, posterior.times, candidate.weight)
-    # Of several processes the highest point is looked for at many tau.
-    return models.fewer() if terms.gauss_markov > 1 else models

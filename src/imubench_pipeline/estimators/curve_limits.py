@@ -1,13 +1,10 @@
-"""The limits of an Allan curve by the spectrum that was fitted to the same log.
+"""The limits of an Allan curve from the spectrum that was fitted to the same log.
 
-A power law identified at each tau does not know the noise a decade away: near the hump of a
-Gauss-Markov process its degrees of freedom are too many. The fitted model knows, where it explains
-the log.
-
-Where few clusters remain, a log that shows little random walk by chance has too low a curve there
-too: its upper limit allows for a walk one standard error above the fitted one. On 100 logs of the
-MTi-7's gyro, whose walk a log of 5 h hardly shows, the limits from a third of the log on held the
-truth in 90 to 93 % without this.
+The power law identified at each tau does not know the noise a decade away: near the hump of a
+Gauss-Markov process its degrees of freedom are too many. The fitted model does, where it explains
+the log. A log that happens to show little random walk has too low a curve at its end: the upper
+limit there allows for a walk one standard error above the fitted one. (Without this, limits of 100
+logs of the MTi-7's gyro contained the truth in 90 to 93 % from a third of the log on.)
 """
 
 from __future__ import annotations
@@ -18,17 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve
-from imubench_pipeline.allan.phase import Span
-from imubench_pipeline.allan.presence import Presence
+from imubench_pipeline.allan.phase import Presence, Span
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.whittle import model_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.spectral_degrees import Degrees, degrees_of_model
 
 _MIN_CLUSTERS = 100
-
-_MIN_TAU_TIMES_BAND = 1.0
-"""Tau times the highest fitted frequency; below it the curve contains noise that was not fitted."""
+_MIN_TAU_TIMES_BAND = 1.0  # Below it the curve contains frequencies that were not fitted
 
 
 def with_fitted_limits(
@@ -39,16 +33,17 @@ def with_fitted_limits(
 ) -> AllanCurve:
     """Return a curve with the degrees of freedom that the fitted spectrum implies.
 
-    Where the model does not explain the log, and at tau so short that the curve shows frequencies
-    that were not fitted, the fewer of these and those of the identified power law, which the curve
-    comes with, are taken. Where nothing was fitted the curve is the same. ``segments`` are first
-    and one-past-last sample of each; ``presence`` is needed where samples are missing.
+    The smaller of these and those of the identified power law apply where the model does not
+    explain the log, and at tau so short that the curve shows frequencies that were not fitted.
+    Without a fit the curve is unchanged. ``segments`` are first and one-past-last sample of each;
+    ``presence`` is needed where samples are missing.
     """
     if not likelihood.candidates or likelihood.band is None:
         return curve
     chosen = likelihood.candidates[0]
     rate = curve.rate
-    model = with_lines(model_of(chosen.maximum), likelihood)
+    sinusoids = [line.term for line in likelihood.lines if line.narrow]
+    model = replace(model_of(chosen.maximum), sinusoids=sinusoids)
 
     def degrees_at(model: NoiseModel, points: NDArray[np.bool_]) -> Degrees:
         return degrees_of_model(
@@ -63,9 +58,11 @@ def with_fitted_limits(
 
     degrees = degrees_at(model, np.ones(len(curve.tau), dtype=np.bool_))
     upper = degrees.upper
-    walking = _with_more_walk(model, likelihood)
+    walk = likelihood.estimates[0].parameters.get("K")
+    most_walk = walk.upper if walk is not None else None
     few = curve.cluster_size * _MIN_CLUSTERS > curve.samples
-    if walking is not None and few.any():
+    if most_walk is not None and most_walk > model.K and few.any():
+        walking = replace(model, K=(model.K + most_walk) / 2.0)
         upper[few] = np.minimum(upper[few], degrees_at(walking, few).upper)
     doubtful = np.full(len(curve.tau), chosen.goodness.verdict != "explained")
     if likelihood.band.highest < 0.5 * rate * (1.0 - 1e-9):
@@ -81,17 +78,3 @@ def with_fitted_limits(
         edf_upper=np.where(fitted, upper, curve.edf_upper),
         edf_source=tuple(FITTED if is_fitted else POWER_LAW for is_fitted in fitted),
     )
-
-
-def _with_more_walk(model: NoiseModel, likelihood: Likelihood) -> NoiseModel | None:
-    """Return a model with a random walk half way to its upper 95 % limit; None: no limit."""
-    parameters = likelihood.estimates[0].parameters
-    upper = parameters["K"].upper if parameters else None
-    if upper is None or upper <= model.K:
-        return None
-    return replace(model, K=(model.K + upper) / 2.0)
-
-
-def with_lines(model: NoiseModel, likelihood: Likelihood) -> NoiseModel:
-    """Return a model with the narrow lines that were found beside it."""
-    return replace(model, sinusoids=[line.term for line in likelihood.lines if line.narrow])

@@ -1,12 +1,11 @@
 """Estimation of the cut-off of a sensor's low-pass filter from the spectrum of its noise at rest.
 
 White noise of density N behind a filter (`imubench_pipeline.estimators.low_pass`) has the density
-N^2 G(f). The cut-off of an analogue filter may exceed Nyquist; aliasing then hides most of the
-bend, but a long log can determine it. N is the density before the filter.
-
-White noise behind an analogue filter of first order is a Gauss-Markov process. A process has white
-noise in addition, up to Nyquist; a filter has not. Where white noise is not visible, a correlation
-of a few samples is attributed to a filter. A longer one is ambiguous, and no filter is reported.
+N^2 G(f). An analogue cut-off may exceed Nyquist: aliasing then hides most of the bend, but a long
+log can determine it. White noise behind an analogue filter of first order is a Gauss-Markov
+process, without the white noise up to Nyquist that a process has in addition. Where that is not
+visible, a correlation of a few samples is attributed to a filter; a longer one is ambiguous, and no
+filter is reported.
 """
 
 from __future__ import annotations
@@ -39,59 +38,30 @@ from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Behind, Terms
 from imubench_pipeline.typing import Array
 
-_MIN_WHITE_GAIN = 2.0
-"""Minimum gain of log likelihood by white noise in addition to a process."""
-
-_MAX_LEAKAGE_FRACTION = 0.01
-"""Maximum spectral leakage over density in a bin; bins with more are not fitted."""
-
-_MIN_GAIN_RATIO = 0.4
-"""Minimum over maximum gain in a bin; below it, one end of the bin dominates its mean."""
-
-_MAX_DENSITY_RATIO = 10.0
-"""Measured over expected density above which the excess is not leakage.
-
-Leakage from the two ends of a log is exponentially distributed, and exceeds this in 1 of 20,000.
-"""
-
-_MAX_PASSES = 3
-"""Maximum number of fits; each excludes the bins with leakage under the previous filter."""
-
-_COARSE_TOLERANCE = 1e-3
-"""Relative tolerance of the cut-off in the first fit."""
-
-_MIN_FREQUENCY_RATIO = 1 / 300
-"""Minimum frequency over cut-off that is fitted. Drift, e.g. with temperature, does not follow the
-noise models, and far below the bend it is not informative."""
-
-DELTA_LOG_LIKELIHOOD_EXCLUDED = 3.0
-"""Log likelihood below the best at which another filter is excluded: its weight is 5 %."""
+_MIN_WHITE_GAIN = 2.0  # Minimum gain of log likelihood by white noise in addition to a process
+_MAX_LEAKAGE_FRACTION = 0.01  # Maximum spectral leakage over density in a fitted bin
+_MIN_GAIN_RATIO = 0.4  # Minimum over maximum gain within a fitted bin
+_MAX_DENSITY_RATIO = 10.0  # Measured over expected density; leakage exceeds it in 1 of 20,000
+_MAX_PASSES = 3  # Fits; each excludes the bins with leakage under the previous filter
+_COARSE_TOLERANCE = 1e-3  # Relative tolerance of the cut-off in the first fit
+_MIN_FREQUENCY_RATIO = 1 / 300  # Minimum fitted frequency over cut-off: below, drift may dominate
+DELTA_LOG_LIKELIHOOD_EXCLUDED = 3.0  # Below the best, another filter is excluded: weight 5 %
 
 _MIN_DELTA_BIC = 6.0
-"""Minimum gain of BIC by a filter: "strong" evidence (R. E. Kass and A. E. Raftery, J. Am. Stat.
-Assoc. 90, 1995)."""
+"""Minimum gain of BIC by a filter: "strong" evidence (Kass and Raftery, J. Am. Stat. Assoc. 90)."""
 
-_CERTAIN_DELTA_BIC = 20.0
-"""Gain of BIC below which the interval includes N without a filter (`_NO_FILTER_WEIGHT`)."""
-
+_CERTAIN_DELTA_BIC = 20.0  # Below it, the interval includes N without a filter
 _NO_FILTER_WEIGHT = 0.1
-
-_MIN_N_RATIO = 1e-6
-"""Minimum N at an end of the interval of the cut-off, over N at the best cut-off."""
-
-MAX_LIMIT_RATIO = 1.2
-"""Ratio of the limits of a cut-off above which it is not identified."""
-
-_MIN_HALF_WIDTH = 1e-5
-"""Minimum half width of the interval of a log cut-off."""
+_MIN_N_RATIO = 1e-6  # Minimum N at an end of the interval over N at the best cut-off
+MAX_LIMIT_RATIO = 1.2  # Ratio of the limits of a cut-off above which it is not identified
+_MIN_HALF_WIDTH = 1e-5  # Minimum half width of the interval of a log cut-off
 
 ALLOWED_CUTOFFS_REASON = "the log allows cut-offs from {:.4g} to {:.4g} Hz"
 UNKNOWN_BEND_REASON = (
     f"the spectrum bends, but not as behind any of {len(FAMILY)} filters that were tried"
 )
 
-_MAX_STATED_RATIO = 1.6
-"""Maximum ratio of a cut-off to the configured one at which both are the same filter."""
+_MAX_STATED_RATIO = 1.6  # Ratio of found to configured cut-off of the same filter
 
 
 @dataclass(frozen=True)
@@ -105,13 +75,10 @@ class Cutoff:
     gained: float  # BIC of the noise without a filter, less that with it
     or_quantization: bool = False  # quantization noise would explain the spectrum as well
     kind: Kind | None = None  # ``analogue``, ``bilinear`` or ``boxcar``; None without a filter
-    or_process: str | None = None
-    """Reason why process and filter are not distinguishable, or None."""
+    or_process: str | None = None  # reason why process and filter are not distinguishable, or None
     N_behind: float | None = None  # N before the filter, if it is one, in this case; SI
-    behind: Behind | None = None
-    """Power gains of the filter in each bin of the whole spectrum."""
-    ruled: NDArray[np.bool_] | None = None
-    """(b,): bins that spectral leakage dominates."""
+    behind: Behind | None = None  # power gains of the filter in each bin of the whole spectrum
+    ruled: NDArray[np.bool_] | None = None  # (b,): bins that spectral leakage dominates
     readings: Sequence[Reading] = ()  # for all filters that the log does not exclude
     allowed: Sequence[Allowed] = ()  # those filters, the chosen one first
     rounded: float = 0.0  # density of rounding over N^2
@@ -137,10 +104,7 @@ class Cutoff:
     def factors(
         self, number: int, rng: np.random.Generator, terms: Terms, *, in_the_log: bool = False
     ) -> Array:
-        """Return draws of N over its value for the chosen filter in a model, shape (number,).
-
-        N is the density before the filter, or with ``in_the_log`` the density in the log.
-        """
+        """Return draws of N over its value, before the filter or in the log, shape (number,)."""
         of_model = self.models.get(replace(terms, ramp=False))
         readings = self.readings if of_model is None else of_model.readings
         if not readings:
@@ -169,8 +133,7 @@ def find_cutoff(
     clear : ndarray of bool, shape (b,), optional
         Bins without spectral lines.
     resolution : float
-        Step of the register (LSB), SI, where the samples are rounded: white noise of variance
-        LSB^2 / 12 behind the filter.
+        Step of the register (LSB), SI: rounding adds white noise of variance LSB^2 / 12.
     stated : float, optional
         Cut-off of the sensor's filter from its data sheet, Hz. It decides between filter and
         process where the spectrum is ambiguous.
@@ -181,16 +144,30 @@ def find_cutoff(
         With status ``not_identified`` if the limits of the cut-off differ by more than a fifth, or
         if no such filter fits the bend; ``absent`` without a filter.
     """
-    used = np.ones(len(spectrum.frequency), dtype=np.bool_) if clear is None else clear
-    if used.sum() < MIN_BINS:
-        unknown = Parameter(None, "not_shown", f"the spectrum has {used.sum()} bins only")
+    usable = np.ones(len(spectrum.frequency), dtype=np.bool_) if clear is None else clear
+    if usable.sum() < MIN_BINS:
+        unknown = Parameter(None, "not_shown", f"the spectrum has {usable.sum()} bins only")
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
-    fits = FilterFits(spectrum.select(used))
+    fits = FilterFits(spectrum.select(usable))
     if not fits.may_bend():
         return _describe_no_filter(fits.unfiltered()[0], 0.0, None)
     rounding = resolution**2 / (12.0 * spectrum.rate)
-    settled = _iterate_fits(spectrum, used, fits, rounding)
-    fits, tried = settled.fits, settled.tried
+    tried = fits.try_filters(_COARSE_TOLERANCE)
+    ruled = np.zeros(len(usable), dtype=np.bool_)
+    # Repeat the fits while the best filter changes the set of usable bins.
+    for passed in range(_MAX_PASSES if tried else 0):
+        earlier, ruled = ruled, _find_leaky_bins(spectrum, fits, tried[0], rounding)
+        if passed and bool((ruled == earlier).all()):
+            break
+        near = usable & ~ruled & (spectrum.frequency > _MIN_FREQUENCY_RATIO * tried[0].cutoff)
+        if near.sum() >= MIN_BINS:
+            fits = FilterFits(spectrum.select(near))
+        if rounding > 0.0:
+            fits.rounded = rounding / fits.density(tried[0])[0] ** 2
+        fits.choose_slow(tried[0])
+        tried = fits.try_filters()
+        if not tried:
+            break
     N_alone, without, cost_alone, rising = fits.unfiltered()
     behind = fits.behind(tried[0]) if tried else math.inf
     gained = 2.0 * (without - behind)
@@ -198,57 +175,19 @@ def find_cutoff(
     doubt = _explain_ambiguity(fits, tried, cost_alone, gained, stated)
     if doubt is not None or gained < _MIN_DELTA_BIC or beside_rounding < -_MIN_DELTA_BIC:
         return _describe_no_filter(N_alone, gained, doubt)
-    return _describe_filter(spectrum, settled, rounding, (N_alone, gained, beside_rounding))
-
-
-@dataclass(frozen=True)
-class _ConvergedFits:
-    """Fits of filters to the ``used`` bins, without the bins ``ruled`` by leakage."""
-
-    fits: FilterFits
-    tried: Sequence[FilterTrial]
-    used: NDArray[np.bool_]
-    ruled: NDArray[np.bool_]
-
-
-def _iterate_fits(
-    spectrum: Spectrum,
-    usable: NDArray[np.bool_],
-    fits: FilterFits,
-    rounding: float,
-) -> _ConvergedFits:
-    """Fit the filters, repeatedly while the best one changes the set of usable bins."""
-    tried = fits.try_filters(_COARSE_TOLERANCE)
-    used, ruled = usable, np.zeros(len(usable), dtype=np.bool_)
-    for passed in range(_MAX_PASSES if tried else 0):
-        earlier, ruled = ruled, _find_leaky_bins(spectrum, fits, tried[0], rounding)
-        if passed and bool((ruled == earlier).all()):
-            break
-        near = usable & ~ruled & (spectrum.frequency > _MIN_FREQUENCY_RATIO * tried[0].cutoff)
-        if near.sum() >= MIN_BINS:
-            used = near
-            fits = FilterFits(spectrum.select(used))
-        if rounding > 0.0:
-            fits.rounded = rounding / fits.density(tried[0])[0] ** 2
-        fits.choose_slow(tried[0])
-        tried = fits.try_filters()
-        if not tried:
-            break
-    return _ConvergedFits(fits, tried, used, ruled)
+    found = _describe_filter(spectrum, fits, tried, N_alone, gained, beside_rounding)
+    return replace(found, floor=math.hypot(found.floor, math.sqrt(rounding)), ruled=ruled)
 
 
 def _describe_filter(
     spectrum: Spectrum,
-    settled: _ConvergedFits,
-    rounding: float,
-    against: tuple[float, float, float],
+    fits: FilterFits,
+    tried: Sequence[FilterTrial],
+    N_alone: float,
+    gained: float,
+    beside_rounding: float,
 ) -> Cutoff:
-    """Return the result with the best filter and the others that the log allows.
-
-    ``against``: N without a filter, the gain of BIC over no filter, and over quantization noise.
-    """
-    fits, tried, used = settled.fits, settled.tried, settled.used
-    N_alone, gained, beside_rounding = against
+    """Return the best filter, without rounding; the gains are over none, and quantization noise."""
     best = tried[0]
     # Trials with a floor count only if the best has one: with a floor no high cut-off is known.
     alike = [
@@ -270,16 +209,15 @@ def _describe_filter(
         # With so many filters, one may be selected by chance.
         alone = math.log(N_alone / N)
         beside = fits.rounded * N**2 + after**2
-        shown_alone = math.log(
-            N_alone / compute_density_in_log(best.low_pass, N, beside, fits.rate)
-        )
-        readings.append(Reading(_NO_FILTER_WEIGHT, alone, alone, alone, (shown_alone,) * 3))
-    error = SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
+        in_log = math.log(N_alone / compute_density_in_log(best.low_pass, N, beside, fits.rate))
+        readings.append(Reading(_NO_FILTER_WEIGHT, alone, alone, alone, (in_log,) * 3))
+    error = SIGMAS / math.sqrt(2.0 * float(fits.whittle.spectrum.ordinates.sum()))
     ends = [end for reading in readings for end in (reading.below, reading.above)]
     density = Parameter(
         N, lower=N * math.exp(min(0.0, *ends) - error), upper=N * math.exp(max(0.0, *ends) + error)
     )
     or_quantization = beside_rounding < _MIN_DELTA_BIC
+    frequency = Parameter(shown, lower=lower, upper=upper)
     reason = None
     if or_quantization:
         reason = (
@@ -291,23 +229,20 @@ def _describe_filter(
     elif not fits.explains(best):
         reason = UNKNOWN_BEND_REASON
     if reason is not None:
-        frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
-        density = replace(
-            density, value=None, status="not_identified", reason=reason, fitted=density.value
+        frequency, density = (
+            replace(each, value=None, status="not_identified", reason=reason, fitted=each.value)
+            for each in (frequency, density)
         )
-    else:
-        frequency = Parameter(shown, lower=lower, upper=upper)
     white, *slow = BinGains(spectrum)(best)
     return Cutoff(
         frequency,
         best.order,
         density,
-        math.hypot(after, math.sqrt(rounding)),
+        after,
         gained,
         or_quantization,
         best.kind,
         behind=Behind(white + fits.rounded + (after / N) ** 2, *slow),
-        ruled=settled.ruled,
         readings=readings,
         allowed=[
             Allowed(trial, max(0.5 * math.log(high / low), _MIN_HALF_WIDTH))
@@ -348,21 +283,18 @@ def _compute_readings(
         first, second, third = (math.log(max(density / shown, _MIN_N_RATIO)) for _, density in at)
         weight = math.exp(best.cost - trial.cost)
         readings.append(Reading(weight, below, middle, above, (first, second, third)))
-    readings += [
+    digital = [
         read_as_digital(reading, trial, fits.rate)
         for reading, trial in zip(readings, alike, strict=True)
         if trial.is_first_order_analogue
     ]
-    return readings
+    return readings + digital
 
 
 def _find_leaky_bins(
     spectrum: Spectrum, fits: FilterFits, best: FilterTrial, rounding: float
 ) -> NDArray[np.bool_]:
-    """Return the bins that leakage dominates, or in which the gain of the filter varies strongly.
-
-    Bins with a density far above both noise and leakage are not included.
-    """
+    """Return the bins that leakage dominates, or in which the gain of the filter varies."""
     N = fits.density(best)[0]
     gains, low_pass = BinGains(spectrum), best.low_pass
     within = gains.white(low_pass) + rounding / N**2
@@ -380,11 +312,7 @@ def _explain_ambiguity(
     gained: float,
     stated: float | None,
 ) -> tuple[str, float] | None:
-    """Return why process and filter are ambiguous, and N before the filter; None if they are not.
-
-    Only a filter of first order looks like a process, and only without visible white noise up to
-    Nyquist.
-    """
+    """Return why a process may be a first-order filter, and N before it; None if it may not."""
     first = next(
         (trial for trial in tried if trial.is_first_order_analogue and not trial.floor), None
     )

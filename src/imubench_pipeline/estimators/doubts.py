@@ -1,15 +1,13 @@
 """Tests for ambiguous models; parameters that another model would change become doubtful.
 
-An apparent random walk may be a drift with temperature or time (`describe_drift_alternative`). A
-drift with a few turning points in the log has its power in the lowest cosines of the transform, and
-so has a weak random walk. Above them the spectrum of the drift falls as f^-4, and the spectrum of
-the walk as f^-2. A walk is therefore accepted if the model still needs it without the lowest
-cosines, and if the spectrum is not steeper than a random walk.
+An apparent random walk may be a drift with temperature or time, whose power is in the lowest
+cosines of the transform and falls as f^-4 above them. A walk is accepted if the model needs it
+without these cosines too, and if the spectrum is not steeper than f^-2.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,56 +17,17 @@ from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 
-_DELTA_BIC_AGAINST_PAPERS = 6.0
-"""BIC difference to the best model above which values of the papers' model are doubtful."""
-
-_DELTA_AIC_WITHOUT_WALK = 2.5
-"""Advantage in AIC of a model without a random walk at which K is doubtful.
-
-Of processes with a correlation time of a twentieth of the log that are fitted as a walk, three
-quarters exceed it; of true random walks, 2 % do.
-"""
-
-_MIN_WALK_BESIDE_RAMP = 0.25
-"""K fitted with a ramp over K without it, at or below which the ramp may replace the walk.
-
-This happens, with a clearly better AIC, for 1 % of true random walks.
-"""
-
-_DELTA_BIC_EXTRA_TERM = 9.0
-"""Disadvantage in BIC up to which a model with fewer terms may be the true one.
-
-In one of a few hundred logs, flicker noise fitted together with a process gains as much by chance.
-"""
-
-_DELTA_BIC_RARE_TERM = 8.0
-"""Gain in BIC up to which quantization noise or a ramp may be chance, or part of a walk."""
-
-_DELTA_AIC_OTHER_BIAS_TERMS = 4.0
-"""Advantage in AIC, over Gauss-Markov processes alone, at which other terms of bias instability
-make B and T_B doubtful."""
-
-_DELTA_BIC_WITHOUT_BIAS = 4.0
-"""Disadvantage in BIC up to which a model without bias instability is about as good."""
-
-_DRIFT_COSINES = 5
-"""Number of lowest cosines, half a period to two and a half per log, that a drift may explain."""
-
-_MIN_WALK_GAIN = 3.0
-"""Twice the gain in log likelihood from which a walk is needed above these cosines.
-
-97 % of the walks whose K is known to 14 to 20 % reach it, and one in seven of the smooth drifts
-that are fitted as a walk.
-"""
-
-_DELTA_AIC_SMOOTH_DRIFT = 8.0
-"""Advantage in AIC of a spectrum of f^-4 over f^-2 at which K is doubtful.
-
-1 % of the walks exceed it, and some of the drifts with sharp bends.
-"""
-
-_EXCLUDED_COSINES = (0, 4)
-"""Numbers of lowest cosines that are excluded from the slope test: their scatter can hide it."""
+_DELTA_BIC_AGAINST_PAPERS = 6.0  # Above it, values of the papers' model are doubtful
+_DELTA_AIC_WITHOUT_WALK = 2.5  # 2 % of true random walks exceed it, and 3/4 of slow processes
+_MIN_WALK_BESIDE_RAMP = 0.25  # K with a ramp over K without it; 1 % of true walks are below
+_DELTA_BIC_EXTRA_TERM = 9.0  # Up to it, a model with fewer terms may be the true one
+_DELTA_BIC_RARE_TERM = 8.0  # Up to it, quantization noise or a ramp may be chance
+_DELTA_AIC_OTHER_BIAS_TERMS = 4.0  # Above it, other terms make B and T_B doubtful
+_DELTA_BIC_WITHOUT_BIAS = 4.0  # Up to it, a model without bias instability is as good
+_DRIFT_COSINES = 5  # Lowest cosines that a drift may explain: 0.5 to 2.5 periods per log
+_MIN_WALK_GAIN = 3.0  # Twice the gain in log L by a walk above them; 97 % of true walks reach it
+_DELTA_AIC_SMOOTH_DRIFT = 8.0  # Of f^-4 over f^-2; 1 % of true walks exceed it
+_EXCLUDED_COSINES = (0, 4)  # Numbers of lowest cosines that are excluded from the slope test
 
 
 def add_doubts(
@@ -89,22 +48,28 @@ def add_doubts(
         estimate, papers = (
             _flag_excluded_band(each, frame.band.highest) for each in (estimate, papers)
         )
-    rival = (
-        drift
-        or _doubt_walk_by_slow_process(chosen, candidates)
-        or _doubt_walk_by_ramp(chosen, candidates)
-    )
+    rival = drift or _doubt_walk(chosen, candidates)
     if rival is not None:
         estimate, papers = (cast_doubt(each, ("K",), rival) for each in (estimate, papers))
-    other = _doubt_bias_by_fewer_terms(chosen, candidates) or _doubt_bias_by_other_terms(
-        chosen, candidates
-    )
+    other = _doubt_bias(chosen, candidates)
     if other is not None:
         estimate = cast_doubt(estimate, ("B", "T_B"), other, of_curve=False)
     for name in ("Q", "R"):
-        needless = _doubt_rare_term(name, chosen, candidates)
-        if needless is not None:
-            estimate = cast_doubt(estimate, (name,), needless)
+        # The model without it may be hardly worse.
+        terms = chosen.terms
+        linear, ramp = terms.linear.replace(name, ""), terms.ramp and name != "R"
+        without = replace(terms, linear=linear, ramp=ramp)
+        plain = next((c for c in candidates if c.terms == without), None)
+        if (
+            without != terms
+            and plain is not None
+            and plain.bic <= chosen.bic + _DELTA_BIC_RARE_TERM
+        ):
+            worse = f"{plain.bic - chosen.bic:.1f} in BIC"
+            reason = (
+                f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
+            )
+            estimate = cast_doubt(estimate, (name,), reason)
     estimate = _equate_bias_statuses(estimate)
     against = papers_candidate.bic - chosen.bic
     if against > _DELTA_BIC_AGAINST_PAPERS:
@@ -116,102 +81,65 @@ def add_doubts(
     return estimate, papers
 
 
-def _doubt_walk_by_slow_process(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Return a reason if AIC clearly prefers a model without the random walk of the chosen one.
-
-    A slow process looks like a walk: BIC, which penalises such processes, selects the walk.
-    """
-    if "K" not in chosen.terms.linear:
-        return None
-    without = [
-        candidate
-        for candidate in candidates
-        if "K" not in candidate.terms.linear and not candidate.terms.ramp
-    ]
-    best = min(without, key=lambda candidate: candidate.aic, default=chosen)
-    if best.aic > chosen.aic - _DELTA_AIC_WITHOUT_WALK:
-        return None
-    return (
-        f"{best.terms.name}, which has no random walk, is better by "
-        f"{chosen.aic - best.aic:.1f} in AIC: a process as slow as the log passes for a random walk"
-    )
-
-
-def _doubt_walk_by_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Return a reason if AIC prefers walk and ramp, and the ramp leaves little of the walk."""
+def _doubt_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Return a reason if AIC, which permits slow processes, prefers little or no walk."""
     terms = chosen.terms
-    if "K" not in terms.linear or terms.ramp:
+    if "K" not in terms.linear:
         return None
-    beside = replace(terms, ramp=True)
-    best = next((candidate for candidate in candidates if candidate.terms == beside), None)
-    if best is None or best.aic > chosen.aic - _DELTA_AIC_WITHOUT_WALK:
+    without = [c for c in candidates if "K" not in c.terms.linear and not c.terms.ramp]
+    best = min(without, key=lambda candidate: candidate.aic, default=chosen)
+    better = chosen.aic - best.aic
+    if best.aic <= chosen.aic - _DELTA_AIC_WITHOUT_WALK:
+        return (
+            f"{best.terms.name}, which has no random walk, is better by {better:.1f} in AIC: a "
+            "process as slow as the log passes for a random walk"
+        )
+    beside = next((c for c in candidates if c.terms == replace(terms, ramp=True)), chosen)
+    if beside.aic > chosen.aic - _DELTA_AIC_WITHOUT_WALK:
         return None
-    K, least = chosen.maximum.parameter("K"), best.maximum.parameter("K")
+    K, least = chosen.maximum.parameter("K"), beside.maximum.parameter("K")
     if least > _MIN_WALK_BESIDE_RAMP * K:
         return None
-    return (
-        f"{beside.name} is better by {chosen.aic - best.aic:.1f} in AIC, and the ramp leaves "
-        f"{least / K:.2g} of K"
-    )
+    better = chosen.aic - beside.aic
+    leaves = f"the ramp leaves {least / K:.2g} of K"
+    return f"{beside.terms.name} is better by {better:.1f} in AIC, and {leaves}"
 
 
-def _doubt_bias_by_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Return a reason if a model with fewer terms of bias instability is hardly worse."""
+def _doubt_bias(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Return a reason if a model with fewer or other terms of bias instability may be right.
+
+    Other terms count only for models with processes and without a walk: BIC penalises processes as
+    slow as a walk, and may therefore merge one with another process.
+    """
     terms, biases = chosen.terms, sum(chosen.terms.biases)
     if biases == 0:
         return None
     fewer = [candidate for candidate in candidates if sum(candidate.terms.biases) < min(biases, 2)]
     best = min(fewer, key=lambda candidate: candidate.bic, default=None)
-    if best is None or best.bic > chosen.bic + (
-        _DELTA_BIC_EXTRA_TERM if biases > 1 else _DELTA_BIC_WITHOUT_BIAS
-    ):
+    most = _DELTA_BIC_EXTRA_TERM if biases > 1 else _DELTA_BIC_WITHOUT_BIAS
+    if best is not None and best.bic <= chosen.bic + most:
+        worse = f"{best.bic - chosen.bic:.1f} in BIC"
+        instead = "another B; B_curve is that of both" if biases > 1 else "no B"
+        return f"{best.terms.name} is hardly worse than {terms.name}, by {worse}, and has {instead}"
+    other = min(candidates, key=lambda candidate: candidate.aic)
+    better = chosen.aic - other.aic
+    if terms.gauss_markov == 0 or "K" in terms.linear or other.terms.biases == terms.biases:
         return None
-    worse = f"{best.terms.name} is hardly worse than {terms.name}, by "
-    worse += f"{best.bic - chosen.bic:.1f} in BIC, and has "
-    return worse + ("another B; B_curve is that of both" if biases > 1 else "no B")
-
-
-def _doubt_bias_by_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Return a reason if AIC clearly prefers other terms of bias instability.
-
-    Only for models with processes and without a walk: BIC penalises processes as slow as a walk,
-    and may therefore merge one with another process.
-    """
-    best = min(candidates, key=lambda candidate: candidate.aic)
-    terms = chosen.terms
-    if terms.gauss_markov == 0 or "K" in terms.linear:
-        return None
-    if best.terms.biases == terms.biases:
-        return None
-    better = chosen.aic - best.aic
     if better < _DELTA_AIC_OTHER_BIAS_TERMS:
         return None
-    name = best.terms.name
+    name = other.terms.name
     return f"{name}, with other terms of bias instability, is better by {better:.1f} in AIC"
 
 
-def _doubt_rare_term(name: str, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Return a reason if the model without quantization noise (Q) or ramp (R) is hardly worse."""
-    terms = chosen.terms
-    without = replace(terms, linear=terms.linear.replace(name, ""), ramp=terms.ramp and name != "R")
-    other = next((candidate for candidate in candidates if candidate.terms == without), None)
-    if without == terms or other is None or other.bic > chosen.bic + _DELTA_BIC_RARE_TERM:
-        return None
-    worse = f"{other.bic - chosen.bic:.1f} in BIC"
-    return f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
-
-
 def _equate_bias_statuses(estimate: Estimate) -> Estimate:
-    """Return an estimate with the same status for B_curve and B, where B is the only such term."""
+    """Give B_curve and B the same status, where B is the only term of bias instability."""
     B, of_curve = estimate.parameters["B"], estimate.curve.get("B_curve")
     if estimate.further or of_curve is None:
         return estimate
     if of_curve.status == "not_identified":
         reason = f"the bias instability of the curve is not told: {of_curve.reason}"
         return cast_doubt(estimate, ("B", "T_B"), reason, of_curve=False)
-    if of_curve.status != "ok":
-        return estimate
-    if B.status not in ("not_identified", "doubtful"):
+    if of_curve.status != "ok" or B.status not in ("not_identified", "doubtful"):
         return estimate
     value = of_curve.value if B.status == "doubtful" else None
     unsure = replace(
@@ -223,27 +151,22 @@ def _equate_bias_statuses(estimate: Estimate) -> Estimate:
 def cast_doubt(
     estimate: Estimate, names: Sequence[str], reason: str, *, of_curve: bool = True
 ) -> Estimate:
-    """Return an estimate with parameters of status ``ok`` made doubtful.
+    """Make parameters of status ``ok`` doubtful; with B the figures of the curve too."""
 
-    With B, the figures of the curve become doubtful too, unless ``of_curve`` is False.
-    """
-
-    def doubted_in(
-        group: Mapping[str, Parameter], doubted_names: Container[str]
-    ) -> dict[str, Parameter]:
-        return {
+    def doubt(group: Mapping[str, Parameter], names: Sequence[str]) -> dict[str, Parameter]:
+        doubtful = {
             name: replace(parameter, status="doubtful", reason=reason)
-            if name in doubted_names and parameter.status == "ok"
-            else parameter
             for name, parameter in group.items()
+            if name in names and parameter.status == "ok"
         }
+        return {**group, **doubtful}
 
     figures = CURVE if of_curve and "B" in names else ()
     return replace(
         estimate,
-        parameters=doubted_in(estimate.parameters, names),
-        further=[doubted_in(group, names) for group in estimate.further],
-        curve=doubted_in(estimate.curve, figures),
+        parameters=doubt(estimate.parameters, names),
+        further=[doubt(group, names) for group in estimate.further],
+        curve=doubt(estimate.curve, figures),
     )
 
 
@@ -294,6 +217,5 @@ def describe_drift_alternative(whittle: Whittle, chosen: Maximum) -> str | None:
 def _likelihood_without_lowest_cosines(whittle: Whittle, number: int) -> Whittle:
     """Return the likelihood without the lowest cosines of each part of the log."""
     spectrum = whittle.spectrum
-    place = 2.0 * spectrum.frequency * spectrum.length
-    beyond = place > number + 0.5
+    beyond = 2.0 * spectrum.frequency * spectrum.length > number + 0.5
     return whittle if bool(np.all(beyond)) else whittle.select(spectrum, beyond)

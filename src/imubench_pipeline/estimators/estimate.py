@@ -64,16 +64,16 @@ class Parameter:
         SI; None where the status says why there is none.
     status : str
         ``ok``; ``doubtful``: something about the log or the fit says that the value may be wrong;
-        ``not_shown``: the curve does not show it; ``at_bound``: the fit ran into the
-        end of its search; ``not_identified``: the log cannot tell it; ``absent``: the model
-        has no such term.
+        ``not_shown``: the curve does not show it; ``at_bound``: the fit ran into the end of its
+        search; ``not_identified``: the log cannot determine it; ``absent``: the model has no such
+        term.
     reason : str or None
     lower, upper : float or None
         95 % limits, where the method gives them.
     duration_needed : float or None
-        Length of a log that would tell the value to 10 %, s.
+        Length of a log that would determine the value to 10 %, s.
     fitted : float or None
-        What the model of the log has where no value is given; a value is what the model has.
+        The value in the model of the log, where no value is given.
     """
 
     value: float | None
@@ -86,7 +86,7 @@ class Parameter:
 
     @property
     def in_model(self) -> float | None:
-        """What the model of the log takes."""
+        """The value in the model of the log."""
         return self.value if self.fitted is None else self.fitted
 
     def checked(self) -> Parameter:
@@ -101,19 +101,12 @@ class Parameter:
             where = f"the 95 % limits are {far / near:.2g} times apart"
         else:
             where = "the 95 % interval contains 0" if signs < 0 else "the lower 95 % limit is 0"
-        reason = f"{where}; only the interval is given"
+        reason, fitted = f"{where}; only the interval is given", self.in_model
         # The prior, and not the data, decides how far down such draws reach.
-        lower = (
-            0.0 if signs > 0 and self.lower > 0.0 and far > _MAX_OPEN_RATIO * near else self.lower
-        )
-        return replace(
-            self,
-            value=None,
-            status="not_identified",
-            reason=reason,
-            lower=lower,
-            fitted=self.in_model,
-        )
+        is_open = signs > 0 and self.lower > 0.0 and far > _MAX_OPEN_RATIO * near
+        lower = 0.0 if is_open else self.lower
+        status: Status = "not_identified"
+        return replace(self, value=None, status=status, reason=reason, lower=lower, fitted=fitted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +116,10 @@ class JointDraws:
     Attributes
     ----------
     first : ndarray, shape (d, 6)
-        Q, N, B, T_B, K and R, SI, of each draw; 0 for a term that it does not have. T_B is NaN
-        where B is flicker noise, or 0.
+        Q, N, B, T_B, K and R, SI, of each draw; 0 for an absent term. T_B is NaN where B is
+        flicker noise, or 0.
     further : ndarray, shape (d, g, 2)
-        B and T_B of the further Gauss-Markov processes; B is 0, T_B NaN, where it has fewer.
+        B and T_B of the further Gauss-Markov processes; 0 and NaN where a draw has fewer.
     """
 
     first: Array
@@ -154,8 +147,7 @@ class JointDraws:
 class Estimate:
     """The parameters of one channel by one method.
 
-    A value is ``ok`` only where its interval is narrow enough (`Parameter.checked`): whatever makes
-    or changes an estimate, this holds.
+    A value is ``ok`` only where its interval is narrow enough (`Parameter.checked`).
 
     Attributes
     ----------
@@ -170,8 +162,7 @@ class Estimate:
     curve : mapping of str to Parameter
         The figures of the curve, `CURVE`.
     draws : JointDraws or None
-        Noise models drawn jointly from the posterior, without the lines; None: the method has
-        none, and its parameters are known one by one only.
+        Noise models drawn jointly from the posterior, without lines; None for other methods.
     """
 
     method: str
@@ -182,7 +173,7 @@ class Estimate:
     draws: JointDraws | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        # The class is frozen: what is checked of other fields goes this way.
+        # The class is frozen.
         for name in ("parameters", "curve"):
             object.__setattr__(self, name, _checked(getattr(self, name)))
         for name in ("further", "lines"):
@@ -190,14 +181,8 @@ class Estimate:
 
     def components(self) -> Iterator[tuple[int, str, Parameter]]:
         """Yield component number, name and parameter, the first component first."""
-        for name, parameter in self.parameters.items():
-            yield 1, name, parameter
-        for name, parameter in self.curve.items():
-            yield 1, name, parameter
-        for number, group in enumerate(self.further, start=2):
-            for name, parameter in group.items():
-                yield number, name, parameter
-        for number, group in enumerate(self.lines, start=1):
+        groups = [(1, self.parameters), (1, self.curve), *enumerate(self.further, start=2)]
+        for number, group in [*groups, *enumerate(self.lines, start=1)]:
             for name, parameter in group.items():
                 yield number, name, parameter
 

@@ -18,25 +18,14 @@ from imubench_pipeline.estimators.whittle_kernels import TOLERANCE, best_powers
 from imubench_pipeline.typing import Array
 
 _POINTS_PER_BIN = 6
-"""Frequencies per bin over which a density is averaged."""
-
-_SCAN_CUTOFFS, _COARSE_SCAN_CUTOFFS = 24, 8
-"""Cut-offs of the scan before optimisation, and of the test whether a filter is possible."""
-
-_MAX_BOXCAR_SAMPLES = 20
-"""Maximum whole number of samples whose mean is tried: near its nulls the likelihood is narrow."""
-
+_SCAN_CUTOFFS, _COARSE_SCAN_CUTOFFS = 24, 8  # For the optimisation, and for the test of any filter
+_MAX_BOXCAR_SAMPLES = 20  # Maximum whole number of samples whose mean is tried
 _MIN_CUTOFF = 1 / 500
 
 _MAX_CUTOFFS: Mapping[tuple[Kind, int], float] = {
     ("analogue", 1): 4.0,
-    ("analogue", 2): 1.0,
-    ("analogue", 3): 1.0,
-    ("analogue", 4): 1.0,
-    ("bilinear", 1): 0.42,
-    ("bilinear", 2): 0.42,
-    ("bilinear", 3): 0.42,
-    ("bilinear", 4): 0.42,
+    **{("analogue", order): 1.0 for order in (2, 3, 4)},
+    **{("bilinear", order): 0.42 for order in (1, 2, 3, 4)},
     ("boxcar", 1): 0.222,
 }
 """Filters that are tried, and their highest cut-off over the sampling rate; the lowest is 1/500.
@@ -48,51 +37,28 @@ equal those of a first-order filter with a lower cut-off. The shortest boxcar ha
 FAMILY: Sequence[tuple[Kind, int]] = tuple(_MAX_CUTOFFS)
 """Kind and order of the filters that are tried."""
 
-_CORRELATION_RANGE = (1e2, 1e5)
-"""Shortest and longest correlation time of slow noise, sampling intervals."""
-
-_MIN_CORRELATION_RATIO = 4.0
-"""Minimum ratio of the correlation time of slow noise to the filter's, 1 / (2 pi f_c)."""
+_CORRELATION_RANGE = (1e2, 1e5)  # Correlation times of slow noise, sampling intervals
+_MIN_CORRELATION_RATIO = 4.0  # Correlation time of slow noise over the filter's, 1 / (2 pi f_c)
 
 _MAX_FILTER_SAMPLES, MIN_PROCESS_SAMPLES = 2.0, 10.0
-"""Limits of the correlation in sampling intervals, 1 / (2 pi f_c T).
-
-Below the first, additional white noise is attributed to a filter of first order; processes are at
-least as long as the second.
-"""
+"""Limits of the correlation in sampling intervals: below the first, additional white noise is
+attributed to a filter of first order; processes are at least as long as the second."""
 
 _TIMES_PER_DECADE = 6
-"""Correlation times per decade that are tried."""
-
 _ANALOGUE_PREFERENCE = 0.01
-
-_MIN_SCAN_GAIN = 1.0
-"""Minimum gain of log likelihood in the coarse scan for a full search."""
-
+_MIN_SCAN_GAIN = 1.0  # Minimum gain of log likelihood in the coarse scan for a full search
 _MAX_SLOW_TERMS = 4
-"""Maximum number of terms of slow noise."""
-
-MAX_UNALIASED_CUTOFF = 0.3
-"""Cut-off over the sampling rate below which the likelihood has one maximum: little aliasing."""
-
-_LIMIT_SCAN_CUTOFFS = 24
-"""Cut-offs on each side that are scanned for further maxima within the interval."""
-
-HALF_CHI_SQUARED = 1.9207
-"""Decrease of the log likelihood at the ends of a 95 % interval."""
+MAX_UNALIASED_CUTOFF = 0.3  # Over the rate; below it the likelihood has one maximum
+_LIMIT_SCAN_CUTOFFS = 24  # Scanned on each side for further maxima within the interval
+HALF_CHI_SQUARED = 1.9207  # Decrease of the log likelihood at the ends of a 95 % interval
 
 _UNFILTERED_MODELS = (("N", 0), ("NK", 0), ("NFK", 0), ("NK", 1), ("NFK", 1), ("NK", 2))
 """Linear terms and number of processes of the unfiltered noise models."""
 
 _QUANTIZATION_MODELS = (Terms("N"), Terms("NK"), Terms("NF"), Terms("NFK"), Terms("NK", 1))
-
 _MIN_CUTOFF_RATIO = 1.01
-
 MIN_BINS = 24
-
-_DIGITAL_TWIN_WEIGHT = 0.1
-"""Weight of the same first-order filter applied after sampling: its spectrum has the same shape as
-before sampling, but N then has no aliases."""
+_DIGITAL_TWIN_WEIGHT = 0.1  # Weight of a filter of the same shape after sampling
 
 
 class BinGains:
@@ -152,10 +118,7 @@ class FilterTrial:
 
 
 def explains_bend(spectrum: Spectrum, fitted: Array, trial: FilterTrial) -> bool:
-    """Return whether a fit with a filter explains the spectrum where the filter bends it.
-
-    ``fitted``, shape (b,), is the density of the fit in each bin.
-    """
+    """Return whether a fit, its density of shape (b,), explains the bend of a filter."""
     bent = spectrum.frequency > min(0.1 * trial.cutoff, spectrum.frequency[-MIN_BINS])
     shown = spectrum.select(bent)
     judged = goodness(
@@ -189,10 +152,7 @@ class FilterFits:
         self._bins = self.whittle.bins()
 
     def choose_slow(self, trial: FilterTrial) -> None:
-        """Select the terms of slow noise in a fit with a filter, by BIC (forward selection).
-
-        Powers are not negative: unnecessary terms would all add power, and bias the cut-off.
-        """
+        """Select slow terms by BIC, forward: each unnecessary one would bias the cut-off."""
         slow: list[int] = []
         self.slow = slow
         left = self.gains(trial)
@@ -210,11 +170,7 @@ class FilterFits:
             slow.append(place)
 
     def unfiltered(self) -> tuple[float, float, float, float]:
-        """Return N, half the BIC and -log L of noise without a filter, and half the BIC with Q.
-
-        The density of quantization noise rises towards Nyquist, as the aliases of a steep filter
-        do.
-        """
+        """Return N, half the BIC and -log L without a filter, and half the BIC with Q."""
 
         def score(terms: Terms) -> tuple[float, float, float]:
             fit = self.whittle.maximum(terms)
@@ -268,19 +224,15 @@ class FilterFits:
     def try_filters(self, within: float = 1e-5) -> list[FilterTrial]:
         """Return the maxima of the likelihood over all filters, sorted by BIC, best first.
 
-        ``within`` is the relative tolerance of the cut-off.
+        ``within`` is the relative tolerance of the cut-off. Trials without a floor are preferred,
+        and analogue filters of first order to digital ones, which differ only in N.
         """
-        maxima = [
-            trial for kind, order in FAMILY for trial in self._find_maxima(kind, order, within)
-        ]
-        # Prefer trials without a floor. First-order digital and analogue filters with a floor
-        # differ only in N: prefer the analogue one.
-        return sorted(
-            maxima,
-            key=lambda trial: (
-                trial.score + trial.floor + _ANALOGUE_PREFERENCE * (trial.kind != "analogue")
-            ),
-        )
+
+        def score(trial: FilterTrial) -> float:
+            return trial.score + trial.floor + _ANALOGUE_PREFERENCE * (trial.kind != "analogue")
+
+        maxima = [trial for filters in FAMILY for trial in self._find_maxima(*filters, within)]
+        return sorted(maxima, key=score)
 
     def _find_maxima(self, kind: Kind, order: int, within: float) -> Iterator[FilterTrial]:
         """Yield the maxima of the likelihood over the cut-off, without and with a floor."""
@@ -297,20 +249,13 @@ class FilterFits:
             for place in np.flatnonzero((costs <= beside[:-2]) & (costs < beside[2:])).tolist():
                 best = minimize_scalar(
                     lambda x, floor=floor: self.cost(at(x, floor)),
-                    bounds=(
-                        float(scan[max(place - 1, 0)]),
-                        float(scan[min(place + 1, len(scan) - 1)]),
-                    ),
+                    bounds=scan[[max(place - 1, 0), min(place + 1, len(scan) - 1)]].tolist(),
                     method="bounded",
                     options={"xatol": within},
                 )
                 trial = replace(at(best.x, floor), cost=float(best.fun))
-                if (
-                    floor
-                    and order == 1
-                    and kind != "boxcar"
-                    and trial.correlation(self.rate) > _MAX_FILTER_SAMPLES
-                ):
+                slow = order == 1 and trial.correlation(self.rate) > _MAX_FILTER_SAMPLES
+                if floor and slow and kind != "boxcar":
                     continue  # white noise plus a process
                 before, after = self.density(trial)
                 # If the floor exceeds the filtered noise, the latter is a slow process.
@@ -332,10 +277,7 @@ class FilterFits:
         return explains_bend(self.whittle.spectrum, fitted, trial)
 
     def limits(self, trial: FilterTrial) -> tuple[float, float]:
-        """Return the ends of the 95 % interval from the profile likelihood.
-
-        Above Nyquist the profile may have several maxima; the ends are the outermost.
-        """
+        """Return the outermost ends of the 95 % interval from the profile likelihood."""
         most = self.cost(trial) + HALF_CHI_SQUARED
 
         def beyond(x: float) -> float:
@@ -428,15 +370,11 @@ class OfModel:
     """N under the allowed filters, each fitted jointly with a noise model."""
 
     readings: Sequence[Reading]  # relative to N at the selected cut-off in the same model
-    gained: float
-    """Gain of log likelihood by fitting the cut-off to this model."""
+    gained: float  # gain of log likelihood by fitting the cut-off to this model
 
 
 def read_as_digital(reading: Reading, trial: FilterTrial, rate: float) -> Reading:
-    """Return the reading of a first-order analogue filter as a digital one, after sampling.
-
-    The shape of the spectrum is the same, but N has no aliases.
-    """
+    """Return the reading of a first-order filter applied after sampling: N has no aliases."""
     gain = 0.5 * math.log(float(trial.low_pass.white(Frequencies(0.0, rate))))
     before = (reading.below + gain, reading.at + gain, reading.above + gain)
     return Reading(_DIGITAL_TWIN_WEIGHT * reading.weight, *before, reading.in_the_log)
@@ -445,15 +383,8 @@ def read_as_digital(reading: Reading, trial: FilterTrial, rate: float) -> Readin
 def compute_density_in_log(low_pass: Filter, N: float, beside: float, rate: float) -> float:
     """Return the density of white noise in a log far below the cut-off of a filter.
 
-    Parameters
-    ----------
-    low_pass : Filter
-    N : float
-        Density before the filter, SI.
-    beside : float
-        Squared density of the white noise added after the filter, SI.
-    rate : float
-        Hz.
+    ``N`` is the density before the filter, SI, ``beside`` the squared density of the white noise
+    added after it, SI, and ``rate`` in Hz.
     """
     return math.sqrt(N**2 * float(low_pass.white(Frequencies(0.0, rate))) + beside)
 
@@ -461,10 +392,7 @@ def compute_density_in_log(low_pass: Filter, N: float, beside: float, rate: floa
 def draw_factors(
     readings: Sequence[Reading], number: int, rng: np.random.Generator, *, in_the_log: bool = False
 ) -> Array:
-    """Return draws of N over its value for the selected filter, shape (number,).
-
-    N is the density before the filter, or with ``in_the_log`` the density in the log.
-    """
+    """Return draws of N over its value, before the filter or in the log, shape (number,)."""
     weight = np.array([reading.weight for reading in readings])
     which = rng.choice(len(weight), number, p=weight / weight.sum())
     ends = [r.in_the_log if in_the_log else (r.below, r.at, r.above) for r in readings]

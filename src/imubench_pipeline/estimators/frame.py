@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.cutoff import Cutoff, find_cutoff
+from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import MAX_UNALIASED_CUTOFF, MIN_PROCESS_SAMPLES
 from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
 from imubench_pipeline.estimators.lines import Line, find_lines, mask_lines
@@ -24,6 +25,7 @@ from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.estimators.whittle import (
     COARSE,
     SHAPES,
+    Maximum,
     Terms,
     Whittle,
     model_of,
@@ -33,22 +35,14 @@ from imubench_pipeline.typing import Array
 
 Mask = NDArray[np.bool_]
 
-_LINE_MODEL_BAND = 0.05
-"""Fraction of the sampling rate: the noise model for line detection is fitted below it."""
-
+_LINE_MODEL_BAND = 0.05  # Fraction of the rate below which the model for line detection is fitted
 _SOURCE_UP_TO_NYQUIST = "found: the spectrum follows its model up to Nyquist"
-
-_MIN_CORRELATION_SAMPLES = 3.0
-"""Shortest correlation time, in samples, that is tried where longer ones do not fit."""
-
-_SEPARATE_BEND_RATIO = 60.0
-"""Ratio of the correlation times of a process and a filter above which their bends are separate."""
-
-_MIN_QUANTIZATION_BAND = 1 / 10
-"""Fraction of the sampling rate that the band must reach to make quantization noise visible."""
-
-MIN_BINS = 20
-"""Bins that a fit needs; the papers' model has four parameters."""
+_MIN_CORRELATION_SAMPLES = 3.0  # Shortest process that is tried where longer ones do not fit
+_SEPARATE_BEND_RATIO = 60.0  # Correlation time of a process over the filter's with separate bends
+_MIN_QUANTIZATION_BAND = 1 / 10  # Fraction of the rate at which quantization noise is visible
+MIN_BINS = 20  # Bins that a fit needs; the papers' model has four parameters
+_MAX_FILTER_SAMPLES = 10.0  # Correlation up to which a process may be the sensor's filter
+_MIN_FLOOR_RATIO = 0.03  # Power of unfiltered over filtered white noise that matters
 
 
 @dataclass(frozen=True)
@@ -56,9 +50,8 @@ class FitSelection:
     """The part of a spectrum that is fitted."""
 
     lines: Sequence[Line]
-    clear: Mask
-    used: Mask
-    """(b,): the bins without lines, and the subset that is fitted."""
+    clear: Mask  # (b,): the bins without lines
+    used: Mask  # (b,): the subset that is fitted
     band: Band  # highest frequency that is fitted, and why
     low_pass: Cutoff | None = None
     """The sensor's low-pass filter; None where the user sets the band."""
@@ -77,18 +70,14 @@ class FitSelection:
 
     def _whittle(self, spectrum: Spectrum, bins: Mask, shapes: int) -> Whittle:
         behind = self.low_pass.behind if self.low_pass is not None else None
-        return whittle_of(
-            spectrum.select(bins),
-            self.band.highest,
-            shapes,
-            shortest=self.shortest,
-            behind=behind.select(bins) if behind is not None else None,
-        )
+        behind = behind.select(bins) if behind is not None else None
+        highest, shortest = self.band.highest, self.shortest
+        return whittle_of(spectrum.select(bins), highest, shapes, shortest=shortest, behind=behind)
 
     def needs_cutoff_per_model(self, spectrum: Spectrum, times: Array) -> bool:
         """Return whether the cut-off must be fitted for each noise model separately.
 
-        It must if the filter bends the spectrum well below Nyquist, or if a process (``times``:
+        So it must if the filter bends the spectrum well below Nyquist, or if a process (``times``:
         T_B, s) is nearly as fast as the filter. Near Nyquist, aliasing determines the cut-off.
         """
         if self.low_pass is None or self.low_pass.behind is None:
@@ -119,11 +108,7 @@ class FitSelection:
         return float(self.low_pass.behind.white[0])
 
     def in_the_log(self, posterior: Posterior, terms: Terms, rng: np.random.Generator) -> Posterior:
-        """Return draws of a model with N as in the log at its lowest frequencies.
-
-        An uncertain filter bends the spectrum down to these frequencies, so N includes the
-        uncertainty of the filter.
-        """
+        """Return draws of a model with N as in the log, including the uncertainty of the filter."""
         factors = np.array(math.sqrt(self.folding))
         if self.low_pass is not None and self.low_pass.readings:
             number = len(posterior.parameters)
@@ -136,9 +121,8 @@ class FitSelection:
         """Return draws of a model with N before the filter, including the filter's uncertainty."""
         if self.low_pass is None or not self.low_pass.readings:
             return posterior
-        return _scale_white_noise(
-            posterior, terms, self.low_pass.factors(len(posterior.parameters), rng, terms)
-        )
+        factors = self.low_pass.factors(len(posterior.parameters), rng, terms)
+        return _scale_white_noise(posterior, terms, factors)
 
     def shows_quantization(self, rate: float) -> bool:
         """Return whether quantization noise is visible: no filter, and a sufficient band."""
@@ -188,45 +172,11 @@ def select_for_fit(
 ) -> FitSelection:
     """Find the spectral lines and the low-pass filter, and select the bins to fit.
 
-    Parameters
-    ----------
-    line_spectra : sequence of LineSpectrum
-        As returned by `imubench_pipeline.estimators.spectrum.spectra`.
-    band : float, optional
-        Highest frequency to use, Hz; by default all, behind the low-pass filter if one is found.
-    bandwidth : float, optional
-        Configured cut-off of the sensor's filter, Hz, if known.
-    resolution : float
-        Resolution of the register, SI; 0 if it is not visible.
+    ``line_spectra`` are those of `imubench_pipeline.estimators.spectrum.spectra`; ``band`` is the
+    highest frequency to use, Hz, by default all, behind the low-pass filter if one is found;
+    ``bandwidth`` the configured cut-off of the sensor's filter, Hz, if known; ``resolution`` the
+    step of the register, SI, or 0.
     """
-    lines, clear = _find_lines(spectrum, line_spectra, band)
-    nyquist = 0.5 * spectrum.rate
-    if band is not None:
-        limit = find_band(spectrum, clear, asked=band)
-        used = clear & (spectrum.upper <= limit.highest * (1.0 + 1e-9))
-        return FitSelection(lines, clear, used, limit, shortest=MIN_PROCESS_SAMPLES / spectrum.rate)
-    low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
-    if low_pass.or_quantization:
-        low_pass = replace(low_pass, behind=None, readings=())
-    used, source = clear, _SOURCE_UP_TO_NYQUIST
-    if low_pass.behind is not None and low_pass.ruled is not None:
-        used = clear & ~low_pass.ruled
-        source = f"found: behind a {low_pass.words}, {source.removeprefix('found: ')}"
-    highest = nyquist
-    if used.any() and not used[clear][-1]:
-        highest = float(spectrum.upper[used].max())
-        source = (
-            f"{source.removesuffix(' up to Nyquist')} up to {highest:.4g} Hz; beyond, the filter "
-            "leaves nothing of it"
-        )
-    shortest = MIN_PROCESS_SAMPLES / spectrum.rate
-    return FitSelection(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
-
-
-def _find_lines(
-    spectrum: Spectrum, line_spectra: Sequence[LineSpectrum], band: float | None
-) -> tuple[list[Line], Mask]:
-    """Return the lines, and a mask of the bins without lines."""
     all_bins = np.ones(len(spectrum.frequency), dtype=np.bool_)
     start = min(band or np.inf, _LINE_MODEL_BAND * spectrum.rate)
     below = spectrum.upper <= start
@@ -235,8 +185,93 @@ def _find_lines(
     maximum = whittle_of(spectrum.select(below), start, COARSE).maximum(Terms("NFK", 1))
     low = spectrum.block > 1
     crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
-    lines = find_lines(line_spectra, model_of(maximum), spectrum.rate, crossover)
-    if not lines:
-        return lines, all_bins
-    density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
-    return lines, mask_lines(spectrum, lines, density)
+    lines, clear = find_lines(line_spectra, model_of(maximum), spectrum.rate, crossover), all_bins
+    if lines:
+        density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
+        clear = mask_lines(spectrum, lines, density)
+    shortest = MIN_PROCESS_SAMPLES / spectrum.rate
+    if band is not None:
+        limit = find_band(spectrum, clear, asked=band)
+        used = clear & (spectrum.upper <= limit.highest * (1.0 + 1e-9))
+        return FitSelection(lines, clear, used, limit, shortest=shortest)
+    low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
+    if low_pass.or_quantization:
+        low_pass = replace(low_pass, behind=None, readings=())
+    used, source = clear, _SOURCE_UP_TO_NYQUIST
+    if low_pass.behind is not None and low_pass.ruled is not None:
+        used = clear & ~low_pass.ruled
+        source = f"found: behind a {low_pass.words}, {source.removeprefix('found: ')}"
+    highest = 0.5 * spectrum.rate
+    if used.any() and not used[clear][-1]:
+        highest = float(spectrum.upper[used].max())
+        source = (
+            f"{source.removesuffix(' up to Nyquist')} up to {highest:.4g} Hz; beyond, the filter "
+            "leaves nothing of it"
+        )
+    return FitSelection(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
+
+
+def sensor_density(
+    frame: FitSelection,
+    maximum: Maximum,
+    posterior: Posterior,
+    spectrum: Spectrum,
+    rng: np.random.Generator,
+) -> Parameter | None:
+    """Return N_sensor, the density of white noise before the filter; None where no filter shows.
+
+    N is the density in the log, aliases included; N_sensor compares sensors at other filter
+    settings.
+
+    Parameters
+    ----------
+    frame : FitSelection
+    maximum, posterior : Maximum, Posterior
+        The best fit with the filter of ``frame``, and its draws.
+    spectrum : Spectrum
+        The whole spectrum of the log.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Parameter or None
+        rad/s/sqrt(Hz) or m/s²/sqrt(Hz); the interval covers the filters that the log does not rule
+        out. ``not_identified`` where the filter may be a process; ``doubtful`` where a part of the
+        noise did not pass it.
+    """
+    low_pass, terms = frame.low_pass, maximum.terms
+    if low_pass is None or "N" not in terms.linear:
+        return None
+    N, column = maximum.parameter("N"), terms.linear.index("N")
+    if low_pass.or_process is not None and low_pass.N_behind is not None:
+        drawn = posterior.parameters[:, column]
+        return _describe_interval(low_pass.or_process, drawn, low_pass.N_behind)
+    if low_pass.behind is None:
+        fast = maximum.times < _MAX_FILTER_SAMPLES / spectrum.rate
+        if not fast.any():
+            return None
+        whole = frame.likelihood_of_all_bins(spectrum)
+        shapes = [whole.gauss_markov(float(time))[0] for time in maximum.times[fast]]
+        before = math.sqrt(N**2 + float(maximum.process_powers[fast] @ np.array(shapes)))
+        reason = (
+            f"a process with a correlation time of {maximum.times[fast].max():.3g} s, a few "
+            "samples, may be the low-pass of the sensor; bandwidth in the sensor file would tell"
+        )
+        return _describe_interval(reason, posterior.parameters[:, column], before)
+    draws = frame.before_the_filter(posterior, terms, rng).parameters[:, column]
+    lower, upper = np.quantile(draws, (0.025, 0.975)).tolist()
+    lower, upper, share = min(lower, N), max(upper, N), low_pass.beside
+    if share < _MIN_FLOOR_RATIO:
+        return Parameter(N, lower=lower, upper=upper)
+    times = math.sqrt(1.0 + share)
+    reason = (
+        f"white noise of {100 * share:.2g} % of its power does not pass the {low_pass.words}, as "
+        f"in an interpolated log: N_sensor may be up to {times:.3g} times as high"
+    )
+    return Parameter(N, "doubtful", reason, lower, upper * times)
+
+
+def _describe_interval(reason: str, drawn: Array, other: float) -> Parameter:
+    """Return N_sensor between the limits of draws of N and another density, SI."""
+    lower, upper = np.quantile(drawn, (0.025, 0.975)).tolist()
+    return Parameter(None, "not_identified", reason, min(lower, other), max(upper, other))

@@ -11,8 +11,7 @@ from scipy.special import erfc, polygamma, psi
 from imubench_pipeline.model.states import GoodnessVerdict
 from imubench_pipeline.typing import Array
 
-MIN_FIT_CHANCE = 1e-3
-"""Probability below which a fit is rejected."""
+MIN_FIT_CHANCE = 1e-3  # Probability below which a fit is rejected
 
 
 @dataclass(frozen=True)
@@ -48,17 +47,13 @@ def goodness(nu: Array, data: Array, density: Array, frequency: Array, parameter
     residual = residual - residual.mean()
     spread = max(float(residual @ residual), 1e-300)
     correlation = float(residual[1:] @ residual[:-1]) / spread * math.sqrt(bins)
-    chance = min(1.0, 2.0 * min(_compute_upper_tail(far), _compute_upper_tail(correlation)))
+    chance = min(1.0, 2.0 * min(0.5 * float(erfc(z / math.sqrt(2.0))) for z in (far, correlation)))
     return Goodness(
         deviance=float(deviance.sum() / expected.sum() * bins / free),
         chance=chance,
         verdict="explained" if chance >= MIN_FIT_CHANCE else "not explained",
         where=_describe_worst_band(residual, frequency),
     )
-
-
-def _compute_upper_tail(z: float) -> float:
-    return 0.5 * float(erfc(z / math.sqrt(2.0)))
 
 
 def _describe_worst_band(residual: Array, frequency: Array) -> str:
@@ -70,9 +65,9 @@ def _describe_worst_band(residual: Array, frequency: Array) -> str:
         total = float(residual[inside].sum()) / math.sqrt(float(inside.sum()))
         if abs(total) > best:
             best = abs(total)
-            side = "above" if total > 0 else "below"
+            first, last = frequency[inside][[0, -1]]
             text = (
-                f"furthest from the model from {frequency[inside][0]:.3g} to "
-                f"{frequency[inside][-1]:.3g} Hz: {side} it by {best:.1f} standard errors"
+                f"furthest from the model from {first:.3g} to {last:.3g} Hz: "
+                f"{'above' if total > 0 else 'below'} it by {best:.1f} standard errors"
             )
     return text

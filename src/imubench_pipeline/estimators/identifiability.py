@@ -32,11 +32,6 @@ def relative_errors(whittle: Whittle, maximum: Maximum) -> Array:
     sensitivity = whittle.sensitivity(maximum)
     if maximum.terms.ramp:
         sensitivity[-1] *= maximum.ramp
-    return _invert_information(sensitivity)
-
-
-def _invert_information(sensitivity: Array) -> Array:
-    """Return the square roots of the diagonal of the inverse of the information."""
     bounds = np.full(len(sensitivity), np.inf)
     size = np.linalg.norm(sensitivity, axis=1)
     sensitive = size > 1e-9
@@ -88,16 +83,19 @@ def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
 def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -> dict[str, float]:
     """Return the Cramér-Rao bounds of a model's parameters in a log, relative to their values.
 
-    The keys are the names of `parameter_names`; spectral lines are not included. Rate
-    and highest frequency used are in Hz.
+    The keys are those of `parameter_names`. Rate and highest frequency used are in Hz.
     """
-    maximum = _convert_to_maximum(model)
-    spectrum = ideal_spectrum(rate, duration, highest)
-    return dict(
-        zip(
-            parameter_names(maximum.terms), _compute_relative_errors(spectrum, maximum), strict=True
-        )
-    )
+    values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
+    letters = "".join(letter for letter, value in values.items() if value > 0)
+    processes = [(model.B, model.T_B)] if model.B > 0 and model.T_B else []
+    processes += [(process.B, process.T_B) for process in model.further_processes]
+    processes.sort(key=lambda process: process[1])
+    powers = [values[letter] ** 2 for letter in letters] + [B**2 for B, _ in processes]
+    times = np.array([time for _, time in processes], dtype=np.float64)
+    terms = Terms(letters, len(processes), model.R != 0)
+    maximum = Maximum(terms, np.array(powers), times, model.R, 0.0)
+    errors = _compute_relative_errors(ideal_spectrum(rate, duration, highest), maximum)
+    return dict(zip(parameter_names(terms), errors, strict=True))
 
 
 def parameter_names(terms: Terms) -> list[str]:
@@ -156,8 +154,20 @@ def _find_crossing(
     steps = 0
     while high - low > 1:
         place = (low + high) // 2
-        if steps % 3 < 2 and excesses:
-            place = _guess_crossing(log_lengths, excesses, number, low, high)
+        left = excesses[low][number] if low >= 0 else np.inf
+        right = excesses[high][number] if high < len(log_lengths) else -np.inf
+        if steps % 3 < 2 and (np.isfinite(left) or np.isfinite(right)):
+            # Interpolate, or extrapolate with error ~ length^(-1/2) where one end is known.
+            if not np.isfinite(left):
+                where = log_lengths[high] + 2.0 * right
+            elif not np.isfinite(right):
+                where = log_lengths[low] + 2.0 * left
+            else:
+                part = left / (left - right)
+                where = log_lengths[low] + part * (log_lengths[high] - log_lengths[low])
+            guess = int(np.searchsorted(log_lengths, where))
+            # First the index before the crossing, then the one after it.
+            place = min(max(guess - (low < guess - 1), low + 1), high - 1)
         if excess(place)[number] > 0.0:
             low = place
         else:
@@ -167,40 +177,16 @@ def _find_crossing(
         return None
     if low < 0 or not np.isfinite(excesses[low][number]):
         return float(np.exp(log_lengths[high]))
-    falling = excesses[low][number], excesses[high][number]
-    part = falling[0] / (falling[0] - falling[1])
+    left, right = excesses[low][number], excesses[high][number]
+    part = left / (left - right)
     return float(np.exp(log_lengths[low] + part * (log_lengths[high] - log_lengths[low])))
-
-
-def _guess_crossing(
-    log_lengths: Array, excesses: dict[int, Array], number: int, low: int, high: int
-) -> int:
-    """Return an index between two where the error may be `TARGET_RELATIVE_ERROR`.
-
-    It is interpolated, or extrapolated with error ~ length^(-1/2) where only one end is known.
-    """
-    left = excesses[low][number] if low >= 0 else np.inf
-    right = excesses[high][number] if high < len(log_lengths) else -np.inf
-    if np.isfinite(left) and np.isfinite(right):
-        part = left / (left - right)
-        where = log_lengths[low] + part * (log_lengths[high] - log_lengths[low])
-    elif np.isfinite(left):
-        where = log_lengths[low] + 2.0 * left
-    elif np.isfinite(right):
-        where = log_lengths[high] + 2.0 * right
-    else:
-        return (low + high) // 2
-    place = int(np.searchsorted(log_lengths, where))
-    # First the index before the crossing, then the one after it.
-    return min(max(place - (low < place - 1), low + 1), high - 1)
 
 
 def _compute_relative_errors(spectrum: Spectrum, maximum: Maximum) -> Array:
     """Return the relative Cramér-Rao bounds of a model, given the bins of a spectrum."""
     times = maximum.times if len(maximum.times) else np.array([1.0])
-    return relative_errors(
-        _UntabulatedWhittle(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0), maximum
-    )
+    whittle = _UntabulatedWhittle(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0)
+    return relative_errors(whittle, maximum)
 
 
 class _UntabulatedWhittle(Whittle):
@@ -209,19 +195,3 @@ class _UntabulatedWhittle(Whittle):
     def gauss_markov(self, time: float) -> Array:
         """Return the density of a Gauss-Markov process of B = 1 in each bin."""
         return self.shape_of.gauss_markov(time)
-
-
-def _convert_to_maximum(model: NoiseModel) -> Maximum:
-    values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
-    letters = "".join(letter for letter in "QNFK" if values[letter] > 0)
-    processes = [(model.B, model.T_B)] if model.B > 0 and model.T_B else []
-    processes += [(process.B, process.T_B) for process in model.further_processes]
-    processes.sort(key=lambda process: process[1])
-    powers = [values[letter] ** 2 for letter in letters] + [B**2 for B, _ in processes]
-    return Maximum(
-        Terms(letters, len(processes), model.R != 0),
-        np.array(powers),
-        np.array([time for _, time in processes], dtype=np.float64),
-        model.R,
-        0.0,
-    )

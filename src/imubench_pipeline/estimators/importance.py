@@ -8,32 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri
 from scipy.stats import qmc
 
-from imubench_pipeline.estimators.importance_kernels import fit, set_densities
+from imubench_pipeline.estimators.posterior_kernels import fit_mixture, set_densities
 from imubench_pipeline.typing import Array
 
 _MIN_DEGREES = 5
-_FIRST_MIXTURE_WEIGHT = 0.15
-"""Weight of the first mixture in all later ones, which keeps its support covered."""
-
+_FIRST_MIXTURE_WEIGHT = 0.15  # Of the first mixture in later ones, which keeps its support covered
 _MIN_COMPONENT_MASS = 0.01
-_LEARNING_POINTS = 2048
-"""Number of points to which a mixture is fitted."""
+_LEARNING_POINTS = 2048  # Number of points to which a mixture is fitted
 
 _CLIPPED_POINTS = 8
-"""Number of highest weights that are clipped to one value when a mixture is fitted.
+"""Highest weights that are clipped before a fit (Koblents and Míguez, Stat. Comput. 25, 2015)."""
 
-Otherwise a few points in the tails of the first mixtures would determine the next one (E. Koblents
-and J. Míguez, Statistics and Computing 25, 2015).
-"""
-
-_EM_STEPS = 3
-"""Expectation-maximisation steps between two rounds."""
+_EM_STEPS = 3  # Expectation-maximisation steps between two rounds
 
 
 @dataclass(frozen=True)
@@ -58,22 +51,23 @@ class Mixture:
 
     def densities(self, points: Array) -> Array:
         """Return weight times density of each component, up to a constant, shape (n, c)."""
-        return self._evaluate_densities(points, np.linalg.inv(np.linalg.cholesky(self.scales)))
-
-    def _evaluate_densities(self, points: Array, inverses: Array) -> Array:
         densities = np.empty((len(points), len(self.weights)))
         freedom = _get_degrees(points.shape[1])
-        set_densities(points, self.weights, self.means, inverses, freedom, densities)
+        set_densities(points, self.weights, self.means, self._inverses, freedom, densities)
         return densities
+
+    @cached_property
+    def _inverses(self) -> Array:
+        """Inverses of the roots of the scales."""
+        return np.linalg.inv(np.linalg.cholesky(self.scales))
 
     def fitted(self, points: Array) -> Mixture:
         """Return the mixture after one expectation-maximisation step on points."""
-        inverses = np.linalg.inv(np.linalg.cholesky(self.scales))
-        parts, freedom = self._evaluate_densities(points, inverses), _get_degrees(points.shape[1])
+        parts, freedom = self.densities(points), _get_degrees(points.shape[1])
         weights, means = np.empty_like(self.weights), np.empty_like(self.means)
         scales = np.zeros_like(self.scales)
-        new = (weights, means, scales)
-        number = fit(points, parts, self.means, inverses, freedom, _MIN_COMPONENT_MASS, *new)
+        old = (points, parts, self.means, self._inverses, freedom, _MIN_COMPONENT_MASS)
+        number = fit_mixture(*old, weights, means, scales)
         if not number:
             return self
         return Mixture(weights[:number] / weights[:number].sum(), means[:number], scales[:number])
@@ -132,12 +126,10 @@ def sample_adaptively(
         Logarithm of the density at points, shape (n, d), up to a constant; -inf where it is 0.
     first : Mixture
         Proposal of the first round.
-    size : int
-        Points of a round, a power of 2.
+    size, most : int
+        Points of a round, a power of 2, and of all rounds.
     wanted : float
-        Effective sample size to reach.
-    most : int
-        Maximum number of points; the effective sample size may then be less than ``wanted``.
+        Effective sample size to reach before ``most`` points.
 
     References
     ----------

@@ -1,9 +1,9 @@
-"""What a likelihood fit says of each parameter: value, 95 % interval, and whether it is known."""
+"""Describe a likelihood fit: values, 95 % intervals, and which parameters are identified."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,12 +13,11 @@ from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.identifiability import durations_needed, parameter_names
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
-from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
+from imubench_pipeline.estimators.whittle import Terms, Whittle
 from imubench_pipeline.typing import Array
 
 _AT_BOUND = 0.985
 _ABOUT_AS_GOOD = 2.0
-
 _ABSENT = "the data do not ask for it"
 _ABSENT_BELOW = f"{_ABSENT}; with 95 % it is below the upper limit"
 
@@ -29,64 +28,50 @@ def with_upper_limits(
     wider: Sequence[Candidate],
     draws: dict[Terms, Posterior],
 ) -> Estimate:
-    """Return an estimate that says of the K and B that its model does not have what is known.
+    """Return an estimate with limits of the K and B that its model does not have.
 
-    Where a model that has one is about as good as the chosen one it is ``not_identified``, with its
-    interval; else ``absent``, with an upper limit. ``alike`` are the models that the log does not
+    ``not_identified``, with its interval, where a model that has the term is about as good as the
+    chosen one; else ``absent``, with an upper limit. ``alike`` are the models that the log does not
     rule out, the chosen one first; ``wider`` those with a random walk, or with one bias
-    instability, beside its terms.
+    instability, in addition to its terms.
     """
     parameters = dict(estimate.parameters)
     for name in ("K", "B"):
         if parameters[name].status != "absent":
             continue
-        having = [candidate for candidate in (*wider, *alike) if _has(name, candidate.terms)]
+        having = [c.terms for c in (*wider, *alike) if name in parameter_names(c.terms)]
         if not having:
             continue
-        limits = [
-            float(np.quantile(_draws_of(name, candidate.terms, draws), 0.975))
-            for candidate in having
-        ]
-        good = [
-            candidate
-            for candidate in alike[1:]
-            if as_good(candidate, alike[0]) and _in_model(name, candidate.maximum)
-        ]
+        upper = max(float(np.quantile(_draws_of(name, terms, draws), 0.975)) for terms in having)
+        good = []
+        for other in alike[1:]:
+            powers = dict(zip(parameter_names(other.terms), other.maximum.powers, strict=False))
+            if as_good(other, alike[0]) and powers.get(name, 0.0) > 0.0:
+                good.append(other)
         if not good:
-            parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, max(limits))
+            parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
             continue
         names = " and ".join(candidate.terms.name for candidate in good)
         verb = "is" if len(good) == 1 else "are"
         reason = f"{names}, which {'has' if len(good) == 1 else 'have'} it, {verb} about as good"
         reason += f" as {alike[0].terms.name}; only its interval is given"
-        parameters[name] = Parameter(None, "not_identified", reason, 0.0, max(limits))
-        timed = [candidate.terms for candidate in good if _has("T_B", candidate.terms)]
-        times = [_draws_of("T_B", terms, draws) for terms in timed]
-        if name == "B" and times:
-            ends = [np.quantile(drawn_times, (0.025, 0.975)) for drawn_times in times]
-            low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
+        parameters[name] = Parameter(None, "not_identified", reason, 0.0, upper)
+        timed = [c.terms for c in good if "T_B" in parameter_names(c.terms)]
+        if name == "B" and timed:
+            drawn = [_draws_of("T_B", terms, draws) for terms in timed]
+            low = min(float(np.quantile(times, 0.025)) for times in drawn)
+            high = max(float(np.quantile(times, 0.975)) for times in drawn)
             parameters["T_B"] = Parameter(None, "not_identified", reason, low, high)
     return replace(estimate, parameters=parameters)
 
 
 def as_good(other: Candidate, chosen: Candidate) -> bool:
-    """Tell whether a model is about as good as the chosen one: AIC favours it, or BIC hardly less.
+    """Return whether a model is about as good as the chosen one: by AIC, or hardly worse by BIC.
 
     A difference of 2 is not worth more than a bare mention (R. Kass and A. Raftery, J. Am. Stat.
     Assoc. 90, 1995).
     """
     return other.aic <= chosen.aic or other.bic <= chosen.bic + _ABOUT_AS_GOOD
-
-
-def _in_model(name: str, maximum: Maximum) -> bool:
-    """Tell whether a fit has a parameter above 0."""
-    names = parameter_names(maximum.terms)
-    return name in names and bool(maximum.powers[names.index(name)] > 0.0)
-
-
-def papers_only(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
-    """Return the four parameters of the papers' model."""
-    return {name: parameters[name] for name in ("N", "B", "T_B", "K")}
 
 
 def describe(
@@ -99,10 +84,9 @@ def describe(
 ) -> Estimate:
     """Describe a fit: values with intervals, what is not identified, and what is absent.
 
-    Of all the family's parameters. The intervals go over the models ``alike``, ``chosen`` among
-    them, by their shares. K is the median over them: they share the power of the lowest frequencies
-    in different ways, and it is a fifth nearer to the truth than that of one of them where it is
-    known badly.
+    The intervals of all parameters cover the models ``alike``, ``chosen`` among them, weighted by
+    AIC. K is the median over them: they share the power of the lowest frequencies in different
+    ways, and the median is a fifth nearer to the truth than a single model where K is poorly known.
     """
     maximum = chosen.maximum
     names = parameter_names(maximum.terms)
@@ -114,8 +98,22 @@ def describe(
     )
     described: dict[str, Parameter] = {}
     for i, (name, value) in enumerate(zip(names, values, strict=True)):
-        lower, upper = _interval(name, chosen, alike, draws)
-        described[name] = _parameter(name, float(value), lower, upper, needed[i], whittle)
+        # The interval of the chosen model lies inside: AIC, against a model that fits as well,
+        # prefers a process as slow as a walk to the walk.
+        own = [(_draws_of(name, chosen.terms, draws), 1.0)]
+        lower, upper = mixture_limits(_over_models(name, chosen, alike, draws), own)
+        if value == 0.0:
+            described[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
+            continue
+        # At the end of a search, or where draws are few, the best value lies at the edge.
+        limits = min(lower, float(value)), max(upper, float(value))
+        described[name] = Parameter(float(value), "ok", None, *limits, needed[i])
+        longest, shortest = whittle.longest, whittle.shortest
+        at_longest, at_shortest = value > longest * _AT_BOUND, value < shortest / _AT_BOUND
+        if name.startswith("T_B") and (at_longest or at_shortest):
+            end, bound = ("longest", longest) if at_longest else ("shortest", shortest)
+            reason = f"the {end} correlation time that the log can show is {bound:.4g} s"
+            described[name] = replace(described[name], status="at_bound", reason=reason)
     if "K" in described and described["K"].checked().status == "ok":
         weighted_draws = _over_models("K", chosen, alike, draws)
         if len(weighted_draws) > 1:
@@ -123,63 +121,35 @@ def describe(
             described["K"] = replace(described["K"], value=median)
     for number in ("", " 2"):
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
-            described[f"T_B{number}"] = replace(
-                described[f"B{number}"], lower=None, upper=None, duration_needed=None
-            )
+            bias = described[f"B{number}"]
+            described[f"T_B{number}"] = replace(bias, lower=None, upper=None, duration_needed=None)
     absent = Parameter(None, "absent", _ABSENT)
     parameters = {name: described.get(name, absent) for name in FAMILY}
     if "B" in described and "T_B" not in described:
         parameters["T_B"] = Parameter(
             None, "absent", "bias instability is flicker noise here, which has no correlation time"
         )
-    further = []
-    if "B 2" in described:
-        further.append({"B": described["B 2"], "T_B": described["T_B 2"]})
+    second = "B 2" in described
+    further = [{"B": described["B 2"], "T_B": described["T_B 2"]}] if second else []
     return Estimate(method, parameters, further)
-
-
-def _parameter(
-    name: str,
-    value: float,
-    lower: float,
-    upper: float,
-    needed: float | None,
-    whittle: Whittle,
-) -> Parameter:
-    if value == 0.0:
-        return Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
-    # At the end of a search, or where draws are few, the best value lies at the edge.
-    lower, upper = min(lower, value), max(upper, value)
-    if name.startswith("T_B"):
-        for bound, end in ((whittle.longest, "longest"), (whittle.shortest, "shortest")):
-            near = value > bound * _AT_BOUND if end == "longest" else value < bound / _AT_BOUND
-            if near:
-                reason = f"the {end} correlation time that the log can show is {bound:.4g} s"
-                return Parameter(value, "at_bound", reason, lower, upper, needed)
-    return Parameter(value, "ok", None, lower, upper, needed)
-
-
-def _interval(
-    name: str, chosen: Candidate, alike: Sequence[Candidate], draws: dict[Terms, Posterior]
-) -> tuple[float, float]:
-    """Return the 95 % interval of a parameter, over the models that have it, by their AIC.
-
-    That of the chosen model lies inside: of models that the log hardly tells apart, AIC likes a
-    process that is as slow as a walk better than the walk.
-    """
-    own = [(_draws_of(name, chosen.terms, draws), 1.0)]
-    return mixture_limits(_over_models(name, chosen, alike, draws), own)
 
 
 def _over_models(
     name: str, chosen: Candidate, alike: Sequence[Candidate], draws: dict[Terms, Posterior]
 ) -> list[tuple[Array, float]]:
-    """Return the draws of a parameter in each model that has it, with the weight of the model."""
-    terms = chosen.terms
+    """Return the draws of a parameter in each model in which it means the same, with weights."""
+
+    def is_comparable(terms: Terms, other: Terms) -> bool:
+        if name not in parameter_names(other):
+            return False
+        # One bias instability is one level, flicker or not; of several each has its own.
+        single = name == "B" and sum(terms.biases) == sum(other.biases) == 1
+        return name[0] not in "BT" or terms.biases == other.biases or single
+
     return [
         (_draws_of(name, candidate.terms, draws), math.exp(0.5 * (chosen.aic - candidate.aic)))
         for candidate in alike
-        if candidate.terms == terms or _comparable(name, terms, candidate.terms)
+        if is_comparable(chosen.terms, candidate.terms)
     ]
 
 
@@ -210,18 +180,3 @@ def _draws_of(name: str, terms: Terms, draws: dict[Terms, Posterior]) -> Array:
     posterior = draws[terms]
     columns = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
     return np.asarray(columns[:, parameter_names(terms).index(name)])
-
-
-def _has(name: str, terms: Terms) -> bool:
-    return name in parameter_names(terms)
-
-
-def _comparable(name: str, terms: Terms, other: Terms) -> bool:
-    """Tell whether a parameter means the same in two models."""
-    if not _has(name, other):
-        return False
-    if not name.startswith(("B", "T_B")):
-        return True
-    # One bias instability is one level, flicker or not; of several each has its own.
-    single = sum(terms.biases) == sum(other.biases) == 1
-    return terms.biases == other.biases or (name == "B" and single)

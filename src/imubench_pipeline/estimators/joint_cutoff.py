@@ -1,7 +1,7 @@
 """Joint fit of the cut-off of a low-pass filter and the parameters of a noise model.
 
-The filtered noise bends the spectrum too: the slope of a process or of flicker noise affects the
-fitted cut-off. Each noise model therefore has its own cut-off, and its own N before the filter.
+The slope of a process or of flicker noise affects the fitted cut-off: each noise model has its own
+cut-off, and its own N before the filter.
 """
 
 from __future__ import annotations
@@ -39,33 +39,19 @@ from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Maximum, Terms, Whittle, whittle_of
 
-_MAX_LOG_SHIFT = math.log(2.0)
-"""Maximum change of log f_c by a joint fit."""
-
-_SEARCH_HALF_WIDTHS = 6.0
-"""Range of the first search for a cut-off, in half widths of its interval."""
-
-_RELATIVE_TOLERANCE = 0.04
-"""Tolerance of a cut-off over the half width of its interval."""
-
-_MAX_DELTA_BIC = 6.0
-"""Maximum BIC above the best model at which a joint fit may make a model the best."""
-
-_MIN_AKAIKE_WEIGHT = 0.03
-"""Akaike weight from which a model is fitted jointly; lower than the one for intervals."""
-
-_MIN_N_RATIO = 1e-6
-"""Minimum N over the density of the log, instead of 0."""
+_MAX_LOG_SHIFT = math.log(2.0)  # Maximum change of log f_c by a joint fit
+_SEARCH_HALF_WIDTHS = 6.0  # Range of the first search for a cut-off, in half widths of its interval
+_RELATIVE_TOLERANCE = 0.04  # Tolerance of a cut-off over the half width of its interval
+_MAX_DELTA_BIC = 6.0  # Above the best model, up to which a joint fit may change the order
+_MIN_AKAIKE_WEIGHT = 0.03  # From which a model is fitted jointly; less than for intervals
+_MIN_N_RATIO = 1e-6  # Minimum N over the density of the log, instead of 0
 
 _MIN_INTERVAL_WEIGHT = 0.05
-"""Akaike weight of a joint fit from which its limits enter the interval of the cut-off."""
+"""Akaike weight from which a joint fit enters the interval of the cut-off."""
 
 
 def select_joint_models(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
-    """Return the models that are fitted jointly with a cut-off, in the order of ``candidates``.
-
-    ``always`` is included in any case. The first candidate must be the best.
-    """
+    """Return the models that are fitted jointly with a cut-off, and the one of ``always``."""
     best = candidates[0]
     return [
         candidate
@@ -81,25 +67,27 @@ def refine_cutoff(
 ) -> Cutoff:
     """Return a low-pass whose cut-off is fitted together with all parameters of a model.
 
-    The model is the best by BIC after joint fits. N under the other models, and under other allowed
-    filters, is in ``models``. ``clear``, shape (b,), are the bins without lines and without
-    dominant leakage. The candidates are fits with the present cut-off, best first; ramps are
-    ignored.
+    The model is the best by BIC after joint fits; N under the others, and other allowed filters, is
+    in ``models``. ``clear``, shape (b,), are the bins to fit. The candidates are fits with the
+    present cut-off, best first; ramps are ignored.
     """
     if low_pass.kind is None or low_pass.behind is None or not candidates:
         return low_pass
     joint = _Joint(spectrum, clear, low_pass)
     tried: dict[Terms, list[_Fit]] = {}
+    present = low_pass.allowed[0]
     bic: dict[Terms, float] = {}
     aic: dict[Terms, float] = {}
     for candidate in candidates:
         terms = replace(candidate.terms, ramp=False)
         if terms not in tried:
             tried[terms] = joint.fits(terms)
-            gained = joint.common(terms) - tried[terms][0].cost
+            common = joint.at(present, math.log(present.filter.cutoff), terms)
+            gained = common.cost - tried[terms][0].cost
             bic[terms], aic[terms] = candidate.bic - 2.0 * gained, candidate.aic - 2.0 * gained
     chosen = min(bic, key=lambda terms: bic[terms])
     fit = tried[chosen][0]
+    best, state = fit.allowed.at(fit.x), joint.at(fit.allowed, fit.x, chosen)
     models = {terms: joint.of_model(fits, fit) for terms, fits in tried.items()}
     likely = {terms: math.exp(0.5 * (aic[chosen] - aic[terms])) for terms in aic}
     least = _MIN_INTERVAL_WEIGHT * sum(likely.values())
@@ -110,12 +98,18 @@ def refine_cutoff(
         for each in fits
         for x in joint.limits(each)
     ]
-    best, state = fit.allowed.at(fit.x), joint.at(fit.allowed, fit.x, chosen)
+    shown, lower, upper = best.low_pass.half_power(spectrum.rate), min(ends), max(ends)
+    reason = None
+    if upper > MAX_LIMIT_RATIO * lower:
+        reason = ALLOWED_CUTOFFS_REASON.format(lower, upper)
+    elif not joint.explains(fit):
+        reason = UNKNOWN_BEND_REASON
+    frequency = Parameter(shown, lower=lower, upper=upper)
+    if reason is not None:
+        frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
     return replace(
         low_pass,
-        frequency=_make_parameter(
-            best.low_pass.half_power(spectrum.rate), ends, joint.explains(fit)
-        ),
+        frequency=frequency,
         kind=best.kind,
         order=best.order,
         floor=math.sqrt(state.floor + low_pass.rounded * state.N**2),
@@ -126,18 +120,6 @@ def refine_cutoff(
         ],
         models=models,
     )
-
-
-def _make_parameter(shown: float, ends: Sequence[float], explains: bool) -> Parameter:
-    """Return a cut-off with its limits, or the reason why it is not identified."""
-    lower, upper = min(ends), max(ends)
-    if upper > MAX_LIMIT_RATIO * lower:
-        reason = ALLOWED_CUTOFFS_REASON.format(lower, upper)
-    elif not explains:
-        reason = UNKNOWN_BEND_REASON
-    else:
-        return Parameter(shown, lower=lower, upper=upper)
-    return Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
 
 
 @dataclass(frozen=True)
@@ -177,14 +159,21 @@ class _Joint:
 
     def fits(self, terms: Terms) -> list[_Fit]:
         """Return the fits of a model with the allowed filters, best first."""
-        fits = [self._fit_best(allowed, terms) for allowed in self._low_pass.allowed]
+        fits = []
+        for allowed in self._low_pass.allowed:
+            around = math.log(allowed.filter.cutoff)
+            for reach in (_SEARCH_HALF_WIDTHS * allowed.half_width, _MAX_LOG_SHIFT):
+                best = minimize_scalar(
+                    lambda x, allowed=allowed: self.at(allowed, x, terms).cost,
+                    bounds=(around - reach, min(around + reach, self._get_highest(allowed))),
+                    method="bounded",
+                    options={"xatol": _RELATIVE_TOLERANCE * allowed.half_width},
+                )
+                if abs(best.x - around) < 0.9 * reach:
+                    break
+            fits.append(_Fit(allowed, terms, float(best.x), float(best.fun)))
         fits.sort(key=lambda fit: fit.cost + fit.allowed.filter.floor)
         return [fit for fit in fits if fit.cost < fits[0].cost + DELTA_LOG_LIKELIHOOD_EXCLUDED]
-
-    def common(self, terms: Terms) -> float:
-        """Return -log L of a model at the present cut-off, common to all models."""
-        chosen = self._low_pass.allowed[0]
-        return self.at(chosen, math.log(chosen.filter.cutoff), terms).cost
 
     def of_model(self, fits: Sequence[_Fit], chosen: _Fit) -> OfModel:
         """Return N under the filters in a model, relative to N at the selected cut-off."""
@@ -262,16 +251,3 @@ class _Joint:
     def _get_highest(self, allowed: Allowed) -> float:
         trial = allowed.filter
         return math.log(get_highest_cutoff(trial.kind, trial.order, self._spectrum.rate))
-
-    def _fit_best(self, allowed: Allowed, terms: Terms) -> _Fit:
-        around = math.log(allowed.filter.cutoff)
-        for reach in (_SEARCH_HALF_WIDTHS * allowed.half_width, _MAX_LOG_SHIFT):
-            best = minimize_scalar(
-                lambda x: self.at(allowed, x, terms).cost,
-                bounds=(around - reach, min(around + reach, self._get_highest(allowed))),
-                method="bounded",
-                options={"xatol": _RELATIVE_TOLERANCE * allowed.half_width},
-            )
-            if abs(best.x - around) < 0.9 * reach:
-                break
-        return _Fit(allowed, terms, float(best.x), float(best.fun))

@@ -31,24 +31,18 @@ from imubench_pipeline.typing import Array
 Method = Literal["weighted", "paper"]
 
 _MIN_POINTS = 4
-_UNFILTERED_CLUSTER = 16
-"""Cluster size above which the effect of the sensor's filter is small."""
-
+_UNFILTERED_CLUSTER = 16  # Cluster size above which the effect of the sensor's filter is small
 _MIN_BEND_SIGMAS = 4.0
 _MAX_REFITS = 5
 _MAX_FADED_BEND = 0.1
 _MAX_SAMPLING_SIGMAS = 0.02
-_SCAN_TIMES = 160
-"""Number of correlation times of the scan before optimisation."""
+_SCAN_TIMES = 160  # Number of correlation times of the scan before optimisation
 
 _ACTIVE_SETS = [list(chosen) for p in (1, 2, 3) for chosen in combinations(range(3), p)]
 """Sets of nonzero columns among N, B and K."""
 
-_RIDGE, _MIN_NORM = 1e-13, 1e-300
-"""Ridge for collinear columns of unit norm, and minimum norm of a column."""
-
-_MIN_VARIANCE_FRACTION = 1e-9
-"""A term below this fraction of the variance at every tau is absent."""
+_RIDGE, _MIN_NORM = 1e-13, 1e-300  # For collinear columns, and of a column
+_MIN_VARIANCE_FRACTION = 1e-9  # A term below this fraction of the variance at every tau is absent
 
 
 class UnfitCurveError(ValueError):
@@ -61,24 +55,24 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
     C = sum_i w_i (variance_i - model(tau_i))^2 with
 
     - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, the variance of the Allan variance;
-    - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 (Maia et al., eq. 25), whose dimension is
-      not that of the cost: the bottom of the curve counts less, which on these tau hardly hurts
-      (`tests/papers/test_panel.py`). For the papers' figures.
+    - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 (Maia et al., eq. 25), for the papers' figures.
+      Its dimension is not that of the cost: the bottom of the curve counts less, which makes little
+      difference on these tau (`tests/papers/test_panel.py`).
 
     Parameters
     ----------
     curve : AllanCurve
     method : {"weighted", "paper"}
     longest : float
-        Longest tau of the fit, as a part of the log. The shortest is where the curve begins
-        to follow a model of its longer tau: the sensor's own filter bends it before that.
+        Longest tau of the fit, as a part of the log. The shortest is where the curve begins to
+        follow a model of its longer tau: the sensor's own filter bends it before.
 
     Returns
     -------
     Estimate
         SI, with 95 % limits from the covariance of the Allan variances. ``absent``: the fit is
         best without the term; ``at_bound``: T_B at the end of the search, which goes as far as
-        the process still peaks inside the tau used; ``not_identified``: the log cannot tell
+        the process still peaks inside the tau used; ``not_identified``: the log cannot determine
         the value, see `imubench_pipeline.estimators.limits.add_limits`.
 
     Raises
@@ -92,9 +86,7 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
 
 
 def fit_if_possible(curve: AllanCurve, *, method: Method, longest: float) -> Estimate:
-    """Fit N, B, T_B and K as `fit` does; what cannot be fitted is ``not_shown``, with the reason.
-
-    Parameters, and what is returned, are those of `fit`.
+    """Fit as `fit` does; a curve that cannot be fitted is ``not_shown``, with the reason.
 
     Raises
     ------
@@ -110,7 +102,7 @@ def fit_if_possible(curve: AllanCurve, *, method: Method, longest: float) -> Est
 def solve(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 9) -> Estimate:
     """Fit N, B, T_B and K as `fit` does, without limits, which take most of its time.
 
-    Parameters, errors raised and statuses are those of `fit`, but for ``not_identified``.
+    Parameters, errors and statuses are those of `fit`, except for ``not_identified``.
     """
     return _solved(curve, method, longest)[0]
 
@@ -118,7 +110,7 @@ def solve(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 
 def _solved(
     curve: AllanCurve, method: Method, longest: float
 ) -> tuple[Estimate, AllanCurve, NDArray[np.bool_]]:
-    """Return the estimate without limits, the curve, and the tau that it is of."""
+    """Return the estimate without limits, the curve, and the tau that were fitted."""
     used = curve.cluster_size <= longest * curve.samples
     if used.sum() < _MIN_POINTS:
         raise UnfitCurveError(
@@ -144,9 +136,8 @@ def _solved(
 def _find_first_unbent(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> int:
     """Return the smallest cluster size from which the curve follows a model of its longer tau.
 
-    The sensor's own low-pass filter, and coarse steps of its output, bend the curve at the
-    shortest tau, which weigh most in a fit. Where a bend is seen, it fades as 1/n: the fit
-    begins where it is below the standard error of the curve.
+    Filter and coarse steps bend the curve at the shortest tau, which weigh most. The bend fades as
+    1/n: the fit begins where it is below the standard error of the curve.
     """
     n = curve.cluster_size
     error = np.sqrt(2.0 / curve.edf)
@@ -176,7 +167,7 @@ def _find_first_unbent(curve: AllanCurve, used: NDArray[np.bool_], method: Metho
 
 
 def _predict(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> tuple[Array, Array]:
-    """Return what a model fitted to some tau says of all, and the relative error of that."""
+    """Return the extrapolation of a model to all tau, and its relative error."""
     rate = curve.rate
     expected = model.allan_variance(curve.tau, rate)
     # White noise is averaged over the samples present, fewer than n where some are missing.
@@ -194,35 +185,24 @@ def _predict(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> t
 
 
 def _fit_curve(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> Estimate:
-    continuous = _Search(curve, used, method, sampled=False).estimate()
-    if not _is_sampling_visible(curve, used, continuous.model):
-        return continuous
-    return _Search(curve, used, method, sampled=True).estimate()
-
-
-def _is_sampling_visible(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> bool:
-    """Tell whether the sampled model differs from the continuous one by what the log can tell.
-
-    Sampling adds (S_B + S_K) T^2 / (6 tau), which has the shape of white noise: left out, it
-    goes into N.
-    """
+    """Fit the continuous model, or the sampled one where the log can tell the difference."""
+    fitted = _Search(curve, used, method, sampled=False).estimate()
+    # Sampling adds (S_B + S_K) T^2 / (6 tau), which has the shape of white noise: left out, it
+    # goes into N.
     tau = curve.tau[used]
-    continuous = model.allan_variance(tau)
-    difference = model.allan_variance(tau, curve.rate) - continuous
+    continuous = fitted.model.allan_variance(tau)
+    difference = fitted.model.allan_variance(tau, curve.rate) - continuous
     error = 2.0 * np.sqrt(curve.cluster_size[used] / (2.0 * curve.samples)) * continuous
-    return bool((np.abs(difference) > _MAX_SAMPLING_SIGMAS * error).any())
+    if (np.abs(difference) > _MAX_SAMPLING_SIGMAS * error).any():
+        return _Search(curve, used, method, sampled=True).estimate()
+    return fitted
 
 
 class _Search:
     """Least squares over (S_N, S_B, S_K) for a given T_B, and the search over T_B."""
 
     def __init__(
-        self,
-        curve: AllanCurve,
-        used: NDArray[np.bool_],
-        method: Method,
-        *,
-        sampled: bool,
+        self, curve: AllanCurve, used: NDArray[np.bool_], method: Method, *, sampled: bool
     ) -> None:
         self._tau, self._n = curve.tau[used], curve.cluster_size[used]
         self._interval = float(self._tau[0] / self._n[0])
@@ -240,7 +220,7 @@ class _Search:
         self.shortest = min(CORRELATION_TIMES.samples * self._interval, self.longest / 2.0)
 
     def _shapes(self, times: Array) -> Array:
-        """Return the shape of the process at each tau, a row each T_B."""
+        """Return the shape of the process at each tau, one row for each T_B."""
         if self._sampled:
             return np.array([self._shape(T_B) for T_B in times])
         return np.asarray(gauss_markov_shape(self._tau, times[:, None]))
@@ -250,11 +230,8 @@ class _Search:
             return sampled_gauss_markov_shape(self._n, self._interval, T_B)
         return gauss_markov_shape(self._tau, T_B)
 
-    def densities(self, T_B: float | None) -> tuple[Array, float]:
-        """Return S_N, S_B, S_K that fit best at a T_B, and the root of the cost."""
-        return self._solved(self._shape(T_B) if T_B is not None else np.zeros_like(self._tau))
-
     def _solved(self, shape: Array) -> tuple[Array, float]:
+        """Return S_N, S_B, S_K that fit best with a process, and the root of the cost."""
         columns = np.column_stack([self._white, shape, self._walk]) * self._root_weight[:, None]
         size = np.linalg.norm(columns, axis=0)
         size[size == 0] = 1.0
@@ -262,12 +239,7 @@ class _Search:
         return solution / size, float(residual)
 
     def _costs(self, shapes: Array) -> Array:
-        """Return the squared costs of `_solved` for processes of shapes (t, m), shape (t,).
-
-        All at once, which takes a fifth of the time. What fits best with no density below 0 is
-        what fits best with some of the three columns and has none below 0: of all such choices,
-        that of the lowest cost.
-        """
+        """Return the squared costs of `_solved` for shapes (t, m), over all active sets at once."""
         columns = np.empty((len(shapes), 3, len(self._tau)))
         columns[:, 0], columns[:, 1], columns[:, 2] = self._white, shapes, self._walk
         columns *= self._root_weight
@@ -289,25 +261,33 @@ class _Search:
         cost = self._solved(self._shape(float(scan[best])))[1]
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN_TIMES - 1)]
         minimum = minimize_scalar(
-            lambda u: self.densities(math.exp(u))[1],
+            lambda u: self._solved(self._shape(math.exp(u)))[1],
             bounds=(math.log(low), math.log(high)),
             method="bounded",
             options={"xatol": 1e-10},
         )
         T_B = math.exp(minimum.x) if minimum.fun < cost else float(scan[best])
-        return self._describe(T_B)
-
-    def _describe(self, T_B: float) -> Estimate:
-        (white, drive, walk), _ = self.densities(T_B)
-        parts = {"N": white * self._white, "B": drive * self._shape(T_B), "K": walk * self._walk}
+        shape = self._shape(T_B)
+        (white, drive, walk), _ = self._solved(shape)
+        parts = {"N": white * self._white, "B": drive * shape, "K": walk * self._walk}
         present = {
             name: bool((part > _MIN_VARIANCE_FRACTION * self._variance).any())
             for name, part in parts.items()
         }
         absent = Parameter(None, "absent", "the fit is best without this term")
-        at_end = self._describe_bound(T_B)
         bias = Parameter(bias_instability(drive, T_B)) if present["B"] else absent
         time = Parameter(T_B) if present["B"] else absent
+        at_end = None
+        if T_B > self.longest * 0.99:
+            at_end = (
+                f"T_B runs to the end of its search at {self.longest:.4g} s: the curve does not "
+                "show the peak of a Gauss-Markov process"
+            )
+        elif T_B < self.shortest * 1.01:
+            at_end = (
+                f"T_B runs to the beginning of its search at {self.shortest:.4g} s: the process "
+                "cannot be told from white noise"
+            )
         if present["B"] and at_end:
             bias = Parameter(bias.value, "at_bound", at_end)
             time = Parameter(T_B, "at_bound", at_end)
@@ -320,16 +300,3 @@ class _Search:
                 "K": Parameter(math.sqrt(walk)) if present["K"] else absent,
             },
         )
-
-    def _describe_bound(self, T_B: float) -> str | None:
-        if T_B > self.longest * 0.99:
-            return (
-                f"T_B runs to the end of its search at {self.longest:.4g} s: the curve does not "
-                "show the peak of a Gauss-Markov process"
-            )
-        if T_B < self.shortest * 1.01:
-            return (
-                f"T_B runs to the beginning of its search at {self.shortest:.4g} s: the process "
-                "cannot be told from white noise"
-            )
-        return None

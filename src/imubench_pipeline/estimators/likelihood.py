@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,18 +20,24 @@ from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, averaging_times
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
-from imubench_pipeline.estimators.draws import compute_draw_weight, draw_jointly
 from imubench_pipeline.estimators.estimate import (
     BROADBAND_TIME,
     CURVE,
     FAMILY,
+    PARAMETERS,
     SENSOR,
     Estimate,
     JointDraws,
     Parameter,
+    not_shown,
 )
-from imubench_pipeline.estimators.frame import MIN_BINS, FitSelection, select_for_fit
-from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
+from imubench_pipeline.estimators.frame import (
+    MIN_BINS,
+    FitSelection,
+    select_for_fit,
+    sensor_density,
+)
+from imubench_pipeline.estimators.intervals import describe, with_upper_limits
 from imubench_pipeline.estimators.joint_cutoff import select_joint_models
 from imubench_pipeline.estimators.lines import Line, select_sinusoids
 from imubench_pipeline.estimators.missing import (
@@ -45,8 +52,12 @@ from imubench_pipeline.estimators.model_choice import (
     Candidate,
     compare_models,
 )
-from imubench_pipeline.estimators.posterior import Posterior, sample
-from imubench_pipeline.estimators.sensor_density import sensor_density
+from imubench_pipeline.estimators.posterior import (
+    Posterior,
+    compute_draw_weight,
+    draw_jointly,
+    sample,
+)
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.white_level import (
     WhiteStretch,
@@ -83,13 +94,12 @@ class Likelihood:
         The frequencies used.
     spectrum : Spectrum
     clear, used : ndarray of bool, shape (b,)
-        The bins clear of lines, and those of them that are used: below the end of the band.
+        The bins without lines, and the subset below the end of the band, which is used.
     fitted : ndarray, shape (b,)
-        Density of the chosen model in each bin, its ramp included; NaN where there is none.
+        Density of the chosen model in each bin, its ramp included; NaN without a fit.
     frame : FitSelection
-        What was fitted, and behind what.
     stretch : WhiteStretch or None
-        Where the Allan deviation of the log has the slope -1/2.
+        The stretch of the Allan deviation with the slope -1/2.
     """
 
     estimates: tuple[Estimate, Estimate]
@@ -105,7 +115,7 @@ class Likelihood:
 
     @property
     def low_pass(self) -> Cutoff | None:
-        """The sensor's own low-pass; None where it was not looked for."""
+        """The sensor's own low-pass filter; None if it was not searched for."""
         return self.frame.low_pass
 
 
@@ -132,8 +142,7 @@ def fit(
     band : float, optional
         Highest frequency to use, Hz; by default it is found from the spectrum.
     bandwidth : float, optional
-        Cut-off of the sensor's own filter, where it is stated, Hz: it tells a filter from a
-        process where the spectrum does not.
+        Stated cut-off of the sensor's own filter, Hz: it distinguishes a filter from a process.
     resolution : float
         Step of the register (LSB), SI, where the samples are rounded.
     rng : numpy.random.Generator, optional
@@ -188,68 +197,51 @@ def fit_blocks(
     """Estimate the noise parameters of a log that comes in blocks, in bounded memory (see `fit`).
 
     Missing samples are drawn from their distribution, first by the model of the Allan variance,
-    then by that of the likelihood itself, the more often the more are missing; the bins count
-    for the samples present only.
+    then by the likelihood's own model, more often if more are missing; the bins count for the
+    samples present only.
 
     Parameters
     ----------
     blocks : callable
-        Gives the log in order, in SI, as often as it is called; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
+        Returns the log in order, in SI, at every call; NaN where a sample is missing.
+    samples, holes : int, bool
+        L, the length of all blocks together; whether samples may be missing.
+    stretch : WhiteStretch or None
+        The stretch of the Allan deviation with the slope -1/2, whose white noise is N.
     rate, segments, band, bandwidth, resolution, rng
         As in `fit`.
-    holes : bool
-        Samples may be missing.
-    stretch : WhiteStretch or None
-        Where the Allan deviation of the log has the slope -1/2: which white noise is N.
     """
     spans = spans_of(segments, samples)
+    select = partial(select_for_fit, band=band, bandwidth=bandwidth, resolution=resolution)
     if not holes:
         spectrum, lines = spectra(blocks(), samples, rate, spans)
-        frame = select_for_fit(
-            spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution
-        )
-        return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
+        return fit_spectrum(spectrum, select(spectrum, lines), rng=rng, stretch=stretch)
     means = block_means(blocks(), spans)
     parts = split_at_gaps(means, spans)
     if not parts:
         raise ValueError(f"none of the {samples} samples is present")
     present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
-    model = _first_model(blocks, samples, rate, spans)
-    rounds = _rounds(1.0 - present)
+    gaps = gaps_of(blocks())
+    curve = of_blocks(blocks(), samples, rate, holes=True, gaps=gaps, segments=spans)
+    try:
+        model = least_squares.fit(curve).model
+    except ValueError:  # too few clusters are complete
+        values = np.concatenate([part[np.isfinite(part)] for part in blocks()])
+        model = NoiseModel(N=float(np.std(values)) / math.sqrt(rate))
+    # The rest of the first error shrinks as (missing fraction)^n.
+    needed = math.log(_MAX_REMAINING_MEMORY) / math.log(min(max(1.0 - present, 1e-6), 0.9))
+    rounds = min(max(2, math.ceil(needed)), _MAX_ROUNDS)
     for number in range(1, rounds + 1):
         path = draw_slow_part(means, parts, model, rate, rng)
         complete = fill_missing(blocks(), path, model, rate, rng)
         spectrum, lines = spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
-        frame = select_for_fit(
-            spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution
-        )
+        frame = select(spectrum, lines)
         if frame.used.sum() < MIN_BINS:
             break
         if number < rounds:
             model = model_of(compare_models(frame.whittle(spectrum), quantization=False)[0].maximum)
     return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
-
-
-def _rounds(missing: float) -> int:
-    """Return how often to fill and fit: what is left of the first error shrinks as missing^n."""
-    needed = math.log(_MAX_REMAINING_MEMORY) / math.log(min(max(missing, 1e-6), 0.9))
-    return min(max(2, math.ceil(needed)), _MAX_ROUNDS)
-
-
-def _first_model(
-    blocks: Callable[[], Iterable[Array]], samples: int, rate: float, spans: Sequence[Span]
-) -> NoiseModel:
-    """Return what the Allan variance says, or white noise where too few clusters are complete."""
-    gaps = gaps_of(blocks())
-    curve = of_blocks(blocks(), samples, rate, holes=True, gaps=gaps, segments=spans)
-    try:
-        return least_squares.fit(curve).model
-    except ValueError:
-        present = np.concatenate([part[np.isfinite(part)] for part in blocks()])
-        return NoiseModel(N=float(np.std(present)) / math.sqrt(rate))
 
 
 def fit_spectrum(
@@ -259,24 +251,20 @@ def fit_spectrum(
     rng: np.random.Generator,
     stretch: WhiteStretch | None,
 ) -> Likelihood:
-    """Estimate the noise parameters from what a frame has of a spectrum (see `fit`).
-
-    ``stretch``: where the Allan deviation of the log has the slope -1/2.
-    """
+    """Estimate the noise parameters from the selected bins of a spectrum (see `fit`)."""
     if frame.used.sum() < MIN_BINS:
         return _too_short(spectrum, frame)
     frame, whittle, candidates = fit_models(spectrum, frame)
     chosen = candidates[0]
-    # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
+    # A ramp is no noise: it is selected or not, and a possible one does not widen intervals.
     alike = [chosen] + [
         c for c in candidates[1:] if c.akaike_weight >= MIN_AKAIKE_WEIGHT and not c.terms.ramp
     ]
     number = count_fast_processes(chosen.maximum, frame.folding, stretch)
     wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms, number)]
     papers = next(c for c in candidates if c.terms == PAPERS_MODEL)
-    posteriors: dict[Terms, Posterior] = {}
-    for candidate in (c for c in candidates if c in alike or c in wider or c is papers):
-        posteriors[candidate.terms] = sample(whittle, candidate.maximum, rng)
+    drawn = [c for c in candidates if c in alike or c in wider or c is papers]
+    posteriors = {c.terms: sample(whittle, c.maximum, rng) for c in drawn}
     in_the_log = {
         terms: frame.in_the_log(posterior, terms, rng) for terms, posterior in posteriors.items()
     }
@@ -297,37 +285,17 @@ def fit_spectrum(
     estimate = replace(estimate, lines=sinusoids, draws=of_data.draw_jointly())
     gauss_markov = replace(
         gauss_markov,
-        parameters=papers_only(gauss_markov.parameters),
+        parameters={name: gauss_markov.parameters[name] for name in PARAMETERS},
         lines=sinusoids,
         draws=of_papers.draw_jointly(),
     )
-    return Likelihood(
-        (estimate, gauss_markov),
-        candidates,
-        frame.lines,
-        frame.band,
-        spectrum,
-        frame.clear,
-        frame.used,
-        fitted,
-        frame,
-        stretch,
-    )
+    lines, band, clear, used = frame.lines, frame.band, frame.clear, frame.used
+    both = (estimate, gauss_markov)
+    return Likelihood(both, candidates, lines, band, spectrum, clear, used, fitted, frame, stretch)
 
 
 class _InTheLog:
-    """Models that the log does not rule out, with N as its Allan deviation shows it.
-
-    That is N below any low-pass, fast processes that count into it included.
-
-    Parameters
-    ----------
-    posteriors : mapping of Terms to Posterior
-        Draws of each model, with N as the log shows it.
-    stretch : WhiteStretch or None
-    alike, wider : sequence of Candidate
-        As of `imubench_pipeline.estimators.intervals.with_upper_limits`.
-    """
+    """Models that the log does not rule out, with N as its Allan deviation shows it."""
 
     def __init__(
         self,
@@ -351,7 +319,7 @@ class _InTheLog:
         self.wider = list(self._merged(wider))
 
     def _merged(self, candidates: Sequence[Candidate]) -> Iterator[Candidate]:
-        """Yield models without the processes that count into N, each once; their draws are kept."""
+        """Yield each model once, without the processes that count into N, and keep its draws."""
         merged: set[Terms] = set()
         for candidate in candidates:
             terms, times = candidate.terms, candidate.maximum.times
@@ -380,7 +348,7 @@ class _InTheLog:
     def draw_jointly(self) -> JointDraws:
         """Return draws over all models that the log does not rule out."""
         bins = len(self._whittle.spectrum.density)
-        # Of one model alone the share, which may be next to nothing, does not matter.
+        # The weight of a single model, which may be nearly 0, does not matter.
         alone = len(self.alike) == 1
         parts = [
             (c.terms, self.draws[c.terms], 1.0 if alone else compute_draw_weight(c, bins))
@@ -390,38 +358,30 @@ class _InTheLog:
 
 
 def _too_short(spectrum: Spectrum, frame: FitSelection) -> Likelihood:
-    """Return what is left to say of a log with too few bins to fit."""
+    """Return the result for a log with too few bins to fit."""
     reason = (
         f"{frame.used.sum()} bins of the spectrum are left up to {frame.band.highest:.4g} Hz, "
         f"{MIN_BINS} are needed: too short a log"
     )
     if not frame.clear.all():
         reason += f", or lines that hide too much of it ({(~frame.clear).sum()} bins)"
-    nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
-    of_curve = {name: nothing["B"] for name in CURVE}
-    return Likelihood(
-        (
-            Estimate("likelihood", nothing, curve=of_curve),
-            Estimate("likelihood_gm", papers_only(nothing), curve=of_curve),
-        ),
-        (),
-        frame.lines,
-        None,
-        spectrum,
-        frame.clear,
-        frame.used,
-        np.full(len(frame.used), np.nan),
-        frame,
+    nothing = Parameter(None, "not_shown", reason)
+    estimate = Estimate(
+        "likelihood", dict.fromkeys(FAMILY, nothing), curve=dict.fromkeys(CURVE, nothing)
     )
+    both = estimate, not_shown("likelihood_gm", reason)
+    lines, clear, used = frame.lines, frame.clear, frame.used
+    fitted = np.full(len(used), np.nan)
+    return Likelihood(both, (), lines, None, spectrum, clear, used, fitted, frame)
 
 
 def fit_models(
     spectrum: Spectrum, frame: FitSelection
 ) -> tuple[FitSelection, Whittle, list[Candidate]]:
-    """Fit all models in a frame, and in another one where it explains more.
+    """Fit all models to a selection of bins, and to another one where it explains more.
 
-    Where noise up to Nyquist, behind the filter that shows, is not explained: with processes of a
-    few sampling intervals; then without the frequencies that bend. Returned are the frame, its
+    If noise up to Nyquist, behind the filter found, is not explained: with processes of a few
+    sampling intervals; then without the frequencies that bend. Returned are the selection, its
     likelihood and the models tried, the best first.
     """
 
@@ -455,15 +415,12 @@ def _explains(fitted: tuple[FitSelection, Whittle, list[Candidate]]) -> bool:
 
 
 def _with_one_more(terms: Terms, number: int = 0) -> list[Terms]:
-    """Return the models that have a random walk, or a bias instability, that a model has not.
-
-    So many of its processes count into N, and are no bias instability.
-    """
-    wider = []
+    """Return the models with one more walk or bias instability; ``number`` processes are none."""
+    wider: list[Terms] = []
     terms = replace(terms, ramp=False, gauss_markov=terms.gauss_markov - number)
     if "K" not in terms.linear:
         wider.append(replace(terms, linear=terms.linear + "K"))
     if "F" not in terms.linear and terms.gauss_markov == 0:
-        wider.append(replace(terms, linear=terms.linear.replace("N", "NF")))
-        wider.append(replace(terms, gauss_markov=1))
+        flicker = replace(terms, linear=terms.linear.replace("N", "NF"))
+        wider += [flicker, replace(terms, gauss_markov=1)]
     return [replace(each, gauss_markov=each.gauss_markov + number) for each in wider]

@@ -30,30 +30,15 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
 
-_MAX_RELATIVE_ERROR = 0.5
-"""Relative standard error beyond which a parameter is not identified."""
+_MAX_RELATIVE_ERROR = 0.5  # Relative standard error beyond which a parameter is not identified
 
 _MAX_RELATIVE_ERROR_TIME = 0.75
-"""Relative standard error of T_B beyond which B is not identified either.
+"""Beyond it B is not identified either: in white logs B often seems known, T_B in 1 of 200."""
 
-The best of many T_B fits the random undulations of any curve. In white logs B alone often has a
-relative standard error below 0.5, but T_B has one of 0.75 or less in fewer than 1 of 200 logs.
-"""
-
-_MAX_RELATIVE_ERROR_HELD = 0.25
-"""Maximum relative standard error of B with T_B fixed at its bound, and of N and K with B fixed.
-
-B^2 or K^2 is then two standard errors from 0.
-"""
-
-_CLIP_RELATIVE_ERROR = 10.0
-"""Upper bound of reported relative standard errors; larger ones would overflow in the limits."""
-
-_LOG_TIME_STEP = 1e-3
-"""Step of log T_B in the finite difference."""
-
-_LOG_PARAMETER_STEP = 0.05
-"""Step of a log parameter in the finite differences of the lowest point of the curve."""
+_MAX_RELATIVE_ERROR_HELD = 0.25  # Of B with T_B fixed, and of N and K with B fixed
+_CLIP_RELATIVE_ERROR = 10.0  # Larger ones would overflow in the limits
+_LOG_TIME_STEP = 1e-3  # Step of log T_B in the finite difference
+_LOG_PARAMETER_STEP = 0.05  # Of the finite differences of the lowest point
 
 
 @dataclass(frozen=True)
@@ -71,12 +56,11 @@ class Errors:
     def factors(
         self, name: str, doubtful: Sequence[str], beside: float | None = None
     ) -> tuple[float, float]:
-        """Return the factors from a parameter to its 95 % limits.
+        """Return the factors from a parameter to its 95 % limits, with and without doubtful terms.
 
-        They are valid with and without the ``doubtful`` terms: without one, the parameter moves by
-        its regression on the density of that term. ``beside`` is the standard error with those
-        terms fixed; by default they vary. If the square of an amplitude is less than 1.96 standard
-        errors from 0, its lower limit is 0.
+        Without a term, the parameter moves by its regression on the density of that term.
+        ``beside`` is the standard error with those terms fixed; by default they vary. If the square
+        of an amplitude is less than 1.96 standard errors from 0, its lower limit is 0.
         """
         error = self.of(name) if beside is None else beside
         low, high = -SIGMAS * error, SIGMAS * error
@@ -110,7 +94,7 @@ def fit_errors(
     """Return the errors of a weighted least squares fit at the values of its model.
 
     ``used`` selects the tau of the fit, ``method`` its weights
-    (`imubench_pipeline.estimators.least_squares.fit`), and ``held`` are the fixed parameters.
+    (`imubench_pipeline.estimators.least_squares.fit`); ``held`` are the fixed parameters.
     """
     expected, derivatives = _differentiate_model(curve, used, model)
     names = [name for name in derivatives if name not in held]
@@ -127,8 +111,17 @@ def fit_errors(
     if len(columns) < len(names) or not (size > 0).all():
         return Errors(names, np.diag(np.full(len(names), np.inf)))
     gain = np.linalg.pinv(columns / size) * root / size[:, None]
-    covariance = gain @ _compute_relative_covariance(curve, used, model) @ gain.T
-    return Errors(names, covariance)
+    # The covariance of the Allan variances over the model's. Gaps and segments leave fewer
+    # differences: scale by the ratio of degrees of freedom.
+    sizes, rate = curve.cluster_size[used], curve.rate
+    whole = [
+        equivalent_degrees(int(alpha), int(n), curve.samples - 2 * int(n) + 1)
+        for alpha, n in zip(curve.exponent[used], sizes, strict=True)
+    ]
+    scale = np.sqrt(np.maximum(np.array(whole) / curve.edf[used], 1.0))
+    scale = scale / model.allan_variance(curve.tau[used], rate)
+    covariance = variance_covariance(model, rate, curve.samples, sizes) * np.outer(scale, scale)
+    return Errors(names, gain @ covariance @ gain.T)
 
 
 def _differentiate_model(
@@ -156,22 +149,6 @@ def _differentiate_model(
     return expected, derivatives
 
 
-def _compute_relative_covariance(
-    curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
-) -> Array:
-    """Return the covariance of the Allan variances over the model's, shape (m, m)."""
-    sizes, rate = curve.cluster_size[used], curve.rate
-    expected = model.allan_variance(curve.tau[used], rate)
-    covariance = variance_covariance(model, rate, curve.samples, sizes)
-    # Gaps and segments leave fewer differences: scale by the ratio of degrees of freedom.
-    whole = [
-        equivalent_degrees(int(alpha), int(n), curve.samples - 2 * int(n) + 1)
-        for alpha, n in zip(curve.exponent[used], sizes, strict=True)
-    ]
-    scale = np.sqrt(np.maximum(np.array(whole) / curve.edf[used], 1.0)) / expected
-    return np.asarray(covariance * np.outer(scale, scale))
-
-
 def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -> Estimate:
     """Return an estimate with 95 % limits, and without values that the log does not determine.
 
@@ -193,8 +170,10 @@ def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -
     errors = fit_errors(curve, used, model, estimate.method)
     unknown: dict[str, str] = {}
     if estimate.parameters["T_B"].status == "at_bound":
-        errors_at_bound = fit_errors(curve, used, model, estimate.method, held=["T_B"])
-        unknown = _explain_unknown_at_bound(errors_at_bound.of("B"))
+        error = fit_errors(curve, used, model, estimate.method, held=["T_B"]).of("B")
+        if error > _MAX_RELATIVE_ERROR_HELD:
+            reason = f"the relative standard error of B there is {_format_percent(error)}"
+            unknown = dict.fromkeys(("B", "T_B"), f"{reason}, above 25 %")
     elif "B" in errors.names:
         unknown = _explain_unknown_bias(errors.of("B"), errors.of("T_B"))
     apart = errors
@@ -216,7 +195,14 @@ def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -
             continue
         parameters[name] = replace(parameter, fitted=parameter.value)
         if name in unknown:
-            lower, upper = _compute_wide_limits(name, parameter.value, errors)
+            limited = errors.of(name) < _CLIP_RELATIVE_ERROR
+            lower, upper = None, None
+            if name == "T_B" and limited:
+                lower, upper = (parameter.value * each for each in errors.factors(name, []))
+            elif name != "T_B":
+                # Linear in the amplitude, which may be 0: a logarithmic limit would diverge.
+                lower = 0.0
+                upper = parameter.value * (1.0 + SIGMAS * errors.of(name)) if limited else None
             reason = f"{parameter.reason}; {unknown[name]}" if parameter.reason else unknown[name]
             parameters[name] = Parameter(
                 None, "not_identified", reason, lower, upper, fitted=parameter.value
@@ -275,29 +261,16 @@ def _estimate_lowest_point(
     return described
 
 
-def _explain_unknown_at_bound(error: float) -> dict[str, str]:
-    """Return reasons if B and a T_B at its bound are not identified, from the error of B there."""
-    if error <= _MAX_RELATIVE_ERROR_HELD:
-        return {}
-    reason = f"the relative standard error of B there is {_format_percent(error)}, above 25 %"
-    return {"B": reason, "T_B": reason}
-
-
 def _explain_unknown_bias(error: float, error_of_time: float) -> dict[str, str]:
-    """Return reasons if B and T_B, or T_B alone, are not identified, from their errors."""
+    """Return reasons if B and T_B, or T_B alone, are not identified."""
     of_time = f"the relative standard error of T_B is {_format_percent(error_of_time)}"
     if error > _MAX_RELATIVE_ERROR:
         of_bias = f"the relative standard error of B is {_format_percent(error)}, above 50 %"
         return {"B": of_bias, "T_B": f"{of_bias}; {of_time}"}
     if error_of_time > _MAX_RELATIVE_ERROR_TIME:
         no_peak = "no peak of a Gauss-Markov process is shown"
-        return {
-            "B": (
-                f"{no_peak}: the relative standard error of B is {_format_percent(error)}, "
-                f"but {of_time}"
-            ),
-            "T_B": f"{no_peak}: {of_time}",
-        }
+        of_bias = f"the relative standard error of B is {_format_percent(error)}"
+        return {"B": f"{no_peak}: {of_bias}, but {of_time}", "T_B": f"{no_peak}: {of_time}"}
     if error_of_time > _MAX_RELATIVE_ERROR:
         return {"T_B": f"{of_time}, above 50 %"}
     return {}
@@ -307,18 +280,3 @@ def _format_percent(error: float) -> str:
     if error >= _CLIP_RELATIVE_ERROR:
         return f"{100.0 * _CLIP_RELATIVE_ERROR:.0f} % or more"
     return f"{100.0 * error:.0f} %"
-
-
-def _compute_wide_limits(
-    name: str, value: float, errors: Errors
-) -> tuple[float | None, float | None]:
-    """Return limits of a parameter that is not identified; an amplitude may be 0.
-
-    The upper limit is linear in the amplitude, because a logarithmic one would diverge.
-    """
-    error = errors.of(name)
-    limited = error < _CLIP_RELATIVE_ERROR
-    if name == "T_B":
-        low, high = errors.factors(name, [])
-        return (value * low, value * high) if limited else (None, None)
-    return 0.0, value * (1.0 + SIGMAS * error) if limited else None

@@ -5,14 +5,12 @@ Audio Electroacoust. 15, 1967), so a line need not be phase-coherent over the wh
 model the density of a bin over its expectation is chi-squared with two degrees of freedom per
 segment.
 
-Each line adds two states to a Kalman filter and an integral to an error budget, and some steps cost
-the square or the cube of their number. The strongest lines are therefore used individually. The
-weaker ones are combined in a few groups of neighbours with the same power: of n sinusoids A_i at
-f_i,
+The cost of filters and error budgets grows with the number of lines. The strongest are used
+individually, the weaker ones in a few groups of neighbours. Of n sinusoids A_i at f_i,
 
-    A^2 = sum A_i^2,   f^2 = A^2 / sum (A_i / f_i)^2,
+    A^2 = sum A_i^2,   f^2 = A^2 / sum (A_i / f_i)^2
 
-which preserves the variance of the signal, and of its integral.
+preserves the variance of the signal, and of its integral.
 """
 
 from __future__ import annotations
@@ -33,85 +31,49 @@ from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-FALSE_ALARM_PROBABILITY = 0.005
-"""Probability that a line is detected in a channel without lines."""
-
-_MEDIAN_BINS = 129
-"""Bins of the median filter that corrects the model around a bin."""
-
-_MEDIAN_EFFICIENCY = 1.0 / (1.94 * 1.57)
-"""Independent bins per bin of the median: neighbours are correlated, and a median is less efficient
-than a mean."""
-
-_MAX_FOUND = 1000
-"""Maximum number of lines of a spectrum; the cost of comparing them is quadratic."""
-
+FALSE_ALARM_PROBABILITY = 0.005  # Probability that a line is detected in a channel without lines
+_MEDIAN_BINS = 129  # Bins of the median filter that corrects the model around a bin
+_MEDIAN_EFFICIENCY = 1.0 / (1.94 * 1.57)  # Independent bins per bin of a median of correlated ones
+_MAX_FOUND = 1000  # Maximum number of lines of a spectrum; the cost of comparing them is quadratic
 _SKIPPED_BINS = 2
 _FIRST_BIN = 4
-_LINE_HALF_WIDTH = 3
-"""Bins on each side of a line that contain its power."""
-
+_LINE_HALF_WIDTH = 3  # Bins on each side of a line that contain its power
 _MAX_SINUSOID_BINS = 8
-_WIDTH_LEVEL = 0.1
-"""Fraction of the highest excess at which the width of a line is measured."""
-
-_NEIGHBOUR_START, _NEIGHBOUR_END = 5, 20
-"""Distances, in bins, of the neighbourhood with which a sinusoid is compared."""
-
+_WIDTH_LEVEL = 0.1  # Fraction of the highest excess at which the width of a line is measured
+_NEIGHBOUR_START, _NEIGHBOUR_END = 5, 20  # Bins from a sinusoid to its neighbourhood
 _MAX_NEIGHBOUR_CHANCE = 1e-4
 _MIN_AMPLITUDE_RATIO = 1.1
-_MAX_LINE_LEAKAGE = 0.3
-"""Maximum leakage of a line into a bin of the likelihood, in standard errors of the bin."""
+_MAX_LINE_LEAKAGE = 0.3  # Into a bin of the likelihood, in standard errors of the bin
 
 # Sums over the bins of a line of the squared correlations of Hann-windowed Fourier coefficients
 # (1, 2/3 and 1/6 at a distance of 0, 1 and 2 bins), without and with the distances as weights;
 # the cross terms of line and noise; and the minimum error.
 _POWER_ERROR_TERMS = (12.6, 35.0 / 18.0, 4e-3)
 _PLACE_ERROR_TERMS = (50.0, 5.0 / 18.0, 5e-3)
-
-MAX_SINGLE_LINES = 12
-"""Lines that are used individually if there are too many."""
-
-LINE_GROUPS = 4
-"""Groups of the weaker lines."""
-
-MAX_LINES = MAX_SINGLE_LINES + LINE_GROUPS
-"""Maximum number of lines that are used without grouping."""
+MAX_SINGLE_LINES = 12  # Lines that are used individually if there are too many
+LINE_GROUPS = 4  # Groups of the weaker lines
+MAX_LINES = MAX_SINGLE_LINES + LINE_GROUPS  # Maximum number of lines that are used without grouping
 
 
 @dataclass(frozen=True)
 class Line:
-    """A detected spectral line.
+    """A detected spectral line, with 95 % limits.
 
-    Attributes
-    ----------
-    frequency, frequency_lower, frequency_upper : float
-        Hz, with 95 % limits.
-    amplitude, amplitude_lower, amplitude_upper : float
-        Omega_0, rad/s or m/s², with 95 % limits.
-    ratio : float
-        Its ratio of the highest density to the noise there.
-    false_alarm : float
-        Probability of such a ratio anywhere in the spectrum of a channel without lines.
-    width : float
-        Width, Hz; a sinusoid is not wider than the resolution.
-    resolution : float
-        Distance of the bins, Hz.
-    kind : {"sinusoid", "band", "alias"}
-        A band of noise is wider, or is not significantly above its neighbourhood; an alias is the
-        image of a faster line in block means.
+    A band of noise is wider than a sinusoid, or not significantly above its neighbourhood; an alias
+    is the image of a faster line in block means.
     """
 
-    frequency: float
+    frequency: float  # Hz
     frequency_lower: float
     frequency_upper: float
-    amplitude: float
+    amplitude: float  # Omega_0, rad/s or m/s²
     amplitude_lower: float
     amplitude_upper: float
-    ratio: float
+    ratio: float  # its highest density over the noise there
     false_alarm: float
-    width: float
-    resolution: float
+    """Probability of such a ratio anywhere in the spectrum of a channel without lines."""
+    width: float  # Hz; a sinusoid is not wider than the resolution
+    resolution: float  # distance of the bins, Hz
     kind: Literal["sinusoid", "band", "alias"]
 
     @property
@@ -137,8 +99,11 @@ def find_lines(
     model : NoiseModel
         Fit to the spectrum; a median over neighbouring bins corrects it where it deviates.
     """
-    divided = crossover if len(spectra) > 1 else 0.0
-    searched = [_get_search_range(spectrum, divided) for spectrum in spectra]
+    searched = []
+    for spectrum in spectra:
+        between = int(crossover / spectrum.frequency[1]) if len(spectra) > 1 else 0
+        above = max(_FIRST_BIN, between), len(spectrum.frequency) - 1
+        searched.append((_FIRST_BIN, between) if spectrum.block > 1 else above)
     total = sum(max(0, high - low) for low, high in searched)
     lines: list[Line] = []
     for spectrum, (low, high) in zip(spectra, searched, strict=True):
@@ -152,13 +117,15 @@ def find_lines(
 
 
 def _merge_spectra(lines: list[Line], new: list[Line]) -> list[Line]:
-    """Merge the lines of two spectra: a line near the crossover is in both, sharper in the first.
+    """Merge the lines of two spectra; the first has only skirts of strong lines above its band."""
 
-    Of a strong line above the crossover the first spectrum has the skirt only.
-    """
+    def is_same(line: Line, other: Line) -> bool:
+        wide = _LINE_HALF_WIDTH * line.resolution + 0.5 * other.width
+        return abs(line.frequency - other.frequency) <= wide
+
     joined = list(lines)
     for line in new:
-        same = [other for other in joined if _is_same(line, other)]
+        same = [other for other in joined if is_same(line, other)]
         if all(line.amplitude > _MIN_AMPLITUDE_RATIO * other.amplitude for other in same):
             joined = [other for other in joined if other not in same] + [line]
     return joined
@@ -188,22 +155,10 @@ def _compute_block_gain(frequency: float, block: int, rate: float) -> float:
     return abs(math.sin(block * half) / (block * math.sin(half))) if block > 1 else 1.0
 
 
-def _get_search_range(spectrum: LineSpectrum, crossover: float) -> tuple[int, int]:
-    """Return the first bin to search, and the one past the last."""
-    between = int(crossover / spectrum.frequency[1])
-    if spectrum.block > 1:
-        return _FIRST_BIN, between
-    return max(_FIRST_BIN, between), len(spectrum.frequency) - 1
-
-
-def _is_same(line: Line, other: Line) -> bool:
-    wide = _LINE_HALF_WIDTH * line.resolution + 0.5 * other.width
-    return abs(line.frequency - other.frequency) <= wide
-
-
 def _find_in_spectrum(
     spectrum: LineSpectrum, model: NoiseModel, rate: float, low: int, high: int, total: int
 ) -> list[Line]:
+    """Return the lines between two bins; ``total`` bins are tested in all spectra."""
     n = spectrum.segments
     omega = 2.0 * np.pi * spectrum.frequency / rate
     omega[0] = omega[1]
@@ -228,35 +183,27 @@ def _find_in_spectrum(
 
 def _merge_bands(lines: list[Line]) -> list[Line]:
     """Merge neighbouring pieces of a band of noise."""
-    merged: list[Line] = []
-    for line in lines:
-        last = merged[-1] if merged else None
-        near = _NEIGHBOUR_END * line.resolution + 0.5 * ((last.width if last else 0.0) + line.width)
-        both_wide = last and not (last.narrow or line.narrow)
-        if last and both_wide and line.frequency - last.frequency < near:
-            merged[-1] = _merge_two_bands(last, line)
-        else:
+    merged = lines[:1]
+    for line in lines[1:]:
+        last = merged[-1]
+        near = _NEIGHBOUR_END * line.resolution + 0.5 * (last.width + line.width)
+        if last.narrow or line.narrow or line.frequency - last.frequency >= near:
             merged.append(line)
+            continue
+        power = last.amplitude**2 + line.amplitude**2
+        share = last.amplitude**2 / power
+        merged[-1] = replace(
+            last if last.ratio > line.ratio else line,
+            frequency=share * last.frequency + (1.0 - share) * line.frequency,
+            frequency_lower=last.frequency_lower,
+            frequency_upper=line.frequency_upper,
+            amplitude=math.sqrt(power),
+            amplitude_lower=math.hypot(last.amplitude_lower, line.amplitude_lower),
+            amplitude_upper=math.hypot(last.amplitude_upper, line.amplitude_upper),
+            false_alarm=min(last.false_alarm, line.false_alarm),
+            width=line.frequency - last.frequency + 0.5 * (last.width + line.width),
+        )
     return merged
-
-
-def _merge_two_bands(first: Line, second: Line) -> Line:
-    """Return a band of noise that contains two."""
-    power = first.amplitude**2 + second.amplitude**2
-    share = first.amplitude**2 / power
-    grown = math.sqrt(power)
-    stronger = first if first.ratio > second.ratio else second
-    return replace(
-        stronger,
-        frequency=share * first.frequency + (1.0 - share) * second.frequency,
-        frequency_lower=first.frequency_lower,
-        frequency_upper=second.frequency_upper,
-        amplitude=grown,
-        amplitude_lower=math.hypot(first.amplitude_lower, second.amplitude_lower),
-        amplitude_upper=math.hypot(first.amplitude_upper, second.amplitude_upper),
-        false_alarm=min(first.false_alarm, second.false_alarm),
-        width=second.frequency - first.frequency + 0.5 * (first.width + second.width),
-    )
 
 
 def _estimate_line(
@@ -267,6 +214,7 @@ def _estimate_line(
     group: NDArray[np.int64],
     rate: float,
 ) -> Line:
+    """Return the line of a group of significant bins."""
     step = float(spectrum.frequency[1])
     n = spectrum.segments
     peak = int(group[np.argmax(standing[group])])
@@ -322,11 +270,7 @@ def _is_above_neighbours(spectrum: LineSpectrum, peak: int) -> bool:
 
 
 def mask_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDArray[np.bool_]:
-    """Return a mask of the bins of a spectrum without leakage from lines.
-
-    ``density``, shape (b,), is the fit in each bin. Leakage falls as 1/f², so that a strong line
-    masks more bins than a weak one.
-    """
+    """Return the bins without leakage from lines, given the fitted density, shape (b,)."""
     clear = np.ones(len(spectrum.frequency), dtype=np.bool_)
     allowed = _MAX_LINE_LEAKAGE * density * np.minimum(np.sqrt(2.0 / spectrum.ordinates), 1.0)
     for line in lines:
@@ -340,37 +284,31 @@ def mask_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDA
 
 
 def select_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
-    """Return amplitude and frequency of the sinusoids of a noise model, sorted by frequency.
-
-    ``lines`` are all detected lines, sorted by frequency; bands of noise and aliases are excluded.
-    """
+    """Return amplitude and frequency of the sinusoids among detected lines, sorted by frequency."""
     narrow = [line for line in lines if line.narrow]
-    if len(narrow) <= MAX_LINES:
-        return [_make_parameters(line) for line in narrow]
-    single = set(select_strongest([line.amplitude for line in narrow]))
-    weaker = [line for place, line in enumerate(narrow) if place not in single]
-    sinusoids = [_make_parameters(narrow[place]) for place in single]
-    groups = np.array_split(np.arange(len(weaker)), LINE_GROUPS)
-    sinusoids += [_group_lines([weaker[i] for i in group]) for group in groups]
+    single = _find_single_lines(narrow) if len(narrow) > MAX_LINES else narrow
+    sinusoids = []
+    for line in single:
+        A = Parameter(line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper)
+        f = Parameter(line.frequency, lower=line.frequency_lower, upper=line.frequency_upper)
+        sinusoids.append({"amplitude": A, "frequency": f})
+    weaker = [line for line in narrow if line not in single]
+    if weaker:
+        groups = np.array_split(np.arange(len(weaker)), LINE_GROUPS)
+        sinusoids += [_group_lines([weaker[i] for i in group]) for group in groups]
     return sorted(sinusoids, key=lambda sinusoid: sinusoid["frequency"].value or 0.0)
 
 
-def select_strongest(amplitudes: Sequence[float]) -> list[int]:
-    """Return the indices of the lines that are used individually, all if they are few."""
-    number = len(amplitudes) if len(amplitudes) <= MAX_LINES else MAX_SINGLE_LINES
-    order = sorted(range(len(amplitudes)), key=lambda place: -amplitudes[place])
-    return sorted(order[:number])
+def _find_single_lines(lines: Sequence[Line]) -> list[Line]:
+    """Return the lines that are used individually where there are too many."""
+    return sorted(lines, key=lambda line: -line.amplitude)[:MAX_SINGLE_LINES]
 
 
 def describe_grouping(channel: str, quantity: str, sinusoids: Sequence[Line]) -> Finding:
-    """Return the warning for a channel with more than `MAX_LINES` sinusoids.
-
-    The quantity is gyro or accel.
-    """
-    single = set(select_strongest([sinusoid.amplitude for sinusoid in sinusoids]))
-    powers = [0.5 * sinusoid.amplitude**2 for sinusoid in sinusoids]
-    rest = math.fsum(power for place, power in enumerate(powers) if place not in single)
-    share = rest / math.fsum(powers)
+    """Return the warning for a channel of gyro or accel with more than `MAX_LINES` sinusoids."""
+    single = _find_single_lines(sinusoids)
+    rest = math.fsum(0.5 * line.amplitude**2 for line in sinusoids if line not in single)
+    share = rest / math.fsum(0.5 * line.amplitude**2 for line in sinusoids)
     number = len(sinusoids) - len(single)
     detail = (
         f"{channel} has {len(sinusoids)} sinusoids: the {len(single)} strongest go into error "
@@ -381,26 +319,11 @@ def describe_grouping(channel: str, quantity: str, sinusoids: Sequence[Line]) ->
     return Finding("too_many_lines", "warning", detail, float(len(sinusoids)), channel)
 
 
-def _make_parameters(line: Line) -> dict[str, Parameter]:
-    return {
-        "amplitude": Parameter(
-            line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper
-        ),
-        "frequency": Parameter(
-            line.frequency, lower=line.frequency_lower, upper=line.frequency_upper
-        ),
-    }
-
-
 def _group_lines(lines: Sequence[Line]) -> dict[str, Parameter]:
-    amplitude, low, high = (
-        math.hypot(*values)
-        for values in (
-            [line.amplitude for line in lines],
-            [line.amplitude_lower for line in lines],
-            [line.amplitude_upper for line in lines],
-        )
-    )
+    """Return one sinusoid with the power, and the power of the integral, of several."""
+    amplitude = math.hypot(*(line.amplitude for line in lines))
+    low = math.hypot(*(line.amplitude_lower for line in lines))
+    high = math.hypot(*(line.amplitude_upper for line in lines))
     frequency = amplitude / math.hypot(*(line.amplitude / line.frequency for line in lines))
     first, last = lines[0].frequency, lines[-1].frequency
     reason = f"{len(lines)} weak lines from {first:.4g} to {last:.4g} Hz together"

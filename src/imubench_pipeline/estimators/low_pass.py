@@ -27,24 +27,14 @@ from imubench_pipeline.typing import Array
 
 Kind = Literal["analogue", "bilinear", "boxcar"]
 
-BOXCAR_CUTOFF_LENGTH = 0.442946
-"""Cut-off of a boxcar times its length, where sinc^2 is one half."""
-
-_FLICKER_ALIASES = 3
-"""Aliases of flicker noise on each side; the filter leaves little of the others."""
-
-_MIN_ALIASES = 2
-"""Aliases on each side that are summed, in addition to those up to four times the cut-off."""
-
-_GRID_SIZE = 512
-"""Frequencies of the numerical integral over G."""
+BOXCAR_CUTOFF_LENGTH = 0.442946  # Cut-off of a boxcar times its length, where sinc^2 is one half
+_FLICKER_ALIASES = 3  # On each side; the filter leaves little of the others
+_MIN_ALIASES = 2  # On each side, in addition to those up to four times the cut-off
+_GRID_SIZE = 512  # Frequencies of the numerical integral over G
 
 
 class Frequencies:
-    """Frequencies f up to Nyquist (Hz) of samples at a rate (Hz).
-
-    Functions of frequency that all filters share are cached.
-    """
+    """Frequencies f up to Nyquist (Hz) of samples at a rate (Hz), and cached functions of them."""
 
     def __init__(self, frequency: ArrayLike, rate: float) -> None:
         self.f = np.asarray(frequency, dtype=np.float64)
@@ -102,20 +92,11 @@ def _make_integration_grid(rate: float) -> Frequencies:
 
 @dataclass(frozen=True)
 class Filter:
-    """A low-pass filter; results have the shape of the frequencies.
-
-    Parameters
-    ----------
-    kind : {"analogue", "bilinear", "boxcar"}
-    order : int
-        n of the Butterworth filter; 1 for the boxcar.
-    cutoff : float
-        f_c, Hz.
-    """
+    """A low-pass filter; results have the shape of the frequencies."""
 
     kind: Kind
-    order: int
-    cutoff: float
+    order: int  # n of the Butterworth filter; 1 for the boxcar
+    cutoff: float  # f_c, Hz
 
     @property
     def name(self) -> str:
@@ -129,22 +110,32 @@ class Filter:
         if self.kind == "bilinear":
             return self._evaluate_bilinear(at)
         if self.kind == "boxcar":
-            return self._evaluate_boxcar(at)
-        if self.order == 1:
-            return self._evaluate_sampled_process(at)
-        return self._sum_aliases(at, self._evaluate_aliases(at))
+            length = BOXCAR_CUTOFF_LENGTH / self.cutoff * at.rate  # in samples
+            whole = math.ceil(length)
+            # Split 1 - k / length into 1 - k / whole and a constant: Fejer and Dirichlet kernels.
+            half, sine = at.half_angle
+            fejer = (np.sin(whole * half) / sine) ** 2 / whole
+            dirichlet = np.sin((2 * whole - 1) * half) / sine
+            part = whole / length
+            total = part * fejer + (1.0 - part) * dirichlet
+            return np.asarray(np.maximum(total, 1e-12) / length)
+        if self.order > 1:
+            return self._sum_aliases(at, self._evaluate_aliases(at))
+        # The spectrum of a sampled Gauss-Markov process, the sum over the aliases for n = 1:
+        # (h / 2) sinh(h) / (cosh(h) - cos w). Both are divided by e^h, which may overflow.
+        h = 2.0 * np.pi * self.cutoff / at.rate
+        decay = math.exp(-h)
+        sinh, cosh = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
+        return np.asarray(0.5 * h * sinh / (cosh - decay * at.cosine))
 
     def slow(self, at: Frequencies) -> Array:
         """Return the power gain for noise that is slow against the rate, without aliases."""
-        return (
-            self._evaluate_bilinear(at) if self.kind == "bilinear" else self._evaluate_power(at.f)
-        )
+        if self.kind == "bilinear":
+            return self._evaluate_bilinear(at)
+        return self._evaluate_power(at.f)
 
     def gains(self, at: Frequencies) -> tuple[Array, Array, Array]:
-        """Return the gains for white noise, G, for flicker noise, and for slow noise.
-
-        The gain for flicker noise is relative to unfiltered, sampled flicker noise with aliases.
-        """
+        """Return the gains for white noise, G, flicker noise with aliases, and slow noise."""
         if self.kind == "bilinear":
             same = self._evaluate_bilinear(at)
             return same, same, same
@@ -177,9 +168,8 @@ class Filter:
         """Return the spectral leakage of the DCT-II of filtered white noise, as a density.
 
         The even continuation of a smooth signal has discontinuous slopes at its ends. They add the
-        density (4 V T / n) cos^2(w/2) / (2 - 2 cos w)^2, V the variance of first differences. Near
-        Nyquist it exceeds the filtered noise. ``length`` is the duration of the transform at each
-        frequency, s.
+        density (4 V T / n) cos^2(w/2) / (2 - 2 cos w)^2, V the variance of first differences.
+        ``length`` is the duration of the transform at each frequency, s.
         """
         rate, grid = at.rate, _make_integration_grid(at.rate)
         variance = float(np.mean(self.white(grid) * grid.difference_gain)) * rate
@@ -195,9 +185,8 @@ class Filter:
         return LowPass(self.cutoff, self.order).power(f)
 
     def _evaluate_aliases(self, at: Frequencies) -> Array:
-        return self._evaluate_power(
-            at.aliases(_MIN_ALIASES + math.ceil(4.0 * self.cutoff / at.rate))
-        )
+        further = math.ceil(4.0 * self.cutoff / at.rate)
+        return self._evaluate_power(at.aliases(_MIN_ALIASES + further))
 
     def _sum_aliases(self, at: Frequencies, powers: Array) -> Array:
         """Return the sum over all aliases, from the powers of the nearest, shape (k, ...)."""
@@ -212,29 +201,7 @@ class Filter:
             total += rest * (1.0 - steep * (steep - 1) / 24.0 / end**2)
         return np.asarray(total)
 
-    def _evaluate_sampled_process(self, at: Frequencies) -> Array:
-        """Return (pi f_c / f_s) sinh(2 pi f_c / f_s) / (cosh(2 pi f_c / f_s) - cos w).
-
-        The sum over the aliases for n = 1: the spectrum of a sampled Gauss-Markov process.
-        """
-        h = 2.0 * np.pi * self.cutoff / at.rate
-        # Both are divided by e^h, which may overflow.
-        decay = math.exp(-h)
-        sine, cosine = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
-        return np.asarray(0.5 * h * sine / (cosine - decay * at.cosine))
-
     def _evaluate_bilinear(self, at: Frequencies) -> Array:
         warped = at.tangent / math.tan(math.pi * min(self.cutoff / at.rate, 0.4999))
         logarithm = np.minimum(2.0 * self.order * np.log(np.maximum(warped, 1e-30)), 600.0)
         return np.asarray(1.0 / (1.0 + np.exp(logarithm)))
-
-    def _evaluate_boxcar(self, at: Frequencies) -> Array:
-        length = BOXCAR_CUTOFF_LENGTH / self.cutoff * at.rate  # in samples
-        whole = math.ceil(length)
-        # Split 1 - k / length into 1 - k / whole and a constant: Fejer and Dirichlet kernels.
-        half, sine = at.half_angle
-        fejer = (np.sin(whole * half) / sine) ** 2 / whole
-        dirichlet = np.sin((2 * whole - 1) * half) / sine
-        part = whole / length
-        total = part * fejer + (1.0 - part) * dirichlet
-        return np.asarray(np.maximum(total, 1e-12) / length)

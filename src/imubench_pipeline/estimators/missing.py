@@ -1,9 +1,9 @@
 """Missing samples drawn from their distribution, given the samples present and a noise model.
 
-A spectrum needs a complete log. Each missing sample is replaced by a draw: the slow part of the
-noise, which a Kalman smoother interpolates from the block means on both sides, and
-white noise. The result is distributed as a complete log, if the model is right, so
-that a fit and the filling are done in turn (data augmentation).
+A spectrum needs a complete log. Each missing sample is replaced by a draw: white noise, plus the
+slow part of the noise, which a Kalman smoother interpolates from the block means on both sides.
+The result is distributed as a complete log if the model is right, so that fit and filling alternate
+(data augmentation).
 
 References
 ----------
@@ -27,13 +27,9 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.typing import Array
 
-BLOCK_SAMPLES = 64
-"""Samples whose mean is one measurement of the slow part."""
-
+BLOCK_SAMPLES = 64  # Samples whose mean is one measurement of the slow part
 _WINDOW_BLOCKS = 4096
-_MAX_GAP_BLOCKS = 1024
-"""Longest gap, in blocks; a longer one splits the log, because both sides are independent."""
-
+_MAX_GAP_BLOCKS = 1024  # A longer gap splits the log: both sides are independent
 _DIFFUSE_RATIO = 1e4
 
 
@@ -41,9 +37,8 @@ _DIFFUSE_RATIO = 1e4
 class BlockMeans:
     """Means over the samples present in blocks of `BLOCK_SAMPLES`, no block over two segments."""
 
-    begin: NDArray[np.int64]
-    end: NDArray[np.int64]
-    """(b,): first and one-past-last sample of each block."""
+    begin: NDArray[np.int64]  # (b,): first sample
+    end: NDArray[np.int64]  # (b,): one-past-last sample
     mean: Array  # (b,): rad/s or m/s²; 0 where no sample is present
     count: NDArray[np.int64]  # (b,): samples present
 
@@ -57,9 +52,7 @@ class BlockMeans:
 class SlowPath:
     """The slow part of the noise, the level of the log included, linear between knots."""
 
-    sample: Array
-    """(k,): place of the knots on the grid of the log: the middles of blocks, and the ends of
-    parts."""
+    sample: Array  # (k,): places of the knots: the middles of blocks, and the ends of parts
     value: Array  # (k,): rad/s or m/s²
 
     def at(self, samples: NDArray[np.int64]) -> Array:
@@ -68,10 +61,7 @@ class SlowPath:
 
 
 def block_means(blocks: Iterable[Array], segments: Sequence[Span]) -> BlockMeans:
-    """Return the means of blocks of a log with missing samples (NaN), in one pass.
-
-    ``segments`` are first and one-past-last sample of each, in order.
-    """
+    """Return the means of blocks of a log with missing samples (NaN), in one pass."""
     begin = np.concatenate([np.arange(start, stop, BLOCK_SAMPLES) for start, stop in segments])
     ends = np.concatenate([np.full(-(-(b - a) // BLOCK_SAMPLES), b) for a, b in segments])
     end = np.minimum(begin + BLOCK_SAMPLES, ends)
@@ -90,8 +80,8 @@ def yield_present_samples(
     """Yield the samples of a log that are present, and the blocks that they belong to.
 
     The parts are the log in order, NaN where a sample is missing; ``begin`` and ``end``, shape
-    (b,), first and one-past-last sample of each block, rising. Samples of no block are left out.
-    Yielded are the block of each sample, rising, and the samples, at least one.
+    (b,), first and one-past-last sample of each block, rising. Samples outside the blocks are left
+    out.
     """
     reached = 0
     for values in parts:
@@ -104,11 +94,7 @@ def yield_present_samples(
 
 
 def split_at_gaps(means: BlockMeans, segments: Sequence[Span]) -> tuple[Span, ...]:
-    """Divide segments at the holes that are too long to be filled, and trim their ends.
-
-    They are as `block_means` had them. In each part every hole can be filled; it goes from the
-    beginning of a block to the end of one.
-    """
+    """Divide the segments of `block_means` at gaps that are too long to fill; trim their ends."""
     parts: list[Span] = []
     for start, stop in segments:
         chosen = means.within(start, stop)
@@ -129,10 +115,7 @@ def draw_slow_part(
     rate: float,
     rng: np.random.Generator,
 ) -> SlowPath:
-    """Draw the slow part of the noise, given the means of blocks in parts (`split_at_gaps`).
-
-    Its jumps lie between the parts.
-    """
+    """Draw the slow part of the noise, given the means of blocks in parts (`split_at_gaps`)."""
     interval = BLOCK_SAMPLES / rate
     white = max(model.N**2 * rate, 1e-300)
     places, values = [], []
@@ -148,7 +131,7 @@ def draw_slow_part(
             for term in model.realised(interval, max(len(mean), 2) * interval)
             if term.drive is not None and term.drive.process is not None
         ]
-        # The level itself is not known, but does not change.
+        # The level is constant, but unknown.
         terms.append(StateSpace.scalar(1.0, 0.0, _DIFFUSE_RATIO * spread**2))
         decay = np.array([space.transition[0, 0] for space in terms])
         drive = np.array([space.process_noise[0, 0] for space in terms])
@@ -175,10 +158,7 @@ def fill_missing(
     rate: float,
     rng: np.random.Generator,
 ) -> Iterator[Array]:
-    """Yield the blocks of a log with each missing sample (NaN) replaced by a draw.
-
-    N of the model is the white part beside the path.
-    """
+    """Yield the blocks of a log with missing samples (NaN) drawn: path plus white noise."""
     reached = 0
     for values in blocks:
         missing = np.flatnonzero(~np.isfinite(values))

@@ -13,8 +13,7 @@ from imubench_pipeline.estimators.goodness import Goodness, goodness
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.typing import Array
 
-PAPERS_MODEL = Terms("NK", 1)
-"""Model of the papers: N, B, T_B and K."""
+PAPERS_MODEL = Terms("NK", 1)  # Model of the papers: N, B, T_B and K
 
 CANDIDATE_MODELS = (
     Terms("N"),
@@ -31,23 +30,17 @@ CANDIDATE_MODELS = (
 """Models that are always fitted. A ramp and quantization noise are then added to the best one; if
 BIC favours quantization noise, it is added to all of them."""
 
-WALK_LIKE_TIME_FRACTION = 1 / 10
-"""Fraction of the longest correlation time above which a process looks like a random walk."""
+WALK_LIKE_TIME_FRACTION = 1 / 10  # Of the longest T_B; a slower process looks like a walk
 
 BIC_PENALTY_UNIT_ROOT = 4.0
-"""Added to the BIC of a model with such a process, or with a ramp, but without a random walk.
-
-A random walk often looks mean-reverting or trending (D. Dickey and W. Fuller, J. Am. Stat. Assoc.
-74, 1979; C. R. Nelson and H. Kang, Econometrica 49, 1981).
-"""
+"""Added to the BIC of a model with such a process, or with a ramp, but without a random walk, which
+often looks mean-reverting or trending (D. Dickey and W. Fuller, J. Am. Stat. Assoc. 74, 1979; C. R.
+Nelson and H. Kang, Econometrica 49, 1981)."""
 
 BIC_PENALTY_RARE_TERM = 6.0
-"""Added to the BIC of a model for a ramp, and for quantization noise.
-
-Few sensors have either, and both fit random deviations at one end of the spectrum. With the plain
-BIC, 2 to 6 % of simulated logs without a ramp get one in addition to a random walk, and 1 to 3 %
-get quantization noise.
-"""
+"""Added to the BIC of a model for a ramp, and for quantization noise: few sensors have either. With
+the plain BIC, 2 to 6 % of simulated logs without a ramp get one in addition to a random walk, and
+1 to 3 % get quantization noise."""
 
 
 @dataclass(frozen=True)
@@ -57,16 +50,12 @@ class Candidate:
     maximum: Maximum
     bic: float
     aic: float
-    """BIC = -2 log L + p log(number of bins), with penalties, and AIC = -2 log L + 2 p.
-
-    The penalties of BIC: `BIC_PENALTY_UNIT_ROOT` where a Gauss-Markov process or a ramp replaces a
-    random walk; `BIC_PENALTY_RARE_TERM` for a ramp, and for quantization noise.
-    """
+    """BIC = -2 log L + p log(number of bins), with the penalties, and AIC = -2 log L + 2 p."""
     weight: float  # Schwarz weight among the candidates, proportional to e^(-BIC/2)
     akaike_weight: float
-    """Akaike weight, proportional to e^(-AIC/2), used to average intervals over models (K. P.
-    Burnham and D. R. Anderson, "Model Selection and Multimodel Inference", 2002, section 2.9). BIC
-    would exclude weak terms that the log does not rule out."""
+    """Akaike weight, proportional to e^(-AIC/2), used to average intervals over models (Burnham and
+    Anderson, "Model Selection and Multimodel Inference", 2002, section 2.9). BIC would exclude weak
+    terms that the log does not rule out."""
     goodness: Goodness
 
     @property
@@ -76,11 +65,7 @@ class Candidate:
 
 
 def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
-    """Return all candidates, fitted and sorted by BIC, best first.
-
-    ``quantization`` adds models with quantization noise; the band must then reach frequencies at
-    which this noise is visible.
-    """
+    """Return all candidates, with quantization noise if it is visible, sorted by BIC."""
     bins = len(whittle.spectrum.density)
     tried: dict[Terms, Maximum] = {}
     bic = partial(_penalised_bic, bins=bins, longest=whittle.longest)
@@ -92,12 +77,10 @@ def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     for terms in CANDIDATE_MODELS:
         add(terms)
     if quantization:
-        without_quantization = min(tried.values(), key=bic)
-        rounded = Terms(
-            "Q" + without_quantization.terms.linear, without_quantization.terms.gauss_markov
-        )
+        plain = min(tried.values(), key=bic)
+        rounded = replace(plain.terms, linear="Q" + plain.terms.linear)
         add(rounded)
-        if rounded in tried and bic(tried[rounded]) < bic(without_quantization):
+        if rounded in tried and bic(tried[rounded]) < bic(plain):
             # Without this term, other terms had to fit the quantization noise.
             for terms in CANDIDATE_MODELS:
                 add(Terms("Q" + terms.linear, terms.gauss_markov))
@@ -105,27 +88,14 @@ def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     best = min(tried.values(), key=bic).terms
     linear = best.linear if "K" in best.linear else best.linear + "K"
     add(Terms(linear, best.gauss_markov, ramp=True))
-    order = sorted(tried.values(), key=bic)
-    bics = np.array([bic(maximum) for maximum in order])
-    aics = np.array([2.0 * (maximum.cost + maximum.terms.parameters) for maximum in order])
-    weights, akaike_weights = information_weights(bics), information_weights(aics)
-    return [
-        Candidate(
-            maximum,
-            float(bics[i]),
-            float(aics[i]),
-            float(weights[i]),
-            float(akaike_weights[i]),
-            goodness(
-                whittle.spectrum.ordinates,
-                whittle.data(maximum),
-                whittle.density(maximum),
-                whittle.spectrum.frequency,
-                maximum.terms.parameters,
-            ),
-        )
-        for i, maximum in enumerate(order)
-    ]
+    candidates = []
+    for maximum in tried.values():
+        parameters, spectrum = maximum.terms.parameters, whittle.spectrum
+        data, density = whittle.data(maximum), whittle.density(maximum)
+        tested = goodness(spectrum.ordinates, data, density, spectrum.frequency, parameters)
+        aic = 2.0 * (maximum.cost + parameters)
+        candidates.append(Candidate(maximum, bic(maximum), aic, math.nan, math.nan, tested))
+    return rescore(candidates, {})
 
 
 def _penalised_bic(maximum: Maximum, bins: int, longest: float) -> float:
@@ -145,11 +115,7 @@ def _penalised_bic(maximum: Maximum, bins: int, longest: float) -> float:
 
 
 def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
-    """Return the candidates with updated scores, sorted by BIC.
-
-    ``gained`` is the gain of log likelihood of each model without a ramp; the model with a ramp
-    gains as much.
-    """
+    """Return the candidates, sorted by BIC, with gains of log likelihood without a ramp."""
     gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
     bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
     aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)
@@ -166,8 +132,7 @@ def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> l
     ]
 
 
-MIN_AKAIKE_WEIGHT = 0.05
-"""Candidates with a smaller Akaike weight do not enter the intervals."""
+MIN_AKAIKE_WEIGHT = 0.05  # Candidates with a smaller Akaike weight do not enter the intervals
 
 
 def information_weights(scores: Array) -> Array:

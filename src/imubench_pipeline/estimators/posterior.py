@@ -1,63 +1,54 @@
-"""Draws from the posterior of a model, for the intervals of its parameters.
+"""Draws from the posterior of a model, and joint draws over the models that the log allows.
 
 The prior is uniform in the amplitudes Q, N, B and K, in R, and in log T_B up to a fifth of the log.
-(A uniform prior in log N is improper towards 0: if another term explains the spectrum without N,
-all the posterior mass would go there.)
+(A uniform prior in log N would put all mass at 0 if another term explains the spectrum without N.)
 
 The draws are by importance sampling: for each correlation time of a grid the posterior of the
 amplitudes is nearly normal, and a few Newton steps find its mode. If the effective sample size is
-too small, as along thin curved ridges between terms that can replace each other, an adaptive
-Metropolis chain is used instead.
+too small, as along thin curved ridges between interchangeable terms, an adaptive Metropolis chain
+is used instead. Joint draws keep the correlations, such as of N and K, that matter for error
+budgets.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from imubench_pipeline.estimators.estimate import FAMILY, JointDraws
 from imubench_pipeline.estimators.importance import Mixture, sample_adaptively
+from imubench_pipeline.estimators.model_choice import (
+    BIC_PENALTY_RARE_TERM,
+    BIC_PENALTY_UNIT_ROOT,
+    WALK_LIKE_TIME_FRACTION,
+    Candidate,
+)
 from imubench_pipeline.estimators.posterior_kernels import chain, log_posteriors, mode_at
-from imubench_pipeline.estimators.whittle import Maximum, Whittle
+from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.estimators.whittle_kernels import Problem, shape_at
 from imubench_pipeline.typing import Array
 
-MAX_DRAWS = 80_000
-"""Default number of draws; a tail of 2.5 % has 2,000 of them."""
-
-_DRAWS_PER_POINT = 6
-"""Target number of draws per independent point: limits of two seeds then agree within 3 %."""
-
-_MAX_DRAWS_PER_POINT = 80
-"""Maximum number of draws per independent point; above it, a chain is about as good."""
-
+MAX_DRAWS = 80_000  # Default number of draws; a tail of 2.5 % has 2,000 of them
+_DRAWS_PER_POINT = 6  # Draws per independent point; limits of two seeds agree within 3 %
+_MAX_DRAWS_PER_POINT = 80  # Above it, a chain is about as good
 _MAX_ROUNDS = 4
-_GRID_SIZES = (0, 20, 9)
-"""Correlation times of the first mixture along each axis, for 0, 1 and 2 processes."""
-
-_COMPONENT_SIGMA = 0.7
-"""Standard deviation of its components in log T_B, in grid spacings."""
-
-_MAX_SIGMA = 2.0
-"""Largest standard deviation in log T_B, about the best fit."""
-
+_GRID_SIZES = (0, 20, 9)  # T_B of the first mixture along each axis, for 0, 1 and 2 processes
+_COMPONENT_SIGMA = 0.7  # of its components in log T_B, in grid spacings
+_MAX_SIGMA = 2.0  # standard deviation in log T_B about the best fit
 _MIN_BEST_FIT_WEIGHT = 0.3
-"""Minimum weight of the component at the best fit."""
-
 _NEGLIGIBLE_WEIGHT, _MIN_WEIGHT = 1e-6, 5e-3
-_WEAK_TERM_ERROR = 0.15
-"""Relative standard deviation of a squared amplitude above which it may be near 0."""
+_WEAK_TERM_ERROR = 0.15  # Relative SD of a squared amplitude above which it may be near 0
 
 _WEAK_AMPLITUDE, _WEAK_LOG_SIGMA = 0.7, 0.8
-"""Asinh of the amplitude over its unit, and standard deviation of its logarithm, in components for
-a term near 0."""
+"""Asinh of an amplitude near 0 over its unit, and standard deviation of its logarithm."""
 
 _MIN_WEAK_WEIGHT = 0.03
-_RIDGE = 1e-4
-"""Ridge on the information matrix, against collinear terms."""
-
+_RIDGE = 1e-4  # Ridge on the information matrix, against collinear terms
 _MIN_START_SIGMAS = 0.3
+KEPT_DRAWS = 200  # Number of draws that are kept for an estimate
 
 
 @dataclass(frozen=True)
@@ -74,10 +65,7 @@ class Posterior:
 def sample(
     whittle: Whittle, maximum: Maximum, rng: np.random.Generator, draws: int = MAX_DRAWS
 ) -> Posterior:
-    """Draw from the posterior of a model around its best fit.
-
-    Terms that are 0 in the best fit are drawn too.
-    """
+    """Draw from the posterior of a model around its best fit, also terms that are 0 there."""
     target = _Target(whittle, maximum)
     wanted = draws / _DRAWS_PER_POINT
     size = 1 << max(9, math.ceil(math.log2(wanted)))
@@ -96,11 +84,7 @@ def sample(
 
 
 class _Target:
-    """The posterior of a model, in coordinates in which it is nearly normal.
-
-    They are log T_B, and z with amplitude = unit sinh z > 0: linear where an amplitude may be 0,
-    and logarithmic where it is well known.
-    """
+    """The posterior in log T_B and z, amplitude = unit sinh z, in which it is nearly normal."""
 
     def __init__(self, whittle: Whittle, maximum: Maximum) -> None:
         terms = maximum.terms
@@ -225,27 +209,21 @@ class _Target:
         information = np.zeros((p + g, p + g))
         information[:p, :p] = curvature
         if g:
-            slopes = np.column_stack(
-                [
-                    0.5 * parts[:, linear + k] * self._differentiate_shape(float(place))
-                    for k, place in enumerate(places)
-                ]
-            )
+            table = self.problem.table
+            last = table.first + table.step * (len(table.logarithms) - 1)
+            slopes, ends = np.empty((len(parts), g)), np.empty((2, len(parts)))
+            for k, place in enumerate(places.tolist()):
+                low = max(place - 0.5 * table.step, table.first)
+                high = min(place + 0.5 * table.step, last)
+                shape_at(low, table, ends[0])
+                shape_at(high, table, ends[1])
+                slope = np.log(ends[1] / ends[0]) / (high - low)
+                slopes[:, k] = 0.5 * parts[:, linear + k] * slope
             half = 0.5 * self.problem.bins.nu[:, None]
             information[p:, :p] = slopes.T @ (half * parts)
             information[:p, p:] = information[p:, :p].T
             information[p:, p:] = slopes.T @ (half * slopes) + np.eye(g) / width**2
         return np.append(log_amplitudes, places), np.asarray(np.linalg.inv(information))
-
-    def _differentiate_shape(self, place: float) -> Array:
-        """Return the change of the logarithm of a shape with log T_B."""
-        first, step, logarithms = self.problem.table
-        last = first + step * (len(logarithms) - 1)
-        low, high = max(place - 0.5 * step, first), min(place + 0.5 * step, last)
-        ends = np.empty((2, len(self.problem.bins.nu)))
-        shape_at(low, self.problem.table, ends[0])
-        shape_at(high, self.problem.table, ends[1])
-        return np.asarray(np.log(ends[1] / ends[0]) / (high - low))
 
     def posterior(self, amplitudes: Array, effective: float, rng: np.random.Generator) -> Posterior:
         """Return equally weighted points as draws of the parameters."""
@@ -265,3 +243,65 @@ class _Target:
             ramps * self.ramp_unit,
             effective,
         )
+
+
+def compute_draw_weight(candidate: Candidate, bins: int) -> float:
+    """Return the weight of a model among the draws, not normalised: by AIC, but for T_B by BIC.
+
+    Amplitudes start at 0, and AIC keeps a weak term in some draws; BIC would remove it from all. A
+    correlation time is searched over decades, of which a fit covers a small part: BIC, with the
+    number of fitted bins, has the right penalty. `draw_jointly` applies the penalty for a process
+    as slow as a walk.
+    """
+    terms = candidate.terms
+    of_times = terms.gauss_markov * (0.5 * math.log(bins) - 1.0)
+    of_rare_terms = 0.5 * BIC_PENALTY_RARE_TERM * (terms.ramp + ("Q" in terms.linear))
+    return candidate.akaike_weight * math.exp(-of_times - of_rare_terms)
+
+
+def draw_jointly(
+    parts: Sequence[tuple[Terms, Posterior, float]], longest: float, number: int = KEPT_DRAWS
+) -> JointDraws:
+    """Return draws from the posteriors of several models, in proportion to their weights.
+
+    They are selected at equal distances of the cumulative weight (systematic resampling without a
+    random start). ``parts`` are the models that the log does not exclude, with unnormalised
+    weights; ``longest`` is the longest correlation time that the log can determine, s.
+
+    Raises
+    ------
+    ValueError
+        If there is no model, or no weight above 0.
+    """
+    if not sum(share for _, _, share in parts) > 0.0:
+        raise ValueError("expected models with shares above 0")
+    most = max(terms.gauss_markov for terms, _, _ in parts)
+    drawn = [_convert_draws(terms, posterior, most) for terms, posterior, _ in parts]
+    first = np.concatenate([first_components for first_components, _ in drawn])
+    further = np.concatenate([processes for _, processes in drawn])
+    counts = [len(posterior.parameters) for _, posterior, _ in parts]
+    mass = np.repeat([share / n for (_, _, share), n in zip(parts, counts, strict=True)], counts)
+    times = np.column_stack((first[:, FAMILY.index("T_B")], further[:, :, 1]))
+    slow = (times > WALK_LIKE_TIME_FRACTION * longest).any(axis=1)
+    mass = np.cumsum(np.where(slow, math.exp(-0.5 * BIC_PENALTY_UNIT_ROOT), 1.0) * mass)
+    rows = np.searchsorted(mass, (np.arange(number) + 0.5) / number * mass[-1])
+    return JointDraws(first[rows], further[rows])
+
+
+def _convert_draws(terms: Terms, posterior: Posterior, most: int) -> tuple[Array, Array]:
+    """Return the first components and the further processes of the draws of one model."""
+    linear, count = len(terms.linear), len(posterior.parameters)
+    first = np.zeros((count, len(FAMILY)))
+    first[:, FAMILY.index("T_B")] = np.nan
+    first[:, FAMILY.index("R")] = posterior.ramps
+    for place, letter in enumerate(terms.linear):
+        column = FAMILY.index("B" if letter == "F" else letter)
+        first[:, column] = posterior.parameters[:, place]
+    pairs = np.stack([posterior.parameters[:, linear:], posterior.times], axis=2)
+    if terms.gauss_markov and "F" not in terms.linear:
+        # By convention the first component is flicker noise, or else the fastest process.
+        first[:, FAMILY.index("B")], first[:, FAMILY.index("T_B")] = pairs[:, 0].T
+        pairs = pairs[:, 1:]
+    further = np.tile([0.0, np.nan], (count, most, 1))
+    further[:, : pairs.shape[1]] = pairs
+    return first, further

@@ -1,8 +1,8 @@
-"""The compiled inner loops of the posterior: its logarithm, its modes for given T_B, and a chain.
+"""The compiled inner loops of the posterior, and of importance sampling from it.
 
 A point is (log amplitude of each term ..., log T_B of each process ...). The posterior is flat in
 the amplitudes and in R, over which it is integrated, and flat in log T_B within the table of
-shapes. The chain is an adaptive Metropolis one, for where importance sampling fails.
+shapes. An adaptive Metropolis chain is used where importance sampling fails.
 """
 
 from __future__ import annotations
@@ -18,31 +18,8 @@ from imubench_pipeline.typing import Array
 _MOST_STEPS = 40
 _TOLERANCE = 1e-3
 _LONGEST_STEP = 1.5
-
 _BURN_IN = 4_000
 _ADAPT_EVERY = 250
-
-
-@njit(cache=True)
-def _model_at(point: Array, problem: Problem, model: Array, shape: Array) -> bool:
-    """Set the density of a point; return whether its correlation times lie in the table."""
-    fixed, table = problem.fixed, problem.table
-    bins, linear = fixed.shape
-    processes = (point.size - linear) // 2
-    last = table.first + table.step * (table.logarithms.shape[0] - 1)
-    for j in range(linear):
-        power = math.exp(2.0 * point[j])
-        for i in range(bins):
-            model[i] = power * fixed[i, j] + (model[i] if j else 0.0)
-    for g in range(processes):
-        where = point[linear + processes + g]
-        if where < table.first or where > last:
-            return False
-        shape_at(where, table, shape)
-        power = math.exp(2.0 * point[linear + g])
-        for i in range(bins):
-            model[i] += power * shape[i]
-    return True
 
 
 @njit(cache=True)
@@ -60,17 +37,27 @@ def _ramp_at(bins: Bins, model: Array) -> tuple[float, float]:
 def log_posterior(
     point: Array, problem: Problem, model: Array, shape: Array
 ) -> tuple[float, float, float]:
-    """Return the logarithm of the posterior at a point, the best R there and its information.
-
-    ``model`` and ``shape`` are working memory, shape (b,).
-    """
-    if not _model_at(point, problem, model, shape):
-        return -np.inf, 0.0, 0.0
-    bins, linear = problem.bins, problem.fixed.shape[1]
+    """Return the log posterior at a point, the best R and its information; model is set."""
+    fixed, bins, with_ramp, table = problem
+    b, linear = fixed.shape
+    processes = (point.size - linear) // 2
+    last = table.first + table.step * (table.logarithms.shape[0] - 1)
+    for j in range(linear):
+        power = math.exp(2.0 * point[j])
+        for i in range(b):
+            model[i] = power * fixed[i, j] + (model[i] if j else 0.0)
+    for g in range(processes):
+        where = point[linear + processes + g]
+        if where < table.first or where > last:
+            return -np.inf, 0.0, 0.0
+        shape_at(where, table, shape)
+        power = math.exp(2.0 * point[linear + g])
+        for i in range(b):
+            model[i] += power * shape[i]
     value = -cost_of(bins.nu, bins.density, model)
-    for j in range((point.size + linear) // 2):
+    for j in range(linear + processes):
         value += point[j]  # flat in the amplitude a is e^x in x = log a
-    if not problem.with_ramp:
+    if not with_ramp:
         return value, 0.0, 0.0
     best, information = _ramp_at(bins, model)
     if information > 0.0:
@@ -80,7 +67,7 @@ def log_posterior(
 
 @njit(cache=True)
 def log_posteriors(points: Array, problem: Problem) -> tuple[Array, Array, Array]:
-    """Return those of points, each of shape (n,)."""
+    """Return `log_posterior` at points, each of shape (n,)."""
     n = points.shape[0]
     values, best, information = np.empty(n), np.empty(n), np.empty(n)
     model, shape = np.empty(problem.bins.nu.size), np.empty(problem.bins.nu.size)
@@ -92,9 +79,9 @@ def log_posteriors(points: Array, problem: Problem) -> tuple[Array, Array, Array
 def mode_at(start: Array, times: Array, problem: Problem) -> tuple[Array, Array, Array]:
     """Return the mode of the log amplitudes for given log T_B, the curvature and D there.
 
-    ``start`` holds log amplitudes; D_j, shape (b, p), is the density of a term over that of the
-    model, times 2. The curvature of the posterior is sum nu D_j D_k / 2, and 2 from a flat
-    amplitude: it keeps a term that is absent from running off to 0.
+    ``start`` holds log amplitudes; D_j, shape (b, p), is the density of a term over the density of
+    the model, times 2. The curvature of the posterior is sum nu D_j D_k / 2, and 2 from a flat
+    amplitude, which bounds an absent term away from 0.
 
     Raises
     ------
@@ -139,10 +126,7 @@ def _climb(
     curvature: Array,
     parts: Array,
 ) -> float:
-    """Go a step, or a part of it, that leads no lower than ``best``, and set what the next needs.
-
-    Returned is the logarithm of the posterior there; NaN, and nothing is set, if no part does.
-    """
+    """Take a step, or a part of it, to no lower a log posterior; return it, or NaN if none."""
     nu, density, cross, ramp = bins
     b, p = columns.shape
     proposal, powers = np.empty(p), np.empty(p)
@@ -195,8 +179,8 @@ def chain(
 ) -> Array:
     """Return draws of a point, shape (draws, d).
 
-    ``covariance``, shape (d, d), is that of the first proposals; the draws in which the chain
-    learns are not kept.
+    ``covariance``, shape (d, d), is the covariance of the first proposals. It is adapted during the
+    burn-in, which is not returned.
 
     References
     ----------
@@ -235,10 +219,7 @@ def _walk(
     points: Array,
     problem: Problem,
 ) -> tuple[int, float]:
-    """Take or refuse one proposal after the other, and set the points; return how many were taken.
-
-    ``current`` is the logarithm of the posterior at ``x``; so is what is returned beside it.
-    """
+    """Accept or reject proposals; return the number accepted and the log posterior."""
     n, d = normals.shape
     model, shape = np.empty(problem.bins.nu.size), np.empty(problem.bins.nu.size)
     away, proposal = np.empty(d), np.empty(d)
@@ -260,7 +241,7 @@ def _walk(
 
 @njit(cache=True)
 def _learn(mean: Array, covariance: Array, points: Array, first: int) -> None:
-    """Move mean and covariance towards points, of which ``first`` came before."""
+    """Update mean and covariance with points; ``first`` points came before."""
     n, d = points.shape
     change = np.empty(d)
     for k in range(n):
@@ -271,3 +252,88 @@ def _learn(mean: Array, covariance: Array, points: Array, first: int) -> None:
         for a in range(d):
             for c in range(d):
                 covariance[a, c] += gain * (change[a] * change[c] - covariance[a, c])
+
+
+@njit(cache=True)
+def _square(point: Array, mean: Array, inverse: Array) -> float:
+    total = 0.0
+    for a in range(point.size):
+        z = 0.0
+        for e in range(a + 1):
+            z += inverse[a, e] * (point[e] - mean[e])
+        total += z * z
+    return total
+
+
+@njit(cache=True)
+def set_densities(
+    points: Array, weights: Array, means: Array, inverses: Array, freedom: int, densities: Array
+) -> None:
+    """Set weight times density of each component of a mixture, up to a constant, shape (n, c)."""
+    n, d = points.shape
+    for k in range(weights.size):
+        factor = weights[k]
+        for a in range(d):
+            factor *= inverses[k, a, a]
+        for i in range(n):
+            base = 1.0 / (1.0 + _square(points[i], means[k], inverses[k]) / freedom)
+            value = factor
+            for _ in range((freedom + d) // 2):
+                value *= base
+            densities[i, k] = value
+
+
+@njit(cache=True)
+def fit_mixture(
+    points: Array,
+    parts: Array,
+    means: Array,
+    inverses: Array,
+    freedom: int,
+    least: float,
+    new_weights: Array,
+    new_means: Array,
+    new_scales: Array,
+) -> int:
+    """Set the components that are kept, from the densities at points; return their number."""
+    n, d = points.shape
+    near = np.empty(n)
+    for i in range(n):
+        total = 0.0
+        for k in range(new_weights.size):
+            total += parts[i, k]
+        for k in range(new_weights.size):
+            parts[i, k] /= n * max(total, 1e-300)
+    count = 0
+    for k in range(new_weights.size):
+        mass, squares = 0.0, 0.0
+        for i in range(n):
+            mass += parts[i, k]
+            squares += parts[i, k] ** 2
+        if mass <= least or mass**2 <= (2 * d + 2) * squares:
+            continue
+        mean, scale = new_means[count], new_scales[count]
+        near_total = 0.0
+        for i in range(n):
+            square = _square(points[i], means[k], inverses[k])
+            near[i] = parts[i, k] * (freedom + d) / (freedom + square)
+            near_total += near[i]
+        for a in range(d):
+            total = 0.0
+            for i in range(n):
+                total += near[i] * points[i, a]
+            mean[a] = total / near_total
+        for i in range(n):
+            for a in range(d):
+                for e in range(a + 1):
+                    scale[a, e] += near[i] * (points[i, a] - mean[a]) * (points[i, e] - mean[e])
+        for a in range(d):
+            for e in range(a + 1):
+                scale[a, e] /= mass
+                scale[e, a] = scale[a, e]
+        for a in range(d):
+            # The covariance of few points is too narrow in some direction.
+            scale[a, a] = scale[a, a] * (1.0 + d * squares / mass**2) + 1e-14
+        new_weights[count] = mass
+        count += 1
+    return count

@@ -65,14 +65,8 @@ def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterat
             model=estimate.model.name,
             component=component,
             parameter=name,
-            value=parameter.value,
-            lower=parameter.lower,
-            upper=parameter.upper,
             unit=units[name],
-            status=parameter.status,
-            reason=parameter.reason,
-            duration_needed=parameter.duration_needed,
-            fitted=parameter.fitted,
+            **asdict(parameter),
         )
 
 
@@ -112,10 +106,7 @@ def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
 
 
 def estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]]:
-    """Read the estimates of a recording from its table ``parameters``, by channel.
-
-    With joint draws where the path of its table ``draws`` is given.
-    """
+    """Read the estimates of a recording by channel, with joint draws if their path is given."""
     return _estimates(read("parameters", [path]), joint)
 
 

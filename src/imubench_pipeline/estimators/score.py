@@ -1,8 +1,8 @@
 """Agreement of a model with the measured curve: of its own curve, and of simulated logs.
 
-One simulated log is one draw. At long tau its curve scatters widely, so the difference of one draw
-ranks no method (Maia et al., Table 3, use one). The scores use the curve of the model, and the
-distribution over many draws. Each tau is weighted by the precision of the measured curve.
+At long tau the curve of one simulated log scatters widely: a single draw (Maia et al., Table 3)
+ranks no method. The scores use the curve of the model, and the distribution over many draws. Each
+tau is weighted by the precision of the measured curve.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ import numpy as np
 from imubench_pipeline.typing import Array
 
 SUREST = 0.02
-"""Relative error below which a tau counts no more than others: figures are printed with two digits,
-and what counts by its error alone counts at the shortest tau alone."""
+"""Relative error below which the weight is constant: else the shortest tau alone would count."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +52,7 @@ class Scores:
 
 
 def weights(error: Array) -> Array:
-    """Return the weight of each tau, of sum 1.
-
-    Parameters
-    ----------
-    error : ndarray, shape (m,)
-        Relative standard error of the measured Allan deviation.
-    """
+    """Return the weight of each tau, of sum 1, from the relative standard error, shape (m,)."""
     weight = 1.0 / (error**2 + SUREST**2)
     return np.asarray(weight / weight.sum())
 
@@ -67,23 +60,16 @@ def weights(error: Array) -> Array:
 def rms(one: Array, other: Array, weight: Array | None = None) -> Array:
     """Return the RMS over the last axis of the difference of two curves, or of many and one.
 
-    Parameters
-    ----------
-    one, other : ndarray, shape (..., m)
-        Allan deviations, or their logarithms.
-    weight : ndarray, shape (m,), optional
-        Of sum 1; equal where it is not given.
+    Allan deviations or their logarithms, shape (..., m); ``weight``, shape (m,), of sum 1, or
+    equal.
     """
     return np.asarray(np.sqrt(np.average((one - other) ** 2, axis=-1, weights=weight)))
 
 
 def beats(one: Array, other: Array) -> float:
-    """Return the chance that a draw of the first kind has the lower RMS of two.
+    """Return the probability that a draw of the first kind has the lower RMS of two.
 
-    Parameters
-    ----------
-    one, other : ndarray, shape (k,), (l,)
-        RMS of single draws of each kind.
+    ``one`` and ``other``, shape (k,) and (l,), are the RMS of single draws of each kind.
     """
     place = np.searchsorted(np.sort(other), one, side="right")
     return float(1.0 - np.mean(place) / other.size)
@@ -94,10 +80,8 @@ def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
 
     Parameters
     ----------
-    measured : ndarray, shape (m,)
-        Allan deviation, rad/s or m/s².
-    error : ndarray, shape (m,)
-        Its relative standard error.
+    measured, error : ndarray, shape (m,)
+        Allan deviation, rad/s or m/s², and its relative standard error.
     model : ndarray, shape (m,)
         Allan deviation of the model.
     draws : ndarray, shape (k, m)

@@ -15,39 +15,17 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
-_MIN_SINUSOID_RATIO = 0.5
-"""Ratio of the integrals of a sinusoid and of white noise after 1 s, above which it is reported."""
-
-_MAX_SLOW_FREQUENCY = 0.05
-"""Frequency over sampling rate up to which the test for missing slow noise extends."""
-
-_MIN_FLAT_RATIO = 0.95
-"""Minimum fitted density over N^2, below the effect of a low-pass filter."""
-
+_MIN_SINUSOID_RATIO = 0.5  # Integral of a sinusoid over that of white noise after 1 s
+_MAX_SLOW_FREQUENCY = 0.05  # Over the rate, of the test for missing slow noise
+_MIN_FLAT_RATIO = 0.95  # Minimum fitted density over N^2, below the effect of a low-pass filter
 _MIN_ORDINATES = 4.0
-"""Minimum number of ordinates of the test."""
-
-_MAX_DENSITY_RATIO = 0.7
-"""Density over N^2 below which slow noise is missing."""
-
-_MAX_CHANCE = 1e-4
-"""Maximum false-alarm probability over all sums of a channel."""
-
-_SPACING_RATIO = 1.4
-"""Ratio of the numbers of ordinates in successive sums."""
+_MAX_DENSITY_RATIO = 0.7  # Density over N^2 below which slow noise is missing
+_MAX_CHANCE = 1e-4  # Maximum false-alarm probability over all sums of a channel
+_SPACING_RATIO = 1.4  # Ratio of the numbers of ordinates in successive sums
 
 
 def spectral_findings(channel: str, frame: FitSelection, white: float | None) -> list[Finding]:
-    """Return the findings on the spectrum of a channel: its lines, and the limit of its band.
-
-    Parameters
-    ----------
-    channel : str
-    frame : FitSelection
-        The part of the spectrum that was fitted.
-    white : float or None
-        N of the channel, SI; None if it is not known.
-    """
+    """Return the findings on the lines and the band of a channel; ``white`` is N, SI, if known."""
     band = frame.band
     findings = line_findings(channel, frame.lines, white)
     if band.source.startswith(("found: beyond", "default")):
@@ -57,11 +35,7 @@ def spectral_findings(channel: str, frame: FitSelection, white: float | None) ->
 
 
 def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> list[Finding]:
-    """Return a note on a channel with lines.
-
-    A warning is added if there are too many lines for the noise model, and if a line contributes
-    much to an error budget, relative to N: the sensor itself seldom causes such a line.
-    """
+    """Return a note on lines, and warnings if they are too many, or strong relative to N."""
     group = [line for line in lines if line.kind != "alias"]
     if not group:
         return []
@@ -74,37 +48,25 @@ def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> l
         "noise there; they are left out of the likelihood"
     )
     findings = [Finding("lines", "note", detail, strongest.frequency, channel)]
-    strong = _describe_strong_line(channel, sinusoids, white)
-    findings += [strong] if strong else []
+    if white:
+        # After t the integral A / (2 pi f) of a sinusoid differs by A sin(pi f t) / (pi f sqrt(2))
+        # rms; the sine is at most 1, or its argument. White noise: N sqrt(t), here t = 1 s.
+        integrals = {
+            line.amplitude / (math.sqrt(2.0) * max(1.0, math.pi * line.frequency)) / white: line
+            for line in sinusoids
+        }
+        most = max(integrals, default=0.0)
+        if most >= _MIN_SINUSOID_RATIO:
+            detail = (
+                f"a sinusoid of {channel} at {integrals[most].frequency:.5g} Hz integrates to "
+                f"{most:.3g} times what its white noise does in a second, and is in the error "
+                "budgets: if it is a vibration of the place, and not of the sensor, record "
+                "elsewhere, or on softer ground"
+            )
+            findings.append(Finding("strong_line", "warning", detail, most, channel))
     if number > MAX_LINES:
         findings.append(describe_grouping(channel, quantity_of(channel), sinusoids))
     return findings
-
-
-def _describe_strong_line(
-    channel: str, sinusoids: Iterable[Line], white: float | None
-) -> Finding | None:
-    """Return a warning on the sinusoid with the largest integral over a second.
-
-    Its integral A / (2 pi f) differs by A sin(pi f t) / (pi f sqrt(2)) rms after t; the sine is
-    at most 1, or its argument.
-    """
-    if not white:
-        return None
-    parts = {
-        line.amplitude / (math.sqrt(2.0) * max(1.0, math.pi * line.frequency)) / white: line
-        for line in sinusoids
-    }
-    most = max(parts, default=0.0)
-    if most < _MIN_SINUSOID_RATIO:
-        return None
-    frequency = parts[most].frequency
-    detail = (
-        f"a sinusoid of {channel} at {frequency:.5g} Hz integrates to {most:.3g} times what its "
-        "white noise does in a second, and is in the error budgets: if it is a vibration of the "
-        "place, and not of the sensor, record elsewhere, or on softer ground"
-    )
-    return Finding("strong_line", "warning", detail, most, channel)
 
 
 def slow_noise_missing(
@@ -112,22 +74,20 @@ def slow_noise_missing(
 ) -> Finding | None:
     """Return a finding where the lowest frequencies hold less than white noise.
 
-    Every noise adds to the density of white noise, N^2; below a sensor's low-pass nothing takes
-    from it. A log whose lowest frequencies hold less had its bias zeroed again and again at rest,
-    passed a high-pass, or had a curve or means of its parts subtracted. Its K and B, and the errors
-    of dead reckoning that come of them, are those of what is left.
-
-    The ordinates of white noise are chi-squared variates, so that nu of them, over N^2, sum to
-    chi-squared with nu degrees of freedom: a sum far below that is none of chance.
+    Slow noise only adds to the density of white noise, N^2, below a sensor's low-pass. A log with
+    less had its bias zeroed repeatedly at rest, passed a high-pass, or had a curve or means of its
+    parts subtracted: its K and B, and the dead reckoning errors computed from them, are too small.
+    Ordinates of white noise over N^2 sum to chi-squared, with nu degrees of freedom: a sum far
+    below is not chance.
 
     Parameters
     ----------
     spectrum : Spectrum
-        Of the log as it is, with nothing taken out.
+        Of the log without corrections.
     fitted : ndarray, shape (b,)
         Density of the chosen model in each bin; NaN where there is none.
     white : float or None
-        Lower limit of N, SI; None: it is not known.
+        Lower limit of N, SI; None if unknown.
     """
     if not white or not np.isfinite(white):
         return None

@@ -1,8 +1,7 @@
 """Mean densities of the noise terms in the bins of a spectrum.
 
-The low frequencies of a spectrum come from block means, whose spectrum is that of the samples
-folded: exact closed forms for white noise, quantization, random walk and Gauss-Markov process,
-a sum over the folds for flicker noise.
+Low frequencies come from block means, whose spectrum is the folded spectrum of the samples: closed
+forms for white noise, quantization, random walk and Gauss-Markov process, a sum for flicker noise.
 """
 
 from __future__ import annotations
@@ -16,11 +15,8 @@ from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum
 from imubench_pipeline.noise.terms import driving_density
 from imubench_pipeline.typing import Array
 
-_POINTS_PER_BIN = 6
-"""Frequencies per bin at which a density is evaluated."""
-
-_MAX_BLOCK_OVER_TIME = 1e-3
-"""Block duration over T_B below which a Gauss-Markov process looks like a random walk."""
+_POINTS_PER_BIN = 6  # Frequencies per bin at which a density is evaluated
+_MAX_BLOCK_OVER_TIME = 1e-3  # Below this block duration over T_B, a process looks like a walk
 
 
 class Shapes:
@@ -46,21 +42,16 @@ class Shapes:
             2.0 * spectrum.frequency[self._single] * spectrum.length[self._single]
         )
 
-    @property
-    def bins(self) -> int:
-        """Number of bins."""
-        return len(self._length)
-
     def white(self) -> Array:
         """Return the density of N = 1: 1 in every bin."""
-        return np.ones(self.bins)
+        return np.ones(len(self._length))
 
     def quantization(self) -> Array:
         """Return the density of Q = 1: (2 - 2 cos(omega)) / (m T)."""
         return np.asarray((self._gap / (self._block * self._interval)).mean(axis=0))
 
     def random_walk(self) -> Array:
-        """Return the density of K = 1, with what averaging m samples leaves of it."""
+        """Return the density of K = 1, averaged over m samples."""
         step = self._block * self._interval
         return np.asarray((step**2 / self._gap * self._averaged).mean(axis=0))
 
@@ -75,15 +66,15 @@ class Shapes:
             kernel = np.sin(self._omega[:, bins] / 2.0)[..., None] ** 2 / (m * sine) ** 2
             density[:, bins] = (kernel / (2.0 * sine)).mean(axis=-1) * m * self._interval
         shape = density.mean(axis=0)
-        shape[self._single] *= _flicker_edges(self._order)
+        shape[self._single] *= [_flicker_edge(order) for order in self._order.tolist()]
         return np.asarray(shape)
 
     def gauss_markov(self, T_B: float) -> Array:
         """Return the density of a Gauss-Markov process of B = 1.
 
-        The means of m samples are an ARMA(1, 1) process. The lowest ordinates are mended for
-        the ends of the log: c_k^2 is the quadratic form of the covariance in closed form, not
-        the spectrum.
+        The means of m samples are an ARMA(1, 1) process. The lowest ordinates are corrected for the
+        ends of the log: c_k^2 is the quadratic form of the covariance in closed form, not the
+        spectrum.
         """
         variance = driving_density(1.0, T_B) * T_B / 2.0
         h = self._interval / T_B
@@ -91,7 +82,8 @@ class Shapes:
         q, p = -math.expm1(-h), math.exp(-h)
         Q, P = -np.expm1(-m * h), np.exp(-m * h)
         # Covariance 0 and 1 of the block means; for m = 1 they are v and v p.
-        covariance_0 = variance / m**2 * _bracket(m, h, p, q)
+        sums = m * (1.0 + p) / q - 2.0 * p * -np.expm1(-m * h) / q**2  # variance of m sums over v
+        covariance_0 = variance / m**2 * sums
         covariance_1 = variance / m**2 * p * (Q / q) ** 2
         spread = Q**2 + P * self._gap
         shape = covariance_0 + covariance_1 * (2.0 * (self._cosine - P)) / spread
@@ -103,33 +95,15 @@ class Shapes:
         n = np.rint(self._length[i] / (m[i] * self._interval))
         decay, phase = P[i], self._omega[0, i] / 2.0
         sign = np.where(self._order % 2 == 1, 1.0, -1.0)
-        ends = (
-            4.0
-            * variance
-            / n
-            * decay
-            * Q[i] ** 2
-            * np.cos(phase) ** 2
-            * (1.0 + sign * np.exp(-n * m[i] * h))
-            / spread[0, i] ** 2
-        )
-        shape[i] -= ends * m[i] * self._interval
+        ends = 4.0 * variance / n * decay * Q[i] ** 2 * np.cos(phase) ** 2
+        ends *= 1.0 + sign * np.exp(-n * m[i] * h)
+        shape[i] -= ends / spread[0, i] ** 2 * m[i] * self._interval
         return np.asarray(shape)
-
-
-def _bracket(m: Array, h: float, p: float, q: float) -> Array:
-    """Return m (1 + p) / (1 - p) - 2 p (1 - p^m) / (1 - p)^2: the variance of m sums over v."""
-    return m * (1.0 + p) / q - 2.0 * p * -np.expm1(-m * h) / q**2
-
-
-def _flicker_edges(order: Array) -> Array:
-    """Return the mean square of the ordinate k of flicker noise over its density, for k << L."""
-    return np.array([_flicker_edge(k) for k in order.tolist()])
 
 
 @cache
 def _flicker_edge(order: float) -> float:
-    """Return that of one ordinate.
+    """Return the mean square of ordinate k of flicker noise over its density, for k << L.
 
     Flicker noise is a sum of Gauss-Markov processes of all correlation times, and for each the
     mean square of an ordinate is known in closed form.

@@ -1,9 +1,9 @@
 """The spectrum of a log for the likelihood: one pass, bounded memory, two resolutions.
 
 The orthonormal DCT-II diagonalises white noise and a random walk exactly, and a Gauss-Markov
-process nearly; its squared coefficients are the spectrum without the leakage of the Fourier
+process nearly; its squared coefficients are a spectrum without the leakage of the Fourier
 transform. Low frequencies come from the means of blocks of samples over the whole log, high ones
-from segments of it. Beside it, for lines, stands the Hann-windowed Fourier spectrum of segments.
+from segments of it. Lines are detected in a Hann-windowed Fourier spectrum of segments.
 """
 
 from __future__ import annotations
@@ -20,68 +20,34 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.phase import Span, spans_of, split
 from imubench_pipeline.typing import Array
 
-SINGLE = 64
-"""Number of lowest ordinates that are not binned."""
-
-WIDTH = 1.05
-"""Upper over lower frequency of the other bins."""
-
-_MAX_WHOLE_SAMPLES = 1 << 18
-"""Maximum number of samples of a log that is transformed as a whole."""
-
+SINGLE = 64  # Number of lowest ordinates that are not binned
+WIDTH = 1.05  # Upper over lower frequency of the other bins
+_MAX_WHOLE_SAMPLES = 1 << 18  # Maximum number of samples of a log that is transformed as a whole
 _MAX_SEGMENT = 1 << 15
 _MIN_SEGMENT = 1 << 9
 _SEGMENT_OVER_BLOCK = 512
 _ENOUGH_SEGMENTS = 0.75
-BLOCK_BAND = 0.25
-"""Highest frequency taken from block means, rad a block."""
-
-_MIN_AVERAGED_SEGMENTS = 8
-"""Minimum number of segments that a spectrum for lines averages."""
-
+BLOCK_BAND = 0.25  # Highest frequency taken from block means, rad a block
+_MIN_AVERAGED_SEGMENTS = 8  # Minimum number of segments that a spectrum for lines averages
 _MIN_LINE_SEGMENT = 256
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """The binned DCT-II spectrum of a log: two-sided densities, in bins of nu ordinates.
+    """The binned DCT-II spectrum of a log: two-sided densities, in bins of nu ordinates."""
 
-    Attributes
-    ----------
-    frequency, lower, upper : ndarray, shape (b,)
-        Mean frequency of the ordinates of a bin, and its edges, Hz.
-    ordinates : ndarray, shape (b,)
-        nu, degrees of freedom: the number of ordinates averaged.
-    density : ndarray, shape (b,)
-        Their mean, (rad/s)²/Hz or (m/s²)²/Hz.
-    block : ndarray of int, shape (b,)
-        Samples in the blocks whose means were transformed.
-    length : ndarray, shape (b,)
-        Duration of the transform, s.
-    ramp : ndarray, shape (b,)
-        What a ramp of 1 SI unit a second adds to the density.
-    cross : ndarray, shape (b,)
-        Mean product of the log's and that ramp's coefficients, as a density.
-    rate : float
-        Hz.
-    duration : float
-        Of the parts of the log that were used, s.
-    mean : float
-        Mean of the samples, rad/s or m/s².
-    """
-
-    frequency: Array
+    frequency: Array  # (b,): mean frequency of the ordinates of a bin, Hz
     lower: Array
-    upper: Array
-    ordinates: Array
-    density: Array
-    block: NDArray[np.int64]
-    length: Array
-    ramp: Array
-    cross: Array
-    rate: float
-    duration: float
-    mean: float
+    upper: Array  # (b,): edges of a bin, Hz
+    ordinates: Array  # (b,): nu, degrees of freedom: the number of ordinates averaged
+    density: Array  # (b,): their mean, (rad/s)²/Hz or (m/s²)²/Hz
+    block: NDArray[np.int64]  # (b,): samples in the blocks whose means were transformed
+    length: Array  # (b,): duration of the transform, s
+    ramp: Array  # (b,): density that a ramp of 1 SI unit a second adds
+    cross: Array  # (b,): mean product of the coefficients of log and ramp, as a density
+    rate: float  # Hz
+    duration: float  # of the parts of the log that were used, s
+    mean: float  # of the samples, rad/s or m/s²
 
     def select(self, chosen: NDArray[np.bool_]) -> Spectrum:
         """Return the spectrum of chosen bins."""
@@ -95,39 +61,18 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class LineSpectrum:
-    """A Hann-windowed Fourier spectrum, averaged over segments, in which lines stand out.
+    """A Hann-windowed Fourier spectrum, averaged over segments, in which lines are detected."""
 
-    Attributes
-    ----------
-    frequency : ndarray, shape (f,)
-        Hz, equally spaced.
-    density : ndarray, shape (f,)
-        Two-sided, (rad/s)²/Hz or (m/s²)²/Hz.
-    segments : int
-        Segments averaged.
-    points : int
-        Samples, or block means, in a segment.
-    interval : float
-        Time between them, s.
-    block : int
-        Samples in a block.
-    """
-
-    frequency: Array
-    density: Array
-    segments: int
-    points: int
-    interval: float
-    block: int
+    frequency: Array  # (f,): Hz, equally spaced
+    density: Array  # (f,): two-sided, (rad/s)²/Hz or (m/s²)²/Hz
+    segments: int  # averaged
+    block: int  # samples in a block
 
 
 def spectra(
-    blocks: Iterable[Array],
-    samples: int,
-    rate: float,
-    segments: Sequence[Span] | None = None,
+    blocks: Iterable[Array], samples: int, rate: float, segments: Sequence[Span] | None = None
 ) -> tuple[Spectrum, list[LineSpectrum]]:
-    """Return the spectrum of a log, and those in which lines are looked for.
+    """Return the spectrum of a log, and the spectra for the detection of lines.
 
     Parameters
     ----------
@@ -145,7 +90,7 @@ def spectra(
     Raises
     ------
     ValueError
-        If a sample inside a segment is missing, or fewer than 16 samples are there.
+        If a sample inside a segment is missing, or the log has fewer than 16 samples.
 
     References
     ----------
@@ -153,98 +98,70 @@ def spectra(
     1974; P. Whittle, "Estimation and information in stationary time series", 1953.
     """
     spans = spans_of(segments, samples)
-    sums = _Sums(spans, rate)
-    for number, part in split(blocks, spans):
-        sums.push(number, np.asarray(part, dtype=np.float64))
-    return sums.finish()
+    segment, block = _resolution(np.array([stop - start for start, stop in spans]))
+    level, series, squares, hann, number = _sum_segments(blocks, spans, segment, block)
+    interval = block / rate
+    total = sum(float(np.sum(values)) * block for values in series)
+    count = sum(len(values) * block for values in series)
+    if count < 16:
+        raise ValueError(f"the log has {count} samples, expected 16 or more")
+    if not math.isfinite(total):
+        raise ValueError("a sample is missing; fill it before the spectrum is taken")
+    series = [values for values in series if len(values) >= 2]
+    parts = [_transform(values, interval) for values in series]
+    low = tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+    lines = [_lines_of_means(series, interval, block)]
+    if block > 1:
+        low = tuple(column[2.0 * np.pi * low[0] * interval <= BLOCK_BAND] for column in low)
+        frequency = np.arange(len(hann)) * rate / segment
+        lines.append(LineSpectrum(frequency, hann / number / rate, number, 1))
+    bins = [_binned(low, block)]
+    if block > 1:
+        bins.append(_high_bins(squares, number, rate, float(bins[0]["upper"][-1])))
+    spectrum = Spectrum(
+        **{name: np.concatenate([part[name] for part in bins]) for name in bins[0]},
+        rate=rate,
+        duration=count / rate,
+        mean=level + total / count,
+    )
+    return spectrum, [line for line in lines if line is not None]
 
 
 def block_of(segments: Sequence[Span]) -> int:
-    """Return samples in the blocks whose means give the low frequencies of a spectrum."""
+    """Return the samples in the blocks whose means give the low frequencies of a spectrum."""
     return _resolution(np.array([stop - start for start, stop in segments]))[1]
 
 
-class _Sums:
-    """Takes the parts of a log, block by block."""
-
-    def __init__(self, spans: Sequence[Span], rate: float) -> None:
-        lengths = np.array([stop - start for start, stop in spans])
-        self._rate = rate
-        self._segment, self._block = _resolution(lengths)
-        self._rest: list[Array] = [np.empty(0) for _ in spans]
-        self._means: list[list[Array]] = [[] for _ in spans]
-        self._squares = np.zeros(self._segment)
-        self._hann = np.zeros(self._segment // 2 + 1)
-        self._number = 0
-        self._level: float | None = None
-        self._window = _hann(self._segment)
-
-    def push(self, part: int, values: Array) -> None:
-        """Take the next samples of a part."""
-        if self._level is None and len(values):
-            self._level = float(values[: self._segment].mean())
-        joined = np.concatenate((self._rest[part], values)) if len(self._rest[part]) else values
-        ready = len(joined) // self._segment * self._segment
+def _sum_segments(
+    blocks: Iterable[Array], spans: Sequence[Span], segment: int, block: int
+) -> tuple[float, list[Array], Array, Array, int]:
+    """Return a level, block means less it, summed DCT-II and Hann power, their number."""
+    window = _hann(segment)
+    rests: list[Array] = [np.empty(0) for _ in spans]
+    means: list[list[Array]] = [[] for _ in spans]
+    squares, hann, number = np.zeros(segment), np.zeros(segment // 2 + 1), 0
+    level: float | None = None
+    for part, new in split(blocks, spans):
+        values = np.asarray(new, dtype=np.float64)
+        if level is None and len(values):
+            level = float(values[:segment].mean())
+        joined = np.concatenate((rests[part], values)) if len(rests[part]) else values
+        ready = len(joined) // segment * segment
         if ready:
-            rows = joined[:ready].reshape(-1, self._segment) - (self._level or 0.0)
-            self._means[part].append(rows.reshape(-1, self._block).mean(axis=1))
-            if self._block > 1:
-                self._add(rows)
-        self._rest[part] = joined[ready:].copy()
-
-    def _add(self, rows: Array) -> None:
-        """Add segments to the spectra of high frequencies."""
-        coefficients = scipy.fft.dct(rows, type=2, norm="ortho", axis=1)
-        self._squares += np.einsum("ij,ij->j", coefficients, coefficients)
-        self._hann += _hann_power(rows, self._window)
-        self._number += len(rows)
-
-    def finish(self) -> tuple[Spectrum, list[LineSpectrum]]:
-        """Transform the block means, and bin everything."""
-        block, interval = self._block, self._block / self._rate
-        level = self._level or 0.0
-        series = []
-        total, count = 0.0, 0
-        for means, rest in zip(self._means, self._rest, strict=True):
-            whole = len(rest) // block * block
-            tail = (rest[:whole] - level).reshape(-1, block).mean(axis=1)
-            values = np.concatenate([*means, tail])
-            if len(values) >= 2:
-                series.append(values)
-            total += float(np.sum(values)) * block
-            count += len(values) * block
-        if count < 16:
-            raise ValueError(f"the log has {count} samples, expected 16 or more")
-        if not math.isfinite(total):
-            raise ValueError("a sample is missing; fill it before the spectrum is taken")
-        parts = [_transform(values, interval) for values in series]
-        low = tuple(np.concatenate(column) for column in zip(*parts, strict=True))
-        if block > 1:
-            low = tuple(column[2.0 * np.pi * low[0] * interval <= BLOCK_BAND] for column in low)
-        bins = [_binned(low, block)]
-        if block > 1:
-            beyond = float(bins[0]["upper"][-1])
-            bins.append(_high_bins(self._squares, self._number, self._rate, beyond))
-        spectrum = Spectrum(
-            **{name: np.concatenate([part[name] for part in bins]) for name in bins[0]},
-            rate=self._rate,
-            duration=count / self._rate,
-            mean=level + total / count,
-        )
-        lines = [_lines_of_means(series, interval, block)]
-        if block > 1:
-            lines.append(self._lines_of_segments())
-        return spectrum, [line for line in lines if line is not None]
-
-    def _lines_of_segments(self) -> LineSpectrum:
-        return LineSpectrum(
-            np.arange(len(self._hann)) * self._rate / self._segment,
-            self._hann / self._number / self._rate,
-            self._number,
-            self._segment,
-            1.0 / self._rate,
-            1,
-        )
+            rows = joined[:ready].reshape(-1, segment) - (level or 0.0)
+            means[part].append(rows.reshape(-1, block).mean(axis=1))
+            if block > 1:
+                coefficients = scipy.fft.dct(rows, type=2, norm="ortho", axis=1)
+                squares += np.einsum("ij,ij->j", coefficients, coefficients)
+                hann += _hann_power(rows, window)
+                number += len(rows)
+        rests[part] = joined[ready:].copy()
+    level = level or 0.0
+    for of_part, rest in zip(means, rests, strict=True):
+        whole = len(rest) // block * block
+        tail = (rest[:whole] - level).reshape(-1, block).mean(axis=1)
+        of_part.append(tail)
+    return level, [np.concatenate(of_part) for of_part in means], squares, hann, number
 
 
 def _resolution(lengths: NDArray[np.int64]) -> tuple[int, int]:
@@ -358,14 +275,8 @@ def _lines_of_means(series: Sequence[Array], interval: float, block: int) -> Lin
     power = np.zeros(points // 2 + 1)
     for values in series:
         power += _hann_power(values[: len(values) // points * points].reshape(-1, points), window)
-    return LineSpectrum(
-        np.arange(points // 2 + 1) / (points * interval),
-        power / number * interval,
-        number,
-        points,
-        interval,
-        block,
-    )
+    frequency = np.arange(points // 2 + 1) / (points * interval)
+    return LineSpectrum(frequency, power / number * interval, number, block)
 
 
 def _hann(points: int) -> Array:

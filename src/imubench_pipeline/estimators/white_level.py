@@ -1,12 +1,12 @@
 """N as the Allan deviation shows it: the level of its first -1/2 stretch.
 
 White noise has sigma(tau) sqrt(tau) = N at every tau. White noise of density N_0 with a
-Gauss-Markov process faster than a second has two such levels: N_0 at tau far below T_B, and
+Gauss-Markov process faster than a second has the level N_0 at tau far below T_B, and
 
     N^2 = N_0^2 + S_B T_B^2
 
-at tau far above it, where the process is white noise, too. N is the level of the first stretch of
-the curve that lasts. A process that counts into N leaves the model, so that nothing counts twice.
+at tau far above it. N is the level of the first stretch of the curve that lasts. A process that
+counts into N leaves the model, so that nothing counts twice.
 """
 
 from __future__ import annotations
@@ -24,18 +24,12 @@ from imubench_pipeline.estimators.whittle import Maximum, Terms
 from imubench_pipeline.noise.terms import driving_density
 from imubench_pipeline.typing import Array
 
-MIN_DECADES = 0.7
-"""Length of a stretch."""
-
-MIN_CLUSTER = 3
-"""Samples in the first cluster of a stretch: below, the register and the sensor's filter rule."""
-
-MAX_ERROR = 0.03
-"""Relative standard error of the deviation up to which a point belongs to a stretch."""
+MIN_DECADES = 0.7  # Length of a stretch
+MIN_CLUSTER = 3  # Samples; fewer show the register and the sensor's filter
+MAX_ERROR = 0.03  # Relative standard error of the deviation within a stretch
 
 FLAT_WITHIN, MAX_FLAT_WITHIN = 0.03, 0.06
-"""Largest relative distance of a point from the median of its stretch: the first, or two standard
-errors up to the second."""
+"""Maximum distance from the median: the first, or two standard errors up to the second."""
 
 
 @dataclass(frozen=True)
@@ -43,17 +37,15 @@ class WhiteStretch:
     """The first stretch of slope -1/2 of an Allan deviation."""
 
     level: float  # median of sigma sqrt(tau), SI
-    first: float
-    last: float
-    """Its tau, s."""
+    first: float  # shortest tau, s
+    last: float  # longest tau, s
 
 
 def find_white_stretch(curve: AllanCurve) -> WhiteStretch | None:
-    """Return the first -1/2 stretch of an Allan deviation; None where it has none.
+    """Return the first -1/2 stretch of an Allan deviation; None without one.
 
-    That is the first 0.7 decade or more, from clusters of 3 samples on, whose points all lie within
-    3 % of their median (or two standard errors, at most 6 %), as far as the standard error is below
-    3 %.
+    The first 0.7 decade or more, from clusters of 3 samples on, whose points all lie within 3 % of
+    their median (or two standard errors, at most 6 %), up to a standard error of 3 %.
     """
     n, averaged = curve.cluster_size.astype(np.float64), curve.averaged
     degrees = 1.5 * curve.samples / (2.0 * n) * 4.0 * n**2 / (4.0 * n**2 + 5.0) - 1.0
@@ -70,25 +62,16 @@ def find_white_stretch(curve: AllanCurve) -> WhiteStretch | None:
                 break
             stop += 1
         if stop > start and math.log10(n[stop - 1] / n[start]) >= MIN_DECADES:
-            return WhiteStretch(
-                float(np.median(level[start:stop])),
-                float(curve.tau[start]),
-                float(curve.tau[stop - 1]),
-            )
+            first, last = float(curve.tau[start]), float(curve.tau[stop - 1])
+            return WhiteStretch(float(np.median(level[start:stop])), first, last)
     return None
 
 
 def count_fast_processes(maximum: Maximum, folding: float, stretch: WhiteStretch | None) -> int:
-    """Return how many of the fastest processes of a fit count into N.
+    """Return how many of the fastest processes of a fit count into N; 0 without a stretch.
 
-    So many that N is nearest to the level of the stretch; none without a stretch.
-
-    Parameters
-    ----------
-    maximum : Maximum
-    folding : float
-        Density of white noise in the log over that before the low-pass.
-    stretch : WhiteStretch or None
+    With them N is nearest to the level of the stretch. ``folding`` is the density of white noise in
+    the log over the density before the low-pass.
     """
     if stretch is None or "N" not in maximum.terms.linear:
         return 0
@@ -100,10 +83,7 @@ def count_fast_processes(maximum: Maximum, folding: float, stretch: WhiteStretch
 
 
 def merged_maximum(maximum: Maximum, number: int, folding: float, level: float = 1.0) -> Maximum:
-    """Return a fit whose fastest processes, so many, are part of its white noise.
-
-    N is multiplied by ``level``: the curve may not have reached the sum of all densities yet.
-    """
+    """Return a fit whose ``number`` fastest processes are white noise, N times ``level``."""
     if (number, level) == (0, 1.0):
         return maximum
     linear, powers = len(maximum.terms.linear), maximum.powers.copy()
@@ -112,7 +92,7 @@ def merged_maximum(maximum: Maximum, number: int, folding: float, level: float =
     powers[place] = level**2 * (powers[place] + float(np.sum(densities)) / folding)
     return replace(
         maximum,
-        terms=_without(maximum.terms, number),
+        terms=replace(maximum.terms, gauss_markov=maximum.terms.gauss_markov - number),
         powers=np.delete(powers, np.s_[linear : linear + number]),
         times=maximum.times[number:],
     )
@@ -121,7 +101,7 @@ def merged_maximum(maximum: Maximum, number: int, folding: float, level: float =
 def merged_posterior(
     posterior: Posterior, terms: Terms, number: int, level: float = 1.0
 ) -> Posterior:
-    """Return draws of a model whose fastest processes, so many, are part of its white noise.
+    """Return draws of a model whose ``number`` fastest processes are part of its white noise.
 
     The processes of a draw are in the order of T_B: where one is merged, all faster than a second
     are, as a weak process may be faster than the strong one.
@@ -144,10 +124,7 @@ def merged_posterior(
 
 
 def describe_white_level(stretch: WhiteStretch | None, times: Sequence[float]) -> str | None:
-    """Return what N is, where that is not the white noise of the model on a stretch of the curve.
-
-    ``times`` are the correlation times of the processes that count into it, s.
-    """
+    """Return a description of an N with processes of correlation times, s, or without a stretch."""
     if stretch is None:
         return (
             "the Allan deviation has no -1/2 stretch of 0.7 decade: N is the white noise of the "
@@ -165,7 +142,3 @@ def describe_white_level(stretch: WhiteStretch | None, times: Sequence[float]) -
 def _white_densities(squares: Array, times: Array) -> Array:
     """Return the density of Gauss-Markov processes of B^2 and T_B far below 1 / T_B."""
     return np.asarray(squares * driving_density(1.0, 1.0) * times)
-
-
-def _without(terms: Terms, number: int) -> Terms:
-    return replace(terms, gauss_markov=terms.gauss_markov - number)

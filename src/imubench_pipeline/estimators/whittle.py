@@ -2,18 +2,20 @@
 
 -log L = 1/2 sum_i nu_i (log S_i + I_i / S_i) up to a constant, with nu ordinates of mean density
 I in bin i. For given correlation times S is linear in the squared parameters, which are at least
-0: iteratively reweighted non-negative least squares. A ramp R is a mean, not a variance: it moves
+0: iteratively reweighted non-negative least squares. A ramp R is a mean, not a variance: it changes
 I to I - 2 R cross + R^2 ramp, and is profiled out.
 """
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -23,23 +25,27 @@ from imubench_pipeline.estimators.whittle_kernels import (
     Problem,
     ShapeTable,
     best_powers,
+    cost_at,
     shape_at,
 )
-from imubench_pipeline.estimators.whittle_search import one_process, two_processes
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
 from imubench_pipeline.typing import Array
 
-SHAPES = 192
-"""Correlation times at which the shape of a Gauss-Markov process is tabulated."""
-
-COARSE = 48
-"""So many are enough to look for lines and for the band."""
+SHAPES = 192  # Correlation times at which the shape of a Gauss-Markov process is tabulated
+COARSE = 48  # Correlation times that suffice to detect lines and the band
+_SCAN_STEP = 4
+_PAIR_STEP = 12
+_MIN_TIME_RATIO = 2.5  # Minimum ratio of two correlation times of one model
+_SCAN_TOLERANCE = 1e-2  # Tolerance of the cost when correlation times are only compared
+_POLISH_TOLERANCE = 1e-6
+_LOG_TIME_TOLERANCE = 5e-4  # Tolerance of the logarithm of a correlation time
+_MAX_TURNS = 8
 
 
 @dataclass(frozen=True)
 class Terms:
-    """Which terms a model has: letters of Q, N, F, K, Gauss-Markov processes, and a ramp."""
+    """Terms of a model: letters of Q, N, F and K, Gauss-Markov processes, and a ramp."""
 
     linear: str
     gauss_markov: int = 0
@@ -92,41 +98,26 @@ class Maximum:
 
 @dataclass(frozen=True)
 class Behind:
-    """What a low-pass leaves of the noise in each bin of a spectrum."""
+    """Power gains of a low-pass in each bin of a spectrum, each of shape (b,)."""
 
-    white: Array
-    """(b,): of white noise of N = 1, sampled, with what stands behind the filter in proportion to
-    it."""
-    flicker: Array
-    slow: Array
-    """(b,): gain of the power of flicker noise, whose folds show, and of slower noise."""
+    white: Array  # of sampled white noise, with white noise after the filter over N^2
+    flicker: Array  # of flicker noise, with its aliases
+    slow: Array  # of slower noise
 
     def select(self, chosen: NDArray[np.bool_]) -> Behind:
-        """Return that of chosen bins."""
+        """Return the gains in chosen bins."""
         return Behind(self.white[chosen], self.flicker[chosen], self.slow[chosen])
 
 
 @dataclass
 class Whittle:
-    """The likelihood of one spectrum.
+    """The likelihood of one spectrum."""
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        The bins to use.
-    shortest, longest : float
-        Correlation times between which a Gauss-Markov process is looked for, s.
-    shapes : int
-        Correlation times at which its shape is tabulated.
-    behind : Behind, optional
-        The sensor's low-pass, behind which the noise stands; quantization noise does not.
-    """
-
-    spectrum: Spectrum
-    shortest: float
+    spectrum: Spectrum  # the bins to use
+    shortest: float  # correlation time of a Gauss-Markov process that is searched, s
     longest: float
-    shapes: int = SHAPES
-    behind: Behind | None = None
+    shapes: int = SHAPES  # correlation times at which its shape is tabulated
+    behind: Behind | None = None  # the sensor's low-pass; quantization noise does not pass it
     scale: float = field(init=False)
     columns: dict[str, Array] = field(init=False)
     shape_of: Shapes = field(init=False)
@@ -154,17 +145,14 @@ class Whittle:
         return other
 
     def standing(self, behind: Behind) -> Whittle:
-        """Return the likelihood of the same data behind a low-pass; this one stands behind none."""
+        """Return the likelihood of the same data behind a low-pass; here there is none."""
         other = copy.copy(self)
         other.columns, other.behind = {}, behind
         vars(other)["table"] = self.table + np.log(behind.slow)
         return other
 
     def with_column(self, letter: str, shape: Array) -> Whittle:
-        """Return the likelihood with another density in the place of a linear term.
-
-        The letter is Q, N, F or K; ``shape``, (b,), is the density for a parameter of 1.
-        """
+        """Return the likelihood with another density, shape (b,), for Q, N, F or K of 1."""
         _ = self.table  # made once for both
         other = copy.copy(self)
         other.columns = self.columns | {letter: shape}
@@ -182,17 +170,15 @@ class Whittle:
     def column(self, letter: str) -> Array:
         """Return the density of a unit linear term (Q, N, F or K) in each bin."""
         if letter not in self.columns:
-            make = {
-                "Q": self.shape_of.quantization,
-                "N": self.shape_of.white,
-                "F": self.shape_of.flicker,
-                "K": self.shape_of.random_walk,
-            }
-            shape = make[letter]()
-            if self.behind is not None and letter == "N":
-                shape = self.behind.white
-            elif self.behind is not None and letter in "FK":
-                shape = shape * (self.behind.flicker if letter == "F" else self.behind.slow)
+            shapes, behind = self.shape_of, self.behind
+            if letter == "Q":
+                shape = shapes.quantization()
+            elif letter == "N":
+                shape = shapes.white() if behind is None else behind.white
+            elif letter == "F":
+                shape = shapes.flicker() * (1.0 if behind is None else behind.flicker)
+            else:
+                shape = shapes.random_walk() * (1.0 if behind is None else behind.slow)
             self.columns[letter] = shape
         return self.columns[letter]
 
@@ -241,7 +227,7 @@ class Whittle:
         bins = self.bins()
         where = np.empty(0)
         if terms.gauss_markov:
-            search = one_process if terms.gauss_markov == 1 else two_processes
+            search = _fit_one_process if terms.gauss_markov == 1 else _fit_two_processes
             where = search(Problem(fixed, bins, terms.ramp, self.shape_table()))
         times = np.sort(np.exp(where))
         processes = [self.gauss_markov(float(time)) for time in times]
@@ -256,7 +242,7 @@ class Whittle:
         """Return S with S S^T the Fisher information of (log parameter ..., log T_B ..., R).
 
         Shape (m, b), or (m, 2 b) with a ramp, which shares no information with the others; the
-        parameters stand in the order of `Maximum.powers`, then `times`.
+        order is `Maximum.powers`, then `times`.
         """
         matrix = self.matrix(maximum.terms, maximum.times)
         total = matrix @ maximum.powers
@@ -266,10 +252,8 @@ class Whittle:
         ]
         step = 0.05
         for power, time in zip(maximum.process_powers, maximum.times, strict=True):
-            low, high = (
-                max(time / (1 + step), self.times[0]),
-                min(time * (1 + step), self.times[-1]),
-            )
+            low = max(time / (1 + step), self.times[0])
+            high = min(time * (1 + step), self.times[-1])
             change = self.gauss_markov(high) - self.gauss_markov(low)
             rows.append(power * change / np.log(high / low) / total)
         noise = np.array(rows) * np.sqrt(self._nu / 2.0)
@@ -280,11 +264,6 @@ class Whittle:
         full[:-1, :bins] = noise
         full[-1, bins:] = np.sqrt(self._nu * self.spectrum.ramp / total)
         return full
-
-    def information(self, maximum: Maximum) -> Array:
-        """Return the Fisher information of (log of each parameter ..., log T_B ..., R)."""
-        sensitivity = self.sensitivity(maximum)
-        return np.asarray(sensitivity @ sensitivity.T)
 
 
 def whittle_of(
@@ -298,8 +277,8 @@ def whittle_of(
     """Return the likelihood of a spectrum, with the correlation times that it can show.
 
     ``highest`` is the frequency up to which its bins reach, Hz; ``shortest`` the shortest
-    correlation time, s, by default twenty sampling intervals. ``shapes`` and ``behind``: as of
-    `Whittle`.
+    correlation time, s, by default twenty sampling intervals; ``shapes`` and ``behind`` are those
+    of `Whittle`.
     """
     longest = CORRELATION_TIMES.of_log * float(spectrum.length.max())
     least = CORRELATION_TIMES.samples / spectrum.rate if shortest is None else shortest
@@ -325,3 +304,114 @@ def model_of(maximum: Maximum) -> NoiseModel:
         R=maximum.ramp,
         further=[process for process in processes if process.B > 0],
     )
+
+
+def _polish(
+    places: Array, which: int, low: float, high: float, problem: Problem
+) -> tuple[float, float]:
+    """Minimise the cost over one correlation time between limits (Brent's method)."""
+    tried = places.copy()
+
+    def cost(place: float) -> float:
+        tried[which] = place
+        return cost_at(tried, problem, _POLISH_TOLERANCE)
+
+    best = minimize_scalar(
+        cost, bounds=(low, high), method="bounded", options={"xatol": _LOG_TIME_TOLERANCE}
+    )
+    return float(best.x), float(best.fun)
+
+
+def _scan(
+    places: Array, which: int, low: float, high: float, problem: Problem
+) -> tuple[float, float]:
+    """Return the best of one correlation time on a grid between limits, and its cost."""
+    tried, table = places.copy(), problem.table
+    best, lowest = places[which], np.inf
+    for i in range(0, table.logarithms.shape[0], _SCAN_STEP):
+        tried[which] = table.first + i * table.step
+        if low <= tried[which] <= high:
+            cost = cost_at(tried, problem, _SCAN_TOLERANCE)
+            if cost < lowest:
+                best, lowest = tried[which], cost
+    return best, lowest
+
+
+def _fit_one_process(problem: Problem) -> Array:
+    """Scan the correlation time, then polish the best.
+
+    The search is not compiled: numba would inline and compile each of its levels for seconds.
+    """
+    first, step, logarithms = problem.table
+    last = first + step * (logarithms.shape[0] - 1)
+    place = np.array([first])
+    best, lowest = _scan(place, 0, first, last, problem)
+    reach = _SCAN_STEP * step
+    place[0] = best
+    low, high = max(first, best - reach), min(last, best + reach)
+    polished, cost = _polish(place, 0, low, high, problem)
+    place[0] = polished if cost < lowest else best
+    return place
+
+
+def _fit_two_processes(problem: Problem) -> Array:
+    """Polish the best pair of a coarse grid, and the best process with another one."""
+    begun = [_descend(pair, cost, problem, turns=1) for pair, cost in _pairs(problem)]
+    pair, cost = min(begun, key=lambda one: one[1])
+    return _descend(pair, cost, problem, turns=_MAX_TURNS)[0]
+
+
+def _pairs(problem: Problem) -> Iterator[tuple[Array, float]]:
+    """Yield pairs of correlation times to begin with, and their costs."""
+    first, step, logarithms = problem.table
+    last = first + step * (logarithms.shape[0] - 1)
+    apart = np.log(_MIN_TIME_RATIO)
+    lowest = np.inf
+    pair = np.array([first, last])
+    places = np.empty(2)
+    for i in range(0, logarithms.shape[0], _PAIR_STEP):
+        for j in range(i + _PAIR_STEP, logarithms.shape[0], _PAIR_STEP):
+            places[0], places[1] = first + i * step, first + j * step
+            if places[1] - places[0] < apart:
+                continue
+            cost = cost_at(places, problem, _SCAN_TOLERANCE)
+            if cost < lowest:
+                lowest = cost
+                pair = places.copy()
+    yield pair, lowest
+    single = _fit_one_process(problem)[0]
+    for which in (1, 0):
+        beside = np.array([single, single])
+        low, high = (single + apart, last) if which == 1 else (first, single - apart)
+        if high <= low:
+            continue
+        beside[which], cost = _scan(beside, which, low, high, problem)
+        if cost < np.inf:
+            yield beside, cost
+
+
+def _descend(pair: Array, lowest: float, problem: Problem, *, turns: int) -> tuple[Array, float]:
+    """Polish each of two correlation times in turn."""
+    first, step, logarithms = problem.table
+    last = first + step * (logarithms.shape[0] - 1)
+    apart = np.log(_MIN_TIME_RATIO)
+    best = pair.copy()
+    reach = _PAIR_STEP * step
+    for _ in range(turns):
+        before = lowest
+        for g in range(2):
+            low, high = max(first, best[g] - reach), min(last, best[g] + reach)
+            if g == 0:
+                high = min(high, best[1] - apart)
+            else:
+                low = max(low, best[0] + apart)
+            if high <= low:
+                continue
+            polished, cost = _polish(best, g, low, high, problem)
+            if cost < lowest:
+                lowest = cost
+                best[g] = polished
+        reach = max(0.7 * reach, 0.1 * step)
+        if before - lowest < 1e-4:
+            break
+    return best, lowest

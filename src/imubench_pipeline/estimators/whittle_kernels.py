@@ -1,8 +1,7 @@
 """The compiled inner loops of the Whittle likelihood; data and densities are in units near 1.
 
-Loops over scalars, where NumPy has a word for it: what numba compiles of NumPy's functions (`max`,
-`flatnonzero`, `@`, assignments of slices) takes longer than the kernel, and is waited for at the
-first use.
+They loop over scalars: numba takes longer to compile NumPy's functions (`max`, `flatnonzero`, `@`,
+assignments of slices) than the kernel.
 """
 
 from __future__ import annotations
@@ -15,12 +14,9 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.typing import Array
 
-TOLERANCE = 1e-7
-"""Of the cost."""
-
+TOLERANCE = 1e-7  # Of the cost
 _MOST_STEPS = 60
-_NEAR = 0.1
-"""Gain of the cost by a step from which the next ones are Newton's."""
+_NEAR = 0.1  # Gain of the cost by a step from which the next ones are Newton's
 
 
 class Bins(NamedTuple):
@@ -33,10 +29,7 @@ class Bins(NamedTuple):
 
 
 class ShapeTable(NamedTuple):
-    """Logarithms of the density of a Gauss-Markov process, shape (t, b).
-
-    The logarithms of the correlation times (s) begin at ``first`` and are ``step`` apart.
-    """
+    """Logarithms of process densities, shape (t, b), at log T_B (s) from ``first`` by ``step``."""
 
     first: float
     step: float
@@ -44,7 +37,7 @@ class ShapeTable(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """What is fitted to bins: densities of linear terms, shape (b, p), a ramp, processes."""
+    """Terms to fit to bins: densities of linear terms, shape (b, p), a ramp, processes."""
 
     fixed: Array
     bins: Bins
@@ -76,7 +69,7 @@ def cost_of(nu: Array, data: Array, density: Array) -> float:
 
 @njit(cache=True)
 def _solved(gram: Array, target: Array, free: NDArray[np.bool_]) -> Array:
-    """Return x with gram x = target over what is free, 0 elsewhere (Cholesky's root)."""
+    """Return x with gram x = target over the free variables, 0 elsewhere (Cholesky)."""
     p = target.size
     chosen = np.empty(p, dtype=np.int64)
     m = 0
@@ -115,10 +108,7 @@ def _solved(gram: Array, target: Array, free: NDArray[np.bool_]) -> Array:
 
 @njit(cache=True)
 def _non_negative(gram: Array, target: Array, guess: Array) -> Array:
-    """Minimise x' gram x / 2 - target' x over x >= 0 (Lawson and Hanson's active sets).
-
-    ``guess`` is above 0 where x may be: mostly that is right.
-    """
+    """Minimise x' gram x / 2 - target' x over x >= 0 (active sets of Lawson and Hanson)."""
     p = target.size
     free = np.empty(p, dtype=np.bool_)
     made = np.empty(p)  # gram x
@@ -179,8 +169,8 @@ def best_powers(
 ) -> tuple[Array, float, float]:
     """Return the squared parameters, R and the cost that fit best, to a tolerance of the cost.
 
-    Scoring, with the expected information, which never leads astray; where little is left to gain,
-    Newton's steps, with the observed one: scoring creeps where the data are not as the model says.
+    Fisher scoring, with the expected information, is robust, but slow near the end where the data
+    deviate from the model; there the observed information is used (Newton steps).
     """
     nu, density, cross, ramp = bins
     b, p = columns.shape

@@ -1,8 +1,4 @@
-"""What each noise is: density, Allan variance and state space of its terms, and of their sum.
-
-Beside it what follows from these alone: the growth of errors, flicker noise as a bank of processes,
-low-pass filters, simulated samples.
-"""
+"""Noise terms and their sum: density, Allan variance, state space, growth, simulated samples."""
 
 from imubench_pipeline.noise.model import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace

@@ -10,23 +10,12 @@ from imubench_pipeline.noise.state_space import StateSpace, repeat_step
 
 
 def of_block_means(space: StateSpace, size: int) -> StateSpace:
-    """Return the state space of the means of adjacent blocks of samples.
+    """Return the state space of the means of adjacent blocks of ``size`` samples.
 
     The mean of a block is an additional state, which is output after the end of the block, when the
-    states of the process already belong to the next block.
-
-    Parameters
-    ----------
-    space : StateSpace
-        State space of the samples, with m states.
-    size : int
-        Samples in a block.
-
-    Returns
-    -------
-    StateSpace
-        It has m + 1 states, or m if ``size`` is 1 or m is 0. It starts one block before the
-        samples: its initial state precedes the first block.
+    states of the process already belong to the next block. (There is none if ``size`` is 1 or the
+    space has no states.) It starts one block before the samples: its initial state precedes the
+    first block.
     """
     m = len(space.output)
     if size == 1 or m == 0:

@@ -12,16 +12,10 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.typing import Array
 
-_MAX_ARGUMENT_FOR_SERIES = 2.0
-"""Series are used below this magnitude, where the recurrence of phi and the sum of
-`squared_response` cancel."""
-
+_MAX_ARGUMENT_FOR_SERIES = 2.0  # below it the recurrence of phi and the squared response cancel
 _MAX_SERIES_TERMS = 48
-_SERIES_TOLERANCE = 1e-18
-"""Relative size of a term at which a series is truncated, below the last digit."""
-
-_ARRAY_SERIES_TERMS = 28
-"""Number of terms for arrays; the next term is below 2^28 / 28! = 9e-22 of the first."""
+_SERIES_TOLERANCE = 1e-18  # relative size of the last term of a series, below the last digit
+_ARRAY_SERIES_TERMS = 28  # the next term is below 2^28 / 28! = 9e-22 of the first
 
 ComplexArray = NDArray[np.complex128]
 
@@ -40,7 +34,16 @@ def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray
     M. Hochbruck and A. Ostermann, "Exponential integrators", Acta Numerica 19, 2010.
     """
     if isinstance(z, np.ndarray):
-        return _evaluate_phi_array(order, z)
+        small = np.abs(z) < _MAX_ARGUMENT_FOR_SERIES
+        far = np.where(small, _MAX_ARGUMENT_FOR_SERIES, z)
+        values = np.exp(far)
+        for j in range(order):
+            values = (values - 1.0 / math.factorial(j)) / far
+        if small.any():
+            series = [1.0 / math.factorial(n + order) for n in range(_ARRAY_SERIES_TERMS)]
+            near = np.polynomial.polynomial.polyval(np.where(small, z, 0.0), series)
+            values = np.where(small, near, values)
+        return np.asarray(values, dtype=np.complex128)
     if abs(z) < _MAX_ARGUMENT_FOR_SERIES:
         term: complex = 1.0 / math.factorial(order)
         total = term
@@ -54,19 +57,6 @@ def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray
     for j in range(order):
         value = (value - 1.0 / math.factorial(j)) / z
     return value
-
-
-def _evaluate_phi_array(order: int, z: Array | ComplexArray) -> ComplexArray:
-    small = np.abs(z) < _MAX_ARGUMENT_FOR_SERIES
-    far = np.where(small, _MAX_ARGUMENT_FOR_SERIES, z)
-    value = np.exp(far)
-    for j in range(order):
-        value = (value - 1.0 / math.factorial(j)) / far
-    if small.any():
-        series = [1.0 / math.factorial(n + order) for n in range(_ARRAY_SERIES_TERMS)]
-        near = np.polynomial.polynomial.polyval(np.where(small, z, 0.0), series)
-        value = np.where(small, near, value)
-    return np.asarray(value, dtype=np.complex128)
 
 
 @overload

@@ -12,15 +12,9 @@ weights of the integration on 0..t and -c/W on -W..0, and
 
     sigma^2 = integral of S(f) |H(f)|^2 df over all f,
 
-with H the Fourier transform of h. The same process acts in the window and in the motion: common
-parts cancel, and H(0) = 0. Flicker noise (1/f) and a random walk (1/f^2) have no variance, but this
-integral is finite. Each term has it in closed form (`Term.growth`), with t the time, W
-the window and A the time since switch-on.
-
-References
-----------
-IEEE Std 952-2020, for the densities. The closed forms follow from S(f) |H(f)|^2, Parseval's theorem
-and the state equation of each process.
+with H the Fourier transform of h. H(0) = 0, so that this integral is finite also for flicker noise
+(1/f) and a random walk (1/f^2). Each term has it in closed form (`Term.growth`), with t the time, W
+the window and A the time since switch-on, from the densities of IEEE Std 952-2020.
 """
 
 from __future__ import annotations
@@ -33,21 +27,15 @@ from dataclasses import dataclass
 class Calibrated:
     """The bias of a sensor is estimated as its mean over a static window before the motion.
 
-    The mean of a gyro is its bias plus the Earth's rate; both are removed. The mean of an
-    accelerometer is its bias plus gravity times the tilt. The two are not distinguishable at rest,
-    and both are removed, by a bias correction or by levelling. The sensor is assumed to have been
-    on for some time. The error is 4 % smaller if flicker noise starts with a window as long as the
-    motion, and 0.3 % smaller if it starts this time earlier.
+    The mean of a gyro is its bias plus the Earth's rate, and the mean of an accelerometer its bias
+    plus gravity times the tilt; both are removed. The sensor is assumed to have been on for some
+    time. The error is 4 % smaller if flicker noise starts with a window as long as the motion, and
+    0.3 % smaller if it starts this time earlier.
 
     Parameters
     ----------
     window : float
-        W, s.
-
-    Raises
-    ------
-    ValueError
-        If the window is not above 0.
+        W, s; ValueError if it is not above 0.
     """
 
     window: float
@@ -61,20 +49,14 @@ class Calibrated:
 class Uncalibrated:
     """The bias of a sensor is not estimated: turn-on bias and the noise since switch-on remain.
 
-    Flicker noise, random walk and ramp are 0 at switch-on. The bias at switch-on is the turn-on
-    bias. Gauss-Markov processes are stationary.
+    Flicker noise, random walk and ramp are 0 at switch-on. Gauss-Markov processes are stationary.
 
     Parameters
     ----------
     bias : float or None
         Turn-on bias, 1 sigma, rad/s or m/s^2; None: from the data of the sensor (`in_use`).
     on_time : float
-        Time from switch-on to the start, s.
-
-    Raises
-    ------
-    ValueError
-        If one is negative or not finite.
+        Time from switch-on to the start, s; ValueError if one is negative or not finite.
     """
 
     bias: float | None

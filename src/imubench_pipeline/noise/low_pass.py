@@ -25,14 +25,9 @@ class LowPass:
     Parameters
     ----------
     cutoff : float
-        Frequency at which the power is halved (-3 dB), Hz.
+        Frequency at which the power is halved (-3 dB), Hz; ValueError if not above 0.
     order : int
-        1, or the order of the Butterworth filter.
-
-    Raises
-    ------
-    ValueError
-        If the cut-off is not above 0, or the order not from 1 to 10.
+        1, or the order of the Butterworth filter; ValueError if not 1 to 10.
     """
 
     cutoff: float

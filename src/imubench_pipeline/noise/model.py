@@ -24,36 +24,30 @@ from imubench_pipeline.noise.terms import (
 )
 from imubench_pipeline.typing import Array
 
-_MAX_FLICKER_TAU = 1e5
-"""Default longest tau, s, up to which a state space approximates flicker noise."""
-
+_MAX_FLICKER_TAU = 1e5  # default longest tau of a bank for flicker noise, s
 _KINDS_WITH_PARAMETER = (Quantization, WhiteNoise, Flicker, RandomWalk, Deterministic)
 """Kinds of terms with a parameter of their own in a model."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseModel:
-    """The stochastic error of one axis: the sum of its terms.
-
-    See Maia et al., eq. 2; IEEE Std 952 and 647.
+    """The stochastic error of one axis: the sum of its terms (Maia et al., eq. 2; IEEE Std 952).
 
     Parameters
     ----------
     Q : float
-        Quantization, rad or m/s; 0: none.
+        Quantization, rad or m/s.
     N : float
-        White noise density, rad/s/sqrt(Hz) or m/s^2/sqrt(Hz); 0: none.
+        White noise density, rad/s/sqrt(Hz) or m/s^2/sqrt(Hz).
     B, T_B : float
         Bias instability, rad/s or m/s^2. With a correlation time, s, it is the Gauss-Markov
         process of the papers; without one it is flicker noise, as IEEE Std 952 has it.
-        B = 0: none.
     K : float
-        Random walk, rad/s/sqrt(s) or m/s^2/sqrt(s); 0: none.
+        Random walk, rad/s/sqrt(s) or m/s^2/sqrt(s).
     R : float
-        Ramp, rad/s^2 or m/s^3; its sign is kept; 0: none.
+        Ramp, rad/s^2 or m/s^3; its sign is kept.
     further : sequence of Term
-        More terms of noise, such as Gauss-Markov processes: of any kind that has no parameter
-        above.
+        More terms, such as Gauss-Markov processes, of kinds without a parameter above.
     sinusoids : sequence of Sinusoid
         Lines.
 
@@ -61,7 +55,7 @@ class NoiseModel:
     ------
     ValueError
         If a parameter is negative (R apart) or not finite, T_B is not above 0, or a further term
-        has a place of its own.
+        has a parameter above.
     """
 
     Q: float = 0.0
@@ -110,13 +104,7 @@ class NoiseModel:
 
     @property
     def further_processes(self) -> list[GaussMarkov]:
-        """The further terms as Gauss-Markov processes, for what knows no others.
-
-        Raises
-        ------
-        ValueError
-            If one is none.
-        """
+        """The further terms as Gauss-Markov processes; raises ValueError if one is none."""
         processes = []
         for term in self.further:
             if term.gauss_markov is None:
@@ -125,19 +113,9 @@ class NoiseModel:
         return processes
 
     def psd(self, frequency: ArrayLike, rate: float | None = None) -> Array:
-        """Return the two-sided power spectral density.
+        """Return the two-sided power spectral density at frequencies in Hz, in squared SI units/Hz.
 
-        Parameters
-        ----------
-        frequency : array_like
-            Hz, not 0.
-        rate : float, optional
-            Hz; only quantization noise depends on it.
-
-        Returns
-        -------
-        ndarray
-            (rad/s)²/Hz or (m/s²)²/Hz, in the shape of ``frequency``; lines have none.
+        Lines have none. Only quantization noise depends on the rate, Hz.
 
         Raises
         ------
@@ -149,24 +127,14 @@ class NoiseModel:
         return _sum([term.psd(f, interval) for term in self.terms], f)
 
     def allan_variance(self, tau: ArrayLike, rate: float | None = None) -> Array:
-        """Return the Allan variance.
+        """Return the Allan variance at tau in s, (rad/s)² or (m/s²)².
 
-        Parameters
-        ----------
-        tau : array_like
-            Cluster length, s.
-        rate : float, optional
-            Hz; given, the result is that of the process sampled at this rate, exactly.
-
-        Returns
-        -------
-        ndarray
-            (rad/s)² or (m/s²)², in the shape of ``tau``.
+        With a rate, Hz, it is the exact result for the process sampled at this rate.
 
         Raises
         ------
         ValueError
-            If a rate is given and a cluster holds no sample: it is taken to the nearest number.
+            If a rate is given and a cluster has no sample: it is rounded to the nearest number.
         """
         t = np.asarray(tau, dtype=np.float64)
         if rate is None:
@@ -189,27 +157,18 @@ class NoiseModel:
         return _sum([term.sampled_spectrum(w, 1.0 / rate) for term in self.terms], w)
 
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
-        """Return terms of finite state spaces: flicker noise is Gauss-Markov processes.
-
-        Up to ``longest`` flicker noise is followed; both are in s.
-        """
+        """Return terms with finite state spaces: flicker noise is a bank up to ``longest``, s."""
         terms: list[Term] = []
         for term in self.terms:
             terms.extend(term.realised(interval, longest))
         return terms
 
     def state_space(self, rate: float, longest: float = _MAX_FLICKER_TAU) -> StateSpace:
-        """Return the discrete state space with exact noise covariances.
+        """Return the discrete state space with exact noise covariances, at a rate in Hz.
 
-        The states follow the order of the terms; N is the measurement noise (Maia et
-        al., eq. 18-23; the printed first entry of Q_d, S_B T, is an approximation).
-
-        Parameters
-        ----------
-        rate : float
-            Hz.
-        longest : float
-            Tau up to which flicker noise is followed, s; only then it has several states.
+        The states follow the order of the terms; N is the measurement noise (Maia et al., eq.
+        18-23; the printed first entry of Q_d, S_B T, is an approximation). Flicker noise is
+        approximated by several states up to a tau of ``longest``, s.
         """
         spaces = [term.state_space(1.0 / rate) for term in self.realised(1.0 / rate, longest)]
         return StateSpace.together([*spaces, StateSpace.without_states(0.0)])

@@ -28,21 +28,15 @@ _SCALABLE_PARAMETERS = ("Q", "N", "B", "T_B", "K")
 class SigmaRange:
     """Standard deviations, and their range due to the uncertainty of the noise parameters.
 
-    Attributes
-    ----------
-    value : ndarray, shape (...)
-        With the estimated parameters.
-    lower, upper : ndarray, shape (...)
-        Limits from the drawn models.
-    pooled : ndarray, shape (...)
-        Root mean square over the drawn models: the standard deviation of an error with unknown
-        noise model (law of total variance; the estimates are unbiased for each model). Weights from
-        a wrong model add to it in second order.
+    ``pooled`` is the root mean square over the drawn models: the standard deviation of an error
+    with unknown noise model (law of total variance). Weights from a wrong model add to it in second
+    order.
     """
 
-    value: Array
+    value: Array  # with the estimated parameters
     lower: Array
     upper: Array
+    """Limits from the drawn models."""
     pooled: Array
 
 
@@ -58,8 +52,7 @@ def sigma_range(
     model : NoiseModel
         Estimated model.
     drawn : sequence of NoiseModel
-        From the limits of an estimate (`error_budget.draw_models`), from a covariance of its
-        parameters (`drawn_from_covariance`), or from a posterior.
+        From `error_budget.draw_models`, `drawn_from_covariance`, or a posterior.
     level : float
         Share of the drawn models between the limits.
 
@@ -86,16 +79,10 @@ def sigma_range(
 def drawn_from_covariance(
     model: NoiseModel, names: Sequence[str], covariance: Array, draws: int, rng: np.random.Generator
 ) -> list[NoiseModel]:
-    """Return noise models with jointly log-normal parameters around a model.
+    """Return noise models with jointly log-normal parameters, whose medians are those of a model.
 
-    Parameters
-    ----------
-    model : NoiseModel
-        Its parameters are the medians.
-    names : sequence of str
-        Parameters to draw, of Q, N, B, T_B and K; the others are not changed.
-    covariance : ndarray, shape (p, p)
-        Covariance of their natural logarithms; for small errors, of the relative errors.
+    ``covariance``, shape (p, p), is the covariance of the natural logarithms of the parameters
+    ``names``, of Q, N, B, T_B and K; the others are not changed.
 
     Raises
     ------

@@ -23,15 +23,9 @@ from imubench_pipeline.noise.state_space import root_of
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
 
-_BLOCK_SAMPLES = 1 << 16
-"""Samples of a block, which fits the cache: a quarter faster than a million."""
-
-_MAX_BLOCK_SUMS = 1 << 12
-"""Largest number of blocks of a member of the ensemble."""
-
-_MIN_BLOCKS_IN_CLUSTER = 16
-"""Least number of blocks in a cluster; the Allan variances of shorter ones are drawn from their
-covariance."""
+_BLOCK_SAMPLES = 1 << 16  # fits the cache: a quarter faster than a million
+_MAX_BLOCK_SUMS = 1 << 12  # largest number of blocks of a member of the ensemble
+_MIN_BLOCKS_IN_CLUSTER = 16  # for shorter clusters the covariance is used
 
 
 def channel_rng(seed: int, *names: str) -> np.random.Generator:
@@ -46,23 +40,11 @@ def channel_rng(seed: int, *names: str) -> np.random.Generator:
 
 
 def simulate(model: NoiseModel, rate: float, samples: int, rng: np.random.Generator) -> Array:
-    """Return a simulated log.
+    """Return a simulated log, shape (samples,), rad/s or m/s², at a rate in Hz.
 
-    Parameters
-    ----------
-    model : NoiseModel
-    rate : float
-        Hz.
-    samples : int
-        Length of the log.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    ndarray, shape (samples,)
-        rad/s or m/s². Stationary processes start in their stationary distribution, the random
-        walk and the ramp at 0, sinusoids at a random phase; flicker noise is a bank of
-        Gauss-Markov processes up to the length of the log.
+    Stationary processes start in their stationary distribution, the random walk and the ramp at 0,
+    sinusoids at a random phase; flicker noise is a bank of Gauss-Markov processes up to the length
+    of the log.
     """
     blocks = list(simulate_blocks(model, rate, samples, rng))
     return np.concatenate(blocks) if blocks else np.empty(0)
@@ -144,64 +126,38 @@ def ensemble(
     members: int,
     rng: np.random.Generator,
 ) -> Array:
-    """Return the Allan variances of an ensemble of simulated logs.
+    """Return the Allan variances of an ensemble of simulated logs, shape (members, m).
 
-    Parameters
-    ----------
-    model : NoiseModel
-    rate : float
-        Hz.
-    samples : int
-        Length of each log.
-    sizes : ndarray of int, shape (m,)
-        n of each tau.
-    members : int
-        Logs in the ensemble.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    ndarray, shape (members, m)
-        (rad/s)² or (m/s²)².
+    They are in (rad/s)² or (m/s²)², at ``sizes``, shape (m,), n of each tau, of logs of ``samples``
+    at a rate in Hz.
     """
     width = max(1, -(-samples // _MAX_BLOCK_SUMS))
     long = sizes >= (_MIN_BLOCKS_IN_CLUSTER * width if width > 1 else 1)
     result = np.empty((members, len(sizes)))
     for_short, for_long = rng.spawn(2)
     if not long.all():
-        result[:, ~long] = _draw_from_covariance(
-            model, rate, samples, sizes[~long], members, for_short
-        )
+        short = sizes[~long]
+        mean = model.allan_variance(short / rate, rate)
+        relative = variance_covariance(model, rate, samples, short) / np.outer(mean, mean)
+        # Wilson and Hilferty (1931): the cube root of a chi-squared variate is nearly normal.
+        spread = np.sqrt(np.diag(relative))
+        values, vectors = np.linalg.eigh(relative / np.outer(spread, spread))
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        normal = for_short.standard_normal((members, len(short))) @ root.T
+        ninth = spread**2 / 9.0  # 2 / (9 edf) with spread^2 = 2 / edf
+        result[:, ~long] = mean * (1.0 - ninth + np.sqrt(ninth) * normal) ** 3
     if long.any():
-        result[:, long] = _draw_from_block_sums(
-            model, rate, samples, sizes[long], width, members, for_long
-        )
-    return result
-
-
-def _draw_from_block_sums(
-    model: NoiseModel,
-    rate: float,
-    samples: int,
-    sizes: NDArray[np.int64],
-    width: int,
-    members: int,
-    rng: np.random.Generator,
-) -> Array:
-    blocks = samples // width
-    in_blocks = np.maximum(1, np.rint(sizes / width).astype(np.int64))
-    in_blocks = np.minimum(in_blocks, blocks // 2)
-    # A cluster of complete blocks differs from the requested one by a few per cent.
-    scale = model.allan_variance(sizes / rate, rate) / model.allan_variance(
-        in_blocks * width / rate, rate
-    )
-    distinct, place = np.unique(in_blocks, return_inverse=True)
-    result = np.empty((members, len(sizes)))
-    for member in range(members):
-        sums = block_sums(model, rate, blocks, width, rng)
-        phase = integrate([sums / width], blocks, holes=False)
-        variance = _sum_variances(phase.theta, distinct)
-        result[member] = variance[place] * scale
+        blocks = samples // width
+        in_blocks = np.maximum(1, np.rint(sizes[long] / width).astype(np.int64))
+        in_blocks = np.minimum(in_blocks, blocks // 2)
+        # A cluster of complete blocks differs from the requested one by a few per cent.
+        wanted = model.allan_variance(sizes[long] / rate, rate)
+        scale = wanted / model.allan_variance(in_blocks * width / rate, rate)
+        distinct, place = np.unique(in_blocks, return_inverse=True)
+        for member in range(members):
+            sums = block_sums(model, rate, blocks, width, for_long)
+            theta = integrate([sums / width], blocks, holes=False).theta
+            result[member, long] = _sum_variances(theta, distinct)[place] * scale
     return result
 
 
@@ -229,23 +185,3 @@ def block_sums(
     for term in model.realised(interval, max(blocks * width, 2) * interval):
         sums += term.block_sums(blocks, width, rate, rng)
     return sums
-
-
-def _draw_from_covariance(
-    model: NoiseModel,
-    rate: float,
-    samples: int,
-    sizes: NDArray[np.int64],
-    members: int,
-    rng: np.random.Generator,
-) -> Array:
-    mean = model.allan_variance(sizes / rate, rate)
-    relative = variance_covariance(model, rate, samples, sizes) / np.outer(mean, mean)
-    # Wilson and Hilferty (1931): the cube root of a chi-squared variate is nearly normal.
-    spread = np.sqrt(np.diag(relative))
-    correlation = relative / np.outer(spread, spread)
-    values, vectors = np.linalg.eigh(correlation)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    normal = rng.standard_normal((members, len(sizes))) @ root.T
-    ninth = spread**2 / 9.0  # 2 / (9 edf) with spread^2 = 2 / edf
-    return np.asarray(mean * (1.0 - ninth + np.sqrt(ninth) * normal) ** 3)

@@ -1,9 +1,8 @@
-"""Degrees of freedom of an Allan variance from the noise model of the log.
+"""Degrees of freedom of an Allan variance from the noise model of the log, exact for any spectrum.
 
 The Allan variance at n samples per cluster is the mean square of M second differences of cumulative
 sums, which are Gaussian with covariance r_k at lag k. Its variance is 2 / M^2 times the sum of
-r_k^2 over all pairs. This is exact for any spectrum, including the ends of a log. Ramps and lines
-are deterministic; only their products with the noise contribute to the variance.
+r_k^2 over all pairs. Ramps and lines contribute by their products with the noise only.
 """
 
 from __future__ import annotations
@@ -15,23 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import Span, spans_of
-from imubench_pipeline.allan.presence import Presence
-from imubench_pipeline.allan.quadratic_forms import tail_degrees, variance_degrees
+from imubench_pipeline.allan.confidence import tail_degrees, variance_degrees
+from imubench_pipeline.allan.phase import Presence, Span, spans_of
 from imubench_pipeline.noise.model import NoiseModel
 from imubench_pipeline.noise.terms import Deterministic, Quantization
 from imubench_pipeline.typing import Array
 
-_LAGS_PER_CLUSTER = 32
-"""Lags per cluster length at which the covariance is evaluated; linear in between."""
-
-_MAX_LAG_CLUSTERS = 10
-"""Largest lag, in clusters; the differences of all noise types are nearly independent beyond it."""
-
+_LAGS_PER_CLUSTER = 32  # at which the covariance is evaluated; linear in between
+_MAX_LAG_CLUSTERS = 10  # beyond it differences are nearly independent for all noise types
 _TAIL_LAGS_PER_CLUSTER = 12
-_MAX_DEGREES_WITH_TAIL = 30.0
-"""Largest number of degrees of freedom for which the lower tail is computed from eigenvalues."""
-
+_MAX_DEGREES_WITH_TAIL = 30.0  # above it the lower tail is not computed from eigenvalues
 _MAX_EIGENVALUES = 320
 
 _ROUNDING_COVARIANCE = ((0, 6.0), (1, -4.0), (2, 1.0))
@@ -58,22 +50,10 @@ def degrees_of_model(
 ) -> Degrees:
     """Return the degrees of freedom of the Allan variances of a Gaussian log of a noise model.
 
-    Parameters
-    ----------
-    model : NoiseModel
-        Its ramp and lines add to the Allan variance, but are not noise.
-    rate : float
-        Hz.
-    sizes : ndarray of int, shape (m,)
-        n of each tau.
-    samples : int
-        L.
-    segments : sequence of (int, int), optional
-        First and one-past-last sample of each; no difference spans two.
-    presence : Presence, optional
-        Presence of the samples, if some are missing.
-    share : ndarray, shape (m,), optional
-        Share of the differences that is not lost to holes; 1 by default.
+    ``sizes``, shape (m,), are n of each tau; no difference spans two segments. If samples are
+    missing, ``presence`` says which, and ``share``, shape (m,), is the share of the differences
+    that is not lost. The ramp and the lines of the model add to the Allan variance, but are not
+    noise.
 
     References
     ----------
@@ -110,22 +90,20 @@ def _find_degrees(
     mask = presence.differences(n) if presence is not None else None
     if mask is None:
         squares, products = zip(*(noise.sums(int(M)) for M in terms), strict=True)
-        differences = share * float(terms.sum())
-        relative = sum(squares) / float(terms.sum()) / differences
-        crossed = sum(products) / float(terms.sum()) / differences
+        square, product, counted = sum(squares), sum(products), float(terms.sum())
     else:
         present, stride = mask
         if not present.any():
             return 1.0, 1.0
-        counted, differences = float(present.sum()) * stride, share * float(terms.sum())
         square, product = noise.masked_sums(present, stride)
-        relative, crossed = square / counted / differences, product / counted / differences
+        counted = float(present.sum()) * stride
+    differences = share * float(terms.sum())
+    relative, crossed = square / counted / differences, product / counted / differences
     # edf follows from variance over squared mean = 2 / edf.
     mean = noise.at_zero + noise.ramp**2 + noise.lines
     varied = 2.0 * noise.at_zero**2 * relative
-    varied += (
-        4.0 * noise.ramp**2 * noise.at_zero * crossed + 4.0 * noise.line_products / differences
-    )
+    ramp = 4.0 * noise.ramp**2 * noise.at_zero * crossed
+    varied += ramp + 4.0 * noise.line_products / differences
     edf = max(2.0 * mean**2 / varied, 1.0)
     if edf > _MAX_DEGREES_WITH_TAIL:
         return edf, edf
@@ -179,11 +157,9 @@ class _Covariance:
         """Return the sums of r_k^2 and r_k over all pairs of consecutive differences."""
         n = self._n
         steps = np.arange(_MAX_LAG_CLUSTERS * _LAGS_PER_CLUSTER + 1)
-        lags = (
-            np.unique(steps * n // _LAGS_PER_CLUSTER)
-            if n > _LAGS_PER_CLUSTER
-            else np.arange(_MAX_LAG_CLUSTERS * n + 1)
-        )
+        lags = np.arange(_MAX_LAG_CLUSTERS * n + 1)
+        if n > _LAGS_PER_CLUSTER:
+            lags = np.unique(steps * n // _LAGS_PER_CLUSTER)
         longest = terms - 1
         lags = np.append(lags[lags < longest], longest) if lags[-1] > longest else lags
         smooth, rounding = self._at(lags)

@@ -38,18 +38,8 @@ def summed(
 ) -> Array:
     """Return a quantity of each model that is the sum over its terms, such as a variance.
 
-    Parameters
-    ----------
-    models : sequence of NoiseModel
-    figure : callable
-        Function of a term with array parameters of shape (k,); returns an array of shape (k,), or
-        (places, k).
-    places : int, optional
-        Number of values for each model.
-
-    Returns
-    -------
-    ndarray, shape (models,) or (places, models)
+    ``figure`` returns an array of shape (k,), or (places, k), for a term with array parameters of
+    shape (k,). The result has the shape (models,), or (places, models).
     """
     total = np.zeros((len(models),) if places is None else (places, len(models)))
     for numbers, term in stacked(models):

@@ -15,30 +15,14 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class StateSpace:
-    """A discrete model x' = transition x + w, z = output x + v (Maia et al., eq. 18-23, exact).
+    """A discrete model x' = transition x + w, z = output x + v (Maia et al., eq. 18-23, exact)."""
 
-    Attributes
-    ----------
-    transition : ndarray, shape (m, m)
-        Phi.
-    process_noise : ndarray, shape (m, m)
-        Q_d, covariance of w.
-    output : ndarray, shape (m,)
-        H.
-    measurement_noise : float
-        R_d, variance of v.
-    initial_mean : ndarray, shape (m,)
-        Mean of the first x.
-    initial_variance : ndarray, shape (m, m)
-        Covariance of the first x: the stationary one, or 0 for a random walk.
-    """
-
-    transition: Array
-    process_noise: Array
-    output: Array
-    measurement_noise: float
-    initial_mean: Array
-    initial_variance: Array
+    transition: Array  # Phi, (m, m)
+    process_noise: Array  # Q_d, covariance of w, (m, m)
+    output: Array  # H, (m,)
+    measurement_noise: float  # R_d, variance of v
+    initial_mean: Array  # of the first x, (m,)
+    initial_variance: Array  # (m, m): the stationary covariance, or 0 for a random walk
 
     @classmethod
     def scalar(cls, transition: float, process_noise: float, initial_variance: float) -> StateSpace:
@@ -73,30 +57,19 @@ class StateSpace:
     def of_either_sign(self) -> StateSpace:
         """Return the model with the mean of the first state replaced by its square as variance."""
         squares = np.diag([mean**2 for mean in self.initial_mean.tolist()])
+        variance = self.initial_variance + squares
         return replace(
-            self,
-            initial_mean=np.zeros_like(self.initial_mean),
-            initial_variance=self.initial_variance + squares,
+            self, initial_mean=np.zeros_like(self.initial_mean), initial_variance=variance
         )
 
 
 @dataclass(frozen=True)
 class ContinuousSpace:
-    """A continuous model x' = F x + w, z = H x.
+    """A continuous model x' = F x + w, z = H x."""
 
-    Attributes
-    ----------
-    transition : ndarray, shape (m, m)
-        F, 1/s.
-    density : ndarray, shape (m, m)
-        Q of w.
-    output : ndarray, shape (m,)
-        H.
-    """
-
-    transition: Array
-    density: Array
-    output: Array
+    transition: Array  # F, 1/s, (m, m)
+    density: Array  # Q of w, (m, m)
+    output: Array  # H, (m,)
 
     @classmethod
     def without_states(cls) -> ContinuousSpace:
@@ -128,11 +101,7 @@ def root_of(covariance: Array) -> Array:
 
 
 def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
-    """Return transition and noise covariance of a repeated step, by powers of two.
-
-    ``noise``: covariance that a step adds, shape (m, m). Returns Phi^times, and the sum of
-    Phi^i noise (Phi^i)^T over i from 0 to times - 1.
-    """
+    """Return Phi^times, and the sum of Phi^i noise (Phi^i)^T over i < times, by powers of two."""
     whole, added = np.eye(len(transition)), np.zeros_like(noise)
     while times:
         if times & 1:
@@ -146,11 +115,9 @@ def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Arr
 def draw_block_sums(
     space: StateSpace, start: Array, blocks: int, width: int, rng: np.random.Generator
 ) -> Array:
-    """Draw the sums over blocks of samples, exactly, shape (blocks,).
+    """Draw the sums over blocks of ``width`` samples, exactly, shape (blocks,).
 
-    The sum over a block and the state after it are jointly Gaussian, given the state before. The
-    space has one state, which is the output, and no measurement noise. ``start``, shape (1,): first
-    state. ``width``: samples in a block.
+    The space has one state, which is the output, and no measurement noise; ``start`` is the first.
     """
     step = _propagate_block(float(space.transition[0, 0]), float(space.process_noise[0, 0]), width)
     normal = rng.standard_normal((2, blocks))
@@ -163,11 +130,7 @@ def draw_block_sums(
 def _propagate_block(
     p: float, drive: float, width: int
 ) -> tuple[float, float, float, float, float]:
-    """Return the coefficients of a block for the state and its sum.
-
-    Factors of the state before the block in the state after it and in the sum; then the noise of
-    the state, the noise of the sum that is common with it, and the independent noise of the sum.
-    """
+    """Return the coefficients of the state after a block and of its sum (`_accumulate_sums`)."""
     # The sample i of a block is p^i x + sum_{j<i} p^(i-1-j) w_j.
     powers = p ** np.arange(width + 1)
     reach = np.concatenate(([0.0], np.cumsum(powers)))

@@ -15,10 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.typing import Array
 
 _STRATA_PER_DECADE = 640
-_MIN_PHASE_OF_LARGEST = 1e-3
-"""Lowest frequency of the strata, rad per sample, times the largest cluster; all integrands are
-flat below it."""
-
+_MIN_PHASE_OF_LARGEST = 1e-3  # rad in the largest cluster; integrands are flat below it
 _GOLDEN_SECTION = (np.sqrt(5.0) - 1.0) / 2.0
 
 _CLUSTERS_LOST_AT_ENDS = 1.5
@@ -47,23 +44,9 @@ def variance_covariance(
         cov(n, m) = 1/(2 M) 1/(2 pi) int P^2 |H_n|^2 |H_m|^2 dw,   M = L - 3/2 min(n, m) + 1,
 
     integrated with stratified sampling in log w, one point per stratum. The error of the standard
-    deviation is below 1.5 % for tau up to a ninth of the log, and 5 % up to a quarter.
-
-    Parameters
-    ----------
-    model : Spectrum
-        Such as a `imubench_pipeline.noise.model.NoiseModel`.
-    rate : float
-        Hz.
-    samples : int
-        L, length of the log.
-    sizes : ndarray of int, shape (m,)
-        n of each tau, at most L/2.
-
-    Returns
-    -------
-    ndarray, shape (m, m)
-        (rad/s)^4 or (m/s²)^4; positive semi-definite.
+    deviation is below 1.5 % for tau up to a ninth of the log, and 5 % up to a quarter. ``sizes``,
+    shape (m,), are n of each tau, at most L/2. The covariance, shape (m, m), in (rad/s)^4 or
+    (m/s²)^4, is positive semi-definite.
 
     References
     ----------
@@ -81,11 +64,8 @@ def variance_covariance(
     # The integral over all frequencies is twice the integral over the positive ones.
     shaped *= 4.0 * spectrum * np.sqrt(width / np.pi)
     shaped /= (n**2)[:, None]
-    return np.asarray(
-        shaped
-        @ shaped.T
-        / (2.0 * (samples - _CLUSTERS_LOST_AT_ENDS * np.minimum.outer(n, n) + 1.0))
-    )
+    effective = samples - _CLUSTERS_LOST_AT_ENDS * np.minimum.outer(n, n) + 1.0
+    return np.asarray(shaped @ shaped.T / (2.0 * effective))
 
 
 @lru_cache(maxsize=16)

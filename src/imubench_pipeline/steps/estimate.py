@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve, of_blocks
-from imubench_pipeline.allan.phase import NO_GAPS
-from imubench_pipeline.allan.presence import presence
+from imubench_pipeline.allan.phase import NO_GAPS, presence
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
 from imubench_pipeline.estimators.agreement import disagreements, doubt_contradicted

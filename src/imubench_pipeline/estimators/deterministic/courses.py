@@ -28,15 +28,10 @@ _KIND_NAMES: dict[str, Kind] = {
 }
 """Pulses are single bad blocks, and ramps a term of the noise model: neither is removed."""
 
-_MIN_STEP_SIGMAS = 8.0
-"""Size of a step, in standard errors of a block, above which it is placed to the sample."""
-
-_MAX_STEPS = 8
-"""More steps, when the search reaches its maximum of regressors, are telegraph noise."""
-
+_MIN_STEP_SIGMAS = 8.0  # in errors of a block; larger steps are placed to the sample
+_MAX_STEPS = 8  # more steps, when the search reaches its maximum of regressors, are telegraph noise
 _DELTA_LOG_LIKELIHOOD_95 = 1.92
-_MAX_WALK_LEVERAGE = 0.5
-"""Maximum fraction of the information on the random walk that the removed signals may take."""
+_MAX_WALK_LEVERAGE = 0.5  # fraction of the information on the random walk that signals may take
 
 
 @dataclass(frozen=True)
@@ -86,30 +81,19 @@ class DeterministicSignals:
         if self.means is None:
             return total
         for signal in self.signals:
-            part = self.means.parts[signal.regressor.part]
-            first, last = self._find_span(signal.regressor.part)
-            low, high = max(start, first), min(stop, last)
+            number, parts = signal.regressor.part, self.means.parts
+            part = parts[number]
+            # A signal lasts until the next part begins.
+            last = parts[number + 1].start if number + 1 < len(parts) else stop
+            low, high = max(start, part.start), min(stop, last)
             if high <= low:
                 continue
             places = (np.arange(low, high) + 0.5 - part.start) / self.means.block
             total[low - start : high - start] += signal.amplitudes @ signal.regressor.at(places)
         return total
 
-    def _find_span(self, number: int) -> tuple[int, int]:
-        """Return the range of samples of a part, up to the start of the next part."""
-        assert self.means is not None
-        parts = self.means.parts
-        last = number == len(parts) - 1
-        return parts[number].start, (1 << 62) if last else parts[number + 1].start
-
     def without(self) -> Means:
-        """Return the block means less the signals.
-
-        Raises
-        ------
-        ValueError
-            If the log was too short for a search.
-        """
+        """Return the block means less the signals; the log must have been searched."""
         if self.means is None:
             raise ValueError("the log is too short to be searched")
         parts = []
@@ -169,31 +153,15 @@ def find_deterministic_signals(
     segments: Sequence[Span] | None = None,
     highest: float | None = None,
 ) -> DeterministicSignals:
-    """Return the steps, warm-ups and periodic drift in a log.
+    """Return the steps, warm-ups and periodic drift in a log; none if it is too short.
 
-    Parameters
-    ----------
-    blocks : callable
-        Returns the log in order, in SI, at each call; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
-    rate : float
-        Hz.
-    segments : sequence of (int, int), optional
-        First and one-past-last sample of each segment; time between segments is unknown.
-    highest : float, optional
-        Highest frequency without effect of a filter, Hz.
-
-    Returns
-    -------
-    DeterministicSignals
-        Without signals if the log is too short.
+    ``blocks`` returns the log in order, in SI, NaN where a sample is missing; ``segments`` are the
+    first and one-past-last sample of each; ``highest`` is the highest frequency without effect of
+    a filter, Hz.
     """
     means = block_means(blocks(), samples, rate, segments)
-    if not means.parts:
-        return DeterministicSignals((), None, None)
-    ordinates = Ordinates(means, highest)
-    if not ordinates.is_usable:
+    ordinates = Ordinates(means, highest) if means.parts else None
+    if ordinates is None or not ordinates.is_usable:
         return DeterministicSignals((), None, None)
     searched = search(ordinates)
     if searched.many:
@@ -230,13 +198,11 @@ def _describe(ordinates: Ordinates, searched: SearchResult) -> Iterator[Determin
             # period depends on the period.
             error = math.hypot(error, _compute_spread(ordinates, fit, regressor, own, (low, high)))
         place = start + regressor.where * means.interval
-        period = regressor.kind == "sinusoid"
         step = regressor.kind in ("step", "restart")
-        if step:
-            times: tuple[float | None, ...] = (None, None, None)
-        elif period:
+        times: tuple[float | None, ...] = (None, None, None)
+        if regressor.kind == "sinusoid":
             times = tuple(means.interval / f for f in (regressor.where, high, low))
-        else:
+        elif not step:
             times = tuple(means.interval * t for t in (regressor.where, low, high))
         yield DeterministicSignal(
             kind=_KIND_NAMES[regressor.kind],
@@ -284,13 +250,11 @@ def _compute_spread(
     ordinates: Ordinates, fit: Fit, regressor: Regressor, own: slice, limits: tuple[float, float]
 ) -> float:
     """Return half the range of the size over the limits of its place."""
-    sizes = []
+    sizes = [_compute_size(fit.sizes[own])]
     for where in limits:
         moved = tuple(replace(x, where=where) if x is regressor else x for x in fit.regressors)
-        sizes.append(ordinates.solve(moved, fit.density)[0][own])
-    return 0.5 * float(
-        np.ptp([_compute_size(amplitudes) for amplitudes in (fit.sizes[own], *sizes)])
-    )
+        sizes.append(_compute_size(ordinates.solve(moved, fit.density)[0][own]))
+    return 0.5 * float(np.ptp(sizes))
 
 
 def _compute_size(amplitudes: Array) -> float:
@@ -301,11 +265,7 @@ def _compute_size(amplitudes: Array) -> float:
 def _place_steps(
     blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit
 ) -> tuple[Regressor, ...]:
-    """Return the regressors with large steps placed to the sample, in one pass over the log.
-
-    The place of a step much larger than the noise of a block is the least-squares change point of
-    the samples around it.
-    """
+    """Return the regressors with large steps at the least-squares change point of the samples."""
     size = means.block
     wanted: dict[int, tuple[int, int, float]] = {}
     column = 0

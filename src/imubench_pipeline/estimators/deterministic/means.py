@@ -14,45 +14,22 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.phase import Span, spans_of, split
 from imubench_pipeline.typing import Array
 
-_MAX_BLOCKS = 1 << 14
-"""Approximate number of blocks of a log; it is the resolution of the place of a small step."""
-
-_MIN_BLOCK_SAMPLES = 10
-"""Samples of a block; its mean is below the low-pass cut-off of most sensors."""
-
-_MIN_BLOCKS = 512
-"""Blocks of a short log, whose blocks have fewer samples."""
-
-_MIN_PART_BLOCKS = 64
-"""Shorter parts are not analysed."""
-
-_SIGMA_OVER_MAD = 1.4826
-"""Standard deviation over median absolute deviation of normal noise."""
-
-_MAX_GAP_FRACTION = 1 / 5
-"""Fraction of a segment; a longer gap splits it."""
-
-_MIN_PAUSE = 2.0
-"""Shortest gap, s, in which a sensor or its host can restart."""
-
+_MAX_BLOCKS = 1 << 14  # approximate; it is the resolution of the place of a small step
+_MIN_BLOCK_SAMPLES = 10  # the mean is then below the low-pass cut-off of most sensors
+_MIN_BLOCKS = 512  # blocks of a short log, whose blocks have fewer samples
+_MIN_PART_BLOCKS = 64  # shorter parts are not analysed
+_SIGMA_OVER_MAD = 1.4826  # standard deviation over median absolute deviation of normal noise
+_MAX_GAP_FRACTION = 1 / 5  # fraction of a segment; a longer gap splits it
+_MIN_PAUSE = 2.0  # shortest gap, s, in which a sensor or its host can restart
 _MAX_PAUSES = 48
 
 _SECTIONS = 16
 
-_MIN_SECTION_BLOCKS = 16
-"""Blocks that each section needs for the test of stationarity."""
-
-_MIN_TREND_SIGMAS = 4.5
-"""Slope over its standard error with 14 degrees of freedom: false-alarm probability 1 in 2000."""
-
-_MIN_RELATIVE_TREND = 0.02
-"""Smallest relative change of N over the log that is reported."""
-
-_MIN_CHI_SQUARED = 45.0
-"""Chi-squared with 15 degrees of freedom: false-alarm probability 1 in 10,000."""
-
-_MIN_RELATIVE_SPREAD = 0.05
-"""Smallest relative standard deviation of N over the sections that is reported."""
+_MIN_SECTION_BLOCKS = 16  # blocks that each section needs for the test of stationarity
+_MIN_TREND_SIGMAS = 4.5  # 14 degrees of freedom: false-alarm probability 1 in 2000
+_MIN_RELATIVE_TREND = 0.02  # smallest relative change of N over the log that is reported
+_MIN_CHI_SQUARED = 45.0  # 15 degrees of freedom: false-alarm probability 1 in 10,000
+_MIN_RELATIVE_SPREAD = 0.05  # smallest reported relative standard deviation of N over sections
 
 
 @dataclass(frozen=True)
@@ -92,15 +69,11 @@ class Means:
 
 
 def block_means(
-    blocks: Iterable[Array],
-    samples: int,
-    rate: float,
-    segments: Sequence[Span] | None = None,
+    blocks: Iterable[Array], samples: int, rate: float, segments: Sequence[Span] | None = None
 ) -> Means:
     """Return the block means of a log in one pass, in bounded memory.
 
-    The blocks are the log in order, in SI, NaN where a sample is missing. ``segments`` are the
-    first and one-past-last sample of each segment, by default one.
+    The blocks are the log in order, in SI, NaN where a sample is missing.
     """
     spans = spans_of(segments, samples)
     total = sum(stop - start for start, stop in spans)
@@ -108,10 +81,7 @@ def block_means(
     gathered: list[list[Array]] = [[] for _ in spans]
     rests: list[Array] = [np.empty(0) for _ in spans]
     for number, values in split(blocks, spans):
-        values = np.asarray(values, dtype=np.float64)
-        rest = rests[number]
-        if len(rest):
-            values = np.concatenate((rest, values))
+        values = np.concatenate((rests[number], np.asarray(values, dtype=np.float64)))
         whole = len(values) // size * size
         if whole:
             gathered[number].append(_compute_block_moments(values[:whole].reshape(-1, size)))
@@ -164,13 +134,19 @@ def _split_at_gaps(start: int, size: int, rows: Array, interval: float) -> list[
         span = slice(int(first), int(last) + 1)
         if span.stop - span.start < _MIN_PART_BLOCKS:
             continue
+        present = share[span] >= 0.5
+        usable = present & np.isfinite(fourth[span])
+        square = 2.0 * float(power[span][usable].mean()) if usable.any() else 0.0
+        kurtosis = 0.0
+        if square > 0.0:
+            kurtosis = 2.0 * (float(fourth[span][usable].mean()) / square**2 - 3.0)
         parts.append(
             Part(
                 start + span.start * size,
-                _fill_gaps(mean[span], share[span] >= 0.5),
-                np.where(share[span] >= 0.5, power[span], np.nan),
-                _compute_kurtosis(power[span], fourth[span], share[span] >= 0.5),
-                _find_pauses(share[span] < 0.5, interval),
+                _fill_gaps(mean[span], present),
+                np.where(present, power[span], np.nan),
+                kurtosis,
+                _find_pauses(~present, interval),
             )
         )
     return parts
@@ -182,15 +158,8 @@ def _find_pauses(missing: NDArray[np.bool_], interval: float) -> tuple[tuple[flo
     first, end = edges[::2].astype(np.float64), edges[1::2].astype(np.float64)
     long = np.flatnonzero((end - first) * interval >= _MIN_PAUSE)
     longest = long[np.argsort(first[long] - end[long], kind="stable")][:_MAX_PAUSES]
-    in_order = np.sort(longest)
-    return tuple(zip(0.5 * (first + end)[in_order], (end - first)[in_order], strict=True))
-
-
-def _compute_kurtosis(power: Array, fourth: Array, present: NDArray[np.bool_]) -> float:
-    """Return the excess kurtosis of samples whose differences have these moments."""
-    usable = present & np.isfinite(fourth)
-    square = 2.0 * float(power[usable].mean()) if usable.any() else 0.0
-    return 2.0 * (float(fourth[usable].mean()) / square**2 - 3.0) if square > 0.0 else 0.0
+    longest.sort()
+    return tuple(zip(0.5 * (first + end)[longest], (end - first)[longest], strict=True))
 
 
 def _fill_gaps(mean: Array, present: NDArray[np.bool_]) -> Array:
@@ -203,11 +172,9 @@ def _fill_gaps(mean: Array, present: NDArray[np.bool_]) -> Array:
         return mean
     filled = mean.copy()
     neighbours = np.diff(mean)[present[1:] & present[:-1]]
-    white = (
-        _SIGMA_OVER_MAD * float(np.median(np.abs(neighbours))) / np.sqrt(2.0)
-        if len(neighbours)
-        else 0.0
-    )
+    white = 0.0
+    if len(neighbours):
+        white = _SIGMA_OVER_MAD * float(np.median(np.abs(neighbours))) / np.sqrt(2.0)
     rng = np.random.default_rng(int((~present).sum()))
     missing = np.flatnonzero(~present)
     for run in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):

@@ -3,11 +3,6 @@
 The coefficients c_k are independent with the variance S(omega_k) of the noise model, so that
 generalised least squares reduces to weighted sums. Removing regressors also removes noise from the
 lowest ordinates: an ordinate with leverage h_k counts as 1 - h_k of one.
-
-The uncertainty of the amplitudes depends on a poorly known random walk. A step is a difference of
-two long means, and its error comes from the slowest noise. A weak walk is often fitted as none, and
-with this fit the error of the amplitude would be too small. The covariance is therefore averaged
-over the walks that the log allows (`average_covariance`).
 """
 
 from __future__ import annotations
@@ -27,24 +22,15 @@ from imubench_pipeline.estimators.spectrum import Spectrum, bin_edges
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.typing import Array
 
-NOISE_TERMS = Terms("NFK", 1)
-"""General noise model, which includes the models of logs without regressors."""
-
+NOISE_TERMS = Terms("NFK", 1)  # includes the models of logs without regressors
 _FIT_ROUNDS = 2
-_MIN_WEIGHT = 0.05
-"""Weight of an ordinate that the regressors explain almost completely."""
-
+_MIN_WEIGHT = 0.05  # weight of an ordinate that the regressors explain almost completely
 _WALK_GRID = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
 """Grid of K: root of the density ratio of random walk to other noise at the lowest frequency."""
 
-_FITTED_WALK_FACTORS = np.geomspace(0.6, 1.6, 9)
-"""Grid of K, relative to the fitted K."""
-
-_MIN_OTHER_NOISE = 1e-3
-"""Minimum fraction of the density that is not random walk."""
-
-_MIN_INDEPENDENT_VARIANCE = 1e-9
-"""Ridge on the correlation matrix of the amplitudes, against collinear regressors."""
+_FITTED_WALK_FACTORS = np.geomspace(0.6, 1.6, 9)  # grid of K, relative to the fitted K
+_MIN_OTHER_NOISE = 1e-3  # minimum fraction of the density that is not random walk
+_MIN_INDEPENDENT_VARIANCE = 1e-9  # ridge on the correlation matrix, against collinear regressors
 
 
 @dataclass(frozen=True)
@@ -69,11 +55,9 @@ class Ordinates:
         interval = means.interval
         self.sizes = [len(part.mean) for part in means.parts]
         self.starts = np.cumsum([0, *(n - 1 for n in self.sizes)])
+        centred = [part.mean - part.mean.mean() for part in means.parts]
         self.coefficient = np.concatenate(
-            [
-                scipy.fft.dct(part.mean - part.mean.mean(), type=2, norm="ortho")[1:]
-                for part in means.parts
-            ]
+            [scipy.fft.dct(mean, type=2, norm="ortho")[1:] for mean in centred]
         )
         self.frequency = np.concatenate(
             [np.arange(1, n) / (2.0 * n * interval) for n in self.sizes]
@@ -108,8 +92,7 @@ class Ordinates:
 
     def spectrum(self, residual: Array, weight: Array) -> Spectrum:
         """Return the binned spectrum of coefficients, each counted with its ``weight``."""
-        order, edges = self._order, self._edges
-        interval = self.means.interval
+        order, edges, interval = self._order, self._edges, self.means.interval
         frequency, length = self.frequency[order], self.length[order]
         counts = np.diff(np.append(edges, len(order)))
         last = edges + counts - 1
@@ -141,13 +124,8 @@ class Ordinates:
     def density(self, noise: Maximum) -> Array:
         """Return the density of a noise model at each ordinate, shape (k,)."""
         bins = self._whittle.spectrum.frequency
-        return np.asarray(
-            np.exp(
-                np.interp(
-                    np.log(self.frequency), np.log(bins), np.log(self._whittle.density(noise))
-                )
-            )
-        )
+        logarithm = np.log(self._whittle.density(noise))
+        return np.exp(np.interp(np.log(self.frequency), np.log(bins), logarithm))
 
     def fit(
         self,
@@ -162,17 +140,15 @@ class Ordinates:
         weight = np.ones_like(self.coefficient)
         residual, leverage = self.coefficient, np.zeros_like(weight)
         sizes, covariance = np.empty(0), np.empty((0, 0))
-        rounds = _FIT_ROUNDS if regressors else 1
         density = start
-        for _ in range(rounds):
+        for _ in range(_FIT_ROUNDS if regressors else 1):
             if regressors and density is not None:
                 sizes, covariance, residual, leverage = self.solve(regressors, density)
                 weight = np.maximum(1.0 - leverage, _MIN_WEIGHT)
             whittle = self._whittle.of(self.spectrum(residual, weight))
             noise = whittle.maximum(terms)
             density = self.density(noise)
-        if density is None:
-            raise ValueError("no round was made")
+        assert density is not None  # it was set in every round
         if regressors:
             sizes, covariance, residual, leverage = self.solve(regressors, density)
         return Fit(
@@ -242,9 +218,9 @@ class Ordinates:
 def average_covariance(ordinates: Ordinates, fit: Fit) -> Array:
     """Return the covariance of the amplitudes of a fit, (p, p), averaged over K.
 
-    The prior of K is uniform; the weights are the restricted likelihood (REML), in which the
-    amplitudes are integrated out (D. A. Harville, J. Am. Stat. Assoc. 72, 1977). The other noise is
-    fixed.
+    A weak walk is often fitted as none, and the error of a step would be too small. The prior of K
+    is uniform, the weights are the restricted likelihood (REML; D. A. Harville, J. Am. Stat. Assoc.
+    72, 1977), and the other noise is fixed.
     """
     if not fit.regressors:
         return fit.covariance

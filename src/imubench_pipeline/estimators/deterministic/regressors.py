@@ -15,8 +15,7 @@ import scipy.fft
 
 from imubench_pipeline.typing import Array
 
-_MIN_BEAT_ANGLE = 1e-9
-"""Half the sum or difference of two angles, below which the beat is constant over any part."""
+_MIN_BEAT_ANGLE = 1e-9  # half angle below which a beat is constant over any part
 
 Kind = Literal["step", "restart", "exponential", "sinusoid", "ramp", "pulse"]
 
@@ -63,8 +62,12 @@ class Regressor:
         if self.kind == "sinusoid":
             return np.sinc(self.where) * _transform_sinusoid(n, 2.0 * np.pi * self.where)
         if self.kind == "exponential":
+            # A geometric sum.
             left = math.exp(-1.0 / self.where)
-            return self.where * (1.0 - left) * _transform_exponential(n, left)
+            cos, sin, sign = _tabulate_half_angles(n)
+            below = (1.0 - left) ** 2 + 4.0 * left * sin**2
+            rows = ((1.0 - left**n * sign) * (1.0 - left) * cos / below)[None]
+            return self.where * (1.0 - left) * (math.sqrt(2.0 / n) * rows)
         return np.asarray(scipy.fft.dct(self.means(n), type=2, norm="ortho", axis=1)[:, 1:])
 
     def at(self, blocks: Array) -> Array:
@@ -104,10 +107,3 @@ def _transform_sinusoid(n: int, angle: float) -> Array:
         both[0] += np.where(beats, math.sin(n * angle) * sign * below, float(n))
         both[1] += np.where(beats, (1.0 - math.cos(n * angle) * sign) * below, 0.0)
     return 0.5 * math.sqrt(2.0 / n) * both
-
-
-def _transform_exponential(n: int, left: float) -> Array:
-    """Return the coefficients of left^i, shape (1, n - 1): a geometric sum."""
-    cos, sin, sign = _tabulate_half_angles(n)
-    below = (1.0 - left) ** 2 + 4.0 * left * sin**2
-    return math.sqrt(2.0 / n) * ((1.0 - left**n * sign) * (1.0 - left) * cos / below)[None]

@@ -30,27 +30,17 @@ FALSE_ALARM_PROBABILITY: dict[Kind, float] = {
 }
 """False-alarm probability for each kind in a log without deterministic signals."""
 
-_EDGE_BLOCKS = 3
-"""Blocks at the ends of a part in which no step is searched."""
-
-_TIME_CONSTANTS = 24
-"""Number of time constants that are tried."""
+_EDGE_BLOCKS = 3  # blocks at the ends of a part in which no step is searched
+_TIME_CONSTANTS = 24  # number of time constants that are tried
 
 _MIN_TIME_FRACTION, _MAX_TIME_FRACTION = 1 / 200, 1 / 2
 """Shortest and longest time constant, as fractions of the part of the log."""
 
-_EXPONENTIAL_ORDINATES = 2048
-"""Number of lowest ordinates in which exponentials are searched."""
-
+_EXPONENTIAL_ORDINATES = 2048  # number of lowest ordinates in which exponentials are searched
 _MAX_CYCLES = 64
-_CYCLE_STEP = 0.25
-"""Spacing of the frequencies that are tried, cycles in the part."""
-
-MIN_CYCLES = 0.25
-"""Cycles in the part, e.g. a day in a log of six hours; fewer are a ramp and a bend."""
-
-_MIN_INDEPENDENT_POWER = 1e-3
-"""Minimum fraction of a regressor's power that is independent of others; less is rounding error."""
+_CYCLE_STEP = 0.25  # spacing of the frequencies that are tried, cycles in the part
+MIN_CYCLES = 0.25  # in the part, e.g. a day in a log of six hours; fewer are a ramp and a bend
+_MIN_INDEPENDENT_POWER = 1e-3  # fraction of a regressor's power; less is rounding error
 
 
 @dataclass(frozen=True)
@@ -111,16 +101,13 @@ class Gain:
         if len(columns) == 1:
             return float(_compute_gains(columns, self._weight, self._residual, self._basis)[0])
         # Cosine and sine of a few cycles are not orthogonal: fit one after the other.
-        first = _orthonormalise([self._project_out(columns[0])], self._weight)
+        independent = columns[0] - (self._basis @ (self._weight * columns[0])) @ self._basis
+        first = _orthonormalise([independent], self._weight)
         projection = first @ (self._weight * self._residual)
         both = np.concatenate([self._basis, first])
         left = self._residual - projection @ first
-        return float(
-            projection @ projection + _compute_gains(columns[1:], self._weight, left, both)[0]
-        )
-
-    def _project_out(self, column: Array) -> Array:
-        return np.asarray(column - (self._basis @ (self._weight * column)) @ self._basis)
+        more = _compute_gains(columns[1:], self._weight, left, both)[0]
+        return float(projection @ projection + more)
 
 
 def _orthonormalise(columns: Sequence[Array], w: Array) -> Array:
@@ -140,10 +127,9 @@ def _orthonormalise(columns: Sequence[Array], w: Array) -> Array:
 def _compute_gains(columns: Array, w: Array, r: Array, basis: Array) -> Array:
     """Return the gain of each of several columns, shape (c, k)."""
     weighted = columns * w
-    above = weighted @ r
     whole = np.einsum("ck,ck->c", weighted, columns)
     left = whole - np.sum((weighted @ basis.T) ** 2, axis=1)
-    return _normalise_output(above, whole, left)
+    return _normalise_output(weighted @ r, whole, left)
 
 
 def _normalise_output(above: Array, whole: Array, left: Array) -> Array:
@@ -160,8 +146,7 @@ def _score_steps_and_pulses(
     slope = -math.sqrt(2.0 / n) / (2.0 * np.sin(np.pi * k / (2.0 * n)))
     above = _sum_sines(slope * w * r)
     power = slope**2 * w
-    padded = np.concatenate(([0.0], power))
-    turned = scipy.fft.fft(padded).real
+    turned = scipy.fft.fft(np.concatenate(([0.0], power))).real
     whole = 0.5 * (turned[0] - turned[1:])
     left = whole.copy()
     for row in basis:
@@ -179,8 +164,7 @@ def _score_steps_and_pulses(
         float(gains[place]),
         _compute_threshold(FALSE_ALARM_PROBABILITY["step"] / parts, apart, n),
     )
-    k0 = np.concatenate(([0.0], w * r))
-    above = scipy.fft.idct(k0, type=2, norm="ortho")
+    above = scipy.fft.idct(np.concatenate(([0.0], w * r)), type=2, norm="ortho")
     whole = np.full(n, float(w.sum()) / n)
     left = whole.copy()
     for row in basis:
@@ -231,12 +215,10 @@ def _score_exponentials(number: int, n: int, w: Array, r: Array, basis: Array, p
     low = slice(0, columns.shape[1])
     gains = _compute_gains(columns, w[low], r[low], basis[:, low])
     best = int(np.argmax(gains))
+    chance = FALSE_ALARM_PROBABILITY["exponential"] / parts
+    threshold = _compute_threshold(chance, float(_TIME_CONSTANTS), _TIME_CONSTANTS)
     return Score(
-        Regressor("exponential", number, float(times[best])),
-        float(gains[best]),
-        _compute_threshold(
-            FALSE_ALARM_PROBABILITY["exponential"] / parts, float(_TIME_CONSTANTS), _TIME_CONSTANTS
-        ),
+        Regressor("exponential", number, float(times[best])), float(gains[best]), threshold
     )
 
 

@@ -1,20 +1,14 @@
 """Search for deterministic signals: forward selection by likelihood ratios, then elimination.
 
-Noise and signals compete. A step increases the fitted random walk, and noise fitted to a signal
+Noise and signals compete: a step increases the fitted random walk, and noise fitted to a signal
 hides it. Signals are therefore searched above the noise as fitted, and slow signals also above the
 noise as extrapolated from higher frequencies. A candidate above its threshold is tested by the
-likelihood ratio of the models with and without it, the noise refitted. A signal that a random walk
-hides completely is found by replacing the walk. If it is not significantly better than the walk, it
-is not removed from the log, but reported as the walk's rival.
+likelihood ratio of the models with and without it, the noise refitted.
 
-A walk and a signal both model a rise of the spectrum towards low frequencies. The test compares
-noise without a walk plus the signal with noise including the walk. A signal that needs a walk in
-addition is no evidence against the walk. The gain of the signal includes the choice of its kind,
-place, time constant or period; it must come near the threshold, which allows for this choice. The
-single parameter of the walk is not searched for, and is not penalised.
-
-A sensor that restarted at the pauses of a log has another bias after each pause. The places of
-these steps are known, so the threshold depends on their number only.
+A signal that a random walk hides completely is found by comparing noise without a walk plus the
+signal with noise including the walk. If it is not significantly better, it is not removed from the
+log, but reported as the walk's rival. The places of steps at the pauses of a log are known, so
+their threshold depends on their number only.
 """
 
 from __future__ import annotations
@@ -37,22 +31,12 @@ from imubench_pipeline.estimators.deterministic.scores import (
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.typing import Array
 
-_HELD_OUT_ORDINATES = 16
-"""Lowest ordinates to which the noise is extrapolated instead of fitted."""
-
-_MAX_PAUSE_DISTANCE = 2.0
-"""Distance, in blocks, from a pause within which a step may belong to it."""
-
-_REFIT_MARGIN = 6.0
-"""A candidate is tested with refitted noise if its gain is at most this below the threshold."""
-
+_HELD_OUT_ORDINATES = 16  # lowest ordinates to which the noise is extrapolated instead of fitted
+_MAX_PAUSE_DISTANCE = 2.0  # distance, in blocks, from a pause within which a step may belong to it
+_REFIT_MARGIN = 6.0  # below the threshold; better candidates are tested with refitted noise
 _SLOW_KINDS: tuple[Kind, ...] = ("exponential", "sinusoid")
-_MIN_SLOW_GAIN = 6.0
-"""Gain above which a slow signal is tested: noise fitted without it hides most of it."""
-
-_NEIGHBOUR_ORDINATES = (3, 16)
-"""Distances of the ordinates beside a sinusoid that measure the noise relative to its model."""
-
+_MIN_SLOW_GAIN = 6.0  # of a slow signal to be tested: noise fitted without it hides most of it
+_NEIGHBOUR_ORDINATES = (3, 16)  # distances of ordinates that measure the noise beside a sinusoid
 THRESHOLD_FACTOR: dict[Kind, float] = {
     "step": 1.0,
     "restart": 1.0,
@@ -63,20 +47,12 @@ THRESHOLD_FACTOR: dict[Kind, float] = {
 }
 """Factor on the threshold, because the noise at few ordinates is poorly known."""
 
-_RIVAL_MARGIN = 4.0
-"""A signal at most this below its threshold, in twice the log likelihood, is about as good."""
-
-_MAX_REFIT_GAIN = 8.0
-"""Largest increase of a gain by refitting the noise; candidates further below are not tried."""
-
-_DELTA_AIC_STEPS = 0.5
-"""Disadvantage in AIC up to which steps at known places are as good as a walk."""
-
+_RIVAL_MARGIN = 4.0  # twice the log likelihood; a signal this near its threshold is as good
+_MAX_REFIT_GAIN = 8.0  # candidates further below their threshold are not refitted
+_DELTA_AIC_STEPS = 0.5  # up to which steps at known places are as good as a walk
 _TERMS_WITHOUT_WALK = Terms("NF", NOISE_TERMS.gauss_markov)
 
-MAX_REGRESSORS = 16
-"""Maximum number of regressors; a log with more steps has telegraph noise."""
-
+MAX_REGRESSORS = 16  # maximum number of regressors; a log with more steps has telegraph noise
 _MIN_KEPT_GAIN: dict[Kind, float] = {
     "step": 16.0,
     "restart": 4.0,  # its place is known
@@ -87,16 +63,18 @@ _MIN_KEPT_GAIN: dict[Kind, float] = {
 }
 """Minimum gain of a regressor in the final fit, given the regressors found later."""
 
-_CERTAIN_GAIN_FACTOR = 3.0
-"""Factor on the minimum gain above which the noise is not refitted to confirm it."""
+_CERTAIN_GAIN_FACTOR = 3.0  # on the minimum gain; above it the noise is not refitted
 
 
 def find_candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
     """Return candidates to add to a fit, each with the noise density that it was detected in."""
     scores: dict[Regressor, tuple[Score, Array]] = {}
-    pauses = list_restarts(ordinates)
-    for seen in find_best_scores(ordinates, fit, fit.density):
-        score = _move_to_pause(seen, pauses, fit)
+    pauses = [x for x in list_restarts(ordinates) if x not in fit.regressors]
+    for score in find_best_scores(ordinates, fit, fit.density):
+        if score.regressor.kind == "step":
+            # A step in a pause is a restart there: the means across the pause are interpolated.
+            restarts = (x for x in pauses if is_at_pause(score.regressor, x))
+            score = replace(score, regressor=next(restarts, score.regressor))
         slow = score.regressor.kind in _SLOW_KINDS
         if score.gain > (_MIN_SLOW_GAIN if slow else score.threshold - _REFIT_MARGIN):
             scores[score.regressor] = score, fit.density
@@ -122,15 +100,6 @@ def is_at_pause(regressor: Regressor, pause: Regressor) -> bool:
     return regressor.part == pause.part and near
 
 
-def _move_to_pause(score: Score, pauses: Sequence[Regressor], fit: Fit) -> Score:
-    """Replace a step in a pause by a restart there: the means across the pause are interpolated."""
-    if score.regressor.kind == "step":
-        for pause in pauses:
-            if pause not in fit.regressors and is_at_pause(score.regressor, pause):
-                return replace(score, regressor=pause)
-    return score
-
-
 def fit_with_candidate(
     ordinates: Ordinates, fit: Fit, score: Score, density: Array
 ) -> tuple[Fit, float]:
@@ -145,17 +114,25 @@ def fit_with_candidate(
     tried = ordinates.fit(regressors, fit.density, fit.noise.terms)
     gain = 2.0 * (tried.log_likelihood - fit.log_likelihood)
     if score.regressor.kind == "sinusoid":
-        gain /= _measure_level_beside(ordinates, tried, regressors[-1])
+        # An oscillating noise process is a broad peak of the spectrum, not a sinusoid: divide by
+        # the mean power of the neighbouring ordinates over that of the model, if above 1.
+        sinusoid = regressors[-1]
+        of_part = ordinates.part(sinusoid.part)
+        ratio = tried.residual[of_part] ** 2 * ordinates.weights(tried.density)[of_part]
+        centre = 2.0 * sinusoid.where * ordinates.sizes[sinusoid.part]
+        away = np.abs(np.arange(1, len(ratio) + 1) - centre)
+        beside = ratio[(away >= _NEIGHBOUR_ORDINATES[0]) & (away <= _NEIGHBOUR_ORDINATES[1])]
+        if len(beside):
+            # Allow for two standard errors of the mean of so many chi-squared ordinates.
+            error = float(np.sqrt(2.0 / len(beside)))
+            gain /= max(float(beside.mean()) - 2.0 * error, 1.0)
     return tried, gain
 
 
 def polish(
     ordinates: Ordinates, regressors: Sequence[Regressor], which: int, density: Array
 ) -> tuple[Regressor, ...]:
-    """Optimise the place, time constant or frequency of one regressor.
-
-    ``density``, shape (k,), is the density of the noise, SI²/Hz.
-    """
+    """Optimise the place, time constant or frequency of one regressor, in given noise."""
     best = regressors[which]
     if best.kind in ("ramp", "pulse", "restart"):
         return tuple(regressors)
@@ -177,22 +154,6 @@ def polish(
 def leave_out(regressors: Sequence[Regressor], left_out: int) -> tuple[Regressor, ...]:
     """Return all regressors but one."""
     return tuple(x for i, x in enumerate(regressors) if i != left_out)
-
-
-def _measure_level_beside(ordinates: Ordinates, fit: Fit, sinusoid: Regressor) -> float:
-    """Return the mean power of the ordinates beside a sinusoid over that of the model, at least 1.
-
-    An oscillating noise process is a broad peak of the spectrum, not a sinusoid.
-    """
-    of_part = ordinates.part(sinusoid.part)
-    ratio = fit.residual[of_part] ** 2 * ordinates.weights(fit.density)[of_part]
-    centre = 2.0 * sinusoid.where * ordinates.sizes[sinusoid.part]
-    away = np.abs(np.arange(1, len(ratio) + 1) - centre)
-    beside = ratio[(away >= _NEIGHBOUR_ORDINATES[0]) & (away <= _NEIGHBOUR_ORDINATES[1])]
-    if not len(beside):
-        return 1.0
-    # Allow for two standard errors of the mean of so many chi-squared ordinates.
-    return max(float(beside.mean()) - 2.0 * float(np.sqrt(2.0 / len(beside))), 1.0)
 
 
 @dataclass(frozen=True)
@@ -218,11 +179,10 @@ class Rival:
 
 
 def find_walk_rival(ordinates: Ordinates, fit: Fit) -> Rival | None:
-    """Return the signal that fits a log best in place of a random walk.
+    """Return the signal that fits a log best in place of a random walk, or None.
 
-    Steps, also at all pauses together, warm-ups and periodic drift are tried in addition to the
-    signals of the fit. A ramp is a term of the noise models, whose comparison includes it. None
-    if there is no walk, or no candidate.
+    Steps, also at all pauses together, warm-ups and periodic drift are tried; a ramp is in the
+    noise models.
     """
     if fit.noise.parameter("K") == 0.0:
         return None
@@ -244,8 +204,7 @@ def find_walk_rival(ordinates: Ordinates, fit: Fit) -> Rival | None:
 def fit_steps_at_pauses(ordinates: Ordinates, fit: Fit, walk: float = 0.0) -> Rival | None:
     """Return a fit with a step at each pause that has none, or None where there are none.
 
-    ``walk`` is twice the log likelihood that a random walk gains over the fit. Steps with the same
-    AIC as the walk are as good.
+    ``walk`` is twice the log likelihood that a random walk gains. Steps with its AIC are as good.
     """
     steps_before = [x for x in fit.regressors if x.kind in ("step", "restart")]
     steps = tuple(
@@ -275,8 +234,7 @@ class SearchResult:
 
 def search(ordinates: Ordinates) -> SearchResult:
     """Find the deterministic signals that noise does not explain."""
-    without = ordinates.fit(())
-    fit = without
+    fit = without = ordinates.fit(())
     rival: Rival | None = None
     while len(fit.regressors) < MAX_REGRESSORS:
         extended = _extend_fit(ordinates, fit)
@@ -294,7 +252,10 @@ def search(ordinates: Ordinates) -> SearchResult:
     if len(fit.regressors) >= MAX_REGRESSORS:
         return SearchResult(fit, without, (), True)
     if len(fit.regressors) > 1:
-        fit = _polish_all(ordinates, fit)
+        moved = fit.regressors
+        for which in range(len(moved)):
+            moved = polish(ordinates, moved, which, fit.density)
+        fit = ordinates.fit(moved, fit.density)
     fit, gains = _eliminate(ordinates, fit)
     alike = rival if rival is not None and rival.as_good else None
     return SearchResult(fit, without, gains, False, alike)
@@ -321,14 +282,6 @@ def _extend_fit(ordinates: Ordinates, fit: Fit) -> Fit | None:
         return None
     moved = polish(ordinates, best.regressors, len(best.regressors) - 1, best.density)
     return ordinates.fit(moved, best.density)
-
-
-def _polish_all(ordinates: Ordinates, fit: Fit) -> Fit:
-    """Optimise each regressor in turn, given all others."""
-    moved = fit.regressors
-    for which in range(len(moved)):
-        moved = polish(ordinates, moved, which, fit.density)
-    return ordinates.fit(moved, fit.density)
 
 
 def _eliminate(ordinates: Ordinates, fit: Fit) -> tuple[Fit, tuple[float, ...]]:

@@ -1,10 +1,14 @@
-"""Findings from the deterministic signals of a channel, and caveats on its parameters."""
+"""Findings from the deterministic signals of a channel, and caveats on its parameters.
+
+The slow noise of both halves of a log is compared by a likelihood ratio (`compare_halves`).
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from scipy.special import ndtri
@@ -13,8 +17,12 @@ from imubench_pipeline.estimators.deterministic.courses import (
     DeterministicSignal,
     DeterministicSignals,
 )
-from imubench_pipeline.estimators.deterministic.halves import Halves, compare_halves
-from imubench_pipeline.estimators.deterministic.means import Stationarity, assess_stationarity
+from imubench_pipeline.estimators.deterministic.means import (
+    Means,
+    Stationarity,
+    assess_stationarity,
+)
+from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
 from imubench_pipeline.estimators.deterministic.search import MAX_REGRESSORS
 from imubench_pipeline.estimators.estimate import (
     FAMILY,
@@ -24,11 +32,25 @@ from imubench_pipeline.estimators.estimate import (
     Parameter,
     Status,
 )
+from imubench_pipeline.estimators.spectral_shapes import Shapes
+from imubench_pipeline.estimators.whittle import Maximum
 from imubench_pipeline.model.estimates import DeterministicRow
 from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.typing import Array
 
-_MIN_EXCESS_KURTOSIS = 0.3
-"""Excess kurtosis above which the interval of N is widened."""
+_MIN_EXCESS_KURTOSIS = 0.3  # excess kurtosis above which the interval of N is widened
+_MIN_BLOCKS = 256  # blocks that a part needs to be halved
+_POWER_RATIOS = np.concatenate(([0.0], np.geomspace(1e-4, 1e4, 241)))
+"""Grid of the ratio of slow power in a half of the log to the whole log."""
+
+_WHITE_ROUNDS = 4
+_MIN_WHITE_RATIO = 0.1
+
+_MAX_LOG_LIKELIHOOD_RATIO = 13.0
+"""Twice the log likelihood ratio above which the halves differ.
+
+It is the 99.97 % quantile of chi-squared, as the other terms are fixed although they are uncertain.
+"""
 
 _REMOVED = "it is taken out of the noise"
 
@@ -95,8 +117,7 @@ class Verdict:
             return draws
         middle = float(np.median(N[positive]))
         # Times are uniform over the log, in a random order, independent of other parameters.
-        even = (np.arange(len(N)) + 0.5) / len(N)
-        even = np.random.default_rng(len(N)).permutation(even)
+        even = np.random.default_rng(len(N)).permutation((np.arange(len(N)) + 0.5) / len(N))
         other_times = np.exp(self.growth * (even - 0.5) + self.scatter * ndtri(even))
         first[positive, place] = (middle * (N / middle) ** self.widening * other_times)[positive]
         return replace(draws, first=first)
@@ -142,37 +163,39 @@ def assess_signals(channel: str, unit: str, signals: DeterministicSignals) -> Ve
     if kurtosis > _MIN_EXCESS_KURTOSIS:
         # The power of L samples has a relative variance of (2 + kurtosis) / L.
         widening = math.sqrt(1.0 + 0.5 * kurtosis)
-        findings.append(_describe_heavy_tails(channel, kurtosis, widening))
+        detail = (
+            f"the fast noise of {channel} has heavier tails than a normal distribution (excess "
+            f"kurtosis {kurtosis:.3g}); the interval of N is made {widening:.3g} times as wide"
+        )
+        findings.append(Finding("heavy_tails", "note", detail, kurtosis, channel))
     growth = scatter = 0.0
     steady = assess_stationarity(signals.means)
     if steady is not None and (steady.has_trend or steady.is_variable):
         finding = _describe_nonstationarity(channel, steady)
         findings.append(finding)
         caveats["N"] = ("doubtful", finding.detail)
-        growth, scatter = (
-            (math.log1p(steady.trend), 0.0) if steady.has_trend else (0.0, steady.spread)
-        )
+        if steady.has_trend:
+            growth = math.log1p(steady.trend)
+        else:
+            scatter = steady.spread
     if signals.telegraph:
         reason = (
             f"the bias of {channel} steps {MAX_REGRESSORS} times or more, as telegraph noise does: "
             "the steps are left in the noise, where they pass for B, T_B and K"
         )
-        findings.append(
-            Finding("telegraph_noise", "warning", reason, float(MAX_REGRESSORS), channel)
-        )
+        finding = Finding("telegraph_noise", "warning", reason, float(MAX_REGRESSORS), channel)
+        findings.append(finding)
         caveats |= {name: ("doubtful", reason) for name in ("B", "T_B", "K")}
         return Verdict(tuple(findings), caveats, widening, growth, scatter)
-    noise = signals.searched.fit.noise
-    for halves in compare_halves(signals.without(), noise):
+    for halves in compare_halves(signals.without(), signals.searched.fit.noise):
         if halves.differ:
             finding = _describe_difference(channel, halves)
             findings.append(finding)
             doubted = ("K",) if halves.of == "K" else ("B", "T_B", "K")
             caveats |= {name: ("doubtful", finding.detail) for name in doubted}
             break
-    reason_against = signals.against_random_walk
-    if reason_against is not None:
-        caveats["K"] = ("not_identified", reason_against)
+    if (against := signals.against_random_walk) is not None:
+        caveats["K"] = ("not_identified", against)
     return Verdict(tuple(findings), caveats, widening, growth, scatter)
 
 
@@ -204,34 +227,23 @@ def _describe_signal(channel: str, unit: str, signal: DeterministicSignal) -> Fi
     size = f"{signal.size:.4g} {unit}"
     limits = f"95 %: {signal.size_lower:.4g} to {signal.size_upper:.4g} {unit}"
     if signal.kind == "bias_step":
-        name = "bias_step"
         detail = (
             f"the bias of {channel} steps by {size} ({limits}) at {signal.start:.6g} s "
             f"(± {signal.place_error or 0.0:.2g} s); {_REMOVED}"
         )
     elif signal.kind == "warm_up_drift":
-        name = "warm_up_drift"
         detail = (
             f"{channel} begins {size} ({limits}) away from where it settles, with a time constant "
             f"of {signal.time:.4g} s ({signal.time_lower:.4g} to {signal.time_upper:.4g} s); "
             f"{_REMOVED}"
         )
     else:
-        name = "periodic_drift"
         detail = (
             f"the bias of {channel} swings with an amplitude of {size} ({limits}) and a period of "
             f"{signal.time:.5g} s ({signal.time_lower:.5g} to {signal.time_upper:.5g} s); "
             f"{_REMOVED}"
         )
-    return Finding(name, "warning", detail, signal.size, channel, signal.start, signal.end)
-
-
-def _describe_heavy_tails(channel: str, kurtosis: float, widening: float) -> Finding:
-    detail = (
-        f"the fast noise of {channel} has heavier tails than a normal distribution (excess "
-        f"kurtosis {kurtosis:.3g}); the interval of N is made {widening:.3g} times as wide"
-    )
-    return Finding("heavy_tails", "note", detail, kurtosis, channel)
+    return Finding(signal.kind, "warning", detail, signal.size, channel, signal.start, signal.end)
 
 
 def _describe_nonstationarity(channel: str, steady: Stationarity) -> Finding:
@@ -242,16 +254,14 @@ def _describe_nonstationarity(channel: str, steady: Stationarity) -> Finding:
             f"(± {196 * steady.trend_error:.2g} %) from beginning to end; N is its mean over the "
             "log"
         )
-        return Finding(
-            "noise_grows", "warning", detail, steady.trend, channel, steady.start, steady.end
+        name, value = "noise_grows", steady.trend
+    else:
+        detail = (
+            f"the fast noise of {channel} differs by {100 * steady.spread:.3g} % (one standard "
+            "deviation) between sixteenths of the log, beyond chance; N is its mean over the log"
         )
-    detail = (
-        f"the fast noise of {channel} differs by {100 * steady.spread:.3g} % (one standard "
-        "deviation) between sixteenths of the log, beyond chance; N is its mean over the log"
-    )
-    return Finding(
-        "noise_varies", "warning", detail, steady.spread, channel, steady.start, steady.end
-    )
+        name, value = "noise_varies", steady.spread
+    return Finding(name, "warning", detail, value, channel, steady.start, steady.end)
 
 
 def _describe_difference(channel: str, halves: Halves) -> Finding:
@@ -262,3 +272,95 @@ def _describe_difference(channel: str, halves: Halves) -> Finding:
         f"on {halves.second:.3g} times that of the whole log, beyond chance: it is not one process"
     )
     return Finding(name, "warning", detail, halves.ratio, channel, halves.begin, halves.end)
+
+
+@dataclass(frozen=True)
+class Halves:
+    """The slow noise of the two halves of a log, with the other terms fixed."""
+
+    of: Literal["K", "slow noise"]  # the random walk, or all terms but the white noise together
+    first: float
+    second: float
+    """Ratio of the slow-noise amplitude in each half to the whole log."""
+    ratio: float  # twice the log likelihood ratio of two values against one
+    begin: float
+    middle: float
+    end: float
+    """Limits of the halves, s from the first sample."""
+
+    @property
+    def differ(self) -> bool:
+        """Whether one value does not fit both halves."""
+        return self.ratio > _MAX_LOG_LIKELIHOOD_RATIO
+
+
+def compare_halves(means: Means, noise: Maximum) -> Iterator[Halves]:
+    """Yield comparisons of the slow noise on the two halves of the longest part of a log.
+
+    First for the random walk, if there is one, then for all slow noise; none for short logs.
+    ``means`` are without deterministic signals, ``noise`` is the fit to the whole log.
+    """
+    part = means.longest
+    size = len(part.mean) // 2
+    if size < _MIN_BLOCKS // 2:
+        return
+    densities = []
+    for first in (0, size):
+        half = replace(part, mean=part.mean[first : first + size], power=part.power[:size])
+        ordinates = Ordinates(replace(means, parts=(half,)))
+        if not ordinates.is_usable:
+            return
+        densities.append(_compute_densities(ordinates, noise))
+    begin = part.start / means.rate
+    length = size * means.interval
+    compared: list[tuple[Literal["K", "slow noise"], str]] = [("K", "K"), ("slow noise", "FKG")]
+    for name, scaled in compared:
+        earlier, later = (_evaluate_log_likelihoods(*of_half, scaled) for of_half in densities)
+        if earlier is None or later is None:
+            continue
+        best = [int(np.argmax(earlier)), int(np.argmax(later))]
+        ratio = 2.0 * float(earlier[best[0]] + later[best[1]] - np.max(earlier + later))
+        yield Halves(
+            name,
+            math.sqrt(_POWER_RATIOS[best[0]]),
+            math.sqrt(_POWER_RATIOS[best[1]]),
+            ratio,
+            begin,
+            begin + length,
+            begin + 2.0 * length,
+        )
+
+
+def _compute_densities(
+    ordinates: Ordinates, noise: Maximum
+) -> tuple[Array, Array, dict[str, Array]]:
+    """Return ordinates and density of each bin, and the density of each term in it."""
+    spectrum = ordinates.spectrum(ordinates.coefficient, np.ones_like(ordinates.length))
+    shapes = Shapes(spectrum)
+    units = {"N": shapes.white, "F": shapes.flicker, "K": shapes.random_walk}
+    columns = {letter: noise.parameter(letter) ** 2 * units[letter]() for letter in "NFK"}
+    columns["G"] = np.zeros(len(spectrum.density))
+    for B, time in zip(noise.biases, noise.times, strict=True):
+        columns["G"] += B**2 * shapes.gauss_markov(float(time))
+    return spectrum.ordinates, spectrum.density, columns
+
+
+def _evaluate_log_likelihoods(
+    nu: Array, data: Array, columns: dict[str, Array], scaled: str
+) -> Array | None:
+    """Return the log likelihood of a half for each power of ``scaled`` terms; None: they are 0."""
+    slow = sum((columns[name] for name in scaled), np.zeros(len(nu)))
+    if not slow.any() or not columns["N"].any():
+        return None
+    white = columns["N"]
+    others = [columns[name] for name in columns if name not in scaled and name != "N"]
+    rest = sum(others, np.zeros(len(nu))) + _POWER_RATIOS[:, None] * slow
+    # White noise has its own power on each half, lest a change of it appear as slow noise.
+    power = np.ones((len(rest), 1))
+    for _ in range(_WHITE_ROUNDS):
+        weight = nu / (rest + power * white) ** 2
+        above = np.sum(weight * white * (data - rest), axis=1)
+        power = (above / np.sum(weight * white**2, axis=1))[:, None]
+        power = np.clip(power, _MIN_WHITE_RATIO, 1.0 / _MIN_WHITE_RATIO)
+    density = rest + power * white
+    return np.asarray(-0.5 * np.sum(nu * (np.log(density) + data / density), axis=1))

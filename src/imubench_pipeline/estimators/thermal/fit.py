@@ -1,9 +1,8 @@
 """Joint estimation of the temperature effect and the noise of a log: sensitivity, lag, bias.
 
 y(t) = bias + s (T_L(t) - T_0) + q (T_L(t) - T_0)^2 + noise, with T_L behind a first-order lag L and
-T_0 the mean temperature of the log (a convention, which defines `bias`). For given noise the
-effect is fitted by generalised least squares on the DCT coefficients. For given s, q and L the
-noise is a Whittle fit to the residual. Both are iterated until they converge.
+T_0 the mean temperature. Generalised least squares of the effect for given noise, and a Whittle fit
+of the noise to the residual, are iterated until they converge.
 """
 
 from __future__ import annotations
@@ -24,9 +23,12 @@ from imubench_pipeline.estimators.missing import block_means, split_at_gaps
 from imubench_pipeline.estimators.model_choice import Candidate, compare_models
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, block_of, spectra
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
-from imubench_pipeline.estimators.thermal.path_errors import subtract_path_errors
-from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
-from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
+from imubench_pipeline.estimators.thermal.regression import (
+    BlockSeries,
+    Coefficients,
+    Regression,
+    Regressors,
+)
 from imubench_pipeline.estimators.thermal.result import (
     ThermalFit,
     complete_log,
@@ -37,6 +39,7 @@ from imubench_pipeline.estimators.thermal.uncertainty import (
     add_likely_walk,
     assess_fit,
     compute_mean_error,
+    subtract_path_errors,
     weigh_models,
 )
 from imubench_pipeline.estimators.whittle import Maximum, Whittle, model_of
@@ -44,19 +47,11 @@ from imubench_pipeline.typing import Array
 
 _MAX_ROUNDS = 10
 _TOLERANCE = 0.02
-_SETTLING_FRACTIONS = (1 / 64, 1 / 32, 1 / 16)
-"""Durations of settling that are tried, as fractions of the log."""
-
-_MIN_EXTRA_GAIN = 6.0
-"""Minimum gain of log likelihood, in addition to BIC, by the square or by settling."""
-
+_SETTLING_FRACTIONS = (1 / 64, 1 / 32, 1 / 16)  # durations of settling to try, over the log
+_MIN_EXTRA_GAIN = 6.0  # least gain of log likelihood beyond BIC, by the square or by settling
 _MIN_TRIAL_GAIN = 2.0
-_MAX_ERROR_GROWTH = 2.5
-"""Increase of the error of s above which the settling time has most information on s."""
-
-_MIN_ADDED_ERROR = 0.3
-"""Effect of temperature on a bin, in its standard errors, above which it matters."""
-
+_MAX_ERROR_GROWTH = 2.5  # of s; above it the settling time has most information on s
+_MIN_ADDED_ERROR = 0.3  # smallest significant change of a bin, in its standard errors
 _MIN_BINS = 24
 
 
@@ -75,14 +70,14 @@ def fit_temperature(
     plain: Likelihood | None = None,
     rng: np.random.Generator,
 ) -> ThermalFit:
-    """Estimate what temperature does to a channel, together with its noise.
+    """Estimate the temperature effect of a channel together with its noise.
 
     Parameters
     ----------
     blocks : callable
-        Gives the log in order, in SI, as often as it is called; NaN where a sample is missing.
+        Returns the log in order, in SI, at each call; NaN where a sample is missing.
     samples : int
-        L, the length of all blocks together.
+        L.
     rate : float
         Hz.
     path : TemperaturePath
@@ -92,12 +87,11 @@ def fit_temperature(
     band, bandwidth, resolution : float, optional
         As in `imubench_pipeline.estimators.likelihood.fit`.
     quadratic : bool, optional
-        Whether the square of the temperature is in the model; by default where the log favours
-        it.
+        Whether the square of the temperature is in the model; by default if BIC favours it.
     longest_lag : float, optional
         s; by default a twentieth of the longest segment, at most half an hour. 0: no lag.
     plain : Likelihood, optional
-        The noise of the log as it is, where it is known already.
+        The noise of the log without compensation, if it is known.
     rng : numpy.random.Generator
 
     Raises
@@ -107,9 +101,8 @@ def fit_temperature(
 
     References
     ----------
-    A. C. Aitken, "On least squares and linear combinations of observations", Proc. R. Soc.
-    Edinburgh 55, 1935; H. D. Patterson and R. Thompson, "Recovery of inter-block information
-    when block sizes are unequal", Biometrika 58, 1971.
+    A. C. Aitken, Proc. R. Soc. Edinburgh 55, 1935 (generalised least squares); H. D. Patterson and
+    R. Thompson, Biometrika 58, 1971 (restricted likelihood).
     """
     spans = path.segments
     find_frame = partial(select_for_fit, band=band, bandwidth=bandwidth, resolution=resolution)
@@ -153,7 +146,7 @@ def fit_temperature(
     settled = fit.settle(quadratic)
     verdict = fit.judged(settled, rng)
     if not verdict.compensated and len(fit.lags) > 1:
-        # A lag of nothing is whatever lets a walk pass for temperature: there is none.
+        # Without an effect, the fitted lag only makes a random walk look like temperature.
         fit.lags = fit.lags[:1]
         settled = fit.settle(quadratic)
         verdict = replace(fit.judged(settled, rng), lag=verdict.lag)
@@ -177,7 +170,7 @@ def fit_temperature(
 
 @dataclass(frozen=True)
 class _Settled:
-    """Where the fit has settled."""
+    """A converged fit."""
 
     regressors: Regressors
     regression: Regression
@@ -187,7 +180,7 @@ class _Settled:
 
     @property
     def noise(self) -> Maximum:
-        """The best noise model of what temperature leaves."""
+        """The best noise model of the residual."""
         return self.candidates[0].maximum
 
 
@@ -223,10 +216,10 @@ class _Fit:
         self.lags = self.regressors.lags(longest_lag)
 
     def take_fast(self, left: Spectrum) -> bool:
-        """Take the high frequencies of what temperature leaves; return whether they are others.
+        """Take over the high frequencies of the residual; return whether they changed.
 
-        What temperature shares with the log is known at the low frequencies only (`Coefficients`),
-        and a temperature that jumps has high ones too.
+        The products with temperature are known at low frequencies only (`Coefficients`), and a
+        temperature that jumps has high frequencies too.
         """
         fast = self.spectrum.block != self.series.block
         before, after = self.spectrum.density[fast], left.density[fast]
@@ -242,9 +235,9 @@ class _Fit:
         return True
 
     def settle(self, quadratic: bool | None) -> _Settled:
-        """Return the joint fit; the square is tried where nothing is said of it.
+        """Return the joint fit, with the square and another sensitivity at the beginning if needed.
 
-        So is another sensitivity at the beginning, where a sensor settles.
+        The square is tried if ``quadratic`` is None.
         """
         needed = 0.5 * math.log(len(self.chosen.density)) + _MIN_TRIAL_GAIN
         settled = self._best(self.regressors.also(quadratic=bool(quadratic)))
@@ -256,25 +249,26 @@ class _Fit:
             extended = [] if settled.regressors.settling else extended
             if quadratic is None and not settled.regressors.quadratic:
                 extended.append(settled.regressors.also(quadratic=True))
-            gains = [self._gained(settled, regressors) for regressors in extended]
+            density = settled.whittle.density(settled.noise)
+            weights, lag = self.chosen.ordinates / density, settled.regression.lag
+            gains = [
+                regressors.at(lag, weights).log_likelihood_gain
+                - settled.regression.log_likelihood_gain
+                for regressors in extended
+            ]
             if not gains or max(gains) < needed:
                 break
             wider = self._best(extended[int(np.argmax(gains))])
-            if wider.cost > settled.cost - _MIN_EXTRA_GAIN:
-                break
-            if wider.regression.error > _MAX_ERROR_GROWTH * settled.regression.error:
+            if (
+                wider.cost > settled.cost - _MIN_EXTRA_GAIN
+                or wider.regression.error > _MAX_ERROR_GROWTH * settled.regression.error
+            ):
                 break
             settled = wider
         return settled
 
-    def _gained(self, settled: _Settled, regressors: Regressors) -> float:
-        """Return the log likelihood that more regressors gain, for the noise as it is fitted."""
-        density = settled.whittle.density(settled.noise)
-        wider = regressors.at(settled.regression.lag, self.chosen.ordinates / density)
-        return wider.log_likelihood_gain - settled.regression.log_likelihood_gain
-
     def _best(self, regressors: Regressors) -> _Settled:
-        """Settle from the noise of the log as it is, and from that of ordinary least squares."""
+        """Settle from the noise without compensation, and from the noise after least squares."""
         flat = self.chosen.ordinates
         rough = regressors.at(0.0, flat)
         left = self.whittle.of(regressors.without(self.chosen, rough, flat))
@@ -314,10 +308,7 @@ class _Fit:
         )
 
     def _cost(self, whittle: Whittle, candidates: Sequence[Candidate], free: int) -> float:
-        """Return half the BIC, with the ordinates of the log.
-
-        Those that a fit takes are counted as its parameters.
-        """
+        """Return half the BIC, with the ordinates of the log and ``free`` parameters."""
         maximum, ordinates = candidates[0].maximum, self.chosen.ordinates
         density = whittle.density(maximum)
         data = whittle.data(maximum) * whittle.spectrum.ordinates / ordinates
@@ -325,21 +316,18 @@ class _Fit:
         return cost + 0.5 * free * math.log(len(density))
 
     def judged(self, settled: _Settled, rng: np.random.Generator) -> Verdict:
-        """Return what a settled fit tells."""
+        """Return the verdict on a converged fit."""
+        terms = self.of_the_log[0].terms
+        plain = self._cost(self.whittle, self.of_the_log, terms.parameters)
         return assess_fit(
             settled.regressors,
             settled.regression,
             settled.whittle,
             settled.candidates,
             self.lags,
-            gained=2.0 * (self.plain() - settled.cost),
+            gained=2.0 * (plain - settled.cost),
             rng=rng,
         )
-
-    def plain(self) -> float:
-        """Return half the BIC of the best noise without temperature."""
-        candidates = self.of_the_log
-        return self._cost(self.whittle, candidates, candidates[0].terms.parameters)
 
     @cached_property
     def of_the_log(self) -> Sequence[Candidate]:
@@ -357,10 +345,7 @@ def _described(
     find_frame: Callable[[Spectrum, list[LineSpectrum]], FitSelection],
     rng: np.random.Generator,
 ) -> ThermalFit:
-    """Return the fit as it is told, with the noise that temperature leaves.
-
-    ``lines`` are those of what temperature leaves: it stands out of that noise.
-    """
+    """Return the result, with the noise and the ``lines`` of the residual."""
     without, effect = plain, np.zeros(len(path.value))
     mean = fit.spectrum.mean
     if verdict.compensated:
@@ -379,7 +364,7 @@ def _described(
     added = [path.means(*place, effect) for place in fit.series.places]
     shift = float(np.concatenate(added).mean())
     candidates = settled.candidates if verdict.compensated else fit.of_the_log
-    # T_0 is as uncertain as the mean of the path.
+    # The error of T_0 is the error of the mean of the path.
     of_reference = float(np.std(path.draws.mean(axis=1))) * (verdict.sensitivity.in_model or 0.0)
     spread = math.hypot(
         _mean_error(candidates, without, fit.spectrum),
@@ -405,7 +390,7 @@ def _described(
 
 
 def _mean_error(candidates: Sequence[Candidate], fitted: Likelihood, spectrum: Spectrum) -> float:
-    """Return the standard deviation of the mean of a log, whichever its noise may be."""
+    """Return the standard deviation of the mean of a log, averaged over its noise models."""
     (estimate, _), K = fitted.estimates, fitted.estimates[0].parameters["K"]
     noises = [
         (add_likely_walk(model, K) if "K" in candidate.terms.linear else model, share)

@@ -1,9 +1,8 @@
-"""The smooth path of a temperature that is known by a register, with its error.
+"""The smooth path of a temperature from the readings of a register, with its error.
 
-The temperature is an integrated random walk; a block of equal readings says into which cell of
-the register it falls, a block that the register crosses where the edge of the cell was reached.
-How fast it varies and how much noise the register adds are those of the greatest evidence. The
-temperature that acts is that of a first-order lag behind the one that is measured (`lagged`).
+The temperature is an integrated random walk. A block of equal readings gives the cell of the
+register, and a block with two readings the time at the edge between their cells. The rate of the
+walk and the noise of the register maximise the evidence.
 
 References
 ----------
@@ -35,48 +34,29 @@ from imubench_pipeline.estimators.thermal.register import (
 )
 from imubench_pipeline.typing import Array
 
-DRAWN_PATHS = 24
-"""Number of paths drawn from the distribution of the temperature, given the register."""
-
+DRAWN_PATHS = 24  # paths drawn from the posterior of the temperature
 _LOG_DENSITY_GRID = range(-14, 5, 2)
 _NOISE_GRID = (0.01, 0.1, 0.4)
 _MIN_NOISE = 1e-4
 _MAX_ITERATIONS = 40
 _IMPOSSIBLE_COST = 1e300
 _FLOOR = 1e-3
-_MAX_BOUNDING_NOISE = 0.25
-"""Ratio of noise and step below which a reading bounds the temperature."""
+_MAX_BOUNDING_NOISE = 0.25  # ratio of noise and step below which a reading bounds the temperature
 
 
 @dataclass(frozen=True)
 class TemperaturePath:
-    """A temperature on a coarse grid, linear between the knots of a segment.
+    """A temperature on a coarse grid, linear between the knots of a segment."""
 
-    Attributes
-    ----------
-    sample : ndarray, shape (k,)
-        Place of the knots on the grid of the log.
-    value, deviation : ndarray, shape (k,)
-        Temperature, and its standard deviation, °C.
-    draws : ndarray, shape (d, k)
-        Paths that the readings allow, drawn from their distribution, °C.
-    parts : tuple of slice
-        Knots of each segment.
-    segments : tuple of (int, int)
-        First and one-past-last sample of each segment.
-    step, noise : float
-        Least significant bit of the register (0: none shows), and standard deviation of the
-        noise of a reading, °C.
-    """
-
-    sample: Array
+    sample: Array  # (k,): place of the knots on the grid of the log
     value: Array
     deviation: Array
-    draws: Array
-    parts: tuple[slice, ...]
-    segments: tuple[Span, ...]
-    step: float
-    noise: float
+    """(k,): temperature, and its standard deviation, °C."""
+    draws: Array  # (d, k): paths drawn from their distribution, given the readings, °C
+    parts: tuple[slice, ...]  # knots of each segment
+    segments: tuple[Span, ...]  # first and one-past-last sample of each segment
+    step: float  # least significant bit of the register, °C; 0: unknown
+    noise: float  # standard deviation of the noise of a reading, °C
 
     @property
     def mean(self) -> float:
@@ -89,11 +69,10 @@ class TemperaturePath:
         return float(np.ptp(self.value))
 
     def at(self, points: NDArray[Any], values: Array) -> Array:
-        """Return what is known at the knots, between them; no segment tells of another.
+        """Interpolate values at the knots, shape (k,), within each segment.
 
-        ``points``, shape (n,), are places on the grid of the log, rising; those after a segment and
-        before the next are given what its last knot has. ``values``, shape (k,), are those at the
-        knots.
+        ``points``, shape (n,), are ascending places on the grid of the log; between two segments
+        the value at the last knot is returned.
         """
         cuts = np.searchsorted(points, [start for start, _ in self.segments[1:]])
         pieces = zip(np.split(points, cuts), self.parts, strict=True)
@@ -101,11 +80,10 @@ class TemperaturePath:
         return np.concatenate(pieces_at)
 
     def means(self, first: int, block: int, count: int, values: Array) -> Array:
-        """Return the means over blocks of what is known at the knots, linear between them.
+        """Return means over blocks, shape (..., count), of values at the knots, shape (..., k).
 
-        ``first`` is the first sample of the first of ``count`` blocks of ``block`` samples, which
-        follow each other in one segment. ``values``, shape (..., k), are those at the knots; the
-        means have the shape (..., count).
+        ``first`` is the first sample of ``count`` adjacent blocks of ``block`` samples in a
+        segment.
         """
         part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
         edges = first - 0.5 + block * np.arange(count + 1)
@@ -130,14 +108,8 @@ def temperature_path(
 ) -> TemperaturePath:
     """Return the path of a temperature from the readings of its register.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        Readings in order on the grid of the log, °C; NaN where missing.
-    segments : sequence of (int, int)
-        First and one-past-last sample of each part that no time relates to the others.
-    rng : numpy.random.Generator
-        For the draws.
+    The readings, °C, are on the grid of the log, NaN where missing; the time between segments is
+    unknown.
 
     Raises
     ------
@@ -159,15 +131,14 @@ def temperature_path(
     draws = np.empty((DRAWN_PATHS, len(read.begin)))
     for part in read.pieces:
         if evidence.stays_in_a_cell(part):
-            # Anywhere in the cell, all the time: as errors of a level go, the most that it may be.
+            # Anywhere in the cell, all the time: the largest error that the level can have.
             value[part], variance[part] = read.mean[part] - level, read.step**2 / 12.0
-            off = read.step * (rng.random((DRAWN_PATHS, 1)) - 0.5)
-            draws[:, part] = value[part] + off
+            draws[:, part] = value[part] + read.step * (rng.random((DRAWN_PATHS, 1)) - 0.5)
             continue
         value[part], variance[part], _, precision, shift = evidence.part(part, q, noise)
         normals = rng.standard_normal((DRAWN_PATHS, part.stop - part.start, 2))
         draws[:, part] = draw_paths(evidence.steps(part), q, spread, precision, shift, normals)
-        draws[:, part] += evidence.dwelling(part, q, noise, variance[part], rng)
+        draws[:, part] += evidence.draw_stays(part, q, noise, variance[part], rng)
     value, draws = value + level, draws + level
     if noise < _MAX_BOUNDING_NOISE * read.step:
         inside = read.high == read.low
@@ -186,7 +157,7 @@ def temperature_path(
 
 
 class _Evidence:
-    """The readings as the kernels take them, and how likely they are."""
+    """The readings as the kernels take them, and their likelihood."""
 
     def __init__(self, read: Readings, level: float, spread: float) -> None:
         self._read, self._level, self._spread = read, level, spread
@@ -197,8 +168,8 @@ class _Evidence:
         self._two = stepped & ~self._cell & (read.high - read.low < 1.5 * read.step)
         self._mean = present & ~self._cell & ~self._two
         count = np.maximum(read.count, 1)
-        # All of n readings in one cell: x keeps clear of its edges by about the greatest of n
-        # normal variates, whose median and (nearly) standard deviation these are.
+        # All of n readings are in one cell: x is away from its edges by about the largest of n
+        # normal variates, with this median and (nearly) this standard deviation.
         self._clear = ndtri(0.5 ** (1.0 / count))
         self._soft = 1.0 / np.sqrt(1.0 + 0.9 * np.log(count))
         # Readings on both sides of an edge: x follows from the share of each.
@@ -207,7 +178,7 @@ class _Evidence:
         self._beyond = ndtri(share)
         density = np.exp(-0.5 * self._beyond**2) / math.sqrt(2.0 * math.pi)
         self._share_variance = share * (1.0 - share) / count / density**2
-        # Within a block x moves on.
+        # x changes within a block.
         self._floor = max(_FLOOR * read.step, 2.0 * spread / len(count))
 
     def stays_in_a_cell(self, part: slice) -> bool:
@@ -235,12 +206,12 @@ class _Evidence:
         precision = np.where(two | many, 1.0 / variance, 0.0)
         shift = np.where(two | many, at / variance, 0.0)
         height = -0.5 * np.log(variance[many]).sum()
-        # The share of a block is given, not the x that it tells: with dx = noise dz.
+        # The share of a block is given, not the x that follows from it: dx = noise dz.
         height += (
             0.5 * np.log((noise**2 * self._share_variance[part] + least) / variance)[two].sum()
         )
         height += float((-0.5 * at**2 / variance)[two | many].sum())
-        half = self._half(part, noise)
+        half = self._compute_half_width(part, noise)
         path, spread, evidence = propagate(
             self.steps(part),
             q,
@@ -254,37 +225,38 @@ class _Evidence:
         )
         return path, spread, evidence + float(height), precision, shift
 
-    def _half(self, part: slice, noise: float) -> Array:
-        """Return half the width of what a cell allows the path in each block."""
+    def _compute_half_width(self, part: slice, noise: float) -> Array:
+        """Return half the width of the range of the path in the cell of each block."""
         step = self._read.step
         return np.maximum(0.5 * step - noise * self._clear[part], 0.05 * step)
 
-    def dwelling(
+    def draw_stays(
         self, part: slice, q: float, noise: float, variance: Array, rng: np.random.Generator
     ) -> Array:
-        """Draw what a path may be off by for as long as it stays in a cell, shape (d, k).
+        """Draw errors of a path that are constant during a stay in a cell, shape (d, k).
 
-        With the variance of the wandering path it has that of a level anywhere in the cell.
+        They increase its variance to the variance of a level anywhere in the cell.
         """
-        inside, mean, half = self._cell[part], self._read.mean[part], self._half(part, noise)
+        inside, mean = self._cell[part], self._read.mean[part]
+        half = self._compute_half_width(part, noise)
         off = np.zeros((DRAWN_PATHS, len(inside)))
         if not inside.any():
             return off
-        for dwell in find_cell_stays(inside, mean, float(np.median(half[inside])), q):
-            missing = np.maximum(half**2 / 3.0 - variance, 0.0)[dwell.blocks]
+        for blocks, taper in find_cell_stays(inside, mean, float(np.median(half[inside])), q):
+            missing = np.maximum(half**2 / 3.0 - variance, 0.0)[blocks]
             level = math.sqrt(3.0) * (2.0 * rng.random((DRAWN_PATHS, 1)) - 1.0)
-            off[:, dwell.blocks] = level * dwell.taper * np.sqrt(missing)
+            off[:, blocks] = level * taper * np.sqrt(missing)
         return off
 
     def best(self) -> tuple[float, float, float]:
-        """Return q and the noise that make the readings most likely, and log their evidence."""
+        """Return q and the noise with the maximum evidence, and its logarithm."""
         read = self._read
         present = read.mean[read.count > 0]
         rough = float(np.median(np.abs(np.diff(present)))) if len(present) > 1 else 0.0
         least = _MIN_NOISE * self._spread
         noises = {max(part * read.step, least) for part in _NOISE_GRID} | {max(rough, least)}
         moving = [part for part in read.pieces if not self.stays_in_a_cell(part)]
-        # A level is anywhere in the spread of all of them.
+        # A level has a uniform prior over the spread of all levels.
         level_pieces = len(read.pieces) - len(moving)
         constant = level_pieces * math.log(read.step / self._spread) if level_pieces else 0.0
 
@@ -305,8 +277,7 @@ class _Evidence:
             method="Nelder-Mead",
             options={
                 "maxfev": _MAX_ITERATIONS,
-                "initial_simplex": np.array([first, first, first])
-                + np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 0.3]]),
+                "initial_simplex": first + np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 0.3]]),
                 "xatol": 0.05,
                 "fatol": 0.05,
             },
@@ -321,8 +292,8 @@ def _lagged(times: Array, values: Array, lag: float) -> Array:
     if values.size == 0:
         return result
     result[0] = values[0]
-    # T_lag - T, as it decays and as a ramp of the temperature adds to it: weights of T_lag itself
-    # would be differences of nearly equal numbers over short steps.
+    # T_lag - T decays, and a ramp of the temperature adds to it. Weights of T_lag itself would be
+    # differences of nearly equal numbers over short steps.
     behind = 0.0
     for i in range(1, values.size):
         h = (times[i] - times[i - 1]) / lag
@@ -334,13 +305,13 @@ def _lagged(times: Array, values: Array, lag: float) -> Array:
 def lagged(times: Array, values: Array, lag: float) -> Array:
     """Return a temperature, shape (k,), behind a first-order lag: L dT_lag/dt = T - T_lag.
 
-    Exact at the knots ``times``, s, rising, for a temperature that is linear between them. It is in
-    equilibrium at the first knot. The lag is in s; 0: none.
+    Exact at the ascending knots ``times``, s, for a temperature that is linear between them and in
+    equilibrium at the first.
 
     Raises
     ------
     ValueError
-        If the lag is below 0 or not finite.
+        If the lag, s, is below 0 or not finite.
     """
     if not (lag >= 0.0 and math.isfinite(lag)):
         raise ValueError(f"the lag is {lag} s, expected a time from 0")
@@ -351,10 +322,9 @@ def lagged(times: Array, values: Array, lag: float) -> Array:
 
 
 def lagged_path(path: TemperaturePath, values: Array, rate: float, lag: float) -> Array:
-    """Return a path's knots, shape (k,), behind a lag in s; each segment begins in equilibrium.
+    """Return temperatures at the knots, shape (k,), behind a lag in s (see `lagged`).
 
-    ``values`` are temperatures at the knots: its own, or one of its draws. Errors are those of
-    `lagged`.
+    Each segment begins in equilibrium.
     """
     return np.concatenate(
         [lagged(path.sample[part] / rate, values[part], lag) for part in path.parts]

@@ -1,9 +1,8 @@
 """The compiled recursions of the path of a temperature: expectation propagation on its blocks.
 
-The temperature is an integrated random walk, x'' white of density q. What a block says of x is
-exp(-precision x^2 / 2 + shift x) where it measures x, and P(x + noise in the cell) where it only
-says into which cell of the register x falls; the latter is replaced by the Gaussian of equal
-moments under everything else.
+The temperature is an integrated random walk, x'' white of density q. The likelihood of a block is
+exp(-precision x^2 / 2 + shift x) if it measures x, or P(x + noise in the cell) if it only gives
+the cell of the register; the latter is replaced by the Gaussian with equal moments.
 """
 
 from __future__ import annotations
@@ -81,7 +80,7 @@ def _ahead(
 def _measured(
     x: float, s: float, a: float, b: float, c: float, precision: float, shift: float
 ) -> tuple[float, float, float, float, float]:
-    """Return state and covariance after exp(-precision x^2 / 2 + shift x) is known of x."""
+    """Return state and covariance after a measurement exp(-precision x^2 / 2 + shift x)."""
     grown = 1.0 + precision * a
     pull = (shift - precision * x) / grown
     return x + a * pull, s + b * pull, a / grown, b / grown, c - b * b * precision / grown
@@ -91,7 +90,7 @@ def _measured(
 def _filtered(
     steps: Array, q: float, spread: float, precision: Array, shift: Array, means: Array, covs: Array
 ) -> float:
-    """Filter; leave the filtered means (n, 2) and covariances (n, 3), return log evidence."""
+    """Filter; set the filtered means (n, 2) and covariances (n, 3), return log evidence."""
     n = precision.size
     total = 0.0
     x, s = 0.0, 0.0
@@ -109,10 +108,9 @@ def _filtered(
 
 @njit(cache=True)
 def _gain(h: float, q: float, cov: Array) -> tuple[float, ...]:
-    """Return the smoother's gain G (row by row), and P - G P' G^T, what the future leaves open.
+    """Return the smoother's gain G, row by row, and the residual covariance P - G P' G^T.
 
-    G = P F^T P'^-1 = F^-1 (1 - Q P'^-1), with P' = F P F^T + Q: no digits are lost where q is
-    small.
+    G = P F^T P'^-1 = F^-1 (1 - Q P'^-1), with P' = F P F^T + Q: no digits are lost if q is small.
     """
     a, b, c = cov[0], cov[1], cov[2]
     qa, qb, qc = q * h**3 / 3.0, q * h * h / 2.0, q * h
@@ -157,7 +155,7 @@ def _smoothed(
 
 @njit(cache=True)
 def _messages(steps: Array, q: float, precision: Array, shift: Array, future: Array) -> None:
-    """Leave what the blocks after each say of its state: precision (3) and shift (2), (n, 5)."""
+    """Set the messages from later blocks: precision (3) and shift (2) of the state, (n, 5)."""
     n = precision.size
     future[n - 1] = 0.0
     for i in range(n - 2, -1, -1):
@@ -189,32 +187,14 @@ def propagate(
     precision: Array,
     shift: Array,
 ) -> tuple[Array, Array, float]:
-    """Return mean and variance of the path, and the log evidence of q and the noise.
+    """Return mean and variance of the path, shapes (n,), °C and °C², and the log evidence.
 
-    Parameters
-    ----------
-    steps : ndarray, shape (n,)
-        Time from the block before, in blocks; that of the first is not used but for its size.
-    q : float
-        Density of x'', °C² a block³.
-    spread : float
-        Range of the readings, °C: beside it, what is known of the first x is next to nothing.
-    cell : ndarray of bool, shape (n,)
-        Blocks that say into which cell x falls.
-    low, high : ndarray, shape (n,)
-        Edges of their cells, °C; of the others not used.
-    noise : ndarray, shape (n,)
-        Variance of the noise between x and those edges, °C².
-    precision, shift : ndarray, shape (n,)
-        1/°C² and 1/°C. What the blocks measure, 0 where one measures nothing; changed in place:
-        those of cells are found here.
-
-    Returns
-    -------
-    path, variance : ndarray, shape (n,)
-        °C and °C².
-    evidence : float
-        -inf where the cells do not settle.
+    ``steps``, shape (n,): time since the previous block, in blocks; ``q``: density of x'', °C² per
+    block³; ``spread``: range of the readings, °C, for a vague prior of the first x; ``cell``:
+    blocks that give the cell of x, with the edges ``low`` and ``high``, °C, and the variance
+    ``noise``, °C², of the noise between x and these edges; ``precision``, 1/°C², and ``shift``,
+    1/°C: measurements (0: none), set in place for cells. The evidence is -inf if the iteration does
+    not converge.
     """
     n = precision.size
     means, covs = np.empty((n, 2)), np.empty((n, 3))
@@ -263,7 +243,7 @@ def propagate(
 
 @njit(cache=True)
 def _joined(x: float, s: float, a: float, b: float, c: float, future: Array) -> tuple[float, float]:
-    """Return mean and variance of x, given a Gaussian state and what the future says of it."""
+    """Return mean and variance of x, given a Gaussian state and the message from later blocks."""
     fa, fb, fc, fe, ff = future[0], future[1], future[2], future[3], future[4]
     # (1 + P Lambda)^-1 times (state + P shift), and times P.
     j, k = 1.0 + a * fa + b * fb, a * fb + b * fc
@@ -279,8 +259,7 @@ def draw_paths(
 ) -> Array:
     """Return draws of the path from its Gaussian posterior, shape (draws, n), °C.
 
-    Filter forwards, sample backwards. ``precision`` and ``shift`` are as `propagate` left them,
-    ``normals``, shape (draws, n, 2), standard normal deviates.
+    ``precision`` and ``shift`` are from `propagate`; ``normals``: normal deviates, (draws, n, 2).
     """
     draws, n = normals.shape[0], normals.shape[1]
     means, covs = np.empty((n, 2)), np.empty((n, 3))

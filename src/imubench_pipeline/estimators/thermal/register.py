@@ -1,16 +1,8 @@
 """Block means of a temperature register, its resolution, and jumps of the temperature.
 
-A temperature varies slowly. It is stored in at most `MAX_BLOCKS` blocks of ceil(L / MAX_BLOCKS)
-samples, of one sample in a short log.
-
-The smooth path of a temperature is restarted where the temperature jumps (`split_at_jumps`). If a
-chamber is set to another temperature, or a sensor is carried outside, the temperature changes in a
-few samples far more than in the minutes around. One smooth path through a jump would be too rough
-everywhere, and the errors of the levels between jumps too small.
-
-Long stays in one cell of the register have larger errors (`find_cell_stays`). A path that varies as
-elsewhere would have left the cell. During such a stay it varies less, and may be near an edge
-throughout. This error does not average out, unlike the error of a varying path.
+The smooth path of a temperature is restarted where the temperature jumps (`split_at_jumps`), since
+one path through a jump would be too rough everywhere. Errors during long stays in one cell of the
+register do not average out (`find_cell_stays`).
 """
 
 from __future__ import annotations
@@ -27,41 +19,18 @@ from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.missing import yield_present_samples
 from imubench_pipeline.typing import Array
 
-MAX_BLOCKS = 8192
-"""Maximum number of blocks of a log (plus one per segment)."""
-
-_MAX_LEVELS = 1 << 16
-"""Maximum number of distinct readings from which the resolution is estimated."""
-
-_MIN_READINGS_PER_LEVEL = 8.0
-"""Minimum readings per level; fewer repetitions may be chance."""
-
-_MAX_DIVISOR = 256
-"""Maximum number of steps in the smallest gap, where few levels were read."""
-
-_MAX_CHANCE = 1e-3
-"""Maximum probability that levels are multiples of a step by chance."""
-
-_MAX_ROUNDING = 0.2
-"""Maximum deviation of decimal readings from multiples of a step, in steps."""
-
-_MIN_JUMP_BITS = 1.5
-"""Minimum size of a jump in least significant bits."""
-
-_MIN_JUMP_RATIO = 8.0
-"""Minimum ratio of a jump and the greatest change around it."""
-
-_NEIGHBOUR_BLOCKS = 16
-"""Blocks on each side of a jump that are compared with it."""
-
-_MIN_LEVEL_BLOCKS = 5
-"""Minimum number of blocks of a level between jumps."""
-
-_MAX_JUMPS = 64
-"""Maximum number of jumps in a segment; more are the normal variation of the temperature."""
-
-_MIN_STAY_CROSSINGS = 3.0
-"""Duration of a long stay in a cell, in times that the path takes to cross it."""
+MAX_BLOCKS = 8192  # maximum number of blocks of a log (plus one per segment)
+_MAX_LEVELS = 1 << 16  # maximum number of distinct readings from which the resolution is estimated
+_MIN_READINGS_PER_LEVEL = 8.0  # minimum readings per level; fewer repetitions may be chance
+_MAX_DIVISOR = 256  # maximum number of steps in the smallest gap, where few levels were read
+_MAX_CHANCE = 1e-3  # maximum probability that levels are multiples of a step by chance
+_MAX_ROUNDING = 0.2  # maximum deviation of decimal readings from multiples of a step, in steps
+_MIN_JUMP_BITS = 1.5  # minimum size of a jump in least significant bits
+_MIN_JUMP_RATIO = 8.0  # minimum ratio of a jump and the greatest change around it
+_NEIGHBOUR_BLOCKS = 16  # blocks on each side of a jump that are compared with it
+_MIN_LEVEL_BLOCKS = 5  # minimum number of blocks of a level between jumps
+_MAX_JUMPS = 64  # per segment; more are the normal variation of the temperature
+_MIN_STAY_CROSSINGS = 3.0  # duration of a long stay in a cell over the time to cross it
 
 
 @dataclass(frozen=True)
@@ -88,11 +57,7 @@ class Readings:
 
 
 def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
-    """Return the block means of temperature readings, in one pass and bounded memory.
-
-    The blocks are the readings in order on the grid of the log, °C, of any shape (n,), NaN where
-    missing; ``segments`` are the first and one-past-last sample of each segment; the time between
-    segments is unknown.
+    """Return the block means of temperature readings, °C, NaN where missing, in one pass.
 
     Raises
     ------
@@ -108,7 +73,6 @@ def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readin
     total, count = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.int64)
     low, high = np.full(len(begin), np.inf), np.full(len(begin), -np.inf)
     levels: Array = np.empty(0)
-    present = 0
     for place, chosen in yield_present_samples(blocks, begin, end):
         edges = np.flatnonzero(np.diff(place, prepend=-1))
         block = place[edges]
@@ -116,9 +80,9 @@ def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readin
         count[block] += np.diff(np.append(edges, len(chosen)))
         low[block] = np.minimum(low[block], np.minimum.reduceat(chosen, edges))
         high[block] = np.maximum(high[block], np.maximum.reduceat(chosen, edges))
-        present += len(chosen)
         if len(levels) <= _MAX_LEVELS:
             levels = np.union1d(levels, chosen)
+    present = int(count.sum())
     if present == 0:
         raise ValueError("no temperature is present")
     stops = np.cumsum([len(part) for part in begins])
@@ -138,19 +102,17 @@ def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readin
 
 
 def estimate_resolution(levels: Array, present: int) -> float:
-    """Return the least significant bit of a register from its distinct readings, °C.
+    """Return the least significant bit of a register from its distinct readings, °C; 0: unknown.
 
     It is the smallest gap between the levels, shape (n,), ascending, if all gaps are multiples of
-    it within decimal rounding. It is 0 if there is none, if only one value was read, or if hardly
-    any of the readings ``present`` is repeated.
+    it within decimal rounding, and enough of the readings ``present`` are repeated.
     """
     if len(levels) < 2 or present < _MIN_READINGS_PER_LEVEL * len(levels):
         return 0.0
     gaps = np.diff(levels)
     smallest = float(gaps.min())
     # Decimal rounding makes gaps of one step differ; their mean is unaffected.
-    step = float(np.mean(gaps[gaps < 1.75 * smallest]))
-    first = float(levels[0])
+    step, first = float(np.mean(gaps[gaps < 1.75 * smallest])), float(levels[0])
     for _ in range(2):
         multiples = np.rint((levels - first) / step)
         if multiples[-1] > multiples[0]:
@@ -158,12 +120,16 @@ def estimate_resolution(levels: Array, present: int) -> float:
     if not math.isfinite(step):
         return 0.0
     missed = np.abs((levels - first) / step - multiples)
-    if (
-        float(np.quantile(missed, 0.99)) <= _MAX_ROUNDING
-        and _compute_chance(gaps, step) < _MAX_CHANCE
-    ):
+    regular = float(np.quantile(missed, 0.99)) <= _MAX_ROUNDING
+    if regular and _compute_chance(gaps, step) < _MAX_CHANCE:
         return step
-    return _find_common_divisor(gaps)
+    if len(gaps) < 2:
+        return 0.0
+    # Few levels: the greatest step that divides all gaps, unless it may do so by chance.
+    for step in smallest / np.arange(2, _MAX_DIVISOR + 1):
+        if smallest / step * _compute_chance(gaps, float(step)) < _MAX_CHANCE:
+            return float(step)
+    return 0.0
 
 
 def _compute_chance(gaps: Array, step: float) -> float:
@@ -175,20 +141,6 @@ def _compute_chance(gaps: Array, step: float) -> float:
     return min(2.0 * missed, 1.0) ** len(others)
 
 
-def _find_common_divisor(gaps: Array) -> float:
-    """Return the greatest step of which a few gaps are multiples; 0 if it may be chance."""
-    smallest = float(gaps.min())
-    steps = smallest / np.arange(2, _MAX_DIVISOR + 1)
-    return next(
-        (
-            float(step)
-            for step in steps
-            if len(gaps) > 1 and smallest / step * _compute_chance(gaps, float(step)) < _MAX_CHANCE
-        ),
-        0.0,
-    )
-
-
 def split_at_jumps(read: Readings) -> Readings:
     """Return readings with blocks split at jumps of the temperature, and the pieces between jumps.
 
@@ -197,19 +149,19 @@ def split_at_jumps(read: Readings) -> Readings:
     without jumps are returned unchanged.
     """
     parts = [_find_jumps(read, part) for part in read.parts]
-    if not any(jumps for jumps in parts):
+    if not any(parts):
         return read
     columns: list[Array] = []
     pieces: list[slice] = []
     places: list[slice] = []
-    blocks_before = 0
+    begun = 0
     for part, jumps in zip(read.parts, parts, strict=True):
         blocks, cuts = _cut_blocks(read, part, jumps)
         columns.append(blocks)
-        ends = [0, *cuts, blocks.shape[1]]
-        places.append(slice(blocks_before, blocks_before + blocks.shape[1]))
-        pieces += [slice(blocks_before + a, blocks_before + b) for a, b in pairwise(ends)]
-        blocks_before += blocks.shape[1]
+        ends = [begun, *(begun + cut for cut in cuts), begun + blocks.shape[1]]
+        places.append(slice(begun, ends[-1]))
+        pieces += [slice(a, b) for a, b in pairwise(ends)]
+        begun = ends[-1]
     begin, end, count, mean, low, high = np.concatenate(columns, axis=1)
     return replace(
         read,
@@ -281,31 +233,17 @@ def _cut_blocks(
     return blocks, cuts
 
 
-@dataclass(frozen=True)
-class CellStay:
-    """A long stay in one cell of the register."""
-
-    blocks: slice  # of a segment
-    taper: Array
-    """(b,): from 0 where the path crosses an edge of the cell, and is therefore known, to 1 at a
-    distance of one crossing time."""
-
-
 def find_cell_stays(
     inside: NDArray[np.bool_], level: Array, half: float, q: float
-) -> Iterator[CellStay]:
-    """Yield the long stays in one cell of the register.
+) -> Iterator[tuple[slice, Array]]:
+    """Yield the blocks of a segment in long stays in one cell of the register, and their taper.
 
-    Parameters
-    ----------
-    inside : ndarray of bool, shape (k,)
-        All readings of a block are of one cell.
-    level : ndarray, shape (k,)
-        The mean reading of a block, K.
-    half : float
-        Half the width of a cell, K.
-    q : float
-        Density of the second derivative of the path (an integrated random walk), K² per block³.
+    The taper, shape (b,), is from 0 where the path crosses an edge of the cell, and is therefore
+    known, to 1 at a distance of one crossing time.
+
+    ``inside``, shape (k,): all readings of a block are of one cell; ``level``, shape (k,): mean
+    reading of a block, K; ``half``: half the width of a cell, K; ``q``: density of the second
+    derivative of the path (an integrated random walk), K² per block³.
     """
     if not inside.any():
         return
@@ -320,4 +258,4 @@ def find_cell_stays(
         before = place if begin > 0 else math.inf
         after = end - begin - place if end < len(inside) else math.inf
         away = np.minimum(np.minimum(before, after), crossing) / crossing
-        yield CellStay(slice(begin, end), np.asarray(away) * np.ones(end - begin))
+        yield slice(begin, end), np.asarray(away) * np.ones(end - begin)

@@ -1,29 +1,147 @@
-"""Generalised least squares of a log on its temperature, for given noise: s, q and the lag."""
+"""Generalised least squares of a log on its temperature, for given noise: s, q and the lag.
+
+A mean beta . x in a log changes the density I of a bin to I - 2 beta . cross + beta . gram beta.
+The temperature varies slowly: it is compared at low frequencies only, in the DCT coefficients of
+the log or of its block means.
+"""
 
 from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from imubench_pipeline.estimators.spectrum import Spectrum
+from imubench_pipeline.allan.phase import Span
+from imubench_pipeline.estimators.spectrum import BLOCK_BAND, Spectrum
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged_path
-from imubench_pipeline.estimators.thermal.products import Coefficients, Products
 from imubench_pipeline.typing import Array
 
 _LAG_GRID_SIZE = 16
-_MAX_LAG_FRACTION = 1 / 20
-"""Maximum lag over the duration of the log; a longer lag looks like drift."""
-
+_MAX_LAG_FRACTION = 1 / 20  # longest lag over the log; a longer lag looks like drift
 _MAX_LAG = 1800.0
 _MIN_ORDINATES = 0.02
-_LAGS_PER_BATCH = 8
-"""Lags whose regressors are in memory at the same time."""
+_LAGS_PER_BATCH = 8  # lags whose regressors are in memory at the same time
+
+
+class BlockSeries:
+    """Block means of a log, gathered while its samples pass.
+
+    An incomplete block at the end of a segment is dropped.
+    """
+
+    def __init__(self, segments: Sequence[Span], block: int) -> None:
+        self.segments, self.block = tuple(segments), block
+        self._sums: list[Array] = [np.zeros((stop - start) // block) for start, stop in segments]
+
+    def watch(self, blocks: Iterable[Array]) -> Iterator[Array]:
+        """Yield the blocks of a complete log, in order, SI, unchanged, and gather the means."""
+        reached = 0
+        for values in blocks:
+            for sums, (start, _) in zip(self._sums, self.segments, strict=True):
+                first = max(start, reached)
+                last = min(start + len(sums) * self.block, reached + len(values))
+                if first < last:
+                    inside = values[first - reached : last - reached]
+                    place = (np.arange(first, last) - start) // self.block
+                    low = int(place[0])
+                    sums[low : int(place[-1]) + 1] += np.bincount(place - low, weights=inside)
+            reached += len(values)
+            yield values
+
+    @property
+    def means(self) -> list[Array]:
+        """Means of the blocks of each part that has two and more."""
+        return [np.asarray(sums / self.block) for sums in self._sums if len(sums) >= 2]
+
+    @property
+    def places(self) -> list[tuple[int, int, int]]:
+        """First sample, samples in a block, and number of blocks of these parts."""
+        return [
+            (start, self.block, len(sums))
+            for sums, (start, _) in zip(self._sums, self.segments, strict=True)
+            if len(sums) >= 2
+        ]
+
+
+@dataclass(frozen=True)
+class Products:
+    """Mean products of coefficients in each bin of a spectrum, as densities."""
+
+    cross: Array  # (b, p): of the log and each of p regressors, SI times its unit, per Hz
+    gram: Array  # (b, p, p): of the regressors, in the product of their units, per Hz
+
+
+class Coefficients:
+    """The DCT coefficients of a log at low frequencies, and their products with regressors.
+
+    They are computed from its block means, for the bins of the spectrum with the same blocks.
+    """
+
+    def __init__(self, spectrum: Spectrum, series: BlockSeries) -> None:
+        self._interval = series.block / spectrum.rate
+        self.places = series.places
+        low = spectrum.block == series.block
+        self._bins, self._low = len(low), np.flatnonzero(low)
+        counts = np.rint(spectrum.ordinates[low]).astype(np.int64)
+        lengths = [len(means) for means in series.means]
+        f = np.concatenate([np.arange(1, n) / (2.0 * n * self._interval) for n in lengths])
+        highest = BLOCK_BAND if series.block > 1 else np.inf
+        low_ordinates = np.flatnonzero(2.0 * np.pi * f * self._interval <= highest)
+        self._order = low_ordinates[np.argsort(f[low_ordinates], kind="stable")]
+        self._edges = np.concatenate(([0], np.cumsum(counts)[:-1]))
+        self._counts = counts
+        self.ordinates = spectrum.ordinates
+        self.log = self._of(series.means)
+
+    def _of(self, parts: Sequence[Array]) -> Array:
+        centred = [values - values.mean(axis=-1, keepdims=True) for values in parts]
+        transformed = [
+            scipy.fft.dct(values, type=2, norm="ortho", axis=-1)[..., 1:] for values in centred
+        ]
+        return np.asarray(np.concatenate(transformed, axis=-1)[..., self._order])
+
+    def of_knots(self, path: TemperaturePath, values: Sequence[Array]) -> Array:
+        """Return the coefficients of regressors that are linear between knots, shape (p, n).
+
+        ``values``: p regressors at the knots, shape (k,). Several together take half the time, or
+        less if the length of the log has large prime factors.
+        """
+        rows = np.array(values)
+        return self._of([path.means(*place, rows) for place in self.places])
+
+    def of_time(self, rate: float) -> Array:
+        """Return the coefficients of a ramp of 1 a second, shape (n,), s."""
+        return self._of(
+            [
+                (first + (np.arange(count, dtype=np.float64) + 0.5) * block - 0.5) / rate
+                for first, block, count in self.places
+            ]
+        )
+
+    def density(self) -> Array:
+        """Return the density of the log in each bin with coefficients, else 0."""
+        return self._binned(self.log**2)
+
+    def products(self, regressors: Sequence[Array]) -> Products:
+        """Return the products of log and regressors in each bin with coefficients, else 0."""
+        p = len(regressors)
+        cross, gram = np.zeros((self._bins, p)), np.zeros((self._bins, p, p))
+        for i, left in enumerate(regressors):
+            cross[:, i] = self._binned(left * self.log)
+            for j in range(i + 1):
+                gram[:, i, j] = gram[:, j, i] = self._binned(left * regressors[j])
+        return Products(cross, gram)
+
+    def _binned(self, products: Array) -> Array:
+        result = np.zeros(self._bins)
+        result[self._low] = np.add.reduceat(products, self._edges) / self._counts * self._interval
+        return result
 
 
 @dataclass(frozen=True)
@@ -49,19 +167,9 @@ class Regression:
 
 
 class Regressors:
-    """The regressors of a log, and their products with it, for any lag; `also` has further ones.
+    """The regressors of a log, and their products with it, for any lag.
 
-    Parameters
-    ----------
-    coefficients : Coefficients
-        Of the log.
-    path : TemperaturePath
-    rate : float
-        Hz.
-    reference : float
-        T_0, °C.
-    used : ndarray of bool, shape (b,)
-        Bins to use.
+    ``rate`` is in Hz, ``reference`` is T_0, °C, and ``used``, shape (b,), are the bins to use.
     """
 
     def __init__(
@@ -74,12 +182,12 @@ class Regressors:
     ) -> None:
         self.coefficients, self.path, self.rate = coefficients, path, rate
         self.reference, self.used = reference, used
-        # Whether the square of the temperature, and time, are regressors too; and for how many s
-        # from the beginning a sensor that settles may follow the temperature otherwise.
+        # Whether the square of the temperature and time are regressors, and the duration, s, of
+        # settling from the beginning, in which the sensitivity may be different.
         self.quadratic, self.ramp, self.settling = False, False, 0.0
         self._products: dict[float, Products] = {}
         self._time = coefficients.of_time(rate)
-        # With the ramp and in all bins, for `also` to share: the transforms are the costly part.
+        # With the ramp and in all bins, shared by `also`, since the transforms take most time.
         self._full: dict[tuple[float, bool, float], Products] = {}
         self.ordinates = coefficients.ordinates[used]
 
@@ -91,7 +199,7 @@ class Regressors:
         settling: float | None = None,
         used: NDArray[np.bool_] | None = None,
     ) -> Regressors:
-        """Return the regressors with other terms, or in other bins; None: as they are."""
+        """Return the regressors with other terms, or in other bins; None: unchanged."""
         other = copy.copy(self)
         other.used = self.used if used is None else used
         other.quadratic = self.quadratic if quadratic is None else quadratic
@@ -103,7 +211,7 @@ class Regressors:
 
     @property
     def thermal(self) -> int:
-        """Number of regressors that temperature has."""
+        """Number of regressors of temperature."""
         return 1 + self.quadratic + (self.settling > 0.0)
 
     def knots(self, lag: float) -> Array:
@@ -112,8 +220,8 @@ class Regressors:
 
     def effect(self, regression: Regression) -> Array:
         """Return the effect of temperature at the knots of the path, shape (k,), SI."""
-        of_knots = self._make_terms(self.knots(regression.lag))
-        return np.asarray(np.einsum("i,ik->k", regression.beta[: self.thermal], np.array(of_knots)))
+        terms = np.array(self._make_terms(self.knots(regression.lag)))
+        return np.asarray(np.einsum("i,ik->k", regression.beta[: self.thermal], terms))
 
     def _make_terms(self, knots: Array) -> list[Array]:
         """Return the regressors of temperature at the knots."""
@@ -144,10 +252,7 @@ class Regressors:
         return np.array([float(term.mean()) for term in self._make_terms(self.knots(lag))])
 
     def columns(self, lag: float) -> list[Array]:
-        """Return the coefficients of the regressors in the order of `Regression.beta`.
-
-        Of shape (n,) each, in K, or K² of the square; s of the ramp.
-        """
+        """Return the coefficients of the regressors, shape (n,), ordered as `Regression.beta`."""
         columns = self.coefficients.of_knots(self.path, self._make_terms(self.knots(lag)))
         return [*columns] + [self._time] * self.ramp
 
@@ -178,8 +283,7 @@ class Regressors:
     def at(self, lag: float, weights: Array) -> Regression:
         """Return the fit at a lag in s.
 
-        ``weights``, shape (b,), are nu / S of the bins used: their ordinates over the density of
-        the noise, Hz/SI².
+        ``weights``, shape (b,): ordinates nu over density S of the noise in the bins used, Hz/SI².
         """
         products = self.products(lag)
         information = np.einsum("b,bij->ij", weights, products.gram)
@@ -232,12 +336,9 @@ class Regressors:
         p = self.thermal
         beta, cross, gram = regression.beta[:p], products.cross[:, :p], products.gram[:, :p, :p]
         left = spectrum.density - 2.0 * cross @ beta + np.einsum("i,bij,j->b", beta, gram, beta)
-        degrees = weights * np.einsum(
-            "bij,ij->b", gram, np.linalg.inv(regression.information[:p, :p])
-        )
-        ordinates = np.maximum(
-            spectrum.ordinates - np.minimum(degrees, 1.0), _MIN_ORDINATES * spectrum.ordinates
-        )
+        covariance = np.linalg.inv(regression.information[:p, :p])
+        degrees = np.minimum(weights * np.einsum("bij,ij->b", gram, covariance), 1.0)
+        ordinates = np.maximum(spectrum.ordinates - degrees, _MIN_ORDINATES * spectrum.ordinates)
         with_time = self.also(ramp=True).products(regression.lag) if not self.ramp else products
         return replace(
             spectrum,

@@ -19,10 +19,7 @@ from imubench_pipeline.typing import Array
 def add_temperature_effect(
     blocks: Iterable[Array], path: TemperaturePath, effect: Array
 ) -> Iterator[Array]:
-    """Yield the blocks of a log plus the effect of temperature.
-
-    ``effect``, shape (k,), is the effect at the knots of the path, SI as the log.
-    """
+    """Yield the blocks of a log plus the effect of temperature at the knots, shape (k,), SI."""
     reached = 0
     for values in blocks:
         points = np.arange(reached, reached + len(values))
@@ -48,9 +45,8 @@ def complete_log(
 ) -> Iterator[Array]:
     """Return the blocks of a log with missing samples drawn: temperature effect plus noise.
 
-    The blocks come in order, SI, NaN where a sample is missing; ``spans`` are the parts whose holes
-    can be filled (`imubench_pipeline.estimators.missing.split_at_gaps`), the model is that of
-    what temperature leaves, and ``effect``, shape (k,), as in `add_temperature_effect`.
+    ``spans`` are the parts with gaps that can be filled, the model is the noise of the residual,
+    and ``effect``, shape (k,), as in `add_temperature_effect`.
     """
     means = block_means(remove_temperature_effect(blocks(), path, effect), spans)
     slow = draw_slow_part(means, spans, model, rate, rng)

@@ -2,9 +2,11 @@
 
 The noise is drawn from its posterior, over the models that the log does not exclude; the lag from
 its likelihood for that noise (uniform prior from 0 to the longest); s and q from their normal
-distribution given both. Errors of the temperature path are included by means of its drawn paths.
+distribution given both.
 
-`compute_mean_error` computes the standard error of the mean of a log with such noise.
+A register determines the temperature path only within its resolution. The errors of its drawn paths
+that correlate with the temperature change s, q and the lag; the rest, times s, remains in the log
+as additional noise.
 """
 
 from __future__ import annotations
@@ -14,44 +16,35 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.thermal.path_errors import compute_path_errors
+from imubench_pipeline.estimators.thermal.path import lagged_path
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
-from imubench_pipeline.estimators.whittle import Maximum, Whittle
+from imubench_pipeline.estimators.whittle import Terms, Whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 _MAX_DRAWS = 1_000
-_NOISE_DRAWS = 250
-"""Draws of the effect, and of the noise, over all models."""
-
+_NOISE_DRAWS = 250  # draws of the effect, and of the noise, over all models
 _LAG_GRID_SIZE = 48
-_MAX_DELTA_LOG_LIKELIHOOD = 8.0
-"""Log likelihood below the best at which lags are excluded from the grid."""
-
+_MAX_DELTA_LOG_LIKELIHOOD = 8.0  # below the best; less likely lags are not on the grid
 _MIN_AKAIKE_WEIGHT = 0.05
-_MIN_WALK_WEIGHT = 0.3
-"""Minimum weight of a model with a random walk."""
-
-_MIN_DELTA_BIC = 4.0
-"""Minimum gain of BIC by temperature, because a random walk is easily fitted by it."""
-
-_MAX_RAMP_FRACTION = 0.95
-"""Fraction of the information on s that a ramp shares, above which both are indistinguishable."""
-
+_MIN_WALK_WEIGHT = 0.3  # minimum weight of a model with a random walk
+_MIN_DELTA_BIC = 4.0  # least gain of BIC by temperature, which easily fits a random walk
+_MAX_RAMP_FRACTION = 0.95  # of the information on s that a ramp shares; above it they are confused
 _MIN_MONOTONE_RANGE = 0.9
 _MIN_EXPLAINED_FRACTION = 0.5
 _MAX_LAG_WIDTH = 0.5
-_MAX_WIDTH_RATIO = 1.02
-"""Ratio of the widths of the interval from 0 and the shortest one, below which the former is used,
-because draws are uneven."""
-
-_UPPER_LIMIT_OVER_RMS = 2.24
-"""The 97.5 % quantile of the absolute value of a normal variate over its standard deviation."""
+_MAX_WIDTH_RATIO = 1.02  # of an interval from 0 that is preferred to the shortest one
+_UPPER_LIMIT_OVER_RMS = 2.24  # 97.5 % quantile of |x| over its rms, x normal
+_MAX_NEGLIGIBLE_ERROR = 0.02  # contribution of path errors to a bin, in its standard errors
+_MAX_PATH_ROUNDS = 40
+_PATH_TOLERANCE = 1e-3
+_MIN_NOISE_FRACTION = 0.1  # of the power of a bin, so that each bin keeps some weight
 
 
 @dataclass(frozen=True)
@@ -81,16 +74,20 @@ def assess_fit(
 ) -> Verdict:
     """Return the parameters of a converged fit with intervals and reasons.
 
-    ``whittle`` and the noise models, best first, are fits to the compensated log. ``lags``, shape
-    (l,), s, are the scanned lags; ``gained`` is the BIC of the best noise model without temperature
-    less that of the fit.
+    ``whittle`` and the noise models, best first, are fits to the compensated log; ``lags``, shape
+    (l,), s, are the scanned lags; ``gained`` is the gain of BIC by temperature.
     """
     weights = whittle.spectrum.ordinates / whittle.density(candidates[0].maximum)
     p = regressors.thermal
-    errors = compute_path_errors(regressors, regression, weights)
-    fine = _refine_lags(regressors, weights, lags)
+    changes, residual = compute_path_errors(regressors, regression, weights)
+    low, high = _bracket_likely_lags(regressors, weights, lags)
+    fine = np.array([low])
+    if high != low:
+        coarse = np.linspace(low, high, _LAG_GRID_SIZE)
+        low, high = _bracket_likely_lags(regressors, weights, coarse)
+        fine = np.linspace(low, high, _LAG_GRID_SIZE)
     betas, drawn_lags = _draw_effect(regressors, whittle, candidates, fine, rng)
-    moved = np.sqrt(np.mean(errors.moved**2, axis=0))
+    moved = np.sqrt(np.mean(changes**2, axis=0))
     extra = rng.standard_normal((len(betas), 1)) * moved[None, :]
     betas, drawn_lags = betas[:, :p] + extra[:, :p], np.maximum(drawn_lags + extra[:, p], 0.0)
     lower, upper = np.quantile(betas, [0.025, 0.975], axis=0)
@@ -99,7 +96,10 @@ def assess_fit(
     excluded = any(lower[i] > 0.0 or upper[i] < 0.0 for i in range(1 + regressors.quadratic))
     confused = _explain_confusion(regressors, regression, weights, excluded)
     compensated = excluded and confused is None and gained > _MIN_DELTA_BIC
-    reason = confused or _describe_reason(excluded, gained)
+    reason = confused or "the interval of the sensitivity contains 0"
+    if excluded and confused is None:
+        only = "" if gained > _MIN_DELTA_BIC else " only"
+        reason = f"BIC favours the noise with temperature by {gained:.1f}{only}"
     if regressors.settling > 0.0:
         reason += (
             f"; the first {regressors.settling:.0f} s follow it otherwise and do not count for the "
@@ -116,16 +116,8 @@ def assess_fit(
         compensated,
         reason,
         float(np.std(betas @ at_mean)),
-        errors.density,
+        residual,
     )
-
-
-def _describe_reason(excluded: bool, gained: float) -> str:
-    if not excluded:
-        return "the interval of the sensitivity contains 0"
-    if gained <= _MIN_DELTA_BIC:
-        return f"BIC favours the noise with temperature by {gained:.1f} only"
-    return f"BIC favours the noise with temperature by {gained:.1f}"
 
 
 def _make_parameter(value: float, lower: float, upper: float, confused: str | None) -> Parameter:
@@ -135,17 +127,18 @@ def _make_parameter(value: float, lower: float, upper: float, confused: str | No
 
 
 def lag_parameter(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
-    """Return the lag with the shortest interval that contains 95 % of its draws.
+    """Return the lag with the shortest interval that contains 95 % of its draws, shape (d,), s.
 
     Equal tails would exclude a lag of 0 in half of the logs without a lag. ``value`` is the most
-    likely lag, ``longest`` the longest that was tried, ``draws`` have shape (d,), all in s;
-    ``compensated``: temperature is removed from the noise.
+    likely lag, ``longest`` the longest that was tried, s.
     """
     if longest == 0.0:
         return Parameter(None, "absent", "no lag was asked for")
     if not compensated:
         return Parameter(None, "not_identified", "temperature explains nothing that would lag")
-    lower, upper = _find_shortest_interval(draws)
+    ordered, inside = np.sort(draws), math.ceil(0.95 * len(draws))
+    first = int(np.argmin(ordered[inside - 1 :] - ordered[: len(ordered) - inside + 1]))
+    lower, upper = float(ordered[first]), float(ordered[first + inside - 1])
     # A lag at its lower end: one-sided interval with 5 % above.
     below = float(np.quantile(draws, 0.95))
     if value == 0.0 or below < _MAX_WIDTH_RATIO * (upper - lower):
@@ -158,15 +151,6 @@ def lag_parameter(value: float, draws: Array, longest: float, compensated: bool)
         reason = "its interval contains 0; only that is given"
         return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
     return Parameter(value, "ok", None, lower, upper)
-
-
-def _find_shortest_interval(draws: Array) -> tuple[float, float]:
-    """Return the shortest interval that contains 95 % of the draws."""
-    ordered = np.sort(draws)
-    inside = math.ceil(0.95 * len(ordered))
-    widths = ordered[inside - 1 :] - ordered[: len(ordered) - inside + 1]
-    first = int(np.argmin(widths))
-    return float(ordered[first]), float(ordered[first + inside - 1])
 
 
 def _explain_confusion(
@@ -207,15 +191,6 @@ def _compute_explained_fraction(regressors: Regressors, regression: Regression) 
     part = slice(0, max(upto, 8))
     cross = float(nu[part] @ products.cross[part, 0])
     return cross**2 / float(power[part].sum() * (nu[part] @ plain[part]) + 1e-300)
-
-
-def _refine_lags(regressors: Regressors, weights: Array, lags: Array) -> Array:
-    """Return a grid of lags, s, over the range that the log allows."""
-    low, high = _bracket_likely_lags(regressors, weights, lags)
-    if high == low:
-        return np.array([low])
-    low, high = _bracket_likely_lags(regressors, weights, np.linspace(low, high, _LAG_GRID_SIZE))
-    return np.linspace(low, high, _LAG_GRID_SIZE)
 
 
 def _bracket_likely_lags(
@@ -259,22 +234,23 @@ def _draw_effect(
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
     """Return draws of beta (d, p) and of the lag (d,)."""
-    alike = weigh_models(candidates)
     regressors.prepare(lags)
     products_of_lags = [regressors.products(float(lag)) for lag in lags]
     cross = np.array([products.cross for products in products_of_lags])
     gram = np.array([products.gram for products in products_of_lags])
     betas, chosen_lags = [], []
-    for candidate, share in alike:
+    for candidate, share in weigh_models(candidates):
         number = max(8, round(_NOISE_DRAWS * share))
-        densities = _draw_densities(whittle, candidate.maximum, number, rng)
-        weights = regressors.ordinates / densities
+        # Densities of the noise, drawn from its posterior, shape (number, b).
+        posterior = sample(whittle, candidate.maximum, rng, 8 * number)
+        densities = [
+            whittle.matrix(candidate.terms, posterior.times[row]) @ posterior.parameters[row] ** 2
+            for row in range(0, 8 * number, 8)
+        ]
+        weights = regressors.ordinates / np.array(densities)
         information = np.einsum("db,lbij->dlij", weights, gram, optimize=True)
-        information += (
-            1e-12
-            * information.diagonal(axis1=2, axis2=3)[..., None]
-            * np.eye(information.shape[-1])
-        )
+        diagonal = information.diagonal(axis1=2, axis2=3)[..., None]
+        information += 1e-12 * diagonal * np.eye(information.shape[-1])
         target = np.einsum("db,lbi->dli", weights, cross, optimize=True)
         beta = np.linalg.solve(information, target[..., None])[..., 0]
         gain = 0.5 * np.einsum("dli,dli->dl", target, beta)
@@ -290,23 +266,10 @@ def _draw_effect(
     return np.concatenate(betas), np.concatenate(chosen_lags)
 
 
-def _draw_densities(
-    whittle: Whittle, maximum: Maximum, number: int, rng: np.random.Generator
-) -> Array:
-    """Return densities of the noise drawn from its posterior, shape (number, b)."""
-    posterior = sample(whittle, maximum, rng, 8 * number)
-    rows = []
-    for row in range(0, 8 * number, 8):
-        powers, times = posterior.parameters[row] ** 2, posterior.times[row]
-        rows.append(whittle.matrix(maximum.terms, times) @ powers)
-    return np.array(rows)
-
-
 def add_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
     """Return a model with the rms of K over its posterior, if K is absent from the fit.
 
-    The most likely walk is then often 0, and the error of the mean would be too small. The
-    posterior of K is half a normal distribution, and its rms follows from the upper limit.
+    The fit is often 0, and the error of the mean would be too small. The posterior is half normal.
     """
     if K.status != "absent" or K.upper is None:
         return model
@@ -316,22 +279,94 @@ def add_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
 def compute_mean_error(models: Iterable[tuple[NoiseModel, float]], spectrum: Spectrum) -> float:
     """Return the standard deviation of the mean of a log about the bias at its beginning, SI.
 
-    A random walk starts at 0 at the beginning of the log: sigma^2 = N^2 / D + K^2 D / 3 and, of a
-    process of variance v, 2 v T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long. The models are
-    those that the log does not exclude, with normalised weights: a walk too weak to be selected
-    may still move the mean. A ramp contributes R D / 2, because a random walk in one log may look
-    like a ramp.
+    A random walk starts at 0: sigma^2 = N^2 / D + K^2 D / 3 and, of a process of variance v, 2 v
+    T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long. A ramp contributes R D / 2, because a random
+    walk in one log may look like a ramp. The models have normalised weights.
     """
-    return math.sqrt(
-        sum(share * _compute_mean_variance(model, spectrum) for model, share in models)
-    )
-
-
-def _compute_mean_variance(model: NoiseModel, spectrum: Spectrum) -> float:
     T, whole = 1.0 / spectrum.rate, spectrum.duration
-    # Terms that begin at 0 do so at the beginning of the log.
-    return (model.R * whole / 2.0) ** 2 + sum(
-        term.mean_variance(whole, 0.0)
-        for term in model.realised(T, whole)
-        if term.drive is not None
+    total = 0.0
+    for model, share in models:
+        # Terms that begin at 0 do so at the beginning of the log.
+        terms = (term for term in model.realised(T, whole) if term.drive is not None)
+        variance = sum(term.mean_variance(whole, 0.0) for term in terms)
+        total += share * ((model.R * whole / 2.0) ** 2 + variance)
+    return math.sqrt(total)
+
+
+def compute_path_errors(
+    regressors: Regressors, regression: Regression, weights: Array
+) -> tuple[Array, Array]:
+    """Return the effect of the errors of the drawn paths on an estimate, to first order.
+
+    They are the changes of the p coefficients of temperature and the lag, (d, p + 1), and the mean
+    density of the residual in each bin, shape (b,). ``weights``: as for `Regressors.at`.
+    """
+    path, p = regressors.path, regressors.thermal
+    knots, slope = regressors.knots(regression.lag), regressors.slope(regression)
+    step = max(
+        0.05 * regression.lag, 0.5 * float(np.median(np.diff(path.sample))) / regressors.rate
+    )
+    by_lag = slope * (regressors.knots(regression.lag + step) - knots) / step
+    columns = [
+        *regressors.columns(regression.lag),
+        *regressors.coefficients.of_knots(path, [by_lag]),
+    ]
+    full = np.zeros(len(regressors.used))
+    full[regressors.used] = weights
+    gram = regressors.coefficients.products(columns).gram
+    information = np.einsum("b,bij->ij", full, gram)
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    # A poorly determined lag must not absorb the error of the path.
+    inverse = np.linalg.inv(information / np.outer(scale, scale) + 1e-6 * np.eye(len(scale)))
+    errors = [
+        slope * lagged_path(path, draw - path.value, regressors.rate, regression.lag)
+        for draw in path.draws
+    ]
+    moved, density = [], np.zeros(len(full))
+    for other in regressors.coefficients.of_knots(path, errors):
+        shared = regressors.coefficients.products([*columns, other]).gram[:, -1]
+        own = inverse @ ((full @ shared[:, :-1]) / scale) / scale
+        moved.append(own)
+        density += shared[:, -1] - 2.0 * shared[:, :-1] @ own
+        density += np.einsum("i,bij,j->b", own, gram, own)
+    at = np.array(moved)
+    changes = np.column_stack([at[:, :p], at[:, -1]])
+    return changes, np.maximum(density / len(errors), 0.0)
+
+
+def subtract_path_errors(
+    left: Spectrum, used: NDArray[np.bool_], whittle: Whittle, terms: Terms, errors: Array
+) -> Spectrum:
+    """Return the spectrum of the noise alone, without the residual of path errors.
+
+    ``errors``, shape (b,), is the density P of the residual. A bin with the density S of the noise
+    has S / (S + P) of its density and (S / (S + P))^2 of its ordinates left, iterated. Bins that
+    are not ``used`` are unchanged, and all bins if P is negligible. (D. A. Harville, "Maximum
+    likelihood approaches to variance component estimation", J. Am. Stat. Assoc. 72, 1977.)
+    """
+    fitted, added = left.select(used), errors[used]
+    density = whittle.density(whittle.of(fitted).maximum(terms))
+    if not (added * np.sqrt(fitted.ordinates) > _MAX_NEGLIGIBLE_ERROR * density).any():
+        return left
+    part_of_noise = np.ones(len(added))
+    for _ in range(_MAX_PATH_ROUNDS):
+        before = part_of_noise
+        part_of_noise = np.maximum(density / (density + added), _MIN_NOISE_FRACTION)
+        if np.abs(part_of_noise - before).max() < _PATH_TOLERANCE:
+            break
+        own = whittle.of(_of_noise(fitted, part_of_noise))
+        density = own.density(own.maximum(terms))
+    everywhere = np.ones(len(used))
+    everywhere[used] = part_of_noise
+    return _of_noise(left, everywhere)
+
+
+def _of_noise(spectrum: Spectrum, part: Array) -> Spectrum:
+    """Return the spectrum of noise that is a fraction of the power of each bin."""
+    return replace(
+        spectrum,
+        ordinates=spectrum.ordinates * part**2,
+        density=spectrum.density * part,
+        cross=spectrum.cross * part,
+        ramp=spectrum.ramp * part,
     )

@@ -1,10 +1,7 @@
 """The noise terms of an inertial sensor, with all that follows from each (IEEE Std 952-2020, 647).
 
-A term knows its two-sided power spectral density, its Allan variance in continuous time and as
-sampled, the spectrum of its samples, the covariance of their sums and of block means, its state
-spaces, the growth of its integrals, what filters make of it, and how its parameters are called and
-measured. Models, fits, simulation, budgets, exports and pages take everything from here. A new kind
-of term is a module here, and an entry of `TERMS`.
+Models, fits, simulation, budgets, exports and pages take everything from here. A new kind of term
+is a module here, and an entry of `TERMS`.
 """
 
 from imubench_pipeline.noise.terms.base import Deterministic, Term

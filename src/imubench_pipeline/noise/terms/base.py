@@ -73,8 +73,8 @@ class Term(ABC):
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
         """Generalised covariance of the cumulative sum of the samples at whole lags, SI^2.
 
-        It is that of the second differences at n samples a cluster: what these take out, a
-        constant and a square of the lag, may differ from n to n.
+        For second differences at n samples a cluster: a constant and a square of the lag may
+        differ.
         """
 
     @abstractmethod
@@ -92,62 +92,35 @@ class Term(ABC):
 
     @abstractmethod
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """Return the variance of its integrated error (`noise.growth`).
+        """Return the variance of its integrated error (`noise.growth`), without the turn-on bias.
 
-        Parameters
-        ----------
-        order : int
-            m, 0 to 2: integrations but one.
-        time : float
-            t, s, above 0.
-        start : Calibrated or Uncalibrated
-            The turn-on bias is apart.
-
-        Returns
-        -------
-        float
-            SI: (rad/s)^2 or (m/s^2)^2 times s^(2m+2).
+        ``order`` is m, 0 to 2; ``time`` is t, s, above 0. The unit is (rad/s)^2 or (m/s^2)^2 times
+        s^(2m+2).
         """
 
     @abstractmethod
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """Return the variances of its first and second integral from a known state.
-
-        0 for what does not grow as noise does.
-        """
+        """Return the variances of its first and second integral from a known state; 0 if none."""
 
     @abstractmethod
     def block_covariance(self, lags: Array, block: float) -> Array:
-        """Return the generalised covariance of means over blocks of continuous time.
+        """Return the generalised covariance of means over blocks of continuous time, SI^2.
 
-        Parameters
-        ----------
-        lags : ndarray
-            k, blocks, whole numbers from 0.
-        block : float
-            d, s.
-
-        Returns
-        -------
-        ndarray
-            (rad/s)^2 or (m/s^2)^2.
+        ``lags`` are whole numbers of blocks from 0, ``block`` is their length, s. (I. M. Gelfand
+        and G. E. Shilov, "Generalized Functions", vol. 1, 1964: -ln|t| / pi and -|t| / 2 of 1/|f|
+        and 1/f^2, with the densities of IEEE Std 952-1997, annex C.)
 
         Raises
         ------
         TypeError
             If the term is deterministic.
-
-        References
-        ----------
-        I. M. Gelfand and G. E. Shilov, "Generalized Functions", vol. 1, 1964, for those of 1/|f|
-        and 1/f^2: -ln|t| / pi and -|t| / 2, with the densities of IEEE Std 952-1997, annex C.
         """
 
     @abstractmethod
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
         """Return the covariance of the means of b blocks of samples, in closed form, shape (b, b).
 
-        A walk counts from the first sample of the first.
+        A walk starts at the first sample of the first block.
         """
 
     @abstractmethod
@@ -179,10 +152,7 @@ class Term(ABC):
         return None
 
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
-        """Return terms with a finite state space that approximate it, by default itself.
-
-        Up to a tau ``longest`` it is followed; the sampling interval, too, is in s.
-        """
+        """Return terms with a finite state space that approximate it up to a tau ``longest``, s."""
         return [self]
 
     def scaled(self, factor: float) -> Self:
@@ -195,10 +165,9 @@ class Term(ABC):
         return replace(self, **scaled)
 
     def as_unit(self) -> tuple[float, Term]:
-        """Return a power and the term that is the same for all of the kind: together this one.
+        """Return a power and a term of the kind that times this power is this term.
 
-        By default 1 and itself. Where one parameter alone scales the term, what is computed of
-        the other serves all models of a log.
+        By default 1 and itself. If one parameter scales the term, the other serves all models.
         """
         return 1.0, self
 
@@ -207,18 +176,14 @@ class Term(ABC):
         yield self.source, math.sqrt(self.growth(order, time, start))
 
     def mean_variance(self, time: float, on_time: float) -> float:
-        """Return the variance of its mean over a window, (rad/s)^2 or (m/s^2)^2.
+        """Return the variance of its mean over a window of length ``time``, (rad/s)^2 or (m/s^2)^2.
 
-        ``time`` is the length of the window, ``on_time`` that from switch-on to its beginning, s
-        (see `noise.growth`).
+        The window begins at ``on_time`` after switch-on, s.
         """
         return self.growth(0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
 
     def passed(self, power: Callable[[float], Array]) -> float:
-        """Return the part of its Allan variance that a low-pass leaves; only asked without `drive`.
-
-        ``power`` is the squared gain at a frequency in Hz.
-        """
+        """Return the part of its Allan variance that a low-pass passes, if it has no `drive`."""
         return 1.0
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:
@@ -234,9 +199,9 @@ class Deterministic(Term):
 
     @abstractmethod
     def swing(self, weights: Array, block: float) -> tuple[float, float]:
-        """Return the mean square and the frequency, Hz, of a weighted sum of means over blocks.
+        """Return the mean square and the frequency, Hz, of a weighted sum of adjacent block means.
 
-        ``weights`` are those of adjacent blocks, ``block`` is the length of one, s.
+        ``block`` is the length of a block, s.
         """
 
     @property

@@ -25,15 +25,9 @@ from imubench_pipeline.noise.terms.traits import (
 )
 from imubench_pipeline.typing import Array
 
-PEAK = 0.4365
-"""Peak of the Allan deviation of a Gauss-Markov process over sqrt(S_B T_B)."""
-
-PEAK_TAU = 1.8926
-"""Tau of that peak over T_B."""
-
-FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)
-"""Bias instability plateau over B: 0.664."""
-
+PEAK = 0.4365  # peak of the Allan deviation of a Gauss-Markov process over sqrt(S_B T_B)
+PEAK_TAU = 1.8926  # tau of that peak over T_B
+FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)  # bias instability plateau over B: 0.664
 BIAS_INSTABILITY = TermParameter("B", "bias instability", 1.0, 0.0)
 """B of a Gauss-Markov process, and of flicker noise with an equally high Allan deviation."""
 
@@ -43,9 +37,7 @@ indistinguishable from a random walk."""
 
 _QUADRATURE_NODES, _QUADRATURE_WEIGHTS = np.polynomial.legendre.leggauss(24)
 
-_INTEGRATION_LIMITS = (0.0, 0.003, 0.03, 0.2, 1.0)
-"""Limits of the pieces of an integral; the response of a process with short T_B bends early."""
-
+_INTEGRATION_LIMITS = (0.0, 0.003, 0.03, 0.2, 1.0)  # dense at 0, where short T_B bend
 _MAX_RATIO_FOR_SERIES = 0.5
 _SERIES_COEFFICIENTS = [
     (-1) ** (k + 1) * (2.0**k - 4.0) / (2.0 * math.factorial(k)) for k in range(3, 24)
@@ -57,8 +49,7 @@ _MAX_RATIO_FOR_WALK = 1e-3
 """Largest ratio of cluster length to T_B for the random walk approximation, with an error of a
 thousandth; for smaller ratios the second differences of the covariance of sums cancel."""
 
-_ROWS_PER_BLOCK = 256
-"""Rows of a covariance that are computed together."""
+_ROWS_PER_BLOCK = 256  # rows of a covariance that are computed together
 
 
 @dataclass(frozen=True)
@@ -146,14 +137,33 @@ class GaussMarkov(Term):
         d_y = y phi_2(-y) are what is lost of the state at the start, forward and backward. Where
         not calibrated S_B (T_B^(2m+3) P_m(x) + c^2 T_B (1 - d_x)^2 / 2).
         """
-        return self.density * _grow_variance(order, time, self.T_B, start)
+        x, constant = time / self.T_B, of_constant(order, time)
+        driven = time ** (2 * order + 3) * squared_response(order, x)
+        if isinstance(start, Uncalibrated):
+            remaining = math.factorial(order + 1) * decay(order + 1, x)
+            return self.density * (driven + (constant * remaining) ** 2 * self.T_B / 2.0)
+        y = start.window / self.T_B
+        # The losses are subtracted, not the retained parts, which would cancel for long T_B.
+        lost = math.factorial(order + 1) * x * decay(order + 2, x) - y * decay(2, y)
+        in_window = start.window * squared_response(0, y)
+        return self.density * (driven + constant**2 * (in_window + self.T_B * lost**2 / 2.0))
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
         """S_B times the integral of h^2 from 0 to t.
 
         h = T_B (1 - e^(-s/T_B)) and h = T_B s - T_B^2 (1 - e^(-s/T_B)).
         """
-        first, second = _integrate_squared_responses(time / self.T_B)
+        x = time / self.T_B
+        first, second = np.zeros_like(x), np.zeros_like(x)
+        for start, stop in pairwise(_INTEGRATION_LIMITS):
+            half = (stop - start) / 2.0
+            node = x[:, None] * (start + half * (1.0 + _QUADRATURE_NODES))
+            lost = np.expm1(-node)
+            first += x * half * (lost**2 @ _QUADRATURE_WEIGHTS)
+            # node - 1 + e^(-node) cancels for small arguments.
+            series = 1.0 - node / 3.0 * (1.0 - node / 4.0 * (1.0 - node / 5.0 * (1.0 - node / 6.0)))
+            response = np.where(node < 1e-2, node**2 / 2.0 * series, node + lost)
+            second += x * half * (response**2 @ _QUADRATURE_WEIGHTS)
         return self.density * self.T_B**3 * first, self.density * self.T_B**5 * second
 
     def block_covariance(self, lags: Array, block: float) -> Array:
@@ -177,15 +187,12 @@ class GaussMarkov(Term):
         decayed = -np.expm1(-n * x)
         gain, variance = decayed / (n * lost), self._variance
         covariance = np.empty((len(n), len(n)))
-        for first in range(
-            0, len(n), _ROWS_PER_BLOCK
-        ):  # with thousands of rows, the temporary matrices would be large
+        # Row by row, since the temporary matrices of thousands of rows would be large.
+        for first in range(0, len(n), _ROWS_PER_BLOCK):
             rows = slice(first, first + _ROWS_PER_BLOCK)
             after = np.subtract.outer(blocks.start[rows] + 1.0, blocks.stop)
             before = np.subtract.outer(blocks.start + 1.0, blocks.stop[rows]).T
-            lag = np.maximum(
-                np.maximum(after, before), 0.0
-            )  # 0 on the diagonal, which is set below
+            lag = np.maximum(np.maximum(after, before), 0.0)
             covariance[rows] = variance * np.outer(gain[rows], gain) * np.exp(-x * lag)
         p = math.exp(-x)
         own = (n * (1.0 + p) / lost - 2.0 * p * decayed / lost**2) / n**2
@@ -260,39 +267,3 @@ def sampled_gauss_markov_shape(n: ArrayLike, interval: float, T_B: float) -> Arr
     added = h / (3.0 * n) - h**3 / 6.0 * (n / 3.0 + 1.0 / (15.0 * n))
     continuous = 2.0 / T_B * gauss_markov_shape(n * interval, T_B) + added
     return T_B / 2.0 * np.where(x < 3e-3, continuous, closed)
-
-
-def _grow_variance(order: int, time: float, T_B: float, start: SensorStart) -> float:
-    """Return the variance of the integrated process for S_B = 1 (`GaussMarkov.growth`)."""
-    x = time / T_B
-    constant = of_constant(order, time)
-    driven = time ** (2 * order + 3) * squared_response(order, x)
-    if isinstance(start, Uncalibrated):
-        remaining = math.factorial(order + 1) * decay(order + 1, x)
-        return driven + (constant * remaining) ** 2 * T_B / 2.0
-    y = start.window / T_B
-    # The losses are subtracted, not the retained parts, which would cancel for long T_B.
-    lost = math.factorial(order + 1) * x * decay(order + 2, x) - y * decay(2, y)
-    in_window = start.window * squared_response(0, y)
-    return driven + constant**2 * (in_window + T_B * lost**2 / 2.0)
-
-
-def _integrate_squared_responses(time: Array) -> tuple[Array, Array]:
-    """Integrate the squares of 1 - e^(-x) and x - 1 + e^(-x) from 0 to each time over T_B."""
-    first, second = np.zeros_like(time), np.zeros_like(time)
-    for start, stop in pairwise(_INTEGRATION_LIMITS):
-        half = (stop - start) / 2.0
-        x = time[:, None] * (start + half * (1.0 + _QUADRATURE_NODES))
-        decayed = np.expm1(-x)
-        first += time * half * (decayed**2 @ _QUADRATURE_WEIGHTS)
-        second += time * half * (_evaluate_second_response(x, decayed) ** 2 @ _QUADRATURE_WEIGHTS)
-    return first, second
-
-
-def _evaluate_second_response(x: Array, decayed: Array) -> Array:
-    """Return x - 1 + e^(-x), as a series for small x; ``decayed`` is e^(-x) - 1."""
-    small = x < 1e-2
-    if not small.any():
-        return x + decayed
-    series = x**2 / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0))))
-    return np.where(small, series, x + decayed)

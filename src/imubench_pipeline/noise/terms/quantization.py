@@ -28,13 +28,7 @@ class Quantization(Term):
     states = ("z_Q", "z_Q before")
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
-        """(4 Q^2 / T) sin^2(pi f T): it depends on the sampling.
-
-        Raises
-        ------
-        ValueError
-            If no interval is given.
-        """
+        """(4 Q^2 / T) sin^2(pi f T): it depends on the sampling; ValueError without an interval."""
         if interval is None:
             raise ValueError("the density of quantization noise depends on the rate; give it")
         return self.Q**2 * 4.0 * np.sin(np.pi * frequency * interval) ** 2 / interval

@@ -62,10 +62,7 @@ class Ramp(Deterministic):
         return (self.R * rise) ** 2
 
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
-        """R^2 times the product of the mean times: a slope of variance R^2, of either sign.
-
-        The slope of another log says how large one may be, and no more.
-        """
+        """R^2 times the product of the mean times: a slope of variance R^2, of either sign."""
         return np.asarray(self.R**2 * np.outer(blocks.middle, blocks.middle))
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:

@@ -34,37 +34,18 @@ class SearchRange:
 
 @dataclass(frozen=True)
 class TermParameter:
-    """A parameter of a term: a field of its dataclass.
+    """A parameter of a term: a field of its dataclass."""
 
-    Attributes
-    ----------
-    symbol : str
-        Name of the field.
-    label : str
-        In words.
-    signal, seconds : float
-        Its dimension: powers of the unit of the signal, rad/s or m/s^2, and of seconds.
-    signed : bool
-        It may be negative.
-    search : SearchRange, optional
-        Of a time constant.
-    """
-
-    symbol: str
-    label: str
+    symbol: str  # name of the field
+    label: str  # in words
     signal: float
     seconds: float
-    signed: bool = False
-    search: SearchRange | None = None
+    """Its dimension: powers of the unit of the signal, rad/s or m/s^2, and of seconds."""
+    signed: bool = False  # whether it may be negative
+    search: SearchRange | None = None  # of a time constant
 
     def check(self, value: float) -> None:
-        """Raise for an invalid value.
-
-        Raises
-        ------
-        ValueError
-            If the value is not finite, negative for an unsigned parameter, or no time above 0.
-        """
+        """Raise ValueError if the value is not finite or out of range."""
         time = (self.signal, self.seconds) == (0.0, 1.0)
         if math.isfinite(value) and (self.signed or value > 0.0 or (value == 0.0 and not time)):
             return

@@ -72,13 +72,7 @@ class WhiteNoise(Term):
         return self.N**2, WhiteNoise(1.0)
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """N^2 (t^(2m+1) / ((2m+1) m!^2) + c^2 / W), without the last where not calibrated.
-
-        References
-        ----------
-        P. D. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation
-        Systems", 2nd ed., 2013.
-        """
+        """N^2 (t^(2m+1) / ((2m+1) m!^2) + c^2 / W), the last where calibrated (Groves, 2013)."""
         return self.N**2 * (of_white(order, time) + of_white_mean(order, time, start))
 
     def sources(self, order: int, time: float, start: SensorStart) -> Iterator[tuple[str, float]]:
