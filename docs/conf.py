@@ -8,6 +8,8 @@ from importlib.metadata import version as installed
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+from extensions.declared import counts
+
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 
 project = "imubench_pipeline"
@@ -29,7 +31,8 @@ suppress_warnings = [
     "myst-nb.lexer",  # a notebook that is not run does not say in what language it is
 ]
 
-myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
+myst_enable_extensions = ["dollarmath", "colon_fence", "deflist", "substitution"]
+myst_substitutions = counts()
 myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True

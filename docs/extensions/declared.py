@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from extensions.markdown import cell, code, table
+from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.model.table import TypedColumn
 from imubench_pipeline.noise.terms import TERMS
+from imubench_pipeline.readers.formats import FILE_FORMATS
 from imubench_pipeline.report.glossary import Term, glossary
 from imubench_pipeline.run.formats_command import Line, export_targets, log_formats
 from imubench_pipeline.tables.schemas import TABLES
+
+
+def counts() -> dict[str, int]:
+    """Return the numbers of exported programs, shipped sensors and log formats, for the pages."""
+    sensors = Path(__file__).parents[2] / "config/sensors"
+    return {
+        "programs": len(TARGETS),
+        "sensors": len(list(sensors.glob("*.yaml"))),
+        "formats": len(FILE_FORMATS),
+    }
 
 
 def tables() -> str:
