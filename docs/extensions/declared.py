@@ -20,7 +20,7 @@ def counts() -> dict[str, int]:
     sensors = Path(__file__).parents[2] / "config/sensors"
     return {
         "programs": len(TARGETS),
-        "sensors": sum("\ndatasheet:" in file.read_text() for file in sensors.glob("*.yaml")),
+        "sensors": sum("sold: false" not in file.read_text() for file in sensors.glob("*.yaml")),
         "formats": len(FILE_FORMATS),
     }
 
