@@ -13,8 +13,8 @@ import psutil
 import pytest
 import yaml
 
+from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, read_note
-from imubench_pipeline.run.nightly import recovery
 from imubench_pipeline.run.nightly.night import Night
 from imubench_pipeline.run.nightly.settling import (
     Skip,

@@ -13,7 +13,7 @@ from imubench_pipeline.recordings.kept import outcome
 from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.report.folder import attempt_at_pages
 from imubench_pipeline.run.lock import Lock, TakenError, lock_of
-from imubench_pipeline.run.nightly.recovery import STILL_WRITTEN, remove_temporary
+from imubench_pipeline.run.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
 from imubench_pipeline.run.scripts import Scripts

@@ -15,8 +15,8 @@ from typing import Any
 import yaml
 
 from imubench_pipeline.report.drop_zone import drop_zone_lines
+from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, lock_of
-from imubench_pipeline.run.nightly import recovery
 from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakemake
 from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, settled
 from imubench_pipeline.run.nightly.state import State, StateError, load_tables, read_state, state_of

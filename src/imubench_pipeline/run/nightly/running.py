@@ -16,7 +16,7 @@ from typing import IO
 
 from imubench_pipeline.run.faults import TOLD
 from imubench_pipeline.run.lock import INHERITED, Lock
-from imubench_pipeline.run.nightly.recovery import end_group
+from imubench_pipeline.run.recovery import end_group
 
 _MAX_STOP_TIME = 60.0  # s; for Snakemake to stop its steps
 _MAX_LAST_LINES = 20  # last lines
