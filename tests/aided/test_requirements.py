@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from imubench_pipeline.experiments.aided.trajectories import TRAJECTORY_NAMES
+from imubench_pipeline.extensions.aided.limits import outage_rows
+from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES
 from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.in_outages import outage_rows
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judgements

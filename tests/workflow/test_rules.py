@@ -12,6 +12,13 @@ from tests.workflow.dry_runs import dry_run
 from tests.workflow.rules import costs, rules
 
 
+def package_of(step: str) -> str:
+    """The package that has the module of a step."""
+    package = PROJECT / "src/imubench_pipeline"
+    (found,) = [*package.glob(f"steps/{step}.py"), *package.glob(f"extensions/*/{step}.py")]
+    return ".".join(found.parent.relative_to(package).parts)
+
+
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return {rule.name: rule for rule in rules(tmp_path_factory.mktemp("rules"))}
@@ -23,7 +30,7 @@ def test_each_rule_has_a_script_and_a_module_of_its_name(known: dict[str, Any]) 
     }
     assert {path.stem for path in (PROJECT / "workflow/scripts").glob("*.py")} == known.keys()
     codes = {name: rule.params.get("code") for name, rule in known.items()}
-    assert codes == {name: Plan.code(name) for name in known}
+    assert codes == {name: Plan.code(name, package_of(name)) for name in known}
     assert len(set(codes.values())) == len(codes)
 
 

@@ -59,7 +59,7 @@ rule navigate:
         ),
     params:
         settings=lambda w: plan.navigate_settings(w.sensor),
-        code=plan.code("navigate"),
+        code=plan.code("navigate", "extensions.aided"),
         attempt=tried("navigate"),
     script:
         "../scripts/navigate.py"

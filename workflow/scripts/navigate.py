@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from imubench_pipeline.steps.navigate import navigate
+from imubench_pipeline.extensions.aided.navigate import navigate
 from imubench_pipeline.tables import write
 
 if __name__ == "__main__":

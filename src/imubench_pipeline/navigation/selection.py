@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from imubench_pipeline.extensions.aided.limits import trajectory_of
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import BacktestRow
-from imubench_pipeline.navigation.in_outages import trajectory_of
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.standing import Standing

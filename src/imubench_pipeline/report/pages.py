@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from imubench_pipeline.extensions.aided import page as navigated
 from imubench_pipeline.report import (
     boards,
     compare,
     earth_rate,
     fusion,
     made,
-    navigated,
     papers,
     positions,
     rate_table,

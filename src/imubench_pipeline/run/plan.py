@@ -544,9 +544,9 @@ class Plan:
         return _to_json([entry.model_dump(mode="json") for entry in entries])
 
     @staticmethod
-    def code(step: str) -> str:
-        """Return the digest of the code that a step runs: the module of its name in ``steps``."""
-        return source_digest(f"steps.{step}")
+    def code(step: str, package: str = "steps") -> str:
+        """Return the digest of the code that a step runs: the module of its name in a package."""
+        return source_digest(f"{package}.{step}")
 
 
 def _check_places(run: Run) -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pyarrow.compute as pc
 
+from imubench_pipeline.extensions.aided.limits import outage_rows
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, NavigationRow
 from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
-from imubench_pipeline.navigation.in_outages import outage_rows
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judgements

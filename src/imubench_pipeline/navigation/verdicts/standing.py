@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from imubench_pipeline.extensions.aided.limits import trajectory_of
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.navigation.in_outages import trajectory_of
 from imubench_pipeline.navigation.suitability.conditions import (
     is_condition,
     named,

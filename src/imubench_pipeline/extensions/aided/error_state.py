@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.experiments.aided.strapdown import (
+from imubench_pipeline.extensions.aided.strapdown import (
     GRAVITY_GRADIENT,
     copy,
     multiply,

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.experiments.aided.axis_states import (
+from imubench_pipeline.extensions.aided.axis_states import (
     AxisStates,
     StackedStates,
     split_into_steps,
     stack,
 )
-from imubench_pipeline.experiments.aided.error_state import run
-from imubench_pipeline.experiments.aided.signals import Signals
-from imubench_pipeline.experiments.aided.strapdown import rotation
-from imubench_pipeline.experiments.aided.trajectories import Trajectory
+from imubench_pipeline.extensions.aided.error_state import run
+from imubench_pipeline.extensions.aided.signals import Signals
+from imubench_pipeline.extensions.aided.strapdown import rotation
+from imubench_pipeline.extensions.aided.trajectories import Trajectory
 from imubench_pipeline.typing import Array
 
 FIX_INTERVAL = 1.0

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from imubench_pipeline.experiments.aided.trajectories import Trajectory, headings
+from imubench_pipeline.extensions.aided.trajectories import Trajectory, headings
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.sensor import CHANNELS

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.experiments.aided.strapdown import earth_rate_at, inverse
+from imubench_pipeline.extensions.aided.strapdown import earth_rate_at, inverse
 from imubench_pipeline.typing import Array
 
 DEFAULT_LATITUDE = math.radians(45.0)

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.estimators.rows import recommended_estimates
-from imubench_pipeline.experiments.aided.axis_states import AxisStates, axis_states
-from imubench_pipeline.experiments.aided.error_state import GROUPS
-from imubench_pipeline.experiments.aided.measures import (
+from imubench_pipeline.extensions.aided.axis_states import AxisStates, axis_states
+from imubench_pipeline.extensions.aided.error_state import GROUPS
+from imubench_pipeline.extensions.aided.measures import (
     ERRORS,
     Share,
     inside,
@@ -29,7 +29,7 @@ from imubench_pipeline.experiments.aided.measures import (
     root_mean_square,
     squares,
 )
-from imubench_pipeline.experiments.aided.runs import (
+from imubench_pipeline.extensions.aided.runs import (
     FIX_INTERVAL,
     RECOVERY_TIME,
     WARM_UP,
@@ -37,8 +37,9 @@ from imubench_pipeline.experiments.aided.runs import (
     Outcome,
     schedule,
 )
-from imubench_pipeline.experiments.aided.signals import Signals, Spreads, signals
-from imubench_pipeline.experiments.aided.trajectories import trajectory
+from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
+from imubench_pipeline.extensions.aided.trajectories import trajectory
+from imubench_pipeline.extensions.aided.tunings import TRUE, Models, all_axes, scaled, tunings
 from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.model.estimates import LowPassRow
 from imubench_pipeline.model.recordings import RecordingRow
@@ -52,7 +53,6 @@ from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.model import SensorModel, before_the_filter, in_the_log
 from imubench_pipeline.simulate.models import imu_model
 from imubench_pipeline.steps.noise_source import static_recordings
-from imubench_pipeline.steps.tunings import TRUE, Models, all_axes, scaled, tunings
 from imubench_pipeline.tables import read
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import difference_to_si, quantity_to_si

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
-from imubench_pipeline.experiments.aided.error_state import DEGREES_OF_FREEDOM, GROUPS
-from imubench_pipeline.experiments.aided.runs import WARM_UP, Drive, Outcome
+from imubench_pipeline.extensions.aided.error_state import DEGREES_OF_FREEDOM, GROUPS
+from imubench_pipeline.extensions.aided.runs import WARM_UP, Drive, Outcome
 from imubench_pipeline.typing import Array
 
 ERRORS = ("position", "velocity", "heading")
