@@ -185,6 +185,6 @@ rule papers:
     resources:
         **cost(OfMany(memory=350, memory_of_each=0.3, time=10, time_of_each=0.01)),
     params:
-        code=plan.code("papers"),
+        code=plan.code("papers", "extensions.papers"),
     script:
         "../scripts/papers.py"

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.extensions.aided import page as navigated
+from imubench_pipeline.extensions.papers import page as papers
 from imubench_pipeline.report import (
     boards,
     compare,
     earth_rate,
     fusion,
     made,
-    papers,
     positions,
     rate_table,
     recording,

@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 from pydantic import BaseModel
 
+from imubench_pipeline.extensions.papers import command as papers
 from imubench_pipeline.report import command as report
-from imubench_pipeline.report import papers_command as papers
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import completion_command as completion

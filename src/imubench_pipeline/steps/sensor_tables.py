@@ -10,6 +10,7 @@ import pyarrow as pa
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.datasheets.suspicion import UsualFigures, unusual_rows, usual_of_text
+from imubench_pipeline.extensions.papers.published_figures import published_rows, truth_rows
 from imubench_pipeline.model.estimates import (
     BacktestRow,
     DeterministicRow,
@@ -35,7 +36,6 @@ from imubench_pipeline.recordings.fitness import (
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.copies import recorded_twice
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
-from imubench_pipeline.steps.published_figures import published_rows, truth_rows
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures, without
 

@@ -20,8 +20,8 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
     paper_run,
     simulate_log,
 )
-from imubench_pipeline.experiments.papers.claims import Result, no_result
-from imubench_pipeline.experiments.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.claims import Result, no_result
+from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.simulate.model import SensorModel
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from imubench_pipeline.experiments.papers.about import MAIA
-from imubench_pipeline.experiments.papers.evidence import Evidence
-from imubench_pipeline.experiments.papers.panel import panel_rows
-from imubench_pipeline.experiments.papers.registry import published_rows
+from imubench_pipeline.extensions.papers.about import MAIA
+from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.lines import published_rows
+from imubench_pipeline.extensions.papers.panel import panel_rows
 from imubench_pipeline.tables import build, read, write_arrow
 
 

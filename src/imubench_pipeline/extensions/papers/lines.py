@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from imubench_pipeline.experiments.papers import engers, maia, silva
-from imubench_pipeline.experiments.papers.claims import Paper, rows_of
-from imubench_pipeline.experiments.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers import engers, maia, silva
+from imubench_pipeline.extensions.papers.claims import Paper, rows_of
+from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.model.published import PublishedRow
 
 PAPERS: Sequence[Paper] = (maia.PAPER, silva.PAPER, engers.PAPER)

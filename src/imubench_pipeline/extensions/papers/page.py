@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from imubench_pipeline.experiments.papers.about import (
+from imubench_pipeline.extensions.papers.about import (
     BASES,
     PAPERS,
     VERDICTS,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from imubench_pipeline.experiments.papers.claims import Claim
-from imubench_pipeline.experiments.papers.evidence import Log
+from imubench_pipeline.extensions.papers.claims import Claim
+from imubench_pipeline.extensions.papers.evidence import Log
 
 DEGREE = math.pi / 180.0
 READ_AT = 3600.0

@@ -19,16 +19,16 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
     PAPER_PERIOD,
     PAPER_RATE,
 )
-from imubench_pipeline.experiments.papers.about import Verdict
-from imubench_pipeline.experiments.papers.claims import (
+from imubench_pipeline.extensions.papers.about import Verdict
+from imubench_pipeline.extensions.papers.claims import (
     Claim,
     Result,
     no_result,
     numeric_result,
     verbal_result,
 )
-from imubench_pipeline.experiments.papers.evidence import Evidence
-from imubench_pipeline.experiments.papers.silva_settling import evaluate_settling
+from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.silva_settling import evaluate_settling
 from imubench_pipeline.model.experiments import EarthRateRow
 
 DEGREE = math.pi / 180.0

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from imubench_pipeline.experiments.papers.claims import Claim, Result
-from imubench_pipeline.experiments.papers.evidence import Evidence
-from imubench_pipeline.experiments.papers.maia_printed import DURATION, MTI_GYRO
+from imubench_pipeline.extensions.papers.claims import Claim, Result
+from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.maia_printed import DURATION, MTI_GYRO
 from imubench_pipeline.noise import (
     FLOOR,
     PEAK_TAU,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from imubench_pipeline.experiments.papers.about import About, Basis, Verdict
-from imubench_pipeline.experiments.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.about import About, Basis, Verdict
+from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.model.published import PublishedRow
 
 

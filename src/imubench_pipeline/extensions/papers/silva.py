@@ -10,8 +10,8 @@ import numpy as np
 
 from imubench_pipeline.experiments.earth_rate.known_rate import STARTS, as_printed
 from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, PAPER_RATE
-from imubench_pipeline.experiments.papers.about import SILVA
-from imubench_pipeline.experiments.papers.claims import (
+from imubench_pipeline.extensions.papers.about import SILVA
+from imubench_pipeline.extensions.papers.claims import (
     Claim,
     Paper,
     Result,
@@ -19,15 +19,15 @@ from imubench_pipeline.experiments.papers.claims import (
     numeric_result,
     verbal_result,
 )
-from imubench_pipeline.experiments.papers.evidence import Evidence, Log
-from imubench_pipeline.experiments.papers.silva_runs import (
+from imubench_pipeline.extensions.papers.evidence import Evidence, Log
+from imubench_pipeline.extensions.papers.silva_runs import (
     DEGREE,
     NO_LOG,
     SENSOR,
     filtered,
     turned,
 )
-from imubench_pipeline.experiments.papers.silva_weeks import evaluate_weeks
+from imubench_pipeline.extensions.papers.silva_weeks import evaluate_weeks
 from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 

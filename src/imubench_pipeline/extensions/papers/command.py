@@ -35,12 +35,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the lines; return the exit status."""
     # Only what computes or draws loads this: the other commands answer at once.
-    from imubench_pipeline.experiments.papers.about import PAPERS
+    from imubench_pipeline.extensions.papers.about import PAPERS
     from imubench_pipeline.model.published import PublishedRow
     from imubench_pipeline.report.show import show
 
     if arguments.results is None:
-        from imubench_pipeline.experiments.papers.registry import rows_without_a_run
+        from imubench_pipeline.extensions.papers.lines import rows_without_a_run
 
         rows = [PublishedRow(**row) for row in rows_without_a_run()]
         expected = "without the results of a run: what needs no log"
@@ -82,8 +82,8 @@ def _parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[Ren
     """Yield the table of a paper, and why lines differ."""
     from rich.text import Text
 
-    from imubench_pipeline.experiments.papers.about import VERDICTS
-    from imubench_pipeline.report.papers import cells
+    from imubench_pipeline.extensions.papers.about import VERDICTS
+    from imubench_pipeline.extensions.papers.page import cells
     from imubench_pipeline.report.terminal_table import fitting
 
     reasons = list(dict.fromkeys(row.reason for row in rows if row.reason))

@@ -9,8 +9,8 @@ from functools import cache
 
 import numpy as np
 
-from imubench_pipeline.experiments.papers.about import ENGERS, Verdict
-from imubench_pipeline.experiments.papers.claims import (
+from imubench_pipeline.extensions.papers.about import ENGERS, Verdict
+from imubench_pipeline.extensions.papers.claims import (
     Claim,
     Paper,
     Result,
@@ -18,8 +18,8 @@ from imubench_pipeline.experiments.papers.claims import (
     numeric_result,
     verbal_result,
 )
-from imubench_pipeline.experiments.papers.engers_aim import aim
-from imubench_pipeline.experiments.papers.engers_axes import (
+from imubench_pipeline.extensions.papers.engers_aim import aim
+from imubench_pipeline.extensions.papers.engers_axes import (
     AXES,
     DATASHEETS,
     DEGREE,
@@ -33,8 +33,8 @@ from imubench_pipeline.experiments.papers.engers_axes import (
     in_unit,
     page_of,
 )
-from imubench_pipeline.experiments.papers.engers_figures import figures
-from imubench_pipeline.experiments.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.engers_figures import figures
+from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.model.published import PublishedFigureRow
 from imubench_pipeline.noise import FLOOR
 

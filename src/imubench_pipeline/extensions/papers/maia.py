@@ -13,8 +13,8 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import SI_UNITS
 from imubench_pipeline.estimators.score import SUREST
-from imubench_pipeline.experiments.papers.about import MAIA
-from imubench_pipeline.experiments.papers.claims import (
+from imubench_pipeline.extensions.papers.about import MAIA
+from imubench_pipeline.extensions.papers.claims import (
     DERIVED,
     Claim,
     Paper,
@@ -22,9 +22,9 @@ from imubench_pipeline.experiments.papers.claims import (
     no_result,
     numeric_result,
 )
-from imubench_pipeline.experiments.papers.evidence import Evidence, Log
-from imubench_pipeline.experiments.papers.maia_equations import equations
-from imubench_pipeline.experiments.papers.maia_printed import (
+from imubench_pipeline.extensions.papers.evidence import Evidence, Log
+from imubench_pipeline.extensions.papers.maia_equations import equations
+from imubench_pipeline.extensions.papers.maia_printed import (
     C102_ACCEL,
     C102_GYRO,
     CHANNELS,

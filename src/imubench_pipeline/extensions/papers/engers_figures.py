@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from imubench_pipeline.experiments.papers.claims import (
+from imubench_pipeline.extensions.papers.claims import (
     Claim,
     Result,
     no_result,
     numeric_result,
     verbal_result,
 )
-from imubench_pipeline.experiments.papers.engers_axes import (
+from imubench_pipeline.extensions.papers.engers_axes import (
     DATASHEETS,
     DEGREE,
     NAMES,
@@ -26,7 +26,7 @@ from imubench_pipeline.experiments.papers.engers_axes import (
     in_unit,
     page_of,
 )
-from imubench_pipeline.experiments.papers.evidence import Evidence, Log
+from imubench_pipeline.extensions.papers.evidence import Evidence, Log
 from imubench_pipeline.model.estimates import (
     AllanRow,
     CompensatedAllanRow,
