@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from pydantic import BaseModel
 
+from imubench_pipeline.extensions.nightly import command as nightly
 from imubench_pipeline.extensions.papers import command as papers
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
@@ -29,7 +30,6 @@ from imubench_pipeline.run import run_command as run
 from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
-from imubench_pipeline.run.nightly import command as nightly
 from imubench_pipeline.run.places import places_about
 from imubench_pipeline.run.verification import command as verification
 from imubench_pipeline.settings.command_line import LONGEST, named_path, number, seconds

@@ -50,8 +50,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the workflow on the logs that are complete; return the exit status."""
     with extra("workflow", "run the workflow"):
         import_module("snakemake")
-    from imubench_pipeline.run.nightly.night import Night, TakenError
-    from imubench_pipeline.run.nightly.summary import STATUS, in_words
+    from imubench_pipeline.extensions.nightly.night import Night, TakenError
+    from imubench_pipeline.extensions.nightly.summary import STATUS, in_words
     from imubench_pipeline.settings.validation import ConfigError
 
     try:

@@ -14,13 +14,19 @@ from typing import Any
 
 import yaml
 
+from imubench_pipeline.extensions.nightly.running import errors, last_lines, run_snakemake
+from imubench_pipeline.extensions.nightly.settling import Found, Skip, look, moved, settled
+from imubench_pipeline.extensions.nightly.state import (
+    State,
+    StateError,
+    load_tables,
+    read_state,
+    state_of,
+)
+from imubench_pipeline.extensions.nightly.summary import Skipped, Summary, compared, in_words
 from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, lock_of
-from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakemake
-from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, settled
-from imubench_pipeline.run.nightly.state import State, StateError, load_tables, read_state, state_of
-from imubench_pipeline.run.nightly.summary import Skipped, Summary, compared, in_words
 from imubench_pipeline.run.project import snakefile_of
 from imubench_pipeline.settings.config import Run, read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError

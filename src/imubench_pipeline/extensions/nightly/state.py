@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
+from imubench_pipeline.extensions.nightly.settling import Signature
 from imubench_pipeline.model.comparisons import DriftRow, RankingRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
 from imubench_pipeline.model.table import OfRecordingRow, R
 from imubench_pipeline.report.run_summary import serious
-from imubench_pipeline.run.nightly.settling import Signature
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 

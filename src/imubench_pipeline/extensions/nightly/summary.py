@@ -8,8 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
-from imubench_pipeline.report.run_summary import leaders, left_out, one_line, serious
-from imubench_pipeline.run.nightly.state import (
+from imubench_pipeline.extensions.nightly.state import (
     Known,
     Leader,
     RunRows,
@@ -19,6 +18,7 @@ from imubench_pipeline.run.nightly.state import (
     name_in,
     warned,
 )
+from imubench_pipeline.report.run_summary import leaders, left_out, one_line, serious
 
 Outcome = Literal["fine", "flagged", "failed"]
 
