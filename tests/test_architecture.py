@@ -49,7 +49,7 @@ WRONG = {
         "imubench_pipeline.readers is not allowed to import imubench_pipeline.noise:",
     ),
     "settings of a run": (
-        "experiments/alignment/fine.py",
+        "extensions/calibration/alignment/fine.py",
         "from imubench_pipeline.settings.config import Run\n",
         "imubench_pipeline.experiments is not allowed to import imubench_pipeline.settings.config:",
     ),

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.alignment.attitude import matrix
-from imubench_pipeline.experiments.alignment.triad import Site
-from imubench_pipeline.experiments.alignment.turned import sensed
+from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
+from imubench_pipeline.extensions.calibration.alignment.triad import Site
+from imubench_pipeline.extensions.calibration.alignment.turned import sensed
+from imubench_pipeline.extensions.calibration.calibration import calibration_tables
+from imubench_pipeline.extensions.calibration.in_positions import TRIAD, InPositions
 from imubench_pipeline.recordings.kept import Quality, identified
 from imubench_pipeline.recordings.recording import log_paths
-from imubench_pipeline.settings.positions import TRIAD, InPositions
 from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.steps.calibration import calibration_tables
 from imubench_pipeline.steps.simulate import _blocks
 from imubench_pipeline.tables import build
 from tests.conftest import PROJECT

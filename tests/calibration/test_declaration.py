@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.extensions.calibration.known_rates import AtRest, OnRateTable
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.calibration.recordings import STEPS, UP
 from tests.earth_rate.recordings import SENSOR

@@ -3,8 +3,6 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
-from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
 from imubench_pipeline.experiments.earth_rate.simulation import (
     PAPER_MINUTES,
     PAPER_MODEL,
@@ -13,6 +11,8 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
     simulate_log,
     simulate_runs,
 )
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.extensions.calibration.kalman import RateFilter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.simulate.model import SensorModel

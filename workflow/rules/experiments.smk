@@ -39,7 +39,7 @@ rule calibration:
         **cost(OfRecording(memory=450, memory_of_samples=60, time=5, time_of_values=1)),
     params:
         settings=lambda w: plan.experiment_settings(w.sensor, w.recording),
-        code=plan.code("calibration"),
+        code=plan.code("calibration", "extensions.calibration"),
         attempt=tried("calibration"),
     script:
         "../scripts/calibration.py"

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from imubench_pipeline.steps.calibration import calibration_tables
+from imubench_pipeline.extensions.calibration.calibration import calibration_tables
 from imubench_pipeline.tables import write
 
 if __name__ == "__main__":

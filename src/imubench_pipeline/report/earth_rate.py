@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.extensions.calibration.figures import of_all
 from imubench_pipeline.model.experiments import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
     EarthRateRow,
 )
 from imubench_pipeline.report.alignment import alignments
-from imubench_pipeline.report.calibration import of_all
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.turned import (

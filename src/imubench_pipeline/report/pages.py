@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.extensions.aided import page as navigated
+from imubench_pipeline.extensions.calibration import page_positions as positions
+from imubench_pipeline.extensions.calibration import page_rate_table as rate_table
 from imubench_pipeline.extensions.papers import page as papers
 from imubench_pipeline.report import (
     boards,
@@ -12,8 +14,6 @@ from imubench_pipeline.report import (
     earth_rate,
     fusion,
     made,
-    positions,
-    rate_table,
     recording,
     shortlist,
     start,

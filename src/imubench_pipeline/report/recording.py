@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.extensions.calibration.figures import at_rest
 from imubench_pipeline.model.estimates import (
     BacktestRow,
     EnvelopeRow,
@@ -20,7 +21,6 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import log_paths, read_metadata
 from imubench_pipeline.report import compared_samples, thermal
 from imubench_pipeline.report.backtest import backtest_lines
-from imubench_pipeline.report.calibration import at_rest
 from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.parameters import digits_of, methods_table

@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
-from imubench_pipeline.settings.positions import InPositions
+from imubench_pipeline.extensions.calibration.in_positions import InPositions
+from imubench_pipeline.extensions.calibration.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.shipped import CATALOGUE, folders
 from imubench_pipeline.settings.two_position import TwoPosition

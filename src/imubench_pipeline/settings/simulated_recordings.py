@@ -13,9 +13,9 @@ from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from imubench_pipeline.settings.known_rates import Angle, AtRest, OnRateTable
-from imubench_pipeline.settings.pointing import Pointing
-from imubench_pipeline.settings.positions import InPositions
+from imubench_pipeline.extensions.calibration.in_positions import InPositions
+from imubench_pipeline.extensions.calibration.known_rates import Angle, AtRest, OnRateTable
+from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.settings.printed import Kind as FigureKind
 from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
 from imubench_pipeline.settings.sensor import (

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from imubench_pipeline.settings.known_rates import Gyro, stated_gyro
+from imubench_pipeline.extensions.calibration.known_rates import Gyro, stated_gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
 from imubench_pipeline.settings.validation import Strict, Text, checked
 from imubench_pipeline.units import quantity_to_si

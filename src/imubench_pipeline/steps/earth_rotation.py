@@ -22,11 +22,11 @@ from imubench_pipeline.experiments.earth_rate.courses import (
     thin,
     white_sigma,
 )
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
 from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.experiments.earth_rate.published import RunDesign, published_row
 from imubench_pipeline.experiments.earth_rate.turning import find_turning
 from imubench_pipeline.experiments.earth_rate.turns import FoundDwell, Turning
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
 from imubench_pipeline.model.experiments import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,

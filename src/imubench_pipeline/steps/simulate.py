@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.alignment.attitude import matrix
-from imubench_pipeline.experiments.alignment.triad import Site
-from imubench_pipeline.experiments.alignment.turned import sensed
-from imubench_pipeline.experiments.earth_rate.experiment import Experiment
 from imubench_pipeline.experiments.earth_rate.simulation import true_rate
+from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
+from imubench_pipeline.extensions.calibration.alignment.triad import Site
+from imubench_pipeline.extensions.calibration.alignment.turned import sensed
+from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.calibration.in_positions import TRIAD
+from imubench_pipeline.extensions.calibration.positions import true_angles
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.readers.text_log import TextLog
-from imubench_pipeline.settings.positions import TRIAD
 from imubench_pipeline.settings.sensor import TEMPERATURE, ColumnSource, LogFormat
 from imubench_pipeline.settings.simulated_recordings import (
     SimulatedPositions,
@@ -32,7 +33,6 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import simulate_imu
 from imubench_pipeline.simulate.models import imu_model
 from imubench_pipeline.simulate.profiles import Profile, profiles_of
-from imubench_pipeline.steps.positions import true_angles
 from imubench_pipeline.steps.specimens import fused_blocks
 from imubench_pipeline.tables import making
 from imubench_pipeline.units import quantity_to_si

@@ -24,9 +24,9 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
-from imubench_pipeline.experiments.earth_rate.states import block_states
+from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
+from imubench_pipeline.extensions.calibration.states import block_states
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.experiments.earth_rate.experiment import Experiment
+from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

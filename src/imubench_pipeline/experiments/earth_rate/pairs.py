@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks
+from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import Blocks
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

@@ -21,7 +21,7 @@ from imubench_pipeline.experiments.earth_rate.bound import (
     information_by_states,
     sigma_of,
 )
-from imubench_pipeline.experiments.earth_rate.experiment import Experiment
+from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

@@ -16,9 +16,9 @@ import numpy as np
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.experiments.earth_rate.bound import block_length
 from imubench_pipeline.experiments.earth_rate.courses import white_sigma
-from imubench_pipeline.experiments.earth_rate.experiment import Experiment
-from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
 from imubench_pipeline.experiments.earth_rate.pairs import by_pairs
+from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.calibration.kalman import RateFilter
 from imubench_pipeline.noise import NoiseModel
 
 Row = dict[str, Any]

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
-from imubench_pipeline.experiments.earth_rate.states import block_states
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
+from imubench_pipeline.extensions.calibration.states import block_states
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.simulate.simulation import simulate

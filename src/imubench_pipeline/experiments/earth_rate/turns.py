@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.experiments.earth_rate.alternation import Alternation
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell
+from imubench_pipeline.extensions.calibration.experiment import Dwell
 
 FoundBy = Literal["transient", "step", "schedule", "column"]
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
-from imubench_pipeline.experiments.alignment.attitude import rotation
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Dwell, Experiment
+from imubench_pipeline.extensions.calibration.alignment.attitude import rotation
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Dwell, Experiment
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.model.experiments import CalibrationPointRow, CalibrationRow
-from imubench_pipeline.report.calibration import (
+from imubench_pipeline.extensions.calibration.figures import (
     answer,
     earth_words,
     lines,
     not_observable,
     scatter_words,
 )
+from imubench_pipeline.model.experiments import CalibrationPointRow, CalibrationRow
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.recording import about_of, summary_words
 from imubench_pipeline.report.site import Site

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.experiments.earth_rate.covariance import longest_tau
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks
+from imubench_pipeline.extensions.calibration.covariance import longest_tau
+from imubench_pipeline.extensions.calibration.experiment import Blocks
 from imubench_pipeline.noise import NoiseModel, Role, Term
 from imubench_pipeline.noise.block_means import of_block_means
 from imubench_pipeline.noise.state_space import StateSpace, repeat_step, root_of

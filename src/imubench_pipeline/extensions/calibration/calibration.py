@@ -10,21 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.experiments.calibration.least_squares import (
+from imubench_pipeline.extensions.calibration.in_positions import InPositions
+from imubench_pipeline.extensions.calibration.known_rates import AtRest, OnRateTable
+from imubench_pipeline.extensions.calibration.least_squares import (
     Limits,
     NotObservable,
     NotObservableError,
 )
-from imubench_pipeline.experiments.calibration.rate_table import Calibration, calibrate, residuals
-from imubench_pipeline.experiments.calibration.schedule import Schedule
-from imubench_pipeline.experiments.calibration.still import bias_at_rest
+from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.extensions.calibration.positions import attitude_rows, true_angles
+from imubench_pipeline.extensions.calibration.rate_table import Calibration, calibrate, residuals
+from imubench_pipeline.extensions.calibration.schedule import Schedule
+from imubench_pipeline.extensions.calibration.still import bias_at_rest
 from imubench_pipeline.model.experiments import CalibrationPointRow, CalibrationRow
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.recordings.kept import kept_logs
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
-from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
-from imubench_pipeline.settings.pointing import Pointing
-from imubench_pipeline.settings.positions import InPositions
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.noise_source import (
@@ -33,7 +34,6 @@ from imubench_pipeline.steps.noise_source import (
     noise_source,
     segments_reason,
 )
-from imubench_pipeline.steps.positions import attitude_rows, true_angles
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import CALIBRATED
 from imubench_pipeline.typing import Array

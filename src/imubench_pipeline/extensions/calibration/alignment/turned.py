@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imubench_pipeline.experiments.alignment.triad import Site
+from imubench_pipeline.extensions.calibration.alignment.triad import Site
 from imubench_pipeline.typing import Array
 
 

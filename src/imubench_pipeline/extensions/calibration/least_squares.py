@@ -19,8 +19,8 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import chi2, norm
 
-from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
+from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

@@ -16,15 +16,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.alignment.attitude import euler_angles
-from imubench_pipeline.experiments.alignment.coarse import (
+from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles
+from imubench_pipeline.extensions.calibration.alignment.coarse import (
     coarse_accuracy,
     coarse_alignment,
     mean_vectors,
 )
-from imubench_pipeline.experiments.alignment.fine import UNIFORM_HEADING_SIGMA, FineAlignment
-from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs
+from imubench_pipeline.extensions.calibration.alignment.fine import (
+    UNIFORM_HEADING_SIGMA,
+    FineAlignment,
+)
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.typing import Array
 
 

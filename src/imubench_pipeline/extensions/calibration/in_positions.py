@@ -8,7 +8,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from imubench_pipeline.settings.known_rates import (
+from imubench_pipeline.extensions.calibration.known_rates import (
     AccelerationFromZero,
     Angle,
     RateFromZero,

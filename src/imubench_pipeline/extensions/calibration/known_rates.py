@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.settings.requirements import Latitude, Time
 from imubench_pipeline.settings.validation import Strict, Text, checked
 from imubench_pipeline.units import quantity_to_si

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.alignment.attitude import euler_jacobian
-from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_jacobian
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
 from imubench_pipeline.typing import Array
 
 

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.experiments.alignment.attitude import euler_angles, rotation
-from imubench_pipeline.experiments.alignment.fine import align
-from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.experiments.calibration.least_squares import NotObservableError
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles, rotation
+from imubench_pipeline.extensions.calibration.alignment.fine import align
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.extensions.calibration.in_positions import TRIAD, InPositions
+from imubench_pipeline.extensions.calibration.least_squares import NotObservableError
 from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.recording import ChannelLog
-from imubench_pipeline.settings.positions import TRIAD, InPositions
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.steps.noise_source import NO_MODEL, from_printed, segments_reason
 from imubench_pipeline.steps.outlook import noise_at_rest

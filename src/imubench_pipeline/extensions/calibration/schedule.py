@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Dwell, Experiment
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Dwell, Experiment
 from imubench_pipeline.typing import Array
 
 

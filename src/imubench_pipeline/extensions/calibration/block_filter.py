@@ -23,7 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.states import BlockStates
+from imubench_pipeline.extensions.calibration.states import BlockStates
 from imubench_pipeline.typing import Array
 
 

@@ -16,7 +16,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.calibration.least_squares import (
+from imubench_pipeline.extensions.calibration.experiment import (
+    Blocks,
+    Dwell,
+    Experiment,
+    block_means,
+)
+from imubench_pipeline.extensions.calibration.kalman import RateFilter
+from imubench_pipeline.extensions.calibration.least_squares import (
     LeastSquares,
     Limits,
     NotObservable,
@@ -24,15 +31,8 @@ from imubench_pipeline.experiments.calibration.least_squares import (
     half_width,
     limits,
 )
-from imubench_pipeline.experiments.earth_rate.experiment import (
-    Blocks,
-    Dwell,
-    Experiment,
-    block_means,
-)
-from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
+from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.typing import Array
 
 _MIN_HEADING_SENSITIVITY = 1e-9

@@ -23,19 +23,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.alignment.attitude import (
+from imubench_pipeline.extensions.calibration.alignment.attitude import (
     correct,
     cross_matrix,
     euler_jacobian,
 )
-from imubench_pipeline.experiments.alignment.coarse import coarse_alignment, mean_vectors
-from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.experiments.calibration.least_squares import (
+from imubench_pipeline.extensions.calibration.alignment.coarse import coarse_alignment, mean_vectors
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.calibration.block_filter import BlockFilter
+from imubench_pipeline.extensions.calibration.least_squares import (
     NotObservable,
     NotObservableError,
 )
-from imubench_pipeline.experiments.earth_rate.block_filter import BlockFilter
-from imubench_pipeline.experiments.earth_rate.states import block_states
+from imubench_pipeline.extensions.calibration.states import block_states
 from imubench_pipeline.typing import Array
 
 INITIAL_ANGLE_SIGMA = 10.0

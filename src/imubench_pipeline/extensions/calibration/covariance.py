@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks
+from imubench_pipeline.extensions.calibration.experiment import Blocks
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

@@ -30,7 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from imubench_pipeline.experiments.calibration.least_squares import (
+from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Measured, block_means
+from imubench_pipeline.extensions.calibration.least_squares import (
     CONFIDENCE_LEVEL,
     Fit,
     LeastSquares,
@@ -41,11 +43,9 @@ from imubench_pipeline.experiments.calibration.least_squares import (
     half_width,
     limits,
 )
-from imubench_pipeline.experiments.calibration.schedule import Schedule
-from imubench_pipeline.experiments.earth_rate.covariance import block_mean_covariance
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Measured, block_means
+from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.typing import Array
 
 _MAX_UNKNOWN_RATE = 1e-12

@@ -26,9 +26,9 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from imubench_pipeline.experiments.earth_rate.block_filter import BlockFilter, deviation, triangle
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks
-from imubench_pipeline.experiments.earth_rate.states import UNINFORMATIVE_SIGMA, block_states
+from imubench_pipeline.extensions.calibration.block_filter import BlockFilter, deviation, triangle
+from imubench_pipeline.extensions.calibration.experiment import Blocks
+from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA, block_states
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
