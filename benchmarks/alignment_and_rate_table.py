@@ -24,12 +24,6 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.simulation import (
-    ASSUMED_LATITUDE,
-    PAPER_MODEL,
-    PAPER_RATE,
-    simulate_runs,
-)
 from imubench_pipeline.extensions.calibration.alignment.accuracy import simulate_triad
 from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles, matrix
 from imubench_pipeline.extensions.calibration.alignment.coarse import (
@@ -44,6 +38,12 @@ from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.extensions.calibration.rate_table import RateTable
 from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.extensions.calibration.still import StillRun
+from imubench_pipeline.extensions.earth_rate.simulation import (
+    ASSUMED_LATITUDE,
+    PAPER_MODEL,
+    PAPER_RATE,
+    simulate_runs,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.sigma_range import drawn_from_covariance, sigma_range
 

@@ -23,11 +23,13 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.bound import block_length, cramer_rao
-from imubench_pipeline.experiments.earth_rate.known_rate import STARTS, mean_sigma, settled, track
-from imubench_pipeline.experiments.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.calibration.kalman import Filtered, RateFilter
+from imubench_pipeline.extensions.earth_rate.bound import block_length, cramer_rao
+from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, mean_sigma, settled, track
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
+from imubench_pipeline.extensions.earth_rate.prediction import Outlook
+from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
     PAPER_MINUTES,
@@ -38,8 +40,6 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
     simulate_log,
     simulate_runs,
 )
-from imubench_pipeline.extensions.calibration.experiment import Experiment
-from imubench_pipeline.extensions.calibration.kalman import Filtered, RateFilter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate.model import SensorModel
 

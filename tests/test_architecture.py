@@ -49,9 +49,9 @@ WRONG = {
         "imubench_pipeline.readers is not allowed to import imubench_pipeline.noise:",
     ),
     "settings of a run": (
-        "extensions/calibration/alignment/fine.py",
+        "navigation/ratios.py",
         "from imubench_pipeline.settings.config import Run\n",
-        "imubench_pipeline.experiments is not allowed to import imubench_pipeline.settings.config:",
+        "imubench_pipeline.navigation is not allowed to import imubench_pipeline.settings.config:",
     ),
     "no room": ("flat.py", "\n", "- imubench_pipeline.flat\n"),
 }

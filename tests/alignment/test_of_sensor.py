@@ -14,9 +14,9 @@ from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
+from imubench_pipeline.extensions.earth_rate.outlook import TIMES, noise_at_rest, outlook_tables
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.config import EarthRateSettings
-from imubench_pipeline.steps.outlook import TIMES, noise_at_rest, outlook_tables
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.recordings import put

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 import yaml
 
+from imubench_pipeline.extensions.earth_rate.two_position import TwoPosition
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.recording import channel_logs, static_logs
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.earth_rate.recordings import SENSOR
 

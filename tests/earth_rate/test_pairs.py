@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.experiments.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
+from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MODEL,
     paper_run,
     simulate_runs,
 )
-from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
 from imubench_pipeline.noise import NoiseModel, Ramp
 from tests.earth_rate.brute import MODELS, of_blocks
 

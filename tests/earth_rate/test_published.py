@@ -4,13 +4,13 @@ import math
 
 import pytest
 
-from imubench_pipeline.experiments.earth_rate.courses import thin
-from imubench_pipeline.experiments.earth_rate.published import (
+from imubench_pipeline.extensions.earth_rate.courses import thin
+from imubench_pipeline.extensions.earth_rate.published import (
     RunDesign,
     allowed_sigmas,
     published_row,
 )
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
     PAPER_MODEL,

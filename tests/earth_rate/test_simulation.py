@@ -3,7 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.extensions.calibration.kalman import RateFilter
+from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MINUTES,
     PAPER_MODEL,
     PAPER_RATE,
@@ -11,8 +13,6 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
     simulate_log,
     simulate_runs,
 )
-from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
-from imubench_pipeline.extensions.calibration.kalman import RateFilter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.simulate.model import SensorModel

@@ -19,7 +19,7 @@ rule earth_rotation:
         **cost(OfRecording(memory=450, memory_of_samples=60, time=15, time_of_values=3)),
     params:
         settings=lambda w: plan.experiment_settings(w.sensor, w.recording),
-        code=plan.code("earth_rotation"),
+        code=plan.code("earth_rotation", "extensions.earth_rate"),
         attempt=tried("earth_rotation"),
     script:
         "../scripts/earth_rotation.py"

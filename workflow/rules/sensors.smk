@@ -24,7 +24,7 @@ rule outlook:
         ),
     params:
         settings=lambda w: plan.outlook_settings(w.sensor),
-        code=plan.code("outlook"),
+        code=plan.code("outlook", "extensions.earth_rate"),
         attempt=tried("outlook"),
     script:
         "../scripts/outlook.py"

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from imubench_pipeline.steps.earth_rotation import earth_rate_tables
+from imubench_pipeline.extensions.earth_rate.earth_rotation import earth_rate_tables
 from imubench_pipeline.tables import write
 
 if __name__ == "__main__":

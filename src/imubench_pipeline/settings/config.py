@@ -11,10 +11,10 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
 from imubench_pipeline.extensions.calibration.known_rates import AccelerationFromZero, RateFromZero
+from imubench_pipeline.extensions.earth_rate.two_position import TimeFromZero
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.requirements import Axis, Latitude, Outage, Time, Trajectory
 from imubench_pipeline.settings.shipped import CATALOGUE
-from imubench_pipeline.settings.two_position import TimeFromZero
 from imubench_pipeline.settings.validation import (
     ConfigError,
     Duration,

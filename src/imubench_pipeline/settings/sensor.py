@@ -13,9 +13,9 @@ from pydantic import Field, model_validator
 
 from imubench_pipeline.extensions.calibration.in_positions import InPositions
 from imubench_pipeline.extensions.calibration.known_rates import AtRest, OnRateTable
+from imubench_pipeline.extensions.earth_rate.two_position import TwoPosition
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.shipped import CATALOGUE, folders
-from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import (
     Between,
     ConfigError,

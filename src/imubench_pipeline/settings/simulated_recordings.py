@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 from imubench_pipeline.extensions.calibration.in_positions import InPositions
 from imubench_pipeline.extensions.calibration.known_rates import Angle, AtRest, OnRateTable
 from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.extensions.earth_rate.two_position import TwoPosition
 from imubench_pipeline.settings.printed import Kind as FigureKind
 from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
 from imubench_pipeline.settings.sensor import (
@@ -31,7 +32,6 @@ from imubench_pipeline.settings.sensor import (
     quantity_of,
 )
 from imubench_pipeline.settings.simulated_sensor import AxisSettings, ImuSettings, check_axes
-from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import (
     ConfigError,
     Duration,

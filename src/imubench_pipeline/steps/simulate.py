@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.simulation import true_rate
 from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
 from imubench_pipeline.extensions.calibration.alignment.triad import Site
 from imubench_pipeline.extensions.calibration.alignment.turned import sensed
 from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.calibration.in_positions import TRIAD
 from imubench_pipeline.extensions.calibration.positions import true_angles
+from imubench_pipeline.extensions.earth_rate.simulation import true_rate
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.readers.text_log import TextLog
 from imubench_pipeline.settings.sensor import TEMPERATURE, ColumnSource, LogFormat

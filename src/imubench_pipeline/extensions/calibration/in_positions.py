@@ -19,7 +19,7 @@ from imubench_pipeline.settings.validation import Strict
 from imubench_pipeline.units import quantity_to_si
 
 TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
-"""The axes that it takes, in the order of `imubench_pipeline.experiments.alignment`."""
+"""The axes that it takes, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
 
 
 class InPositions(Strict):

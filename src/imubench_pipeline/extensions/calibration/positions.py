@@ -17,12 +17,12 @@ from imubench_pipeline.extensions.calibration.alignment.triad import Positions, 
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.extensions.calibration.in_positions import TRIAD, InPositions
 from imubench_pipeline.extensions.calibration.least_squares import NotObservableError
+from imubench_pipeline.extensions.earth_rate.outlook import noise_at_rest
 from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.steps.noise_source import NO_MODEL, from_printed, segments_reason
-from imubench_pipeline.steps.outlook import noise_at_rest
 from imubench_pipeline.units import quantity_to_si
 
 ANGLES = ("roll", "pitch", "heading")

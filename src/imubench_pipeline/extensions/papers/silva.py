@@ -8,8 +8,8 @@ from functools import cache
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.known_rate import STARTS, as_printed
-from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, PAPER_RATE
+from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, as_printed
+from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, PAPER_RATE
 from imubench_pipeline.extensions.papers.about import SILVA
 from imubench_pipeline.extensions.papers.claims import (
     Claim,

@@ -12,8 +12,8 @@ from functools import cache
 import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.known_rate import STARTS, settled, track
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
+from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MINUTES,
     PAPER_MODEL,
     PAPER_RATE,

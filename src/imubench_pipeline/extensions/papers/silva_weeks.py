@@ -14,7 +14,7 @@ import numpy as np
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators.estimate import PARAMETERS
-from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL
+from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL
 from imubench_pipeline.extensions.papers.claims import Result, no_result
 from imubench_pipeline.extensions.papers.evidence import Evidence, Log
 from imubench_pipeline.noise.simulate import channel_rng, simulate

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs
 from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles
 from imubench_pipeline.extensions.calibration.alignment.coarse import (
     coarse_accuracy,
@@ -28,6 +27,7 @@ from imubench_pipeline.extensions.calibration.alignment.fine import (
     FineAlignment,
 )
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.earth_rate.simulation import simulate_runs
 from imubench_pipeline.typing import Array
 
 

@@ -16,9 +16,6 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.bound import block_length, bound
-from imubench_pipeline.experiments.earth_rate.known_rate import STARTS, settled, track
-from imubench_pipeline.experiments.earth_rate.pairs import Differences, by_pairs, by_triples
 from imubench_pipeline.extensions.calibration.experiment import (
     Blocks,
     Experiment,
@@ -27,6 +24,9 @@ from imubench_pipeline.extensions.calibration.experiment import (
 )
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
 from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA
+from imubench_pipeline.extensions.earth_rate.bound import block_length, bound
+from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
+from imubench_pipeline.extensions.earth_rate.pairs import Differences, by_pairs, by_triples
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.sigma_range import sigma_range
 from imubench_pipeline.typing import Array

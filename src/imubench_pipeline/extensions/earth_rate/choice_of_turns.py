@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import norm
 
-from imubench_pipeline.experiments.earth_rate.transients import CLEAR_LOG_LIKELIHOOD, Event
+from imubench_pipeline.extensions.earth_rate.transients import CLEAR_LOG_LIKELIHOOD, Event
 from imubench_pipeline.typing import Array
 
 EDGE_DWELL_FRACTION = 0.2

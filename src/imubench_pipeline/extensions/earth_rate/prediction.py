@@ -1,6 +1,6 @@
 """Predict the accuracy of the Earth's rate and north by a gyro, and the best dwell.
 
-All results are the Cramér-Rao bound of runs of equal dwells (`experiments.earth_rate.bound`).
+All results are the Cramér-Rao bound of runs of equal dwells (`extensions.earth_rate.bound`).
 `prediction_rows` gives the necessary turns and times as rows of the table.
 """
 
@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.bound import (
+from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.earth_rate.bound import (
     MAX_BLOCKS,
     block_length,
     information_by_states,
     sigma_of,
 )
-from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

@@ -2,7 +2,7 @@
 
 A run is modelled as its source describes it: the schedule of turns, and the noise of the printed
 figures. An estimate from pairs of dwells then scatters about the true rate with the standard
-deviation of `experiments.earth_rate.pairs`. A published estimate many standard deviations away has
+deviation of `extensions.earth_rate.pairs`. A published estimate many standard deviations away has
 other errors: warm-up of the sensor, a misaligned axis, turns within the mean, or a wrong sense.
 """
 
@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.bound import block_length
-from imubench_pipeline.experiments.earth_rate.courses import white_sigma
-from imubench_pipeline.experiments.earth_rate.pairs import by_pairs
 from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
+from imubench_pipeline.extensions.earth_rate.bound import block_length
+from imubench_pipeline.extensions.earth_rate.courses import white_sigma
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
 from imubench_pipeline.noise import NoiseModel
 
 Row = dict[str, Any]

@@ -7,15 +7,8 @@ from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.figures import of_all
-from imubench_pipeline.model.experiments import (
-    EarthRatePredictionRow,
-    EarthRatePublishedRow,
-    EarthRateRow,
-)
-from imubench_pipeline.report.alignment import alignments
-from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.site import Entry, Site
-from imubench_pipeline.report.turned import (
+from imubench_pipeline.extensions.earth_rate.page_alignment import alignments
+from imubench_pipeline.extensions.earth_rate.page_turned import (
     ESTIMATES,
     answer,
     given_words,
@@ -26,6 +19,13 @@ from imubench_pipeline.report.turned import (
     prediction_payload,
     published_lines,
 )
+from imubench_pipeline.model.experiments import (
+    EarthRatePredictionRow,
+    EarthRatePublishedRow,
+    EarthRateRow,
+)
+from imubench_pipeline.report.payload import Arrays
+from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import counted, number_text
 

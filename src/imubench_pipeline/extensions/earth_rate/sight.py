@@ -8,24 +8,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.alternation import (
+from imubench_pipeline.extensions.earth_rate.alternation import (
     alternation,
     best_shift,
     split_at_turns,
 )
-from imubench_pipeline.experiments.earth_rate.choice_of_turns import (
+from imubench_pipeline.extensions.earth_rate.choice_of_turns import (
     EDGE_DWELL_FRACTION,
     choose,
     compute_min_calm,
     may_be_silent,
     shorter_dwell,
 )
-from imubench_pipeline.experiments.earth_rate.transients import (
+from imubench_pipeline.extensions.earth_rate.transients import (
     CLEAR_LOG_LIKELIHOOD,
     Event,
     LevelBlocks,
 )
-from imubench_pipeline.experiments.earth_rate.turns import Turn
+from imubench_pipeline.extensions.earth_rate.turns import Turn
 from imubench_pipeline.typing import Array
 
 _MIN_SEEN_SHARE = 0.4
@@ -46,7 +46,7 @@ class TurnSchedule:
     """The stated turns, before any analysis of the log."""
 
     # dwell, start, turning, margin: as
-    # `imubench_pipeline.experiments.earth_rate.turning.find_turning` takes them, s
+    # `imubench_pipeline.extensions.earth_rate.turning.find_turning` takes them, s
     dwell: float
     start: float
     turning: float

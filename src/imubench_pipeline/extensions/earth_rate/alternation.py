@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.transients import LevelBlocks, calm_means
+from imubench_pipeline.extensions.earth_rate.transients import LevelBlocks, calm_means
 from imubench_pipeline.typing import Array
 
 _MIN_CONTRADICTION_SIGMAS = 3.5

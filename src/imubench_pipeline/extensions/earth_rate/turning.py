@@ -15,15 +15,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.experiments.earth_rate.alternation import alternation, contradiction
-from imubench_pipeline.experiments.earth_rate.choice_of_turns import EDGE_DWELL_FRACTION
-from imubench_pipeline.experiments.earth_rate.sight import (
+from imubench_pipeline.extensions.earth_rate.alternation import alternation, contradiction
+from imubench_pipeline.extensions.earth_rate.choice_of_turns import EDGE_DWELL_FRACTION
+from imubench_pipeline.extensions.earth_rate.sight import (
     TurnSchedule,
     disturbances,
     find_turns,
     leave_out_knocks,
 )
-from imubench_pipeline.experiments.earth_rate.transients import (
+from imubench_pipeline.extensions.earth_rate.transients import (
     CLEAR_LOG_LIKELIHOOD,
     Event,
     LevelBlocks,
@@ -32,7 +32,7 @@ from imubench_pipeline.experiments.earth_rate.transients import (
     steps,
     transients,
 )
-from imubench_pipeline.experiments.earth_rate.turns import (
+from imubench_pipeline.extensions.earth_rate.turns import (
     DETECTION_ORDER,
     FoundDwell,
     Turn,
@@ -126,7 +126,7 @@ def find_turning(
     """Find the dwells and the turning points of a log.
 
     A column with the position decides if there is one. Else the transients and steps that fit the
-    schedule best are chosen (`experiments.earth_rate.choice_of_turns.choose`): a missed turn makes
+    schedule best are chosen (`extensions.earth_rate.choice_of_turns.choose`): a missed turn makes
     a dwell twice as long, an overshoot belongs to its turn, a knock is left out. Turns that are too
     weak to detect are inserted from the schedule between the detected ones. If fewer than 40 % of
     the scheduled turns are detected, the schedule gives all of them.

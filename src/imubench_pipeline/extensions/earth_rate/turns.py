@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.experiments.earth_rate.alternation import Alternation
 from imubench_pipeline.extensions.calibration.experiment import Dwell
+from imubench_pipeline.extensions.earth_rate.alternation import Alternation
 
 FoundBy = Literal["transient", "step", "schedule", "column"]
 

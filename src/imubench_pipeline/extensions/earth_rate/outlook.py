@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.estimators.rows import recommended_estimates
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
+from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.model.experiments import AlignmentRow, EarthRatePredictionRow
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.courses import (
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.earth_rate.courses import (
     METHODS,
     Course,
     Courses,
@@ -22,11 +23,11 @@ from imubench_pipeline.experiments.earth_rate.courses import (
     thin,
     white_sigma,
 )
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
-from imubench_pipeline.experiments.earth_rate.published import RunDesign, published_row
-from imubench_pipeline.experiments.earth_rate.turning import find_turning
-from imubench_pipeline.experiments.earth_rate.turns import FoundDwell, Turning
-from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
+from imubench_pipeline.extensions.earth_rate.published import RunDesign, published_row
+from imubench_pipeline.extensions.earth_rate.turning import find_turning
+from imubench_pipeline.extensions.earth_rate.turns import FoundDwell, Turning
+from imubench_pipeline.extensions.earth_rate.two_position import TwoPosition
 from imubench_pipeline.model.experiments import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
@@ -41,7 +42,6 @@ from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_met
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording, SimulatedTurns
-from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.simulate.models import axis_model
 from imubench_pipeline.steps.noise_source import (
     NO_MODEL,
