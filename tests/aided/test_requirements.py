@@ -8,8 +8,8 @@ import pytest
 from pydantic import ValidationError
 
 from imubench_pipeline.extensions.aided.limits import outage_rows
+from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES
-from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis

@@ -10,7 +10,7 @@ import pytest
 
 from imubench_pipeline.extensions.earth_rate.page import published_words
 from imubench_pipeline.extensions.earth_rate.page_turned import answer, given_words, needs
-from imubench_pipeline.model.experiments import (
+from imubench_pipeline.extensions.earth_rate.tables import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
     EarthRateRow,

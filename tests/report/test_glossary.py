@@ -23,7 +23,7 @@ from imubench_pipeline.datasheets import deltas as datasheet
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators import estimate, lines
 from imubench_pipeline.estimators.identifiability import bounds_of
-from imubench_pipeline.model.published import AccuracyRow
+from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.navigation import pooled
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.error_budget import Gyrocompass, Start, budget

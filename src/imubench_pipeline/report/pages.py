@@ -9,17 +9,9 @@ from imubench_pipeline.extensions.calibration import page_positions as positions
 from imubench_pipeline.extensions.calibration import page_rate_table as rate_table
 from imubench_pipeline.extensions.earth_rate import page as earth_rate
 from imubench_pipeline.extensions.earth_rate import page_turned as turned
+from imubench_pipeline.extensions.fusion import boards
 from imubench_pipeline.extensions.papers import page as papers
-from imubench_pipeline.report import (
-    boards,
-    compare,
-    fusion,
-    made,
-    recording,
-    shortlist,
-    start,
-    theory,
-)
+from imubench_pipeline.report import compare, fusion, made, recording, shortlist, start, theory
 from imubench_pipeline.report.sensor import device_page, sensor_page
 from imubench_pipeline.report.site import Entry, Page, Site
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.extensions.calibration.figures import at_rest
+from imubench_pipeline.model.comparisons import CoverageRow
 from imubench_pipeline.model.estimates import (
     BacktestRow,
     EnvelopeRow,
@@ -15,7 +16,6 @@ from imubench_pipeline.model.estimates import (
     ModelSampleRow,
     ScoreRow,
 )
-from imubench_pipeline.model.published import CoverageRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import log_paths, read_metadata

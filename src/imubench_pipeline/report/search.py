@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from urllib.parse import quote
 
 from imubench_pipeline.extensions.papers.about import PAPERS
-from imubench_pipeline.model.published import PublishedRow
+from imubench_pipeline.extensions.papers.tables import PublishedRow
 from imubench_pipeline.report.glossary import glossary, term
 from imubench_pipeline.report.site import Site
 

@@ -15,9 +15,10 @@ from typing import Any
 
 import pyarrow as pa
 
-from imubench_pipeline.model.comparisons import DriftRow, NavigationRow
-from imubench_pipeline.model.experiments import CalibrationRow, EarthRatePredictionRow
-from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.extensions.aided.tables import NavigationRow
+from imubench_pipeline.extensions.calibration.tables import CalibrationRow
+from imubench_pipeline.extensions.earth_rate.tables import EarthRatePredictionRow
+from imubench_pipeline.model.comparisons import CoverageRow, DriftRow
 from imubench_pipeline.model.table import OfRecordingRow, R
 from imubench_pipeline.report.comparison import ComparedRecording, compared_recording
 from imubench_pipeline.report.palette import Appearance, sensor_appearances

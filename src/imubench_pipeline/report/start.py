@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
-from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
-from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.extensions.calibration.tables import CalibrationRow
+from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
+from imubench_pipeline.model.comparisons import CoverageRow, NextStepRow, RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from imubench_pipeline.model.published import AccuracyRow
+from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.static_figures.files import figure_text

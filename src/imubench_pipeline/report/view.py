@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pandas.util import hash_array
 
 from imubench_pipeline.estimators.rows import estimate_of
+from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow, ErrorBudgetRow
 from imubench_pipeline.model.estimates import (
     DeterministicRow,
@@ -27,7 +28,6 @@ from imubench_pipeline.model.estimates import (
     SimulatedTruthRow,
     TemperatureRow,
 )
-from imubench_pipeline.model.published import PublishedFigureRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.table import ChannelRow, R
 from imubench_pipeline.noise import NoiseModel

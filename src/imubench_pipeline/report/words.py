@@ -8,9 +8,10 @@ from typing import Any
 
 from markupsafe import Markup
 
+from imubench_pipeline.extensions.calibration.tables import CalibrationRow
+from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import ParameterRow
-from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED, in_words
 from imubench_pipeline.report.practical import PageUnit, interval_text, symbol_text
 from imubench_pipeline.settings.requirements import Requirement

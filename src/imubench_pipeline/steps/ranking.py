@@ -8,7 +8,8 @@ from pathlib import Path
 import pyarrow.compute as pc
 
 from imubench_pipeline.extensions.aided.limits import outage_rows
-from imubench_pipeline.model.comparisons import ErrorBudgetRow, NavigationRow
+from imubench_pipeline.extensions.aided.tables import NavigationRow
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.navigation.selection import ranked

@@ -5,3 +5,10 @@ their errors (`signals`), a noise model the states of the filter (`axis_states`)
 (`error_state`). `runs` repeats it, for several tunings on the same signals, and `measures` says how
 large the errors are at the end of an outage, and whether they are as large as the filter says.
 """
+
+from imubench_pipeline.registry import Extension
+
+EXTENSION = Extension(
+    name="aided",
+    tables="aided.tables",
+)

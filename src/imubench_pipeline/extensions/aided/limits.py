@@ -13,8 +13,9 @@ from typing import Annotated, Any
 
 from scipy.special import ndtr
 
+from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.model import table
-from imubench_pipeline.model.comparisons import ErrorBudgetRow, NavigationRow
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
 from imubench_pipeline.settings.requirements import DIMENSIONS, Limit, Requirement

@@ -38,9 +38,9 @@ from imubench_pipeline.extensions.aided.runs import (
     schedule,
 )
 from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
+from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.extensions.aided.trajectories import trajectory
 from imubench_pipeline.extensions.aided.tunings import TRUE, Models, all_axes, scaled, tunings
-from imubench_pipeline.model.comparisons import NavigationRow
 from imubench_pipeline.model.estimates import LowPassRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel

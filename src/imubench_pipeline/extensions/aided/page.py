@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
-from imubench_pipeline.model.comparisons import NavigationRow
+from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.words.numbers import NO_VALUE, counted, number_text, percent_text

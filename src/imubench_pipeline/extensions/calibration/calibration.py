@@ -22,7 +22,11 @@ from imubench_pipeline.extensions.calibration.positions import attitude_rows, tr
 from imubench_pipeline.extensions.calibration.rate_table import Calibration, calibrate, residuals
 from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.extensions.calibration.still import bias_at_rest
-from imubench_pipeline.model.experiments import CalibrationPointRow, CalibrationRow
+from imubench_pipeline.extensions.calibration.tables import (
+    CALIBRATED,
+    CalibrationPointRow,
+    CalibrationRow,
+)
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.recordings.kept import kept_logs
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
@@ -35,7 +39,6 @@ from imubench_pipeline.steps.noise_source import (
     segments_reason,
 )
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.tables.schemas import CALIBRATED
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.model.experiments import CalibrationRow
+from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView

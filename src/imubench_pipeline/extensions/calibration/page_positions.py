@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.extensions.calibration.figures import attitude_lines
-from imubench_pipeline.model.experiments import CalibrationRow
+from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.report.recording import about_of, summary_words
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView

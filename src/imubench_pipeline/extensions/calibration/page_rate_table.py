@@ -14,7 +14,7 @@ from imubench_pipeline.extensions.calibration.figures import (
     not_observable,
     scatter_words,
 )
-from imubench_pipeline.model.experiments import CalibrationPointRow, CalibrationRow
+from imubench_pipeline.extensions.calibration.tables import CalibrationPointRow, CalibrationRow
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.recording import about_of, summary_words
 from imubench_pipeline.report.site import Site

@@ -17,8 +17,8 @@ from imubench_pipeline.extensions.calibration.alignment.triad import Positions, 
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.extensions.calibration.in_positions import TRIAD, InPositions
 from imubench_pipeline.extensions.calibration.least_squares import NotObservableError
+from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.extensions.earth_rate.outlook import noise_at_rest
-from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import Sensor

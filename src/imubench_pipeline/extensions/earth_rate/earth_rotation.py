@@ -25,16 +25,17 @@ from imubench_pipeline.extensions.earth_rate.courses import (
 )
 from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.published import RunDesign, published_row
-from imubench_pipeline.extensions.earth_rate.turning import find_turning
-from imubench_pipeline.extensions.earth_rate.turns import FoundDwell, Turning
-from imubench_pipeline.extensions.earth_rate.two_position import TwoPosition
-from imubench_pipeline.model.experiments import (
+from imubench_pipeline.extensions.earth_rate.tables import (
+    TURNED,
     EarthRatePredictionRow,
     EarthRatePublishedRow,
     EarthRateRow,
     EarthRateSeriesRow,
     TurningRow,
 )
+from imubench_pipeline.extensions.earth_rate.turning import find_turning
+from imubench_pipeline.extensions.earth_rate.turns import FoundDwell, Turning
+from imubench_pipeline.extensions.earth_rate.two_position import TwoPosition
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import kept_logs
@@ -50,7 +51,6 @@ from imubench_pipeline.steps.noise_source import (
     segments_reason,
 )
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.tables.schemas import TURNED
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 

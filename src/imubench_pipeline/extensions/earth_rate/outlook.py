@@ -21,7 +21,7 @@ from imubench_pipeline.extensions.calibration.alignment.accuracy import accuraci
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
 from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
-from imubench_pipeline.model.experiments import AlignmentRow, EarthRatePredictionRow
+from imubench_pipeline.extensions.earth_rate.tables import AlignmentRow, EarthRatePredictionRow
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng

@@ -19,7 +19,7 @@ from imubench_pipeline.extensions.earth_rate.page_turned import (
     prediction_payload,
     published_lines,
 )
-from imubench_pipeline.model.experiments import (
+from imubench_pipeline.extensions.earth_rate.tables import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
     EarthRateRow,

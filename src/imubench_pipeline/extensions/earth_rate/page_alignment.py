@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.model.experiments import AlignmentRow
+from imubench_pipeline.extensions.earth_rate.tables import AlignmentRow
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.report.site import Site

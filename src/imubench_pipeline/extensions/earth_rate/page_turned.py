@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.model.estimates import EnvelopeRow
-from imubench_pipeline.model.experiments import (
+from imubench_pipeline.extensions.earth_rate.tables import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
     EarthRateRow,
     EarthRateSeriesRow,
     TurningRow,
 )
+from imubench_pipeline.model.estimates import EnvelopeRow
 from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words

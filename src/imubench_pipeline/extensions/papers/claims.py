@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from imubench_pipeline.extensions.papers.about import About, Basis, Verdict
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.model.published import PublishedRow
+from imubench_pipeline.extensions.papers.tables import PublishedRow
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from imubench_pipeline.model.published import PublishedRow
+    from imubench_pipeline.extensions.papers.tables import PublishedRow
 
 _KEYS = ("maia", "silva", "engers")
 _LEGEND = (
@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the lines; return the exit status."""
     # Only what computes or draws loads this: the other commands answer at once.
     from imubench_pipeline.extensions.papers.about import PAPERS
-    from imubench_pipeline.model.published import PublishedRow
+    from imubench_pipeline.extensions.papers.tables import PublishedRow
     from imubench_pipeline.report.show import show
 
     if arguments.results is None:

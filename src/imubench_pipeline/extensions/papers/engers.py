@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.extensions.papers.about import ENGERS, Verdict
 from imubench_pipeline.extensions.papers.claims import (
     Claim,
@@ -35,7 +36,6 @@ from imubench_pipeline.extensions.papers.engers_axes import (
 )
 from imubench_pipeline.extensions.papers.engers_figures import figures
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.model.published import PublishedFigureRow
 from imubench_pipeline.noise import FLOOR
 
 _TEST = "tests/papers/test_engers.py"

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from imubench_pipeline.extensions.papers import engers, maia, silva
 from imubench_pipeline.extensions.papers.claims import Paper, rows_of
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.model.published import PublishedRow
+from imubench_pipeline.extensions.papers.tables import PublishedRow
 
 PAPERS: Sequence[Paper] = (maia.PAPER, silva.PAPER, engers.PAPER)
 

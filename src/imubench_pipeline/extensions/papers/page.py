@@ -14,7 +14,7 @@ from imubench_pipeline.extensions.papers.about import (
     Drawn,
     Verdict,
 )
-from imubench_pipeline.model.published import AccuracyRow, PublishedRow
+from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, as_printed
 from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, PAPER_RATE
 from imubench_pipeline.extensions.papers.about import SILVA
@@ -28,7 +29,6 @@ from imubench_pipeline.extensions.papers.silva_runs import (
     turned,
 )
 from imubench_pipeline.extensions.papers.silva_weeks import evaluate_weeks
-from imubench_pipeline.model.experiments import CalibrationRow
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 
 AT_REST = Log(SENSOR, "sim_published", "gyro_x")

@@ -19,6 +19,7 @@ from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_PERIOD,
     PAPER_RATE,
 )
+from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
 from imubench_pipeline.extensions.papers.about import Verdict
 from imubench_pipeline.extensions.papers.claims import (
     Claim,
@@ -29,7 +30,6 @@ from imubench_pipeline.extensions.papers.claims import (
 )
 from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.extensions.papers.silva_settling import evaluate_settling
-from imubench_pipeline.model.experiments import EarthRateRow
 
 DEGREE = math.pi / 180.0
 PRINTED = {

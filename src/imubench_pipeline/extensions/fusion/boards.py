@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from imubench_pipeline.model.published import PublishedFigureRow
+from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.site import Entry, Site

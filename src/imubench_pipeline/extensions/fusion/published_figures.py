@@ -11,6 +11,7 @@ import pyarrow as pa
 
 from imubench_pipeline.datasheets.comparable import SENSITIVITY
 from imubench_pipeline.estimators.estimate import SI_UNITS
+from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.model.comparisons import DatasheetRow
 from imubench_pipeline.model.estimates import (
     AllanRow,
@@ -19,15 +20,11 @@ from imubench_pipeline.model.estimates import (
     SimulatedTruthRow,
     TemperatureRow,
 )
-from imubench_pipeline.model.published import PublishedFigureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.simulate.models import figures_of, imu_model
-from imubench_pipeline.steps.specimens import fused_model, specimens_of, weights_of
-from imubench_pipeline.units import quantity_to_si
 
 _Place = tuple[str, str, str, str]
 
@@ -167,40 +164,3 @@ def _printed(rows: Iterable[DatasheetRow]) -> dict[_Place, list[tuple[str | None
                 (row.kind, row.comparable * factor)
             )
     return figures
-
-
-def truth_rows(truths: str) -> Iterator[SimulatedTruthRow]:
-    """Yield the rows of the table ``simulated_truth``."""
-    for entry in json.loads(truths):
-        recording = SimulatedRecording.model_validate(entry)
-        rate = quantity_to_si(recording.rate, "frequency")
-        for channel, truth in recording.channels.items():
-            factors = _of_fused(recording, str(channel))
-            for figure in figures_of(truth, channel, rate):
-                factor = factors.get(figure.name.removesuffix(" in the log"), 1.0)
-                yield SimulatedTruthRow(
-                    sensor=recording.sensor,
-                    recording=recording.recording,
-                    channel=channel,
-                    parameter=figure.name,
-                    component=figure.component,
-                    value=figure.value * factor,
-                    unit=figure.unit,
-                    assumed=bool({figure.setting, figure.name} & set(truth.assumed)),
-                    source=recording.source,
-                )
-
-
-def _of_fused(recording: SimulatedRecording, channel: str) -> dict[str, float]:
-    """Return the factors on the noise of one specimen if several are fused."""
-    if recording.specimens is None:
-        return {}
-    models = [model.axes[channel].noise for model in specimens_of(recording)]
-    of_kind = imu_model(recording.channels, recording).axes[channel].noise
-    _, weights = weights_of(models, quantity_to_si(recording.rate, "frequency"))
-    fused = fused_model(models, weights)
-    return {
-        name: getattr(fused, name) / getattr(of_kind, name)
-        for name in ("N", "B", "K")
-        if getattr(of_kind, name)
-    }
