@@ -40,14 +40,15 @@ from imubench_pipeline.extensions.aided.measures import (
     root_mean_square,
     squares,
 )
+from imubench_pipeline.extensions.aided.plan import navigate_settings
 from imubench_pipeline.extensions.aided.runs import FIX_INTERVAL, Drive, Outage, schedule
+from imubench_pipeline.extensions.aided.settings import NavigateSettings
 from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
 from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES, trajectory
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.error_budget import Start, Uncalibrated, budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.settings.config import NavigateSettings
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
 
@@ -219,7 +220,7 @@ def claim(results: Path, sensors: list[str], how: NavigateSettings, simulated: s
             for folder in (results / "recordings" / sensor).iterdir()
             if (folder / "parameters.parquet").is_file()
         )
-        sections = json.loads(plan.navigate_settings(sensor))
+        sections = json.loads(navigate_settings(plan, sensor))
         sections |= {"navigate": how.model_dump(mode="json", exclude={"of"}), "asked": []}
         print(f"\n### {sensor}\n")
         print(

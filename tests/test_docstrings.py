@@ -11,7 +11,7 @@ from tests.conftest import PROJECT
 SOURCE = PROJECT / "src/imubench_pipeline"
 PUBLIC = ["units",
           "settings/conversions", "settings/requirements", "settings/simulated_sensor",
-          "extensions/earth_rate/two_position",
+          "extensions/earth_rate/settings",
           "allan/confidence", "allan/variance",
           "noise/block_means", "noise/growth", "noise/low_pass", "noise/model", "noise/simulate",
           "tables/files", "tables/provenance",

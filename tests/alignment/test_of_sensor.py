@@ -15,8 +15,8 @@ from imubench_pipeline.extensions.calibration.alignment.accuracy import accuraci
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
 from imubench_pipeline.extensions.earth_rate.outlook import TIMES, noise_at_rest, outlook_tables
+from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.recordings import put

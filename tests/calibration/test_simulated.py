@@ -31,7 +31,7 @@ def test_the_truth_lies_in_the_limits(
     experiment: dict[str, Any], told: tuple[str, ...], tmp_path: Path
 ) -> None:
     plan = plan_of(tmp_path, PLAIN | experiment)
-    assert plan.calibrated == [("s", "sim_run")]
+    assert plan.of_experiment("rate_table", "positions", "pointing") == [("s", "sim_run")]
     given = json.loads(plan.simulated_settings("s", "sim_run"))
     made = SimulatedRecording.model_validate(given["recording"])
     folder = plan.recordings["s", "sim_run"].path

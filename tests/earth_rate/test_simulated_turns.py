@@ -86,7 +86,7 @@ def test_it_is_turned_by_the_clock(made: tuple[Plan, Path]) -> None:
 @pytest.mark.release
 def test_what_is_published_stands_beside_what_noise_allows(made: tuple[Plan, Path]) -> None:
     plan, kept = made
-    settings = plan.experiment_settings("s", "sim_run")
+    settings = plan.experiment_settings("s", "sim_run", "earth_rate")
     found = earth_rate_tables(kept, [], "s", "sim_run", settings)
     rate = {(row["part"], row["method"]): row["value"] for row in found["earth_rate"]}
     whole, last = found["earth_rate_published"]

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from imubench_pipeline.extensions.aided.limits import trajectory_of
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import BacktestRow
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
-from imubench_pipeline.navigation.verdicts.standing import Standing
+from imubench_pipeline.navigation.verdicts.standing import Standing, trajectory_of
 from imubench_pipeline.navigation.verdicts.unless import unless_words
 
 _MAX_NAMED_RECORDINGS = 3

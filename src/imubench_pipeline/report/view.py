@@ -31,7 +31,7 @@ from imubench_pipeline.model.estimates import (
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.table import ChannelRow, R
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.settings.sensor import AT_REST
+from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.tables.schemas import BY_RECORDING
 

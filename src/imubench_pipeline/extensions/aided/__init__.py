@@ -6,9 +6,18 @@ their errors (`signals`), a noise model the states of the filter (`axis_states`)
 large the errors are at the end of an outage, and whether they are as large as the filter says.
 """
 
-from imubench_pipeline.registry import Extension
+from imubench_pipeline.registry import Block, Extension
 
 EXTENSION = Extension(
     name="aided",
     tables="aided.tables",
+    blocks=(
+        Block(
+            "run",
+            "navigate",
+            "aided.settings:NavigateSettings",
+        ),
+    ),
+    limits={"navigation": "aided.limits:outage_rows"},
+    rules="rules.smk",
 )

@@ -9,15 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Any
 
+import pyarrow as pa
 from scipy.special import ndtr
 
 from imubench_pipeline.extensions.aided.tables import NavigationRow
-from imubench_pipeline.model import table
-from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
+from imubench_pipeline.navigation.verdicts.standing import OutageErrorRow
 from imubench_pipeline.settings.requirements import DIMENSIONS, Limit, Requirement
 from imubench_pipeline.units import SI_UNITS
 
@@ -27,30 +27,18 @@ _AXIS_FACTORS = {"position": math.sqrt(2.0), "velocity": math.sqrt(2.0), "headin
 _LIMITS_NOTE = "simulated drives; the limits are those of the runs, not of the estimate"
 
 
-@table.row
-class OutageErrorRow(ErrorBudgetRow):
-    """An error at the end of outages on a trajectory."""
-
-    trajectory: Annotated[str | None, table.Column("of the outages")]
-
-
-def trajectory_of(total: ErrorBudgetRow) -> str | None:
-    """Return the trajectory of an error in outages; None for an error of dead reckoning."""
-    return total.trajectory if isinstance(total, OutageErrorRow) else None
-
-
 def outage_rows(
-    navigation: Iterable[NavigationRow],
+    navigation: pa.Table,
     recordings: Iterable[RecordingRow],
     requirements: Mapping[str, Requirement],
 ) -> Iterator[OutageErrorRow]:
     """Yield the rows of the outage limits, for every sensor with static recordings.
 
-    ``navigation`` and ``recordings`` are rows of these tables. A sensor without a filter run has no
+    ``recordings`` are the rows of this table. A sensor without a filter run has no
     figure.
     """
     runs: dict[tuple[Any, ...], NavigationRow] = {}
-    for run in navigation:
+    for run in NavigationRow.rows_of(navigation):
         if run.recommended and run.signals != "log" and run.position is not None:
             runs[run.sensor, run.trajectory, run.outage] = run
     of_sensors: dict[str, RecordingRow] = {}

@@ -37,6 +37,7 @@ from imubench_pipeline.extensions.aided.runs import (
     Outcome,
     schedule,
 )
+from imubench_pipeline.extensions.aided.settings import NavigateSettings
 from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
 from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.extensions.aided.trajectories import trajectory
@@ -46,7 +47,6 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.recordings.kept import kept_static_logs
-from imubench_pipeline.settings.config import NavigateSettings
 from imubench_pipeline.settings.requirements import Trajectory
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
@@ -87,7 +87,7 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
     """Yield the rows of the table ``navigation`` of a sensor.
 
     Of the longest of its static recordings that can be used, in ``folders``; `settings`: of
-    `imubench_pipeline.run.plan.Plan.navigate_settings`.
+    `imubench_pipeline.extensions.aided.plan.navigate_settings`.
     """
     sections = json.loads(settings)
     how = _add_requirements(

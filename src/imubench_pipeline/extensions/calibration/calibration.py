@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.extensions.calibration.in_positions import InPositions
-from imubench_pipeline.extensions.calibration.known_rates import AtRest, OnRateTable
 from imubench_pipeline.extensions.calibration.least_squares import (
     Limits,
     NotObservable,
@@ -21,6 +19,14 @@ from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.extensions.calibration.positions import attitude_rows, true_angles
 from imubench_pipeline.extensions.calibration.rate_table import Calibration, calibrate, residuals
 from imubench_pipeline.extensions.calibration.schedule import Schedule
+from imubench_pipeline.extensions.calibration.settings import (
+    AtRest,
+    InPositions,
+    OnRateTable,
+    SimulatedPositions,
+    SimulatedRest,
+    SimulatedTable,
+)
 from imubench_pipeline.extensions.calibration.still import bias_at_rest
 from imubench_pipeline.extensions.calibration.tables import (
     CALIBRATED,
@@ -100,7 +106,9 @@ def calibration_tables(
 def _positions(sections: Mapping[str, Any]) -> tuple[InPositions, dict[str, float]] | None:
     """Return the positions of a triad, and the true attitude of a simulated one; else None."""
     if "simulated" in sections:
-        positions = SimulatedRecording.model_validate(sections["simulated"]).positions
+        positions = SimulatedRecording.model_validate(sections["simulated"]).block(
+            SimulatedPositions
+        )
         if positions is None:
             return None
         return positions.declared, true_angles(positions.model_dump())
@@ -118,10 +126,11 @@ def _declared(
             return OnRateTable.model_validate(sections["rate_table"]), None
         return AtRest.model_validate(sections["pointing"]), None
     simulated = SimulatedRecording.model_validate(sections["simulated"])
-    if simulated.rate_table is not None:
-        return simulated.rate_table.declared, simulated
-    assert simulated.pointing is not None  # only recordings with one of both are calibrated
-    return simulated.pointing.declared, simulated
+    if (table := simulated.block(SimulatedTable)) is not None:
+        return table.declared, simulated
+    rest = simulated.block(SimulatedRest)
+    assert rest is not None  # only recordings with one of both are calibrated
+    return rest.declared, simulated
 
 
 def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, float]:
@@ -132,8 +141,8 @@ def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, floa
     for name, axis in simulated.channels.items():
         if name == channel and axis.bias is not None:
             truth["bias"] = quantity_to_si(axis.bias, "angular_rate")
-    if simulated.rate_table is not None:
-        truth |= {"scale_factor": simulated.rate_table.scale_factor}
+    if (table := simulated.block(SimulatedTable)) is not None:
+        truth |= {"scale_factor": table.scale_factor}
         truth |= {"quadratic": 0.0, "asymmetry": 0.0}
     return truth
 

@@ -15,8 +15,8 @@ from imubench_pipeline.extensions.calibration.alignment.attitude import euler_an
 from imubench_pipeline.extensions.calibration.alignment.fine import align
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
-from imubench_pipeline.extensions.calibration.in_positions import TRIAD, InPositions
 from imubench_pipeline.extensions.calibration.least_squares import NotObservableError
+from imubench_pipeline.extensions.calibration.settings import TRIAD, InPositions
 from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.extensions.earth_rate.outlook import noise_at_rest
 from imubench_pipeline.noise import NoiseModel

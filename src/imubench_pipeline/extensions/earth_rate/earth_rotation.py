@@ -25,6 +25,11 @@ from imubench_pipeline.extensions.earth_rate.courses import (
 )
 from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.published import RunDesign, published_row
+from imubench_pipeline.extensions.earth_rate.settings import (
+    EarthRateSettings,
+    SimulatedTurns,
+    TwoPosition,
+)
 from imubench_pipeline.extensions.earth_rate.tables import (
     TURNED,
     EarthRatePredictionRow,
@@ -35,14 +40,12 @@ from imubench_pipeline.extensions.earth_rate.tables import (
 )
 from imubench_pipeline.extensions.earth_rate.turning import find_turning
 from imubench_pipeline.extensions.earth_rate.turns import FoundDwell, Turning
-from imubench_pipeline.extensions.earth_rate.two_position import TwoPosition
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import kept_logs
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
-from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.sensor import Sensor
-from imubench_pipeline.settings.simulated_recordings import SimulatedRecording, SimulatedTurns
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.models import axis_model
 from imubench_pipeline.steps.noise_source import (
     NO_MODEL,
@@ -101,10 +104,10 @@ def earth_rate_tables(
     simulated = turns = None
     if "simulated" in sections:
         simulated = SimulatedRecording.model_validate(sections["simulated"])
-        turns = simulated.two_position
+        turns = simulated.block(SimulatedTurns)
     declared = turns.declared if turns else TwoPosition.model_validate(sections["two_position"])
     metadata = read_metadata(next(iter(logs.values())).path)
-    channel = declared.turned([*logs, *metadata["unusable"]])
+    channel = declared.moved_gyro([*logs, *metadata["unusable"]])
     key = Key(sensor, recording, channel)
     if channel not in logs:
         reason = f"{channel} cannot be used; the findings of the recording say why"

@@ -21,11 +21,11 @@ from imubench_pipeline.extensions.calibration.alignment.accuracy import accuraci
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
 from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
+from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.extensions.earth_rate.tables import AlignmentRow, EarthRatePredictionRow
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.steps.noise_source import static_recordings
@@ -98,8 +98,8 @@ def outlook_tables(
     """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
 
     `folders` are those of its static recordings; `settings`: of
-    `imubench_pipeline.run.plan.Plan.outlook_settings`. There are no rows where no recording tells
-    the noise of a gyro, and none of ``alignment`` without an accelerometer.
+    `imubench_pipeline.extensions.earth_rate.plan.outlook_settings`. There are no rows where no
+    recording tells the noise of a gyro, and none of ``alignment`` without an accelerometer.
     """
     rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}
     sections = json.loads(settings)

@@ -6,4 +6,5 @@ EXTENSION = Extension(
     name="papers",
     needs=("earth_rate", "fusion"),
     tables="papers.tables",
+    rules="rules.smk",
 )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
-from imubench_pipeline.extensions.aided.limits import trajectory_of
+from imubench_pipeline.model import table
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.suitability.conditions import (
     is_condition,
@@ -22,6 +22,18 @@ _SURE_PROBABILITY = 0.975
 
 MAX_LIMIT_RATIO = 4.0
 """Maximum ratio of upper to lower limit of an error; beyond it, the log is not conclusive."""
+
+
+@table.row
+class OutageErrorRow(ErrorBudgetRow):
+    """An error at the end of outages on a trajectory."""
+
+    trajectory: Annotated[str | None, table.Column("of the outages")]
+
+
+def trajectory_of(total: ErrorBudgetRow) -> str | None:
+    """Return the trajectory of an error in outages; None for an error of dead reckoning."""
+    return total.trajectory if isinstance(total, OutageErrorRow) else None
 
 
 @dataclass(frozen=True)

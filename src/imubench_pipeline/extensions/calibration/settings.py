@@ -1,58 +1,34 @@
-"""What is declared beside a log of a gyro on a rate table, or at rest with a known direction."""
+"""What is declared of sensors whose rates or directions are known: beside logs, and simulated."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Any, ClassVar, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.settings.experiments import Experiment, Gyro, stated_gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
-from imubench_pipeline.settings.validation import Strict, Text, checked
+from imubench_pipeline.settings.validation import (
+    AccelerationFromZero,
+    Angle,
+    AngleFromZero,
+    Rate,
+    RateFromZero,
+    Strict,
+    Text,
+    TimeFromZero,
+)
 from imubench_pipeline.units import quantity_to_si
-
-Gyro = Literal["gyro_x", "gyro_y", "gyro_z"]
 
 _MAX_UNKNOWN_EARTH_RATE = 1e-9
 """Largest uncertainty of the Earth's rate about an axis without a heading, rad/s."""
 
-
-def _from_zero(dimension: str) -> AfterValidator:
-    return checked(dimension, "a figure from 0", from_zero=True)
-
-
-TimeFromZero = Annotated[Text, _from_zero("time"), Field(examples=["2 s"])]
-Angle = Annotated[Text, checked("angle"), Field(examples=["30 deg"])]
-AngleFromZero = Annotated[Text, _from_zero("angle"), Field(examples=["0.5 deg"])]
-Rate = Annotated[Text, checked("angular_rate"), Field(examples=["-10 deg/s"])]
-RateFromZero = Annotated[Text, _from_zero("angular_rate"), Field(examples=["0.05 deg/s"])]
-AccelerationFromZero = Annotated[Text, _from_zero("acceleration"), Field(examples=["20 mg"])]
-
-
-def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
-    """Return the gyro that an experiment is about: the one that its notes state, or the only one.
-
-    `what` completes "the gyro whose axis ..." of the error.
-
-    Raises
-    ------
-    ValueError
-        If it is not among the channels of the log, or is not stated and the log has another number
-        of gyros than one; the text begins with the key.
-    """
-    gyros = [name for name in channels if name.startswith("gyro_")]
-    if stated in gyros:
-        return stated
-    in_log = ", ".join(gyros) or "no gyro"
-    if stated is not None:
-        raise ValueError(f"channel: found {stated!r}; the log has {in_log}")
-    if len(gyros) != 1:
-        raise ValueError(
-            f"channel: missing; expected the gyro whose axis {what}, the log has {in_log}"
-        )
-    return gyros[0]
+TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+"""The axes that it takes, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
 
 
 class Direction(Strict):
@@ -97,14 +73,16 @@ class Direction(Strict):
         return Pointing(heading=heading, **angles)
 
 
-class AtRest(Direction):
+class AtRest(Direction, Experiment):
     """A static log of a gyro whose axis points where it is known, or known in part."""
+
+    is_static: ClassVar[bool] = True
 
     channel: Gyro | None = Field(
         None, description="whose axis that is; null: the only gyro of the log"
     )
 
-    def gyro(self, channels: Sequence[str]) -> str:
+    def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> str:
         """Return the one of the log's channels whose axis is stated, as of `stated_gyro`."""
         return stated_gyro(self.channel, channels, "points there")
 
@@ -128,7 +106,7 @@ class Step(Strict):
         return quantity_to_si(self.start, "time"), quantity_to_si(self.end, "time")
 
 
-class OnRateTable(Strict):
+class OnRateTable(Experiment):
     """A log of a gyro on a rate table, its axis along that of the table.
 
     Raises
@@ -197,7 +175,7 @@ class OnRateTable(Strict):
         """Return one of its figures in SI."""
         return quantity_to_si(getattr(self, name), dimension)
 
-    def gyro(self, channels: Sequence[str], *, column: bool) -> str:
+    def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str:
         """Return the one of the log's channels that is along the axis of the table.
 
         `column`: the log has a column with the rate of the table.
@@ -219,3 +197,111 @@ class OnRateTable(Strict):
                 "one of the two: leave one out"
             )
         return stated_gyro(self.channel, channels, "is along that of the table")
+
+
+class InPositions(Experiment):
+    """A triad that is turned about its z axis, by the clock, and stands still between the turns.
+
+    Raises
+    ------
+    ValueError
+        If a figure has a unit of another dimension or is out of range, or a turn takes all of a
+        dwell.
+    """
+
+    latitude: Latitude = Field(description="of the place, with its unit; south is negative")
+    dwell: Time = Field(description="from the start of one turn to the start of the next")
+    turning: TimeFromZero = Field("2 s", description="of it at the end that the turn takes")
+    turned: tuple[Angle, ...] = Field(
+        ("0 deg", "180 deg"),
+        min_length=1,
+        description="angle of each position from the first, about z; they follow each other again "
+        "and again",
+    )
+    gyro_bias: RateFromZero = Field("0.5 deg/s", description="standard deviation of each")
+    accelerometer_bias: AccelerationFromZero = Field("20 mg", description="likewise")
+
+    @model_validator(mode="after")
+    def _stands(self) -> Self:
+        if self.seconds("turning") >= self.seconds("dwell"):
+            raise ValueError(
+                f"turning is {self.turning}; expected less than the dwell, {self.dwell}"
+            )
+        return self
+
+    def seconds(self, name: str) -> float:
+        """Return one of its times in s."""
+        return quantity_to_si(getattr(self, name), "time")
+
+    @property
+    def latitude_si(self) -> float:
+        """The latitude, rad."""
+        return quantity_to_si(self.latitude, "angle")
+
+    def angle(self, number: int) -> float:
+        """Return the angle of a position, counted from 0, from the first one, rad.
+
+        It grows where the next one is less far round, so that all turns go the same way.
+        """
+        angles = [quantity_to_si(text, "angle") for text in self.turned]
+        return angles[number % len(angles)] + 2.0 * math.pi * (number // len(angles))
+
+    def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> None:
+        """Raise ValueError if the log lacks an axis; it is about all of them."""
+        missing = [name for name in TRIAD if name not in channels]
+        if missing:
+            raise ValueError(
+                f"the log has no {', '.join(missing)}; expected three gyros and accelerometers"
+            )
+
+
+class SimulatedTable(OnRateTable):
+    """A gyro on a rate table that keeps to its steps, with ramps between them."""
+
+    scale_factor: float = Field(1.0, gt=0, description="true one: indicated over true rate")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @model_validator(mode="after")
+    def _has_steps(self) -> Self:
+        if not self.steps:
+            raise ValueError("steps is missing; expected the steady rates of the table")
+        return self
+
+    @property
+    def declared(self) -> OnRateTable:
+        """What would stand beside such a log."""
+        return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
+
+
+class SimulatedPositions(InPositions):
+    """A triad that is turned by the clock, and senses gravity and the Earth's rate."""
+
+    roll: Angle = Field("0 deg", description="true one, in the first position")
+    pitch: Angle = Field("0 deg", description="likewise")
+    heading: Angle = Field("0 deg", description="likewise, from north towards east")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @property
+    def declared(self) -> InPositions:
+        """What would stand beside such a log."""
+        return InPositions(**{name: getattr(self, name) for name in InPositions.model_fields})
+
+
+class SimulatedRest(AtRest):
+    """A gyro at rest that senses its part of the Earth's rate."""
+
+    true_heading: Angle = Field("0 deg", description="of the axis, where heading is null")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @property
+    def declared(self) -> AtRest:
+        """What would stand beside such a log."""
+        return AtRest(**{name: getattr(self, name) for name in AtRest.model_fields})
+
+    @property
+    def true(self) -> Pointing:
+        """Where the axis points, exactly."""
+        stated, heading = self.pointing, self.pointing.heading
+        if heading is None:
+            heading = quantity_to_si(self.true_heading, "angle")
+        return Pointing(latitude=stated.latitude, heading=heading, elevation=stated.elevation)

@@ -1,14 +1,21 @@
-"""What is declared beside a log of a gyro that was turned between north and south."""
+"""What is declared of gyros that are turned between north and south, and sought of them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from imubench_pipeline.extensions.calibration.known_rates import Gyro, stated_gyro
+from imubench_pipeline.settings.experiments import Experiment, Gyro, stated_gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
-from imubench_pipeline.settings.validation import Strict, Text, checked
+from imubench_pipeline.settings.validation import (
+    AccelerationFromZero,
+    RateFromZero,
+    Strict,
+    Text,
+    checked,
+)
 from imubench_pipeline.units import quantity_to_si
 
 
@@ -17,6 +24,7 @@ def _deviation(dimension: str) -> AfterValidator:
 
 
 _from_zero = checked("time", "a time from 0", from_zero=True)
+_Rate = Annotated[Text, checked("angular_rate")]
 TimeFromZero = Annotated[Text, _from_zero, Field(examples=["2 s"])]
 
 _REQUIRED_KEYS = {
@@ -25,7 +33,7 @@ _REQUIRED_KEYS = {
 }
 
 
-class TwoPosition(Strict):
+class TwoPosition(Experiment):
     """A log in which one gyro was turned end for end, between north and south, again and again.
 
     Raises
@@ -116,6 +124,68 @@ class TwoPosition(Strict):
         """Standard deviation of a steady drift, rad/s^2."""
         return quantity_to_si(self.drift, "gyro_ramp") if self.drift else 0.0
 
-    def turned(self, channels: list[str]) -> str:
+    def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> str:
         """Return the one of the log's channels that was turned, as of `stated_gyro`."""
         return stated_gyro(self.channel, channels, "was turned")
+
+
+class PublishedRate(Strict):
+    """What a source prints of the Earth's rate that it found."""
+
+    where: Text = Field(description="such as section 6")
+    printed: _Rate = Field(description="with its unit, as printed")
+    part: Text = Field("whole", description="of the run: whole, or such as 'last 13 min'")
+
+
+class SimulatedTurns(TwoPosition):
+    """A gyro that is turned between north and south, by the clock."""
+
+    transient: _Rate = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    published: tuple[PublishedRate, ...] = ()
+
+    @model_validator(mode="after")
+    def _parts_are_there(self) -> Self:
+        parts = {"whole", *(f"last {text}" for text in self.last)}
+        for rate in self.published:
+            if rate.part not in parts:
+                raise ValueError(f"published: part is {rate.part!r}; expected one of {parts}")
+        return self
+
+    @property
+    def declared(self) -> TwoPosition:
+        """What would stand beside such a log."""
+        return TwoPosition(**{name: getattr(self, name) for name in TwoPosition.model_fields})
+
+
+class EarthRateSettings(Strict):
+    """The Earth's rate from gyros that were turned, and what it would take."""
+
+    margin: TimeFromZero = Field(
+        "0.5 s", description="left out on both sides of a turn that is seen"
+    )
+    goals: tuple[float, ...] = Field(
+        (1.0, 0.1, 0.01),
+        min_length=1,
+        description="standard deviations that are asked for, as a part of the Earth's rate",
+    )
+    run_time: Time = Field("1 h", description="of a run, for which the best dwell is sought")
+    latitude: Latitude = Field(
+        "45 deg", description="where sensors at rest are to find the Earth's rate, and north"
+    )
+    gyro_bias: RateFromZero = Field(
+        "0.5 deg/s",
+        description="standard deviation of the fixed bias of gyros whose datasheet prints none",
+    )
+    accelerometer_bias: AccelerationFromZero = Field(
+        "20 mg",
+        description="standard deviation of that of accelerometers, likewise",
+    )
+    draws: int = Field(60, ge=20, description="noise models that give the range of a sigma")
+
+    @field_validator("goals")
+    @classmethod
+    def _above_zero(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
+        if min(goals) <= 0:
+            raise ValueError("expected parts above 0, such as 0.01 for 1 %")
+        return goals
