@@ -54,8 +54,8 @@ class Extension:
     commands: Mapping[str, str] = field(default_factory=dict)  # of `imubench`, by name
     pages: tuple[str, ...] = ()  # that a report has once
     recording_pages: Mapping[str, str] = field(default_factory=dict)  # by kind of recording
-    sections: tuple[str, ...] = ()  # of the page of a static recording
-    start_sections: tuple[str, ...] = ()  # of the start page
+    sections: tuple[str, ...] = ()  # of pages that a report has once
+    recording_sections: tuple[str, ...] = ()  # of the page of a static recording
     search: tuple[str, ...] = ()  # names that the search of the report finds
     templates: str | None = None  # folder
     glossary: str | None = None  # file of the terms of its pages

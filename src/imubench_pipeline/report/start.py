@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.extensions.calibration.tables import CalibrationRow
-from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
 from imubench_pipeline.model.comparisons import CoverageRow, NextStepRow, RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
 from imubench_pipeline.report.comparison import Comparison
@@ -53,8 +51,6 @@ def _start(site: Site) -> dict[str, Any]:
             for view in warned
         ],
         "in_doubt": _in_doubt(site, warned),
-        "not_found": list(_without_result(site.turned, EarthRateRow)),
-        "not_calibrated": list(_without_result(site.calibrated, CalibrationRow)),
         "changed": site.changed_devices(),
         "rankings": ranked,
         "next_steps": list(_next_steps(site)),
@@ -88,16 +84,6 @@ def _failures(site: Site) -> Iterator[dict[str, Any]]:
     views = {view.full_name: view for view in site.views}
     for row in site.rows(FailureRow):
         yield {**row, "view": views.get((row.sensor, row.recording or ""))}
-
-
-def _without_result(
-    views: Sequence[RecordingView], of: type[EarthRateRow] | type[CalibrationRow]
-) -> Iterator[dict[str, Any]]:
-    """Yield the recordings of an experiment of which nothing could be estimated, and why."""
-    for view in views:
-        rows = view.rows(of)
-        if rows and all(row.value is None for row in rows):
-            yield {"view": view, "reason": sentence(rows[0].reason)}
 
 
 def summary(views: Sequence[RecordingView], several: bool = True) -> str:

@@ -8,8 +8,6 @@ from typing import Any
 
 from markupsafe import Markup
 
-from imubench_pipeline.extensions.calibration.tables import CalibrationRow
-from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.navigation.suitability.conditions import EXCLUDED, in_words
@@ -274,12 +272,3 @@ def started_text(started: str | None) -> str:
 
 
 _ISO = re.compile(r"^(\d{4}-\d\d-\d\d)T(\d\d:\d\d(?::\d\d)?)(?:\.0+(?!\d))?")
-
-
-def noise_words(rows: Sequence[EarthRateRow | CalibrationRow]) -> str:
-    """Return by which noise model figures of a recording are weighed, in a sentence."""
-    fitted = next((row for row in rows if row.model), None)
-    if fitted is None:
-        return ""
-    origin = f", from {fitted.model_from}" if fitted.model_from else ""
-    return f"Noise model: {fitted.model}{origin}."

@@ -20,4 +20,6 @@ EXTENSION = Extension(
     ),
     limits={"navigation": "aided.limits:outage_rows"},
     rules="rules.smk",
+    pages=("aided.page:NAVIGATION",),
+    templates="templates",
 )

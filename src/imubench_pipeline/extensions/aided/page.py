@@ -72,7 +72,8 @@ NAVIGATION = Entry(
     title="Navigation",
     context=_context,
     tables=("navigation",),
-    exists=lambda site: site.navigated,
+    exists=lambda site: bool(site.rows(NavigationRow)),
+    place=1,
 )
 """The page of filters that were tuned by what is known of the sensors."""
 

@@ -47,4 +47,11 @@ EXTENSION = Extension(
         "pointing": "calibration.simulated:at_rest",
     },
     rules="rules.smk",
+    recording_pages={
+        "rate_table": "calibration.page_rate_table:RATE_TABLE",
+        "positions": "calibration.page_positions:POSITIONS",
+    },
+    sections=("calibration.figures:NOT_CALIBRATED",),
+    recording_sections=("calibration.figures:at_rest",),
+    templates="templates",
 )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.site import Section, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import noise_words, sentence
+from imubench_pipeline.report.words import sentence
 from imubench_pipeline.words.numbers import degrees_text, limit_digits, number_text, percent_text
 
 WORDS = {
@@ -177,25 +177,75 @@ def _direction(row: CalibrationRow) -> str:
     return elevation if upright else f"{elevation}, no heading"
 
 
-def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
+class Estimated(Protocol):
+    """An estimate in a table."""
+
+    @property
+    def value(self) -> float | None:
+        """The value."""
+
+    @property
+    def reason(self) -> str | None:
+        """Why there is none."""
+
+    @property
+    def model(self) -> str | None:
+        """The terms of the noise model."""
+
+    @property
+    def model_from(self) -> str | None:
+        """What that is from."""
+
+
+def calibrated(site: Site) -> list[RecordingView]:
+    """Return the recordings on a rate table, in positions, or at rest with a direction."""
+    named = site.named_in(CalibrationRow)
+    return [
+        view
+        for view in site.views
+        if view.row.kind in ("rate_table", "positions") or view.full_name in named
+    ]
+
+
+def without_result(
+    views: Sequence[RecordingView], rows_of: Callable[[RecordingView], Sequence[Estimated]]
+) -> Iterator[dict[str, Any]]:
+    """Yield the recordings of an experiment of which nothing could be estimated, and why."""
+    for view in views:
+        rows = rows_of(view)
+        if rows and all(row.value is None for row in rows):
+            yield {"view": view, "reason": sentence(rows[0].reason)}
+
+
+NOT_CALIBRATED = Section(
+    page="index.html",
+    template="not_calibrated.html.jinja",
+    context=lambda site: (
+        list(without_result(calibrated(site), lambda view: view.rows(CalibrationRow))) or None
+    ),
+)
+"""What could not be calibrated, on the start page."""
+
+
+def at_rest(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | None:
     """Return what the page of a static recording says of its bias; None without a direction."""
     rows = [row for row in view.rows(CalibrationRow) if row.run == "at_rest"]
     if not rows:
         return None
-    return {
+    return "at_rest.html.jinja", {
         "channel": rows[0].channel,
         "lines": [line for line in lines(rows) if line["status"] != "not_observable"],
         "open": not_observable(rows),
         "noise": noise_words(rows),
         "scatter": scatter_words(rows),
-        "earth": earth_words(rows, system),
+        "earth": earth_words(rows, site.system),
     }
 
 
 def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
     """Return the lines of the page that has all calibrated recordings, by kind of run."""
     by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
-    for view in site.calibrated:
+    for view in calibrated(site):
         rows = view.rows(CalibrationRow)
         if not rows:
             continue
@@ -234,3 +284,12 @@ def attitude_lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
             "off": "–" if off is None else f"{number_text(off, 2)} σ",
             "why": sentence(row.reason),
         }
+
+
+def noise_words(rows: Sequence[Estimated]) -> str:
+    """Return by which noise model figures of a recording are weighed, in a sentence."""
+    fitted = next((row for row in rows if row.model), None)
+    if fitted is None:
+        return ""
+    origin = f", from {fitted.model_from}" if fitted.model_from else ""
+    return f"Noise model: {fitted.model}{origin}."

@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.extensions.calibration.figures import attitude_lines
+from imubench_pipeline.extensions.calibration.figures import attitude_lines, noise_words
 from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.report.recording import about_of, summary_words
-from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.site import RecordingPage, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import noise_words
 
 
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
@@ -26,3 +25,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "command": site.again(view, "calibration"),
         "page": {"looks": {}, "channels": [], "findings": []},
     }
+
+
+POSITIONS = RecordingPage("positions.html.jinja", context, "several positions")
+"""The page of a triad that stood in several positions."""

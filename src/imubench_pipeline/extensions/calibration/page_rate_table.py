@@ -11,15 +11,15 @@ from imubench_pipeline.extensions.calibration.figures import (
     answer,
     earth_words,
     lines,
+    noise_words,
     not_observable,
     scatter_words,
 )
 from imubench_pipeline.extensions.calibration.tables import CalibrationPointRow, CalibrationRow
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.recording import about_of, summary_words
-from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.site import RecordingPage, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import noise_words
 from imubench_pipeline.words.numbers import counted, number_text
 
 
@@ -41,6 +41,10 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "command": site.again(view, "calibration"),
         "page": {"looks": {}, "channels": [], "findings": [], **_payload(points)},
     }
+
+
+RATE_TABLE = RecordingPage("rate_table.html.jinja", context, "rate table")
+"""The page of a gyro on a rate table."""
 
 
 def _payload(points: Sequence[CalibrationPointRow]) -> dict[str, Any]:

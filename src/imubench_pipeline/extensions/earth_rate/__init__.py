@@ -27,4 +27,8 @@ EXTENSION = Extension(
     ),
     motions={"two_position": "earth_rate.simulated:turned"},
     rules="rules.smk",
+    pages=("earth_rate.page:EARTH_RATE_PAGE",),
+    recording_pages={"two_position": "earth_rate.page_turned:TURNED_PAGE"},
+    sections=("earth_rate.page:NOT_FOUND",),
+    templates="templates",
 )

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.extensions.calibration.figures import of_all
+from imubench_pipeline.extensions.calibration.figures import calibrated, of_all, without_result
 from imubench_pipeline.extensions.earth_rate.page_alignment import alignments
 from imubench_pipeline.extensions.earth_rate.page_turned import (
     ESTIMATES,
@@ -25,32 +25,43 @@ from imubench_pipeline.extensions.earth_rate.tables import (
     EarthRateRow,
 )
 from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.report.site import Entry, Section, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import counted, number_text
 
 
+def turned(site: Site) -> list[RecordingView]:
+    """Return the recordings of gyros that were turned between north and south."""
+    return [view for view in site.views if view.row.kind == "two_position"]
+
+
+def predicted(site: Site) -> list[RecordingView]:
+    """Return the recordings at rest by whose noise it is predicted what their sensor could find."""
+    named = site.named_in(EarthRatePredictionRow)
+    return [view for view in site.views if view.static and view.full_name in named]
+
+
 def _context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
-    runs = [_run(site, view) for view in site.turned]
-    published = [row for view in site.turned for row in view.rows(EarthRatePublishedRow)]
+    runs = [_run(site, view) for view in turned(site)]
+    published = [row for view in turned(site) for row in view.rows(EarthRatePublishedRow)]
     predicted = list(_predicted(site))
     aligned = alignments(site, arrays)
     return {
         "truth": EARTH_RATE,
         "runs": runs,
-        "given": given_words([row for view in site.turned for row in view.rows(EarthRateRow)]),
-        "rejected": [view for view in site.turned if view.left_out],
+        "given": given_words([row for view in turned(site) for row in view.rows(EarthRateRow)]),
+        "rejected": [view for view in turned(site) if view.left_out],
         "published": [
             {**line, "view": view}
-            for view in site.turned
+            for view in turned(site)
             for line in published_lines(view.rows(EarthRatePublishedRow))
         ],
         "verdict": published_words(published),
         "needs": predicted,
         "alignments": aligned,
         "calibrations": of_all(site),
-        "not_calibrated": [view for view in site.calibrated if view.left_out],
+        "not_calibrated": [view for view in calibrated(site) if view.left_out],
         "page": {
             "looks": {},
             "channels": [],
@@ -65,7 +76,7 @@ def _context(site: Site) -> dict[str, Any]:
 
 
 def _views(site: Site) -> list[RecordingView]:
-    return [*site.turned, *site.calibrated, *site.predicted]
+    return [*turned(site), *calibrated(site), *predicted(site)]
 
 
 EARTH_RATE_PAGE = Entry(
@@ -74,8 +85,18 @@ EARTH_RATE_PAGE = Entry(
     context=_context,
     views=_views,
     exists=lambda site: bool(_views(site)),
+    place=4,
 )
 """The page of all experiments that look for the Earth's rate."""
+
+NOT_FOUND = Section(
+    page="index.html",
+    template="not_found.html.jinja",
+    context=lambda site: (
+        list(without_result(turned(site), lambda view: view.rows(EarthRateRow))) or None
+    ),
+)
+"""Of which the Earth's rate could not be estimated, on the start page."""
 
 
 def _run(site: Site, view: RecordingView) -> dict[str, Any]:
@@ -99,7 +120,7 @@ def _run(site: Site, view: RecordingView) -> dict[str, Any]:
 def _predicted(site: Site) -> Iterator[dict[str, Any]]:
     """Yield what each sensor would need, once where several recordings say the same."""
     yielded: list[tuple[str, Any]] = []
-    for view in [*site.turned, *site.predicted]:
+    for view in [*turned(site), *predicted(site)]:
         rows = view.rows(EarthRatePredictionRow)
         needed = needs(rows)
         if needed is None or (view.sensor, needed) in yielded:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.extensions.calibration.figures import noise_words
 from imubench_pipeline.extensions.earth_rate.tables import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
@@ -18,9 +19,9 @@ from imubench_pipeline.model.estimates import EnvelopeRow
 from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words
-from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.site import RecordingPage, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.report.words import noise_words, sentence
+from imubench_pipeline.report.words import sentence
 from imubench_pipeline.words.numbers import (
     counted,
     degrees_text,
@@ -92,6 +93,10 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
             "arrays": arrays.texts,
         },
     }
+
+
+TURNED_PAGE = RecordingPage("turned.html.jinja", context, "two positions")
+"""The page of a gyro that was turned between north and south."""
 
 
 def _summary(

@@ -6,4 +6,6 @@ EXTENSION = Extension(
     name="fusion",
     tables="fusion.tables",
     sensor_tables={"published_figures": "fusion.published_figures:published_rows"},
+    pages=("fusion.boards:BOARDS",),
+    templates="templates",
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
@@ -42,7 +42,7 @@ def _context(site: Site) -> dict[str, Any]:
                         "view": view,
                         "name": site.names[view.sensor],
                         "channels": [
-                            _channel(site, channel, board["sensors"][view.sensor])
+                            _channel(site, view, channel, board["sensors"][view.sensor])
                             for channel in channels[view.sensor]
                         ],
                     }
@@ -75,6 +75,7 @@ BOARDS = Entry(
     context=_context,
     views=lambda site: [view for name in site.settings["boards"] for view in _views(site, name)],
     exists=lambda site: bool(site.settings.get("boards")),
+    place=3,
 )
 """The page that shows every board."""
 
@@ -86,16 +87,19 @@ def _shared(board: Mapping[str, Any]) -> str:
     return f"All sensors of the board have {' and '.join(shared)}."
 
 
-def _channel(site: Site, channel: ChannelView, figures: Mapping[str, str | None]) -> dict[str, Any]:
+def _channel(
+    site: Site, view: RecordingView, channel: ChannelView, figures: Mapping[str, str | None]
+) -> dict[str, Any]:
+    rows = view.rows(PublishedFigureRow)
     return {
         "view": channel,
         "figures": figures.get(channel.channel),
         "answer": thermal.answer(channel, site.system),
-        "lines": list(published_lines(channel.published)),
+        "lines": list(published_lines(row for row in rows if row.channel == channel.channel)),
     }
 
 
-def published_lines(rows: Sequence[PublishedFigureRow]) -> Iterator[dict[str, Any]]:
+def published_lines(rows: Iterable[PublishedFigureRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of what a source prints of a channel, of rows of ``published_figures``."""
     for row in rows:
         quantity = row.channel.split("_")[0]

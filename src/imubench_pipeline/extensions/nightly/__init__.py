@@ -4,4 +4,5 @@ from imubench_pipeline.registry import Extension
 
 EXTENSION = Extension(
     name="nightly",
+    commands={"nightly": "nightly.command:COMMAND"},
 )

@@ -7,7 +7,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from imubench_pipeline.settings.command_line import LONGEST, number, seconds
+from imubench_pipeline.settings.command_line import LONGEST, Command, number, seconds
 from imubench_pipeline.settings.extras import extra
 
 _TIME_TYPE = number(0.0, LONGEST, "a time, such as 10 s", seconds)
@@ -70,3 +70,16 @@ def run(options: argparse.Namespace) -> int:
     if status or not options.quiet:
         print(in_words(summary), end="", file=sys.stderr if status == 2 else sys.stdout)
     return status
+
+
+COMMAND = Command(
+    "run on the logs that are complete, and say what is new: for timers",
+    add_arguments,
+    run,
+    (
+        "fine",
+        "a log was rejected, a warning is new or a device has changed since the last run",
+        "failed, for one recording at least, or another run goes on",
+    ),
+    passes_on=True,
+)

@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from imubench_pipeline.settings.command_line import NO_RESULTS, Command
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
@@ -111,3 +113,11 @@ def _parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[Ren
     for verdict in dict.fromkeys(row.verdict for row in rows):
         yield Text(f"  {verdict}: {meanings[verdict]}")
     yield Text()
+
+
+COMMAND = Command(
+    "print what the papers say, line by line, beside what is found",
+    add_arguments,
+    run,
+    ("printed", "", NO_RESULTS),
+)

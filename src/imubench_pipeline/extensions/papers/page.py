@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.extensions.papers.about import (
@@ -16,7 +16,8 @@ from imubench_pipeline.extensions.papers.about import (
 )
 from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
-from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.report.search import Found
+from imubench_pipeline.report.site import Entry, Section, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.words.numbers import limit_digits, number_text, percent_text
 
@@ -50,6 +51,7 @@ def _views(site: Site) -> list[RecordingView]:
 
 
 PAPERS_PAGE = Entry(
+    place=5,
     file="papers.html",
     title="Papers",
     context=_context,
@@ -167,3 +169,37 @@ def cells(row: PublishedRow) -> dict[str, str]:
         ratio = number_text(row.ratio, 3)
         tolerance = f"±{percent_text(row.tolerance, 2)}"
     return {"found_text": words or "–", "ratio_text": ratio, "tolerance_text": tolerance}
+
+
+def find_lines(site: Site) -> Iterator[Found]:
+    """Yield every line of the papers, for the search."""
+    sections = {paper.name: paper.key for paper in PAPERS}
+    for row in site.rows(PublishedRow):
+        title = f"{row.place}: {row.quantity}"
+        words = f"{row.paper} {row.printed_as} {row.verdict}"
+        yield "paper", title, f"papers.html#{sections[row.paper]}", words
+
+
+READING = Section(
+    page="theory.html",
+    template="reading.html.jinja",
+    context=lambda site: words_of_reading(site.rows(AccuracyRow)) or None,
+    tables=("accuracy",),
+)
+"""What comes of reading the curve, on the page of the theory."""
+
+
+def words_of_reading(rows: Sequence[AccuracyRow]) -> str:
+    """Return what comes of reading the curve, by the table ``accuracy``; empty where that is."""
+    of_curve = {row.parameter: row for row in rows if row.method == "curve"}
+    if not of_curve:
+        return ""
+    bias, walk = of_curve["B"], of_curve["K"]
+    off = ""
+    if bias.bias is not None:
+        size = number_text(100.0 * abs(bias.bias), 2)
+        off = f", {size} % too {'small' if bias.bias < 0 else 'large'}"
+    return (
+        f"In {bias.logs} simulated logs of 10 h it finds B in {bias.given or 'none'}{off}, "
+        f"and K in {walk.given or 'none'}: "
+    )
