@@ -3,8 +3,14 @@
 
 include: "workflow/rules/common.smk"  # the plan of the run, and what the rules share
 include: "workflow/rules/recordings.smk"  # one log: samples, curve, estimates, scores, errors
-include: "workflow/rules/experiments.smk"  # gyros that were turned, or whose rates are known
 include: "workflow/rules/sensors.smk"  # the recordings of a sensor
+
+
+for file in files_of("rules"):  # of extensions
+
+    include: file
+
+
 include: "workflow/rules/comparison.smk"  # all sensors: tables, ranking, shortlist, fusion
 include: "workflow/rules/report.smk"  # what is read: pages, figures, exports
 

@@ -24,20 +24,21 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.alignment.accuracy import simulate_triad
-from imubench_pipeline.experiments.alignment.attitude import euler_angles, matrix
-from imubench_pipeline.experiments.alignment.coarse import (
+from imubench_pipeline.extensions.calibration.alignment.accuracy import simulate_triad
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles, matrix
+from imubench_pipeline.extensions.calibration.alignment.coarse import (
     coarse_accuracy,
     coarse_alignment,
     mean_vectors,
 )
-from imubench_pipeline.experiments.alignment.fine import FineAlignment, align
-from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.experiments.calibration.rate_table import RateTable
-from imubench_pipeline.experiments.calibration.schedule import Schedule
-from imubench_pipeline.experiments.calibration.still import StillRun
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.calibration.alignment.fine import FineAlignment, align
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.extensions.calibration.rate_table import RateTable
+from imubench_pipeline.extensions.calibration.schedule import Schedule
+from imubench_pipeline.extensions.calibration.still import StillRun
+from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     PAPER_MODEL,
     PAPER_RATE,
@@ -45,7 +46,6 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.sigma_range import drawn_from_covariance, sigma_range
-from imubench_pipeline.settings.pointing import Pointing
 
 Array = NDArray[np.float64]
 

@@ -30,8 +30,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.experiments.earth_rate.turning import find_turning
-from imubench_pipeline.experiments.earth_rate.turns import FoundBy, Turning
+from imubench_pipeline.extensions.earth_rate.turning import find_turning
+from imubench_pipeline.extensions.earth_rate.turns import FoundBy, Turning
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 

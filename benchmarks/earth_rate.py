@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.bound import block_length, cramer_rao
-from imubench_pipeline.experiments.earth_rate.experiment import Experiment
-from imubench_pipeline.experiments.earth_rate.kalman import Filtered, RateFilter
-from imubench_pipeline.experiments.earth_rate.known_rate import STARTS, mean_sigma, settled, track
-from imubench_pipeline.experiments.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.calibration.kalman import Filtered, RateFilter
+from imubench_pipeline.extensions.earth_rate.bound import block_length, cramer_rao
+from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, mean_sigma, settled, track
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
+from imubench_pipeline.extensions.earth_rate.prediction import Outlook
+from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
     PAPER_MINUTES,

@@ -32,24 +32,25 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.experiments.aided.axis_states import AxisStates, axis_states
-from imubench_pipeline.experiments.aided.error_state import GROUPS
-from imubench_pipeline.experiments.aided.measures import (
+from imubench_pipeline.extensions.aided import navigate
+from imubench_pipeline.extensions.aided.axis_states import AxisStates, axis_states
+from imubench_pipeline.extensions.aided.error_state import GROUPS
+from imubench_pipeline.extensions.aided.measures import (
     inside,
     root_mean_square,
     squares,
 )
-from imubench_pipeline.experiments.aided.runs import FIX_INTERVAL, Drive, Outage, schedule
-from imubench_pipeline.experiments.aided.signals import Signals, Spreads, signals
-from imubench_pipeline.experiments.aided.trajectories import TRAJECTORY_NAMES, trajectory
+from imubench_pipeline.extensions.aided.plan import navigate_settings
+from imubench_pipeline.extensions.aided.runs import FIX_INTERVAL, Drive, Outage, schedule
+from imubench_pipeline.extensions.aided.settings import NavigateSettings
+from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
+from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES, trajectory
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.error_budget import Start, Uncalibrated, budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.settings.config import NavigateSettings
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
-from imubench_pipeline.steps import navigate
 
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 ACCEL = NoiseModel(N=9.6e-4, B=3.4e-4, T_B=38.3, K=1.7e-5)
@@ -219,7 +220,7 @@ def claim(results: Path, sensors: list[str], how: NavigateSettings, simulated: s
             for folder in (results / "recordings" / sensor).iterdir()
             if (folder / "parameters.parquet").is_file()
         )
-        sections = json.loads(plan.navigate_settings(sensor))
+        sections = json.loads(navigate_settings(plan, sensor))
         sections |= {"navigate": how.model_dump(mode="json", exclude={"of"}), "asked": []}
         print(f"\n### {sensor}\n")
         print(

@@ -13,10 +13,8 @@ import psutil
 import pytest
 import yaml
 
-from imubench_pipeline.run.lock import Lock, TakenError, read_note
-from imubench_pipeline.run.nightly import recovery
-from imubench_pipeline.run.nightly.night import Night
-from imubench_pipeline.run.nightly.settling import (
+from imubench_pipeline.extensions.nightly.night import Night
+from imubench_pipeline.extensions.nightly.settling import (
     Skip,
     complete_name,
     look,
@@ -24,8 +22,16 @@ from imubench_pipeline.run.nightly.settling import (
     settled,
     unsettled,
 )
-from imubench_pipeline.run.nightly.state import State, StateError, load_tables, read_state, state_of
-from imubench_pipeline.run.nightly.summary import STATUS, Summary, compared, in_words
+from imubench_pipeline.extensions.nightly.state import (
+    State,
+    StateError,
+    load_tables,
+    read_state,
+    state_of,
+)
+from imubench_pipeline.extensions.nightly.summary import STATUS, Summary, compared, in_words
+from imubench_pipeline.run import recovery
+from imubench_pipeline.run.lock import Lock, TakenError, read_note
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import replacing, write
@@ -218,7 +224,7 @@ def test_logs_as_they_were_need_no_second_look(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waited: list[float] = []
-    monkeypatch.setattr("imubench_pipeline.run.nightly.settling.time.sleep", waited.append)
+    monkeypatch.setattr("imubench_pipeline.extensions.nightly.settling.time.sleep", waited.append)
     put(tmp_path, "a.csv")
     found, _ = settled(tmp_path, 300.0, {})
     assert waited == [10.0]

@@ -194,7 +194,10 @@ def test_notes_that_cannot_be_used_reject_their_own_recording_alone(
     assert json.loads(plan.ingest_settings("s", "b"))[kind].startswith("logs/s/b.yaml")
     assert said in json.loads(plan.ingest_settings("s", "b"))[kind]
     assert "error" not in json.loads(plan.ingest_settings("s", "a"))
-    assert plan.static_of("s") == ["a", "b"] and plan.calibrated == []
+    assert (
+        plan.static_of("s") == ["a", "b"]
+        and plan.of_experiment("rate_table", "positions", "pointing") == []
+    )
 
 
 def test_a_drop_zone_that_is_not_there(project: dict[str, Any]) -> None:

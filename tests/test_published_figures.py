@@ -12,9 +12,10 @@ from imubench_pipeline.datasheets.deltas import bias_deltas, deltas
 from imubench_pipeline.datasheets.measured import sensitivity
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.extensions.fusion.published_figures import published_rows
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.steps.published_figures import published_rows, truth_rows
+from imubench_pipeline.steps.sensor_tables import truth_rows
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.keys import Key
 from tests.rows import typed

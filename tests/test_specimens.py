@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.steps.published_figures import truth_rows
+from imubench_pipeline.steps.sensor_tables import truth_rows
 from imubench_pipeline.steps.specimens import fused_blocks, fused_model, specimens_of, weights_of
 
 DEGREE = math.pi / 180.0

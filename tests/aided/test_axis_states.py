@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.aided.axis_states import axis_states, split_into_steps, stack
+from imubench_pipeline.extensions.aided.axis_states import axis_states, split_into_steps, stack
 from imubench_pipeline.noise import NoiseModel
 
 RATE, WIDTH, STEPS = 50.0, 5, 10

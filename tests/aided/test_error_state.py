@@ -5,9 +5,9 @@ import pytest
 from scipy.linalg import block_diag
 from scipy.stats import chi2
 
-from imubench_pipeline.experiments.aided.axis_states import AxisStates, axis_states
-from imubench_pipeline.experiments.aided.error_state import DEGREES_OF_FREEDOM, GROUPS
-from imubench_pipeline.experiments.aided.runs import (
+from imubench_pipeline.extensions.aided.axis_states import AxisStates, axis_states
+from imubench_pipeline.extensions.aided.error_state import DEGREES_OF_FREEDOM, GROUPS
+from imubench_pipeline.extensions.aided.runs import (
     INITIAL_HEADING_SIGMA,
     INITIAL_TILT_SIGMA,
     WARM_UP,
@@ -16,9 +16,9 @@ from imubench_pipeline.experiments.aided.runs import (
     Outcome,
     schedule,
 )
-from imubench_pipeline.experiments.aided.signals import Signals, Spreads, signals
-from imubench_pipeline.experiments.aided.strapdown import mechanise, rotation, turn_between
-from imubench_pipeline.experiments.aided.trajectories import Trajectory, headings, trajectory
+from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
+from imubench_pipeline.extensions.aided.strapdown import mechanise, rotation, turn_between
+from imubench_pipeline.extensions.aided.trajectories import Trajectory, headings, trajectory
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel

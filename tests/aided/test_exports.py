@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.aided.axis_states import AxisStates, axis_states, with_turn_on
-from imubench_pipeline.experiments.aided.runs import Drive, Outage
-from imubench_pipeline.experiments.aided.signals import Spreads, signals
-from imubench_pipeline.experiments.aided.trajectories import trajectory
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.export.matrices import FLICKER_TAU_OVER_HORIZON
 from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.extensions.aided.axis_states import AxisStates, axis_states, with_turn_on
+from imubench_pipeline.extensions.aided.runs import Drive, Outage
+from imubench_pipeline.extensions.aided.signals import Spreads, signals
+from imubench_pipeline.extensions.aided.trajectories import trajectory
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.settings.sensor import CHANNELS

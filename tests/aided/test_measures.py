@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.aided.measures import predicted, squares, within
-from imubench_pipeline.experiments.aided.runs import Drive, Outcome, schedule
-from imubench_pipeline.experiments.aided.trajectories import trajectory
+from imubench_pipeline.extensions.aided.measures import predicted, squares, within
+from imubench_pipeline.extensions.aided.runs import Drive, Outcome, schedule
+from imubench_pipeline.extensions.aided.trajectories import trajectory
 
 
 @pytest.mark.parametrize("rate", [10.0, 12.5, 125.0 / 3.0, 119.0 / 3.0, 50.0, 104.0 / 3.0])

@@ -10,14 +10,14 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
-from imubench_pipeline.experiments.aided.measures import Share
+from imubench_pipeline.extensions.aided.measures import Share
+from imubench_pipeline.extensions.aided.navigate import _is_consistent, navigate
+from imubench_pipeline.extensions.aided.settings import NavigateSettings
+from imubench_pipeline.extensions.aided.tunings import scaled, tunings
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.settings.config import NavigateSettings
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
-from imubench_pipeline.steps.navigate import _is_consistent, navigate
-from imubench_pipeline.steps.tunings import scaled, tunings
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import kept

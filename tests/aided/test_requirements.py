@@ -7,10 +7,9 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from imubench_pipeline.experiments.aided.trajectories import TRAJECTORY_NAMES
-from imubench_pipeline.model.comparisons import NavigationRow
+from imubench_pipeline.extensions.aided.limits import outage_rows
+from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.in_outages import outage_rows
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judgements
@@ -33,7 +32,7 @@ def verdict(size: float, half: float = 1.05, **changes: Any) -> dict[str, Any]:
         **changes,
     )
     about = RecordingRow.rows_of(build("recordings", recording_rows("imu")["recordings"]))
-    runs = NavigationRow.rows_of(build("navigation", [run]))
+    runs = build("navigation", [run])
     rows = outage_rows(runs, about, {"robot": OUTAGE})
     basis = Basis.of(about)
     judged = list(judgements(rows, {"robot": OUTAGE}, {"imu": {"price_class": None}}, basis))

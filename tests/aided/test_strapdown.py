@@ -8,8 +8,8 @@ import pytest
 import r3f
 
 from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
-from imubench_pipeline.experiments.aided.strapdown import EARTH_RADIUS, inverse, mechanise
-from imubench_pipeline.experiments.aided.trajectories import (
+from imubench_pipeline.extensions.aided.strapdown import EARTH_RADIUS, inverse, mechanise
+from imubench_pipeline.extensions.aided.trajectories import (
     DEFAULT_LATITUDE,
     TRAJECTORY_NAMES,
     Trajectory,

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from imubench_pipeline.experiments.alignment.attitude import (
+from imubench_pipeline.extensions.calibration.alignment.attitude import (
     correct,
     cross_matrix,
     euler_angles,

@@ -6,15 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.alignment.accuracy import simulate_triad, true_means
-from imubench_pipeline.experiments.alignment.attitude import euler_angles, matrix
-from imubench_pipeline.experiments.alignment.coarse import (
+from imubench_pipeline.extensions.calibration.alignment.accuracy import simulate_triad, true_means
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles, matrix
+from imubench_pipeline.extensions.calibration.alignment.coarse import (
     coarse_accuracy,
     coarse_alignment,
     mean_vectors,
 )
-from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
 from imubench_pipeline.noise import NoiseModel
 from tests.alignment.triads import ALIKE, ATTITUDE, ONE, POSITIONS, SITE, TWO, UNLIKE
 from tests.conftest import few

@@ -6,18 +6,26 @@ from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.alignment.accuracy import simulate_triad, true_means
-from imubench_pipeline.experiments.alignment.attitude import cross_matrix, euler_angles, matrix
-from imubench_pipeline.experiments.alignment.coarse import (
+from imubench_pipeline.extensions.calibration.alignment.accuracy import simulate_triad, true_means
+from imubench_pipeline.extensions.calibration.alignment.attitude import (
+    cross_matrix,
+    euler_angles,
+    matrix,
+)
+from imubench_pipeline.extensions.calibration.alignment.coarse import (
     coarse_accuracy,
     coarse_alignment,
     mean_vectors,
 )
-from imubench_pipeline.experiments.alignment.fine import INITIAL_ANGLE_SIGMA, FineAlignment, align
-from imubench_pipeline.experiments.alignment.triad import Positions, Triad
-from imubench_pipeline.experiments.calibration.least_squares import NotObservableError
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
-from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL
+from imubench_pipeline.extensions.calibration.alignment.fine import (
+    INITIAL_ANGLE_SIGMA,
+    FineAlignment,
+    align,
+)
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Triad
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.extensions.calibration.least_squares import NotObservableError
+from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.simulate.simulation import simulate

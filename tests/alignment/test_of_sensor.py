@@ -11,12 +11,12 @@ import pytest
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
-from imubench_pipeline.experiments.alignment.accuracy import accuracies
-from imubench_pipeline.experiments.alignment.fine import UNIFORM_HEADING_SIGMA
-from imubench_pipeline.experiments.alignment.triad import Site, Triad
+from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
+from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
+from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
+from imubench_pipeline.extensions.earth_rate.outlook import TIMES, noise_at_rest, outlook_tables
+from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.settings.config import EarthRateSettings
-from imubench_pipeline.steps.outlook import TIMES, noise_at_rest, outlook_tables
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.recordings import put

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.alignment.attitude import matrix
-from imubench_pipeline.experiments.alignment.triad import Site
-from imubench_pipeline.experiments.alignment.turned import sensed
+from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
+from imubench_pipeline.extensions.calibration.alignment.triad import Site
+from imubench_pipeline.extensions.calibration.calibration import calibration_tables
+from imubench_pipeline.extensions.calibration.settings import TRIAD, InPositions
+from imubench_pipeline.extensions.calibration.simulated import sensed
 from imubench_pipeline.recordings.kept import Quality, identified
 from imubench_pipeline.recordings.recording import log_paths
-from imubench_pipeline.settings.positions import TRIAD, InPositions
 from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.steps.calibration import calibration_tables
 from imubench_pipeline.steps.simulate import _blocks
 from imubench_pipeline.tables import build
 from tests.conftest import PROJECT
@@ -99,7 +99,7 @@ def test_an_axis_that_is_missing_is_named(tmp_path: Path) -> None:
     row = found(tmp_path / "run", columns)["roll"]
     assert row["status"] == "not_shown" and row["reason"].startswith("accel_y cannot be used")
     with pytest.raises(ValueError, match="the log has no accel_y"):
-        InPositions.model_validate(DECLARED).check(list(columns))
+        InPositions.model_validate(DECLARED).moved_gyro(list(columns))
 
 
 def test_what_is_sensed_turns_with_the_triad() -> None:

@@ -2,8 +2,8 @@
 
 import math
 
-from imubench_pipeline.experiments.alignment.attitude import matrix
-from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.noise import NoiseModel
 
 SITE = Site(latitude=-0.4, gravity=9.79)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.extensions.calibration.calibration import calibration_tables
+from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.settings.config import EarthRateSettings
-from imubench_pipeline.steps.calibration import calibration_tables
 from tests.earth_rate.recordings import SENSOR
 from tests.earth_rate.runs import PAPER, RATE
 

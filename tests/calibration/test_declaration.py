@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.extensions.calibration.settings import AtRest, OnRateTable
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.calibration.recordings import STEPS, UP
 from tests.earth_rate.recordings import SENSOR
@@ -26,7 +26,7 @@ def test_what_is_declared_in_si() -> None:
         {"latitude": "60 deg", "heading": "180 deg", "heading_sigma": "2 deg"}
     )
     assert rest.pointing.rate == pytest.approx(-EARTH_RATE / 2, rel=1e-3)
-    assert rest.gyro(["gyro_y", "accel_x"]) == "gyro_y"
+    assert rest.moved_gyro(["gyro_y", "accel_x"]) == "gyro_y"
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,10 @@ def test_a_rate_table_is_no_static_recording_and_a_direction_leaves_one(tmp_path
         "static",
     ]
     assert plan.static_of("s") == ["night", "still"]
-    assert plan.calibrated == [("s", "still"), ("s", "table")]
+    assert plan.of_experiment("rate_table", "positions", "pointing") == [
+        ("s", "still"),
+        ("s", "table"),
+    ]
 
 
 def test_the_ingest_does_not_depend_on_steps_and_directions(tmp_path: Path) -> None:

@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from imubench_pipeline.experiments.calibration.least_squares import (
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.calibration.least_squares import (
     LeastSquares,
     NotObservableError,
     block_length,
     half_width,
 )
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
-from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs
+from imubench_pipeline.extensions.earth_rate.simulation import simulate_runs
 from imubench_pipeline.noise import NoiseModel
 from tests.earth_rate.brute import MODELS, of_blocks
 from tests.earth_rate.test_experiment import experiments

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.extensions.calibration.pointing import Pointing
 
 angles = st.floats(-3.1, 3.1)
 latitudes = st.floats(-1.57, 1.57)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from imubench_pipeline.experiments.calibration.least_squares import NotObservableError
-from imubench_pipeline.experiments.calibration.rate_table import RateTable, calibrate
-from imubench_pipeline.experiments.calibration.schedule import Schedule
-from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs
+from imubench_pipeline.extensions.calibration.least_squares import NotObservableError
+from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.extensions.calibration.rate_table import RateTable, calibrate
+from imubench_pipeline.extensions.calibration.schedule import Schedule
+from imubench_pipeline.extensions.earth_rate.simulation import simulate_runs
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.simulate.simulation import simulate
 from tests.conftest import few

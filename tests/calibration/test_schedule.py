@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.calibration.schedule import Schedule
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell
+from imubench_pipeline.extensions.calibration.experiment import Dwell
+from imubench_pipeline.extensions.calibration.schedule import Schedule
 
 
 def table(rate, steps, ramp):

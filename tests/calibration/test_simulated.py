@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.extensions.calibration.calibration import calibration_tables
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.steps.calibration import calibration_tables
 from imubench_pipeline.steps.simulate import write_simulated
 from tests.calibration.recordings import STEPS, UP, by_parameter
 from tests.earth_rate.test_simulated_turns import ENTRY, plan_of
@@ -31,7 +31,7 @@ def test_the_truth_lies_in_the_limits(
     experiment: dict[str, Any], told: tuple[str, ...], tmp_path: Path
 ) -> None:
     plan = plan_of(tmp_path, PLAIN | experiment)
-    assert plan.calibrated == [("s", "sim_run")]
+    assert plan.of_experiment("rate_table", "positions", "pointing") == [("s", "sim_run")]
     given = json.loads(plan.simulated_settings("s", "sim_run"))
     made = SimulatedRecording.model_validate(given["recording"])
     folder = plan.recordings["s", "sim_run"].path

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.calibration.still import StillRun, bias_at_rest, not_observable
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
-from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, simulate_runs
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.extensions.calibration.still import StillRun, bias_at_rest, not_observable
+from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, simulate_runs
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.simulate.simulation import simulate
 from tests.earth_rate.brute import MODELS, of_blocks

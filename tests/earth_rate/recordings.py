@@ -9,11 +9,11 @@ import pyarrow as pa
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.extensions.earth_rate.earth_rotation import earth_rate_tables
+from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import Quality, identified
 from imubench_pipeline.recordings.recording import LogWriter, log_paths
-from imubench_pipeline.settings.config import EarthRateSettings
-from imubench_pipeline.steps.earth_rotation import earth_rate_tables
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.runs import PAPER, RATE, turned

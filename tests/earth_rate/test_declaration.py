@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 import yaml
 
+from imubench_pipeline.extensions.earth_rate.settings import TwoPosition
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.recording import channel_logs, static_logs
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.earth_rate.recordings import SENSOR
 
@@ -58,13 +58,13 @@ def test_what_cannot_be_used_names_file_and_key(changes: dict[str, Any], said: s
 
 def test_the_channel_that_was_turned() -> None:
     one = TwoPosition.model_validate(GOOD)
-    assert one.turned(["gyro_y", "accel_x"]) == "gyro_y"
+    assert one.moved_gyro(["gyro_y", "accel_x"]) == "gyro_y"
     with pytest.raises(ValueError, match=r"^channel: missing; .* the log has gyro_x, gyro_y$"):
-        one.turned(["gyro_x", "gyro_y"])
+        one.moved_gyro(["gyro_x", "gyro_y"])
     with pytest.raises(ValueError, match="the log has no gyro"):
-        one.turned(["accel_x"])
+        one.moved_gyro(["accel_x"])
     with pytest.raises(ValueError, match="channel: found 'gyro_z'; the log has gyro_x"):
-        TwoPosition.model_validate(GOOD | {"channel": "gyro_z"}).turned(["gyro_x"])
+        TwoPosition.model_validate(GOOD | {"channel": "gyro_z"}).moved_gyro(["gyro_x"])
 
 
 def planned(tmp_path: Path, notes: dict[str, Any], text: str, log: dict[str, Any]) -> Plan:
@@ -103,11 +103,11 @@ def test_a_log_with_such_notes_is_rejected_and_says_why(
     tmp_path: Path, notes: dict[str, Any], said: str
 ) -> None:
     plan = planned(tmp_path, notes, TEXT, LOG)
-    assert plan.turned == [("s", "a")] and plan.static_of("s") == []
+    assert plan.of_experiment("two_position") == [("s", "a")] and plan.static_of("s") == []
     row = ingested(plan, tmp_path)
     assert (row["status"], row["kind"]) == ("rejected", "two_position")
     assert said in row["reason"]
-    json.loads(plan.experiment_settings("s", "a"))
+    json.loads(plan.experiment_settings("s", "a", "earth_rate"))
 
 
 def test_several_gyros_need_the_one_that_was_turned(tmp_path: Path) -> None:
@@ -133,5 +133,5 @@ def test_a_turned_log_is_read_with_its_position_and_keeps_its_turns(tmp_path: Pa
 
 def test_a_log_without_such_notes_is_static(tmp_path: Path) -> None:
     plan = planned(tmp_path, {"device": "7"}, TEXT, LOG)
-    assert plan.turned == [] and plan.static_of("s") == ["a"]
+    assert plan.of_experiment("two_position") == [] and plan.static_of("s") == ["a"]
     assert ingested(plan, tmp_path)["kind"] == "static"

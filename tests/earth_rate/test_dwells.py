@@ -7,12 +7,12 @@ import pytest
 from scipy.stats import chi2
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.bound import block_length, cramer_rao
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
-from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
-from imubench_pipeline.experiments.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.calibration.kalman import RateFilter
+from imubench_pipeline.extensions.earth_rate.bound import block_length, cramer_rao
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
+from imubench_pipeline.extensions.earth_rate.prediction import Outlook
+from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     PAPER_MODEL,
     simulate_runs,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
 
 
 @st.composite

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
-from imubench_pipeline.experiments.earth_rate.hypotheses import (
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
+from imubench_pipeline.extensions.earth_rate.hypotheses import (
     PrintedRun,
     angle_needed,
     apart,
@@ -18,7 +18,7 @@ from imubench_pipeline.experiments.earth_rate.hypotheses import (
     warm_up,
     wrong_part,
 )
-from imubench_pipeline.experiments.earth_rate.pairs import by_pairs
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
 from imubench_pipeline.noise import NoiseModel
 
 RATE, LATITUDE = 7.292115e-5, math.radians(-23.3)

@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.experiments.earth_rate.bound import block_length, cramer_rao
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
-from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.extensions.calibration.kalman import RateFilter
+from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA, block_states
+from imubench_pipeline.extensions.earth_rate.bound import block_length, cramer_rao
+from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MODEL,
     paper_run,
     simulate_runs,
 )
-from imubench_pipeline.experiments.earth_rate.states import UNINFORMATIVE_SIGMA, block_states
 from imubench_pipeline.noise import NoiseModel, WhiteNoise
 from tests.earth_rate.brute import MODELS, of_blocks, of_samples
 from tests.earth_rate.test_experiment import experiments

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.experiment import Experiment
-from imubench_pipeline.experiments.earth_rate.known_rate import (
+from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.earth_rate.known_rate import (
     STARTS,
     as_printed,
     mean_sigma,
     settled,
     track,
 )
-from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, paper_run, simulate_log
+from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, paper_run, simulate_log
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate.model import SensorModel
 

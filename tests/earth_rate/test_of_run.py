@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from imubench_pipeline.extensions.earth_rate.tables import TURNED
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import Quality, identified
 from imubench_pipeline.recordings.recording import log_paths
 from imubench_pipeline.steps.noise_source import from_static
 from imubench_pipeline.tables import build
-from imubench_pipeline.tables.schemas import TURNED
 from tests.earth_rate.recordings import (
     EVERY_30,
     PRINTED,

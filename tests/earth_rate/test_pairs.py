@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
-from imubench_pipeline.experiments.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
+from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MODEL,
     paper_run,
     simulate_runs,

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.bound import block_length, cramer_rao, information
-from imubench_pipeline.experiments.earth_rate.experiment import Experiment
-from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
-from imubench_pipeline.experiments.earth_rate.pairs import by_pairs
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
-from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, paper_run
+from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.calibration.kalman import RateFilter
+from imubench_pipeline.extensions.earth_rate.bound import block_length, cramer_rao, information
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
+from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
+from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, paper_run
 from imubench_pipeline.navigation.error_budget import Gyrocompass
 from imubench_pipeline.noise import NoiseModel
 from tests.earth_rate.brute import MODELS

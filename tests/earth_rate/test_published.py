@@ -4,13 +4,13 @@ import math
 
 import pytest
 
-from imubench_pipeline.experiments.earth_rate.courses import thin
-from imubench_pipeline.experiments.earth_rate.published import (
+from imubench_pipeline.extensions.earth_rate.courses import thin
+from imubench_pipeline.extensions.earth_rate.published import (
     RunDesign,
     allowed_sigmas,
     published_row,
 )
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
     PAPER_MODEL,
@@ -43,10 +43,14 @@ def test_white_noise_is_the_least() -> None:
 
 def test_the_demonstration_has_the_runs_of_the_paper() -> None:
     plan = Plan({})
-    runs = [name for sensor, name in plan.turned if sensor == "sirrs01_03"]
+    runs = [name for sensor, name in plan.of_experiment("two_position") if sensor == "sirrs01_03"]
     assert runs == ["sim_run_1", "sim_run_2", "sim_run_3", "sim_run_4"]
     assert plan.static_of("sirrs01_03") == ["sim_published", "sim_pointing_east"]
-    calibrated = [name for sensor, name in plan.calibrated if sensor == "sirrs01_03"]
+    calibrated = [
+        name
+        for sensor, name in plan.of_experiment("rate_table", "positions", "pointing")
+        if sensor == "sirrs01_03"
+    ]
     assert calibrated == ["sim_rate_table", "sim_pointing_east"]
 
 

@@ -8,10 +8,10 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
-from imubench_pipeline.experiments.earth_rate.bound import bound, cramer_rao
-from imubench_pipeline.experiments.earth_rate.courses import sigma_ranges
-from imubench_pipeline.experiments.earth_rate.experiment import Experiment
-from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
+from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.calibration.kalman import RateFilter
+from imubench_pipeline.extensions.earth_rate.bound import bound, cramer_rao
+from imubench_pipeline.extensions.earth_rate.courses import sigma_ranges
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import yaml
 
-from imubench_pipeline.experiments.earth_rate.turning import find_turning
+from imubench_pipeline.extensions.earth_rate.earth_rotation import earth_rate_tables
+from imubench_pipeline.extensions.earth_rate.turning import find_turning
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.recording import channel_logs
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.steps.earth_rotation import earth_rate_tables
 from imubench_pipeline.steps.simulate import write_simulated
 from tests.earth_rate.recordings import PRINTED, SENSOR
 
@@ -86,7 +86,7 @@ def test_it_is_turned_by_the_clock(made: tuple[Plan, Path]) -> None:
 @pytest.mark.release
 def test_what_is_published_stands_beside_what_noise_allows(made: tuple[Plan, Path]) -> None:
     plan, kept = made
-    settings = plan.experiment_settings("s", "sim_run")
+    settings = plan.experiment_settings("s", "sim_run", "earth_rate")
     found = earth_rate_tables(kept, [], "s", "sim_run", settings)
     rate = {(row["part"], row["method"]): row["value"] for row in found["earth_rate"]}
     whole, last = found["earth_rate_published"]

@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
-from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
-from imubench_pipeline.experiments.earth_rate.simulation import (
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.extensions.calibration.kalman import RateFilter
+from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MINUTES,
     PAPER_MODEL,
     PAPER_RATE,

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from imubench_pipeline.experiments.earth_rate.alternation import alternation, split_at_turns
-from imubench_pipeline.experiments.earth_rate.choice_of_turns import interval_density
-from imubench_pipeline.experiments.earth_rate.experiment import Dwell
-from imubench_pipeline.experiments.earth_rate.transients import (
+from imubench_pipeline.extensions.calibration.experiment import Dwell
+from imubench_pipeline.extensions.earth_rate.alternation import alternation, split_at_turns
+from imubench_pipeline.extensions.earth_rate.choice_of_turns import interval_density
+from imubench_pipeline.extensions.earth_rate.transients import (
     CLEAR_LOG_LIKELIHOOD,
     blocks_of,
     transients,
 )
-from imubench_pipeline.experiments.earth_rate.turning import find_turning
-from imubench_pipeline.experiments.earth_rate.turns import Turning
+from imubench_pipeline.extensions.earth_rate.turning import find_turning
+from imubench_pipeline.extensions.earth_rate.turns import Turning
 from imubench_pipeline.noise import NoiseModel
 from tests.conftest import few
 from tests.earth_rate.runs import DEGREE, EARTH, PAPER, RATE, TURN, bump, turned

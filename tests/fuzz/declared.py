@@ -26,13 +26,13 @@ from typing import Any
 
 import yaml
 
+from imubench_pipeline.extensions.nightly.state import State, StateError, read_state
 from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.report.publish import _keys
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.run.lock import _describe_holder, read_note
-from imubench_pipeline.run.nightly.recovery import restarted
-from imubench_pipeline.run.nightly.state import State, StateError, read_state
+from imubench_pipeline.run.recovery import restarted
 from imubench_pipeline.settings.config import read_run
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor, merged_log

@@ -7,11 +7,11 @@ import pytest
 from scipy import signal
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.experiments.papers import engers
-from imubench_pipeline.experiments.papers.claims import rows_of
-from imubench_pipeline.experiments.papers.engers_axes import AXES, DEGREE, OF_BIAS, OF_NOISE
-from imubench_pipeline.experiments.papers.evidence import Evidence
-from imubench_pipeline.model.published import PublishedRow
+from imubench_pipeline.extensions.papers import engers
+from imubench_pipeline.extensions.papers.claims import rows_of
+from imubench_pipeline.extensions.papers.engers_axes import AXES, DEGREE, OF_BIAS, OF_NOISE
+from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.tables import PublishedRow
 from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import read_simulated
 from imubench_pipeline.tables import build

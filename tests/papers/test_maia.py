@@ -10,16 +10,16 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from imubench_pipeline.experiments.papers import maia, maia_printed
-from imubench_pipeline.experiments.papers.claims import rows_of
-from imubench_pipeline.experiments.papers.evidence import Evidence
-from imubench_pipeline.experiments.papers.maia_equations import (
+from imubench_pipeline.extensions.papers import maia, maia_printed
+from imubench_pipeline.extensions.papers.claims import rows_of
+from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.maia_equations import (
     WEIGHED_AT,
     as_printed,
     by_integral,
     spread_over_weight,
 )
-from imubench_pipeline.experiments.papers.maia_printed import (
+from imubench_pipeline.extensions.papers.maia_printed import (
     CHANNELS,
     GRIDS,
     MTI_GYRO,

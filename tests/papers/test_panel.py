@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.experiments.papers.panel import panel_rows
+from imubench_pipeline.extensions.papers.panel import panel_rows
 
 pytestmark = pytest.mark.release
 

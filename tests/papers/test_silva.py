@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MINUTES
-from imubench_pipeline.experiments.papers import silva, silva_runs, silva_settling, silva_weeks
-from imubench_pipeline.experiments.papers.claims import rows_of
-from imubench_pipeline.experiments.papers.evidence import Evidence
+from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MINUTES
+from imubench_pipeline.extensions.papers import silva, silva_runs, silva_settling, silva_weeks
+from imubench_pipeline.extensions.papers.claims import rows_of
+from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.tables import build
 from tests.conftest import few
 

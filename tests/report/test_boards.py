@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.model.published import PublishedFigureRow
-from imubench_pipeline.report.boards import BOARDS, published_lines
+from imubench_pipeline.extensions.fusion.boards import BOARDS, published_lines
+from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.report.pages import pages
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Site

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.model.experiments import CalibrationRow
+from imubench_pipeline.extensions.calibration.figures import answer, earth_words, scatter_words
+from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.report.calibration import answer, earth_words, scatter_words
 from imubench_pipeline.report.publish import publish
 from tests.alignment.test_of_sensor import outlook, put_triad
 from tests.calibration.recordings import STEPS, UP, at_rest, on_table, run

@@ -3,8 +3,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.model.comparisons import RepeatabilityRow
-from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.model.comparisons import CoverageRow, RepeatabilityRow
 from imubench_pipeline.report.datasheets import (
     coverage_tables,
     curve_distances,

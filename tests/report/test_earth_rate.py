@@ -8,17 +8,17 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.model.experiments import (
+from imubench_pipeline.extensions.earth_rate.page import published_words
+from imubench_pipeline.extensions.earth_rate.page_turned import answer, given_words, needs
+from imubench_pipeline.extensions.earth_rate.tables import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
     EarthRateRow,
 )
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.report.earth_rate import published_words
 from imubench_pipeline.report.pages import pages
 from imubench_pipeline.report.publish import one_file, publish
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.turned import answer, given_words, needs
 from imubench_pipeline.tables import build
 from tests.earth_rate.recordings import EVERY_30, put, put_at_rest, run, turned_log
 from tests.earth_rate.runs import PAPER, turned

@@ -23,7 +23,8 @@ from imubench_pipeline.datasheets import deltas as datasheet
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators import estimate, lines
 from imubench_pipeline.estimators.identifiability import bounds_of
-from imubench_pipeline.model.published import AccuracyRow
+from imubench_pipeline.extensions.papers.page import words_of_reading
+from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.navigation import pooled
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.error_budget import Gyrocompass, Start, budget
@@ -33,7 +34,6 @@ from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.datasheets import DEPENDS
 from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
-from imubench_pipeline.report.theory import words_of_reading
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import findings
 from imubench_pipeline.units import from_si, to_si
@@ -59,7 +59,7 @@ def theory() -> str:
         lstrip_blocks=True,
     )
     page = environment.get_template("theory.html.jinja")
-    return page.render(figure="figures/theory.svg", terms=glossary(), reading="")
+    return page.render(figure="figures/theory.svg", terms=glossary(), sections=())
 
 
 class Page(HTMLParser):
@@ -395,7 +395,7 @@ def test_a_page_may_name_another_base() -> None:
         )
     )
     made = environment.get_template("theory.html.jinja")
-    assert made.render(base="other", figure="f", terms=glossary(), reading="").startswith(
+    assert made.render(base="other", figure="f", terms=glossary(), sections=()).startswith(
         "<p>other</p>"
     )
 

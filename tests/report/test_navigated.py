@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.model.comparisons import NavigationRow
-from imubench_pipeline.report.navigated import NAVIGATION, TUNINGS, answers, ranking
+from imubench_pipeline.extensions.aided.page import NAVIGATION, TUNINGS, answers, ranking
+from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.settings.config import Method
 from imubench_pipeline.tables import build
 from tests.report.browser.made import publish_some

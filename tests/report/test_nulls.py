@@ -16,12 +16,12 @@ import pyarrow as pa
 import pytest
 from rich.console import Console
 
+from imubench_pipeline.extensions.nightly import state as nightly
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import run_summary, terminal
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import pages
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.run.nightly import state as nightly
 from imubench_pipeline.tables import build, schema, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report import (

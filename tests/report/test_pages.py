@@ -11,6 +11,7 @@ import pyarrow as pa
 import pytest
 
 from imubench_pipeline import report
+from imubench_pipeline.registry import installed_extensions
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.publish import publish
@@ -21,6 +22,9 @@ from tests.report.test_boards import BOARD, of_board, some
 from tests.report.test_navigated import navigation_row
 
 pytestmark = pytest.mark.usefixtures("small_report")
+
+
+EXTENSIONS = [f"imubench_pipeline.extensions.{one.name}" for one in installed_extensions()]
 
 
 class Tables(dict[str, pa.Table]):
@@ -61,7 +65,7 @@ def test_a_page_reads_no_table_that_it_does_not_declare(entry: Entry, whole: Sit
     tables.read.clear()
     noting._rows.clear()
     assert page.context()
-    undeclared = tables.read - {*entry.tables, *of_recordings}
+    undeclared = tables.read - {*entry.shown_tables, *of_recordings}
     assert not undeclared, "the page would not be written again when these change"
     publishing.environment(noting.system).get_template(page.template)
 
@@ -79,7 +83,8 @@ def test_a_page_disappears_with_what_it_shows(tmp_path: Path) -> None:
 def test_every_page_that_a_module_declares_is_in_the_report(whole: Site) -> None:
     declared = [
         value
-        for module in pkgutil.iter_modules(report.__path__, f"{report.__name__}.")
+        for package in (report, *map(import_module, EXTENSIONS))
+        for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}.")
         for value in vars(import_module(module.name)).values()
         if isinstance(value, Entry)
     ]

@@ -5,10 +5,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.registry import files_of
 from imubench_pipeline.run.resources import Cost, OfMany, OfRecording
 from tests.conftest import PROJECT
 
-FILES = sorted((PROJECT / "workflow/rules").glob("*.smk"))
+FILES = [*sorted((PROJECT / "workflow/rules").glob("*.smk")), *files_of("rules")]
 
 _RULE = re.compile(r"^rule (\w+):\n((?:    .*\n|\n)*)", re.MULTILINE)
 _COST = re.compile(r"\*\*cost\((.*?)\),\n    \w", re.DOTALL)

@@ -5,11 +5,18 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.registry import FOLDER
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, PARTS_OF, TABLES
 from tests.conftest import PROJECT
 from tests.workflow.dry_runs import dry_run
 from tests.workflow.rules import costs, rules
+
+
+def package_of(script: Path) -> str:
+    """The package that has the module of a step, by its script."""
+    folder = script.parents[1]
+    return f"extensions.{folder.name}" if folder.parent == FOLDER else "steps"
 
 
 @pytest.fixture(scope="module")
@@ -18,12 +25,14 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 
 def test_each_rule_has_a_script_and_a_module_of_its_name(known: dict[str, Any]) -> None:
-    assert {rule.name: rule.script for rule in known.values()} == {
-        name: f"../scripts/{name}.py" for name in known
+    scripts = {
+        rule.name: Path(rule.basedir.get_path_or_uri(secret_free=True), rule.script).resolve()
+        for rule in known.values()
     }
-    assert {path.stem for path in (PROJECT / "workflow/scripts").glob("*.py")} == known.keys()
+    places = (PROJECT / "workflow/scripts", *FOLDER.glob("*/scripts"))
+    assert {path.stem: path for place in places for path in place.glob("*.py")} == scripts
     codes = {name: rule.params.get("code") for name, rule in known.items()}
-    assert codes == {name: Plan.code(name) for name in known}
+    assert codes == {name: Plan.code(name, package_of(script)) for name, script in scripts.items()}
     assert len(set(codes.values())) == len(codes)
 
 

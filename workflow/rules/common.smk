@@ -7,13 +7,15 @@ import time
 from functools import partial
 
 from snakemake.iocontainers import Wildcards
+from snakemake.sourcecache import infer_source_file
 from snakemake.utils import update_config
 
 from imubench_pipeline.recordings.kept import outcome
+from imubench_pipeline.registry import files_of, references
 from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.report.folder import attempt_at_pages
 from imubench_pipeline.run.lock import Lock, TakenError, lock_of
-from imubench_pipeline.run.nightly.recovery import STILL_WRITTEN, remove_temporary
+from imubench_pipeline.run.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
 from imubench_pipeline.run.scripts import Scripts
@@ -166,10 +168,20 @@ def tried(step):
     return lambda w: plan.attempt(step, w.sensor, w.get("recording"))
 
 
+ADDED_TABLES = {}
+"""The tables of all sensors that extensions add, with the files that they are joined from."""
+
+JOBS = {}
+"""The wildcards of the jobs of a step that is not of every sensor or recording."""
+
+
 def own_rules():
     """The rules of this workflow by their names here; one that uses them may name them otherwise."""
+    folders = [HERE] + [
+        infer_source_file(str(file.parent)) for file in files_of("rules")
+    ]
     known = {name: proxy.rule for name, proxy in rules._rules.items()}
-    return {name: rule for name, rule in known.items() if rule.basedir == HERE}
+    return {name: rule for name, rule in known.items() if rule.basedir in folders}
 
 
 def jobs():
@@ -192,16 +204,15 @@ def jobs():
 
 def jobs_of(step, rule):
     """The sensor and recording of each job of a step, by its rule."""
+    if step in JOBS:
+        return JOBS[step]
     if "recording" not in rule.wildcard_names:
-        sensors = plan.navigated if step == "navigate" else FOLDERS
-        return [{"sensor": name} for name in sensors] if rule.wildcard_names else [{}]
-    chosen = {
-        "simulate": [key for key, found in plan.recordings.items() if found.simulated],
-        "earth_rotation": plan.turned,
-        "calibration": plan.calibrated,
-        "samples_of_models": plan.on_boards,
-    }
-    recordings = chosen.get(step, plan.recordings)
+        return [{"sensor": name} for name in FOLDERS] if rule.wildcard_names else [{}]
+    return jobs_of_each(plan.recordings)
+
+
+def jobs_of_each(recordings):
+    """The sensor and recording of the jobs of some recordings."""
     return [{"sensor": sensor, "recording": name} for sensor, name in recordings]
 
 

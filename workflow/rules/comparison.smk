@@ -4,16 +4,9 @@
 rule tables:
     input:
         **{name: of_each_sensor(name) for name in OF_SENSOR},
-        **{name: of_each(plan.turned, name) for name in TURNED if name not in OUTLOOK},
-        **{
-            name: of_each(plan.turned if name in TURNED else [], name)
-            + of_each_sensor(name)
-            for name in OUTLOOK
-        },
-        **{name: of_each(plan.calibrated, name) for name in CALIBRATED},
-        **{name: of_each_sensor(name, plan.navigated) for name in NAVIGATED},
+        **ADDED_TABLES,
     output:
-        **as_files(*sorted({*OF_SENSOR, *OUTLOOK, *TURNED, *CALIBRATED, *NAVIGATED})),
+        **as_files(*sorted({*OF_SENSOR, *ADDED_TABLES})),
     log:
         LOGS + "/tables.log",
     group:
@@ -47,9 +40,9 @@ rule files:
 
 rule ranking:
     input:
+        **{name: table(name) for name in references("limits")},
         error_budget=table("error_budget"),
         backtest=table("backtest"),
-        navigation=table("navigation"),
         recordings=table("recordings"),
         doubts=table("doubts"),
         parameters=table("parameters"),
@@ -148,43 +141,3 @@ rule catalogue:
         code=plan.code("catalogue"),
     script:
         "../scripts/catalogue.py"
-
-
-rule papers:
-    input:
-        **{
-            name: table(name)
-            for name in (
-                "recordings",
-                "allan",
-                "allan_compensated",
-                "parameters",
-                "models",
-                "reconstruction",
-                "scores",
-                "datasheet",
-                "error_budget",
-                "temperature",
-                "published_figures",
-                "simulated_truth",
-                "earth_rate",
-                "earth_rate_published",
-                "alignment",
-                "calibration",
-                "grades",
-                "fusion",
-            )
-        },
-        of_models=of_each(plan.on_boards, "samples_of_models"),
-    output:
-        **as_files("published", "accuracy"),
-    log:
-        LOGS + "/papers.log",
-    group:
-        "comparison"
-    resources:
-        **cost(OfMany(memory=350, memory_of_each=0.3, time=10, time_of_each=0.01)),
-    params:
-        code=plan.code("papers"),
-    script:
-        "../scripts/papers.py"

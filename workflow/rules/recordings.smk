@@ -210,6 +210,9 @@ rule error_budget:
         "../scripts/error_budget.py"
 
 
+JOBS["simulate"] = jobs_of_each(plan.simulated)
+JOBS["samples_of_models"] = jobs_of_each(plan.on_boards)
+
 # What is kept of every recording, and those of its tables that its sensor's are joined from.
 OF_RECORDING = (
     rules.ingest,

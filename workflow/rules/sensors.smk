@@ -1,76 +1,10 @@
 """What all recordings of a sensor tell."""
 
-
-rule outlook:
-    input:
-        quality=at_rest("quality.json"),
-        parameters=at_rest("parameters.parquet"),
-    output:
-        alignment=JOINED + "/alignment.parquet",
-        earth_rate_prediction=JOINED + "/earth_rate_prediction.parquet",
-    log:
-        LOGS + "/sensors/{sensor}/outlook.log",
-    group:
-        "comparison"
-    resources:
-        **cost(
-            OfMany(
-                memory=350,
-                memory_of_each=0.1,
-                time=3,
-                time_of_each=0.005,
-                many_jobs=True,
-            )
-        ),
-    params:
-        settings=lambda w: plan.outlook_settings(w.sensor),
-        code=plan.code("outlook"),
-        attempt=tried("outlook"),
-    script:
-        "../scripts/outlook.py"
-
-
-OUTLOOK = tables_of(rules.outlook)
-
-
-# Of the sensors that the setting `navigate` asks for.
-rule navigate:
-    input:
-        quality=at_rest("quality.json"),
-        parameters=at_rest("parameters.parquet"),
-        draws=at_rest("draws.parquet"),
-        allan=at_rest("allan.parquet"),
-        low_pass=at_rest("low_pass.parquet"),
-    output:
-        navigation=JOINED + "/navigation.parquet",
-    log:
-        LOGS + "/sensors/{sensor}/navigate.log",
-    group:
-        "comparison"
-    resources:
-        **cost(
-            OfMany(
-                memory=500,
-                memory_of_each=0.2,
-                time=60,
-                time_of_each=0.005,
-                many_jobs=True,
-            )
-        ),
-    params:
-        settings=lambda w: plan.navigate_settings(w.sensor),
-        code=plan.code("navigate"),
-        attempt=tried("navigate"),
-    script:
-        "../scripts/navigate.py"
-
-
-NAVIGATED = tables_of(rules.navigate)
 # `estimate_findings` becomes a part of `findings`.
 OF_SENSOR = sorted(
     {*PARTS} - {"estimate_findings"}
     | {"recordings", "findings", "doubts", "failures", "drift", "pooled"}
-    | {"simulated_truth", "published_figures"}
+    | {"simulated_truth", *references("sensor_tables")}
 )
 
 

@@ -31,7 +31,6 @@ from imubench_pipeline.settings.sensor import (
     LogFormat,
     RecordingNotes,
     Sensor,
-    kind_of,
     merged_log,
     of_ingest,
     quantity_of,
@@ -329,8 +328,7 @@ def _ingest(
 ) -> tuple[Path, Quality]:
     """Ingest a log; return the folder of its samples, and its quality."""
     limits = parse(QualitySettings, quality, "quality")
-    experiments = {"two_position": notes.two_position, "rate_table": notes.rate_table}
-    settings = of_ingest(log, notes, kind_of(experiments)) | {
+    settings = of_ingest(log, notes, notes.kind) | {
         "simulated": False,
         "quality": limits.model_dump(mode="json"),
     }

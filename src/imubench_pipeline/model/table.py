@@ -71,7 +71,6 @@ FittedValue = Annotated[
     float | None, Column("what the model has where there is no value; no estimate", "as in unit")
 ]
 EstimateStatus = Annotated[Status, Column("whether there is a value, and its quality")]
-TurnedGyro = Annotated[str, Column("the gyro that was turned")]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import BacktestRow
 from imubench_pipeline.model.verdicts import UnitFactor
-from imubench_pipeline.navigation.in_outages import trajectory_of
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
-from imubench_pipeline.navigation.verdicts.standing import Standing
+from imubench_pipeline.navigation.verdicts.standing import Standing, trajectory_of
 
 
 def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:

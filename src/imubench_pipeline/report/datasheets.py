@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
-from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.model.comparisons import CoverageRow, DatasheetRow, RepeatabilityRow
 from imubench_pipeline.report.practical import System, page_unit, printed_text
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of

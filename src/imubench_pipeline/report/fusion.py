@@ -36,7 +36,9 @@ def _context(site: Site) -> dict[str, Any]:
     }
 
 
-FUSION = Entry(file="fusion.html", title="Fusion", context=_context, tables=("fusion", "grades"))
+FUSION = Entry(
+    file="fusion.html", title="Fusion", context=_context, tables=("fusion", "grades"), place=2
+)
 """The page that says how many of one sensor equal one of another."""
 
 

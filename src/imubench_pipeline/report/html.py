@@ -16,6 +16,7 @@ import jinja2
 from jinja2.runtime import Context
 from markupsafe import Markup, escape
 
+from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.words.estimates import symbol_text
@@ -27,7 +28,9 @@ from imubench_pipeline.words.verdicts import doubts_text
 def environment(system: System) -> jinja2.Environment:
     """Return the templates, with the units in which the pages open."""
     templates = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).with_name("templates")),
+        loader=jinja2.FileSystemLoader(
+            [Path(__file__).with_name("templates"), *files_of("templates")]
+        ),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         finalize=_shown,

@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
-from imubench_pipeline.report import (
-    boards,
-    compare,
-    earth_rate,
-    fusion,
-    made,
-    navigated,
-    papers,
-    positions,
-    rate_table,
-    recording,
-    shortlist,
-    start,
-    theory,
-    turned,
-)
+from imubench_pipeline.registry import Hook
+from imubench_pipeline.report import compare, fusion, made, recording, shortlist, start, theory
 from imubench_pipeline.report.sensor import device_page, sensor_page
-from imubench_pipeline.report.site import Entry, Page, Site
+from imubench_pipeline.report.site import RECORDING_PAGES, Entry, Page, Site
+
+_ADDED: Hook[Entry] = Hook("pages")
 
 ENTRIES: Sequence[Entry] = (
     start.START,
@@ -29,30 +17,18 @@ ENTRIES: Sequence[Entry] = (
     start.RECORDINGS,
     start.DATASHEETS,
     shortlist.SHORTLIST,
-    navigated.NAVIGATION,
-    fusion.FUSION,
-    boards.BOARDS,
-    earth_rate.EARTH_RATE_PAGE,
-    papers.PAPERS_PAGE,
+    *sorted((fusion.FUSION, *_ADDED.objects()), key=lambda entry: entry.place),
     theory.THEORY,
     made.MADE,
 )
 """The pages that there is one of, in the order of the navigation; the first is the start page."""
-
-_STATIC = ("recording.html.jinja", recording.context)
-_OF_KIND: Mapping[str, tuple[str, recording.Context]] = {
-    "two_position": ("turned.html.jinja", turned.context),
-    "rate_table": ("rate_table.html.jinja", rate_table.context),
-    "positions": ("positions.html.jinja", positions.context),
-}
-"""Template and context of the page of a recording that is not static, by its kind."""
 
 
 def pages(site: Site) -> Iterator[Page]:
     """Yield the pages of the report, the start page last: it stands for the finished report."""
     for view in site.views:
         kind = "" if view.left_out else view.row.kind
-        yield recording.page_of(site, view, *_OF_KIND.get(kind, _STATIC))
+        yield recording.page_of(site, view, RECORDING_PAGES.by_key().get(kind, recording.STATIC))
     for sensor in site.sensors:
         yield sensor_page(site, sensor)
     for path in dict.fromkeys(view.device_page for view in site.views):

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.model.comparisons import CoverageRow
 from imubench_pipeline.model.estimates import (
     BacktestRow,
     EnvelopeRow,
@@ -14,20 +15,19 @@ from imubench_pipeline.model.estimates import (
     ModelSampleRow,
     ScoreRow,
 )
-from imubench_pipeline.model.published import CoverageRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import log_paths, read_metadata
+from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import compared_samples, thermal
 from imubench_pipeline.report.backtest import backtest_lines
-from imubench_pipeline.report.calibration import at_rest
 from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.parameters import digits_of, methods_table
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks, samples_payload
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.shell import imubench
-from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.site import Page, RecordingPage, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import RecordingError
@@ -50,15 +50,17 @@ _SHOWN_MODELS = 4
 _RATE_FROM = {"stamps": "from the stamps", "stated": "as stated"}
 
 
-Context = Callable[[Site, RecordingView, Path], dict[str, Any]]
-"""Gives what a template needs of a recording, from its folder, too."""
+Section = Callable[[Site, RecordingView], tuple[str, Any] | None]
+"""Returns the template of a section of a static recording, and what it is given as `section`."""
+
+_SECTIONS: Hook[Section] = Hook("recording_sections")
 
 
-def page_of(site: Site, view: RecordingView, template: str, context: Context) -> Page:
+def page_of(site: Site, view: RecordingView, of: RecordingPage) -> Page:
     """Return the page of a recording of any kind."""
     folder = site.results / "recordings" / view.sensor / view.name
     key = recording_key(site, view, folder)
-    return Page(view.page, template, key, lambda: context(site, view, folder))
+    return Page(view.page, of.template, key, lambda: of.context(site, view, folder))
 
 
 def recording_key(site: Site, view: RecordingView, folder: Path) -> str:
@@ -100,7 +102,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "notes": [row for row in numbered if row["severity"] == "note"],
         "channels": [_channel(site, view, channel, samples, of_models) for channel in channels],
         "has_temperature": "temperature" in samples["envelope"],
-        "at_rest": at_rest(view, site.system),
+        "added": [made for add in _SECTIONS.objects() if (made := add(site, view)) is not None],
         "budget": budgets[0] if budgets else None,
         "backtest": backtest_lines(
             view.rows(BacktestRow), site.settings["requirements"], site.system
@@ -126,6 +128,10 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
             "arrays": arrays.texts,
         },
     }
+
+
+STATIC = RecordingPage("recording.html.jinja", context)
+"""The page of a sensor that was at rest."""
 
 
 def _summary(view: RecordingView, channels: int) -> str:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from urllib.parse import quote
 
-from imubench_pipeline.experiments.papers.about import PAPERS
-from imubench_pipeline.model.published import PublishedRow
+from imubench_pipeline.registry import Hook
 from imubench_pipeline.report.glossary import glossary, term
 from imubench_pipeline.report.site import Site
 
 Found = tuple[str, str, str, str]
 """Kind, title, address (page and section), and further words by which it is found."""
+
+
+Search = Callable[[Site], Iterable[Found]]
+"""Returns further entries."""
+
+_ADDED: Hook[Search] = Hook("search")
 
 
 def index(site: Site) -> str:
@@ -40,8 +45,5 @@ def _entries(site: Site) -> Iterator[Found]:
         yield "page", title, file, ""
     for entry in glossary().values():
         yield "term", entry.name, f"theory.html#{entry.section}", entry.short
-    sections = {paper.name: paper.key for paper in PAPERS}
-    for row in site.rows(PublishedRow):
-        title = f"{row.place}: {row.quantity}"
-        words = f"{row.paper} {row.printed_as} {row.verdict}"
-        yield "paper", title, f"papers.html#{sections[row.paper]}", words
+    for entries_of in _ADDED.objects():
+        yield from entries_of(site)

@@ -7,8 +7,13 @@ from dataclasses import asdict
 from typing import Any
 from urllib.parse import urlencode
 
-from imubench_pipeline.model.comparisons import DriftRow, PooledRow, RankingRow, RepeatabilityRow
-from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.model.comparisons import (
+    CoverageRow,
+    DriftRow,
+    PooledRow,
+    RankingRow,
+    RepeatabilityRow,
+)
 from imubench_pipeline.navigation.drift import SIGNIFICANCE_LEVEL
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines

@@ -10,15 +10,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
-from imubench_pipeline.model.comparisons import DriftRow, NavigationRow
-from imubench_pipeline.model.experiments import CalibrationRow, EarthRatePredictionRow
-from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.model.comparisons import CoverageRow, DriftRow
 from imubench_pipeline.model.table import OfRecordingRow, R
+from imubench_pipeline.registry import Hook
 from imubench_pipeline.report.comparison import ComparedRecording, compared_recording
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, first_choices, units_of_pages
@@ -63,13 +63,42 @@ class Entry:
     # the files kept with recordings that it shows, where they are there: likewise
     files: Callable[[Site], Iterable[Path]] = lambda _: ()
     exists: Callable[[Site], bool] = lambda _: True  # tells whether a report has it
+    place: int = 0  # in the navigation, among the pages of extensions
+
+    @property
+    def sections(self) -> list[Section]:
+        """The sections that extensions add."""
+        return [section for section in _SECTIONS.objects() if section.page == self.file]
+
+    @property
+    def shown_tables(self) -> set[str]:
+        """The joined tables that it shows, those of its sections included."""
+        return {*self.tables, *chain.from_iterable(section.tables for section in self.sections)}
 
     def page(self, site: Site) -> Page:
         """Return the page of a report."""
-        shown = (site.tables[table].to_pylist() for table in self.tables)
+        shown = (site.tables[table].to_pylist() for table in sorted(self.shown_tables))
         kept = (path.read_bytes() for path in self.files(site) if path.is_file())
         key = site.key_of([view.key for view in self.views(site)], *shown, *kept)
-        return Page(self.file, f"{self.file}.jinja", key, lambda: self.context(site))
+
+        def context() -> Mapping[str, Any]:
+            made = ((section.template, section.context(site)) for section in self.sections)
+            return {**self.context(site), "sections": [one for one in made if one[1] is not None]}
+
+        return Page(self.file, f"{self.file}.jinja", key, context)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A part of a page that an extension adds."""
+
+    page: str  # the file of its `Entry`
+    template: str  # is given as `section` what `context` returns
+    context: Callable[[Site], Any]  # returns None where the section is left out
+    tables: tuple[str, ...] = ()  # the joined tables that it shows, beside those of the page
+
+
+_SECTIONS: Hook[Section] = Hook("sections")
 
 
 @dataclass
@@ -140,33 +169,8 @@ class Site:
                 self._compared[view.full_name] = compared_recording(view, self.system)
             yield self._compared[view.full_name]
 
-    @cached_property
-    def turned(self) -> list[RecordingView]:
-        """The recordings of gyros that were turned between north and south."""
-        return [view for view in self.views if view.row.kind == "two_position"]
-
-    @cached_property
-    def navigated(self) -> bool:
-        """Whether filters were tuned for a sensor."""
-        return bool(self.rows(NavigationRow))
-
-    @cached_property
-    def calibrated(self) -> list[RecordingView]:
-        """The recordings on a rate table, in positions, or at rest with a direction."""
-        named = self._named_in(CalibrationRow)
-        return [
-            view
-            for view in self.views
-            if view.row.kind in ("rate_table", "positions") or view.full_name in named
-        ]
-
-    @cached_property
-    def predicted(self) -> list[RecordingView]:
-        """The recordings at rest by whose noise it is predicted what their sensor could find."""
-        named = self._named_in(EarthRatePredictionRow)
-        return [view for view in self.views if view.static and view.full_name in named]
-
-    def _named_in(self, of: type[OfRecordingRow]) -> set[Name]:
+    def named_in(self, of: type[OfRecordingRow]) -> set[Name]:
+        """Return sensor and name of the recordings that have rows of a class."""
         return {(row.sensor, row.recording) for row in self.rows(of)}
 
     def device_page_of(self, row: DriftRow) -> str | None:
@@ -177,7 +181,7 @@ class Site:
     def _device_pages(self) -> dict[tuple[str, str], str | None]:
         return {view.full_name: view.device_page for view in self.views}
 
-    @property
+    @cached_property
     def navigation(self) -> list[tuple[str, str]]:
         """The pages that every page leads to, with their names."""
         return [(entry.file, entry.title) for entry in self.entries if entry.exists(self)]
@@ -278,7 +282,25 @@ class Site:
             "version": self.version,
             "first_rows": _FIRST_ROWS,
             "plain_rows": _PLAIN_ROWS,
+            "kinds": {kind: page.words for kind, page in RECORDING_PAGES.by_key().items()},
         }
+
+
+RecordingContext = Callable[[Site, RecordingView, Path], dict[str, Any]]
+"""Returns what a template needs of a recording, from its folder, too."""
+
+
+@dataclass(frozen=True)
+class RecordingPage:
+    """The page of a recording of a kind."""
+
+    template: str
+    context: RecordingContext
+    words: str = ""  # what lists of recordings say of the kind
+
+
+RECORDING_PAGES: Hook[RecordingPage] = Hook("recording_pages")
+"""The pages of recordings that are not static, by their kind."""
 
 
 def _device_page(sensor: str, device: str, simulated: bool) -> str:

@@ -8,9 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
-from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
-from imubench_pipeline.model.published import CoverageRow
+from imubench_pipeline.model.comparisons import CoverageRow, NextStepRow, RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
@@ -57,8 +55,6 @@ def _start(site: Site) -> dict[str, Any]:
             for view in warned
         ],
         "in_doubt": _in_doubt(site, warned),
-        "not_found": list(_without_result(site.turned, EarthRateRow)),
-        "not_calibrated": list(_without_result(site.calibrated, CalibrationRow)),
         "changed": site.changed_devices(),
         "rankings": ranked,
         "next_steps": list(_next_steps(site)),
@@ -92,16 +88,6 @@ def _failures(site: Site) -> Iterator[dict[str, Any]]:
     views = {view.full_name: view for view in site.views}
     for row in site.rows(FailureRow):
         yield {**row.columns(), "view": views.get((row.sensor, row.recording or ""))}
-
-
-def _without_result(
-    views: Sequence[RecordingView], of: type[EarthRateRow] | type[CalibrationRow]
-) -> Iterator[dict[str, Any]]:
-    """Yield the recordings of an experiment of which nothing could be estimated, and why."""
-    for view in views:
-        rows = view.rows(of)
-        if rows and all(row.value is None for row in rows):
-            yield {"view": view, "reason": sentence(rows[0].reason)}
 
 
 def summary(views: Sequence[RecordingView], several: bool = True) -> str:

@@ -27,11 +27,10 @@ from imubench_pipeline.model.estimates import (
     SimulatedTruthRow,
     TemperatureRow,
 )
-from imubench_pipeline.model.published import PublishedFigureRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.table import ChannelRow, R
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.settings.sensor import AT_REST
+from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.tables.schemas import BY_RECORDING
 
@@ -74,7 +73,6 @@ class ChannelView:
     lines: list[LineRow] = field(default_factory=list)
     spectrum: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     findings: list[FindingRow] = field(default_factory=list)
-    published: list[PublishedFigureRow] = field(default_factory=list)
     fixed_bias: float | None = None
     temperature: dict[str, TemperatureRow] = field(default_factory=dict)
     low_pass: dict[str, LowPassRow] = field(default_factory=dict)
@@ -278,9 +276,6 @@ def _channels(view: RecordingView) -> list[ChannelView]:
         if truth.channel in channels:
             components = channels[truth.channel].true_components
             components.setdefault(truth.parameter, []).append(truth)
-    for printed in view.rows(PublishedFigureRow):
-        if printed.channel in channels:
-            channels[printed.channel].published.append(printed)
     for name, channel in channels.items():
         channel.findings = [finding for finding in view.findings if finding.channel in (None, name)]
     return list(channels.values())

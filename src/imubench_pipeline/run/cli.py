@@ -9,17 +9,16 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from difflib import get_close_matches
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
 
 from pydantic import BaseModel
 
+from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import command as report
-from imubench_pipeline.report import papers_command as papers
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import completion_command as completion
@@ -29,10 +28,16 @@ from imubench_pipeline.run import run_command as run
 from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
-from imubench_pipeline.run.nightly import command as nightly
 from imubench_pipeline.run.places import places_about
 from imubench_pipeline.run.verification import command as verification
-from imubench_pipeline.settings.command_line import LONGEST, named_path, number, seconds
+from imubench_pipeline.settings.command_line import (
+    LONGEST,
+    NO_RESULTS,
+    Command,
+    named_path,
+    number,
+    seconds,
+)
 from imubench_pipeline.settings.config import Run, read_config
 from imubench_pipeline.settings.extras import ExtraError
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
@@ -85,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own = list(sys.argv[1:] if arguments is None else arguments)
     first = next(iter(own), "-")
     flags = []
-    if first in _PASS_ON and "--" in own:
+    if first in COMMANDS and COMMANDS[first].passes_on and "--" in own:
         end = own.index("--")
         own, flags = own[:end], own[end + 1 :]
     if first not in COMMANDS and not first.startswith("-"):
@@ -322,23 +327,7 @@ def _completion(options: argparse.Namespace) -> int:
     return 0
 
 
-_PASS_ON = {"run", "nightly"}
-"""Commands of which all that stands after ``--`` is for Snakemake."""
-
-
-class Command(NamedTuple):
-    """A command.
-
-    ``statuses``: what its exit statuses mean, from 0; an empty text is one that it never has.
-    """
-
-    help: str
-    add_arguments: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace], int]
-    statuses: tuple[str, ...]
-
-
-_NO_RESULTS = "what was asked for is not there, or cannot be used"
+_ADDED: Hook[Command] = Hook("commands")
 
 COMMANDS = {
     "analyse": Command(
@@ -366,6 +355,7 @@ COMMANDS = {
             "a step failed, a recording was left out, or a setting is wrong, likewise",
             "the folder is none of logs, or snakemake does not know a flag",
         ),
+        passes_on=True,
     ),
     "schema": Command(
         "write the JSON Schema of a configuration file, for editors",
@@ -396,53 +386,37 @@ COMMANDS = {
         "write what a filter or simulator loads",
         _add_export,
         _export,
-        ("written", "", "the program cannot hold it, or " + _NO_RESULTS),
+        ("written", "", "the program cannot hold it, or " + NO_RESULTS),
     ),
     "show": Command(
         "show the comparison of the sensors in the terminal",
         show.add_arguments,
         show.run,
-        ("shown", "", _NO_RESULTS),
-    ),
-    "papers": Command(
-        "print what the papers say, line by line, beside what is found",
-        papers.add_arguments,
-        papers.run,
-        ("printed", "", _NO_RESULTS),
+        ("shown", "", NO_RESULTS),
     ),
     "shortlist": Command(
         "say by datasheets alone which sensors are worth logging",
         shortlist.add_arguments,
         shortlist.run,
-        ("said", "", _NO_RESULTS),
+        ("said", "", NO_RESULTS),
     ),
     "report": Command(
         "write the report again, elsewhere or in one file",
         report.add_arguments,
         report.run,
-        ("written", "", _NO_RESULTS),
+        ("written", "", NO_RESULTS),
     ),
     "figures": Command(
         "draw the figures of channels for print",
         figures.add_arguments,
         figures.run,
-        ("drawn", "", _NO_RESULTS),
+        ("drawn", "", NO_RESULTS),
     ),
     "simulate": Command(
         "write a simulated log of a sensor, to test filters on",
         simulation.add_arguments,
         simulation.run,
-        ("written", "", _NO_RESULTS),
-    ),
-    "nightly": Command(
-        "run on the logs that are complete, and say what is new: for timers",
-        nightly.add_arguments,
-        nightly.run,
-        (
-            "fine",
-            "a log was rejected, a warning is new or a device has changed since the last run",
-            "failed, for one recording at least, or another run goes on",
-        ),
+        ("written", "", NO_RESULTS),
     ),
     "verify": Command(
         "say whether all results are as runs left them",
@@ -450,6 +424,7 @@ COMMANDS = {
         verification.run,
         ("all is as it was left", "something is not", "there are no results"),
     ),
+    **_ADDED.by_key(),
     "completion": Command(
         "print what a shell needs to complete all this",
         completion.add_arguments,

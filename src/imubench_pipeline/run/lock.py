@@ -16,7 +16,7 @@ from typing import Any
 
 import psutil
 
-from imubench_pipeline.run.nightly.recovery import restarted
+from imubench_pipeline.run.recovery import restarted
 from imubench_pipeline.tables import read_json
 
 INHERITED = "IMUBENCH_LOCK"

@@ -22,17 +22,16 @@ from imubench_pipeline.datasheets.suspicion import usual_as_text, usual_figures
 from imubench_pipeline.navigation.suitability.abilities import abilities
 from imubench_pipeline.recordings.drop_zone import Recording, account_for, found_logs
 from imubench_pipeline.recordings.known_logs import versions_of
+from imubench_pipeline.registry import blocks
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.config import Run, given_beside, read_run
+from imubench_pipeline.settings.experiments import AT_REST, Kind, kind_of, stated_experiments
 from imubench_pipeline.settings.printed import IN_USE
 from imubench_pipeline.settings.requirements import Requirement, read_requirements
 from imubench_pipeline.settings.sensor import (
-    EXPERIMENTS,
-    Kind,
     LogFormat,
     RecordingNotes,
     Sensor,
-    kind_of,
     merged_log,
     of_ingest,
     read_sensor_files,
@@ -65,7 +64,8 @@ _RANKING_KEYS = ("price_class", "must")
 
 _REPORTED_SECTIONS = {
     *("allan", "estimate", "reconstruction", "quality"),
-    *("datasheet", "error_budget", "fusion", "earth_rate", "navigate"),
+    *("datasheet", "error_budget", "fusion"),
+    *blocks("run"),
 }
 """Sections of the settings that the report shows."""
 
@@ -105,7 +105,7 @@ class Plan:
         )
         simulated = read_simulated(self.run.to_simulate, declared)
         self.boards: dict[str, Board] = simulated.boards
-        self._simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
+        self.simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
         self._read_notes: dict[Path, object] = {}
         self._still_written: list[Recording] = []
@@ -157,7 +157,7 @@ class Plan:
         """Return a recording that is held back, if its results exist; its log may be missing."""
         sensor, _, name = key.partition("/")
         folder = self.run.results / "recordings" / sensor / name
-        if (sensor, name) in self._simulated or not all(
+        if (sensor, name) in self.simulated or not all(
             (folder / file).is_file() for file in _INGEST_OUTPUTS
         ):
             return []
@@ -170,14 +170,14 @@ class Plan:
         folder = self.run.results / "simulated"
         return [
             Recording(sensor, name, folder / sensor / name, None, simulated=True)
-            for sensor, name in self._simulated
+            for sensor, name in self.simulated
         ]
 
     def files(self) -> str:
         """Return every file in the drop zone, with its recording or the reason to skip it."""
         found = [log for log in self.recordings.values() if not log.simulated]
         files = account_for(self.run.logs, found, self._still_written)
-        return _to_json([asdict(file) for file in files])
+        return to_json([asdict(file) for file in files])
 
     def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
         """Return the number of the attempt of a step, see `Faults.attempt`.
@@ -191,7 +191,7 @@ class Plan:
         """Return the settings of the ingest of a recording, or its error if it cannot be read."""
         key = (sensor, name)
         if key not in self._of_ingest:
-            self._of_ingest[key] = _to_json(self._ingest(self.recordings[key]))
+            self._of_ingest[key] = to_json(self._ingest(self.recordings[key]))
         return self._of_ingest[key]
 
     def _ingest(self, recording: Recording) -> dict[str, object]:
@@ -204,7 +204,7 @@ class Plan:
         try:
             log, notes = self._written(recording)
             if recording.simulated:
-                log = layout(self._simulated[recording.sensor, recording.name], log)
+                log = layout(self.simulated[recording.sensor, recording.name], log)
             else:
                 try:
                     notes.check_gyro(log)
@@ -229,7 +229,7 @@ class Plan:
         """Return what was done with the sensor; what its notes were to say, if they are wrong."""
         recording = self.recordings[sensor, name]
         if recording.simulated:
-            return self._simulated[sensor, name].kind
+            return self.simulated[sensor, name].kind
         return kind_of(self._readable_notes(recording))
 
     def _readable_notes(self, recording: Recording) -> object:
@@ -246,10 +246,20 @@ class Plan:
             self._read_notes[recording.notes] = read_yaml(recording.notes) or {}
         return self._read_notes[recording.notes]
 
-    @cached_property
-    def turned(self) -> list[tuple[str, str]]:
-        """Sensor and name of the recordings of gyros that were turned."""
-        return [key for key in self.recordings if self.kind(*key) == "two_position"]
+    def of_experiment(self, *keys: str) -> list[tuple[str, str]]:
+        """Return sensor and name of the recordings with one of these experiments."""
+        return [key for key in self.recordings if self._experiment(*key) in keys]
+
+    def _experiment(self, sensor: str, name: str) -> str | None:
+        """Return the key of the experiment of a recording; None: the sensor was at rest."""
+        if (kind := self.kind(sensor, name)) != AT_REST:
+            return kind
+        recording = self.recordings[sensor, name]
+        if recording.simulated:
+            return next(iter(stated_experiments(self.simulated[sensor, name])), None)
+        notes = self._readable_notes(recording)
+        stated = notes if isinstance(notes, Mapping) else {}
+        return next((key for key in blocks("notes") if stated.get(key) is not None), None)
 
     @property
     def on_boards(self) -> list[tuple[str, str]]:
@@ -262,41 +272,31 @@ class Plan:
 
     def static_of(self, sensor: str) -> list[str]:
         """Return the static recordings of a sensor."""
-        return self._at_rest.get(sensor, [])
+        return self.at_rest.get(sensor, [])
 
     @cached_property
-    def _at_rest(self) -> dict[str, list[str]]:
+    def at_rest(self) -> dict[str, list[str]]:
+        """The static recordings of each sensor that has some."""
         by_sensor: dict[str, list[str]] = {}
         for sensor, name in self.recordings:
-            if self.kind(sensor, name) == "static":
+            if self.kind(sensor, name) == AT_REST:
                 by_sensor.setdefault(sensor, []).append(name)
         return by_sensor
 
-    @cached_property
-    def calibrated(self) -> list[tuple[str, str]]:
-        """Sensor and name of the recordings on a rate table, in positions, or that point known."""
-        return [key for key in self.recordings if self._calibrates(*key)]
+    def experiment_settings(self, sensor: str, name: str, *sections: str) -> str:
+        """Return sections of the configuration, and what is stated of a sensor and its recording.
 
-    def _calibrates(self, sensor: str, name: str) -> bool:
-        if self.kind(sensor, name) in ("rate_table", "positions"):
-            return True
-        recording = self.recordings[sensor, name]
-        if recording.simulated:
-            return self._simulated[sensor, name].pointing is not None
-        notes = self._readable_notes(recording)
-        return isinstance(notes, Mapping) and notes.get("pointing") is not None
-
-    def experiment_settings(self, sensor: str, name: str) -> str:
-        """Return the settings of the experiments with turned or stated axes of a recording."""
+        That is the experiment of its notes, or all of a simulated recording.
+        """
         recording = self.recordings[sensor, name]
         declared = self.sensors.get(sensor)
         settings: dict[str, object] = {
-            "earth_rate": self.run.earth_rate.model_dump(mode="json"),
+            **{section: getattr(self.run, section).model_dump(mode="json") for section in sections},
             "sensor": declared.model_dump(mode="json", exclude_unset=True) if declared else None,
         }
         if recording.simulated:
-            entry = self._simulated[sensor, name]
-            return _to_json(
+            entry = self.simulated[sensor, name]
+            return to_json(
                 settings
                 | {
                     "simulated": entry.model_dump(
@@ -307,48 +307,9 @@ class Plan:
         try:
             notes = self._written(recording)[1]
         except ConfigError:
-            return _to_json(settings)  # it is rejected, and says why
-        experiments = notes.model_dump(mode="json", include=set(EXPERIMENTS), exclude_none=True)
-        return _to_json(settings | experiments)
-
-    def outlook_settings(self, sensor: str) -> str:
-        """Return the settings of the predictions for a sensor at rest."""
-        declared = self.sensors.get(sensor)
-        biases = {key: {"bias_repeatability", "offset"} for key in ("gyro", "accel")}
-        printed = declared.datasheet.model_dump(mode="json", include=biases) if declared else {}
-        settings = self.run.earth_rate.model_dump(mode="json")
-        return _to_json({"earth_rate": settings, "datasheet": printed})
-
-    @property
-    def navigated(self) -> list[str]:
-        """Sensors with static recordings that the settings select for navigation."""
-        of = self.run.navigate.of
-        return [
-            sensor
-            for sensor, recordings in self._at_rest.items()
-            if of == "all"
-            or (of == "simulated" and all((sensor, r) in self._simulated for r in recordings))
-        ]
-
-    def navigate_settings(self, sensor: str) -> str:
-        """Return the settings of the navigation of a sensor."""
-        declared = self.sensors.get(sensor)
-        return _to_json(
-            {
-                "navigate": self.run.navigate.model_dump(mode="json", exclude={"of"}),
-                "asked": sorted(
-                    {
-                        (limit.trajectory, limit.outage)
-                        for requirement in self.requirements.values()
-                        for limit in requirement.in_outages
-                    }
-                ),
-                "sensor": declared.model_dump(mode="json", exclude_unset=True)
-                if declared
-                else None,
-                "truths": json.loads(self.truths(sensor)),
-            }
-        )
+            return to_json(settings)  # it is rejected, and says why
+        experiments = notes.model_dump(mode="json", include=set(blocks("notes")), exclude_none=True)
+        return to_json(settings | experiments)
 
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
         """Return the format and the notes of a log; ConfigError if it cannot be used."""
@@ -373,16 +334,16 @@ class Plan:
     def estimate_settings(self, sensor: str, name: str) -> str:
         """Return the settings of the estimates of a recording."""
         settings = self.run.estimate.model_dump(mode="json")
-        return _to_json(
+        return to_json(
             {"estimate": settings, "bandwidth": self.bandwidth(sensor, name)}
             | self._read_by_authors(sensor, name)
         )
 
     def _read_by_authors(self, sensor: str, name: str) -> dict[str, object]:
         """Return the values that the source of a simulated recording read from its curve, in SI."""
-        if (sensor, name) not in self._simulated:
+        if (sensor, name) not in self.simulated:
             return {}
-        channels = self._simulated[sensor, name].channels.items()
+        channels = self.simulated[sensor, name].channels.items()
         read = {str(key): axis.read.si(key) for key, axis in channels if axis.read is not None}
         return {"authors": read} if read else {}
 
@@ -396,9 +357,9 @@ class Plan:
 
     def simulated_settings(self, sensor: str, name: str) -> str:
         """Return the parameters and the log format of a simulated recording."""
-        recording = self._simulated[sensor, name]
+        recording = self.simulated[sensor, name]
         written = layout(recording, self.sensors[sensor].log)
-        return _to_json(
+        return to_json(
             {
                 "recording": recording.model_dump(
                     mode="json", exclude=_KEYS_WITHOUT_EFFECT_ON_SAMPLES
@@ -421,12 +382,12 @@ class Plan:
     def settings(self, section: str) -> str:
         """Return one section of the run's configuration."""
         value = getattr(self.run, section)
-        return _to_json(value.model_dump(mode="json") if isinstance(value, BaseModel) else value)
+        return to_json(value.model_dump(mode="json") if isinstance(value, BaseModel) else value)
 
     def datasheet_settings(self, sensor: str) -> str:
         """Return the settings of the comparison with the datasheet of a sensor."""
         declared = self.sensors.get(sensor)
-        return _to_json(
+        return to_json(
             {
                 "datasheet": declared.datasheet.model_dump(mode="json") if declared else {},
                 "tolerance": self.run.datasheet.tolerance,
@@ -437,7 +398,7 @@ class Plan:
     def error_budget_settings(self, sensor: str) -> str:
         """Return the settings of the error budget of a sensor, with its printed figures."""
         declared = self.sensors.get(sensor)
-        return _to_json(
+        return to_json(
             {
                 "error_budget": self.run.error_budget.model_dump(mode="json"),
                 "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
@@ -456,7 +417,7 @@ class Plan:
         for name, about in sensors.items():
             about["abilities"] = abilities(self.sensors[name]).model_dump(mode="json")
         requirements = self._requirements("title", "note", "example", "environment")
-        return _to_json({"requirements": requirements, "sensors": sensors})
+        return to_json({"requirements": requirements, "sensors": sensors})
 
     def _requirements(self, *unused: str) -> dict[str, object]:
         """Return the requirements of applications, without keys that a step does not use."""
@@ -476,7 +437,7 @@ class Plan:
 
     def report_settings(self) -> str:
         """Return the settings of the report."""
-        return _to_json(
+        return to_json(
             {
                 "report": self.run.report.model_dump(mode="json"),
                 "results": str(self.run.results),
@@ -488,7 +449,7 @@ class Plan:
                 "requirements": self._requirements(),
                 "on_purpose": {
                     f"{sensor}/{name}": dict(entry.shows)
-                    for (sensor, name), entry in self._simulated.items()
+                    for (sensor, name), entry in self.simulated.items()
                     if entry.shows
                 },
             }
@@ -510,7 +471,7 @@ class Plan:
 
     def figures_settings(self) -> str:
         """Return the settings of the figures of all sensors."""
-        return _to_json({"report": {"units": self.run.report.units}})
+        return to_json({"report": {"units": self.run.report.units}})
 
     def catalogue(self, *more: str) -> str:
         """Return the datasheets of all sensor files, with vendor and model, and more keys."""
@@ -522,7 +483,7 @@ class Plan:
 
     def _sensor_files(self, names: Iterable[str], more: Iterable[str]) -> str:
         keys = {"vendor", "model", "datasheet", *more}
-        return _to_json(
+        return to_json(
             {
                 name: self.sensors[name].model_dump(mode="json", include=keys)
                 | {"log": _PLACEHOLDER_LOG}
@@ -540,13 +501,13 @@ class Plan:
 
     def truths(self, sensor: str) -> str:
         """Return the true parameters of the simulated recordings of a sensor."""
-        entries = (entry for (of, _), entry in self._simulated.items() if of == sensor)
-        return _to_json([entry.model_dump(mode="json") for entry in entries])
+        entries = (entry for (of, _), entry in self.simulated.items() if of == sensor)
+        return to_json([entry.model_dump(mode="json") for entry in entries])
 
     @staticmethod
-    def code(step: str) -> str:
-        """Return the digest of the code that a step runs: the module of its name in ``steps``."""
-        return source_digest(f"steps.{step}")
+    def code(step: str, package: str = "steps") -> str:
+        """Return the digest of the code that a step runs: the module of its name in a package."""
+        return source_digest(f"{package}.{step}")
 
 
 def _check_places(run: Run) -> None:
@@ -565,7 +526,7 @@ def _check_places(run: Run) -> None:
         )
 
 
-def _to_json(value: object) -> str:
+def to_json(value: object) -> str:
     """Return a value as JSON, in which Snakemake finds no wildcard: a name may have braces."""
     text = json.dumps(value, sort_keys=True, ensure_ascii=False)
     return _BRACE_BEFORE_WORD.sub(r"\\u007b", text)

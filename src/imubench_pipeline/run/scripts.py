@@ -13,8 +13,8 @@ from snakemake.script import script as script_of_snakemake
 from snakemake.sourcecache import LocalSourceFile, SourceCache, infer_source_file
 
 from imubench_pipeline.run.faults import Faults, Of
-from imubench_pipeline.run.nightly.recovery import remove_unfinished
 from imubench_pipeline.run.processes import Job, Processes, StepError
+from imubench_pipeline.run.recovery import remove_unfinished
 from imubench_pipeline.run.resources import Limit, Limits
 from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import QUALITY, Failure, failure_of, write_empty

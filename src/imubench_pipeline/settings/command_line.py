@@ -10,6 +10,7 @@ import math
 import reprlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 
 def named_path(text: str) -> Path:
@@ -77,3 +78,21 @@ def whole_number(least: int, most: int, words: str) -> Callable[[str], int]:
 MOST_WHOLE = 2**63 - 1
 LONGEST = 1e10
 """s, three centuries."""
+
+
+NO_RESULTS = "what was asked for is not there, or cannot be used"
+"""What the exit status 2 of a command means that shows results."""
+
+
+class Command(NamedTuple):
+    """A command.
+
+    ``statuses``: what its exit statuses mean, from 0; an empty text is one that it never has.
+    ``passes_on``: all that stands after ``--`` is for Snakemake.
+    """
+
+    help: str
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+    statuses: tuple[str, ...]
+    passes_on: bool = False

@@ -6,15 +6,14 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, field_validator
+from pydantic import BaseModel, BeforeValidator, Field, field_validator
 
-from imubench_pipeline.settings.known_rates import AccelerationFromZero, RateFromZero
+from imubench_pipeline.settings.experiments import WithBlocks, with_blocks
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.requirements import Axis, Latitude, Outage, Time, Trajectory
+from imubench_pipeline.settings.requirements import Axis, Latitude, Time
 from imubench_pipeline.settings.shipped import CATALOGUE
-from imubench_pipeline.settings.two_position import TimeFromZero
 from imubench_pipeline.settings.validation import (
     ConfigError,
     Duration,
@@ -23,20 +22,16 @@ from imubench_pipeline.settings.validation import (
     NamedPath,
     Strict,
     Text,
-    checked,
     cut,
     parse,
 )
 from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
-from imubench_pipeline.units import difference_to_si, quantity_to_si
 
 _SIMULATED_RECORDINGS_FILE = Path("config/simulated.yaml")
 _SECTIONS_WITHOUT_RECORDING = {"held_back", "exports", "limits", "report"}
 
 
-_difference = checked("temperature", "a difference, such as 10 K", to_si=difference_to_si)
-
-_AccelerationDensity = Annotated[Text, checked("accel_density", "a density above 0")]
+_Section = TypeVar("_Section", bound=BaseModel)
 
 Folders = NamedPath | Annotated[tuple[NamedPath, ...], Field(min_length=1)]
 
@@ -176,91 +171,6 @@ class FusionSettings(Strict):
     seed: int = Field(20260101, ge=0)
 
 
-class EarthRateSettings(Strict):
-    """The Earth's rate from gyros that were turned, and what it would take."""
-
-    margin: TimeFromZero = Field(
-        "0.5 s", description="left out on both sides of a turn that is seen"
-    )
-    goals: tuple[float, ...] = Field(
-        (1.0, 0.1, 0.01),
-        min_length=1,
-        description="standard deviations that are asked for, as a part of the Earth's rate",
-    )
-    run_time: Time = Field("1 h", description="of a run, for which the best dwell is sought")
-    latitude: Latitude = Field(
-        "45 deg", description="where sensors at rest are to find the Earth's rate, and north"
-    )
-    gyro_bias: RateFromZero = Field(
-        "0.5 deg/s",
-        description="standard deviation of the fixed bias of gyros whose datasheet prints none",
-    )
-    accelerometer_bias: AccelerationFromZero = Field(
-        "20 mg",
-        description="standard deviation of that of accelerometers, likewise",
-    )
-    draws: int = Field(60, ge=20, description="noise models that give the range of a sigma")
-
-    @field_validator("goals")
-    @classmethod
-    def _above_zero(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
-        if min(goals) <= 0:
-            raise ValueError("expected parts above 0, such as 0.01 for 1 %")
-        return goals
-
-
-def _of_drive(text: str) -> str:
-    if quantity_to_si(text, "time") > 36_000.0:
-        raise ValueError(f"found {text}; expected a drive of at most 10 h")
-    return text
-
-
-def _of_filter(text: str) -> str:
-    if not 10.0 <= quantity_to_si(text, "frequency") <= 1000.0:
-        raise ValueError(f"found {text}; expected 10 Hz to 1 kHz")
-    return text
-
-
-class NavigateSettings(Strict):
-    """Filters tuned by all that is known of a sensor, on simulated drives with outages of GNSS."""
-
-    of: Literal["none", "simulated", "all"] = Field(
-        "simulated", description="sensors: of simulated recordings alone, all, or none"
-    )
-    trajectories: tuple[Trajectory, ...] = Field(("field",), min_length=1)
-    outages: tuple[Outage, ...] = Field(
-        ("10 s", "30 s", "60 s"), min_length=1, description="without GNSS, one after the other"
-    )
-    duration: Annotated[Duration, AfterValidator(_of_drive)] = Field(
-        "310 s", description="of a run; the first 120 s have GNSS; at least what its outages take"
-    )
-    rate: Annotated[Frequency, AfterValidator(_of_filter)] = Field(
-        "50 Hz", description="of the samples that a filter is given"
-    )
-    runs: int = Field(
-        12,
-        ge=4,
-        le=10_000,
-        description="of each trajectory; 100 of 10 min make the errors sure to 5 %",
-    )
-    gyro_bias: RateFromZero = Field(
-        "0.1 deg/s", description="standard deviation of the bias that is another at each switch-on"
-    )
-    accel_bias: AccelerationFromZero = Field("3 mg", description="likewise of accelerometers")
-    accel_noise: _AccelerationDensity = Field(
-        "100 ug/sqrt(Hz)",
-        description="two-sided density of the accelerometers that stand in where a log has none",
-    )
-    gyro_scale: float = Field(
-        0.0, ge=0, lt=0.1, description="standard deviation of the error of the scale factor"
-    )
-    accel_scale: float = Field(0.0, ge=0, lt=0.1, description="likewise of accelerometers")
-    temperature_change: Annotated[Text, _difference] | None = Field(
-        None, examples=["10 K"], description="over a run, where the drift of a sensor is known"
-    )
-    seed: int = Field(20260101, ge=0)
-
-
 class LimitSettings(Strict):
     """What a step may take of one recording or sensor, which is left out beyond."""
 
@@ -299,7 +209,8 @@ def _path_or_none(value: object) -> object:
     return None if str(value).strip().lower() in _NO_PATH_WORDS else value
 
 
-class Run(Strict):
+@with_blocks("run")
+class Run(WithBlocks):
     """One run: where the logs are, and the settings of each step."""
 
     logs: NamedPath = Field(Path("logs"), description="the drop zone: logs/<sensor>/<recording>")
@@ -334,10 +245,14 @@ class Run(Strict):
     decide: DecideSettings = DecideSettings()
     exports: ExportSettings = ExportSettings()
     fusion: FusionSettings = FusionSettings()
-    earth_rate: EarthRateSettings = EarthRateSettings()
-    navigate: NavigateSettings = NavigateSettings()
     limits: LimitSettings = LimitSettings()
     report: ReportSettings = ReportSettings()
+
+    def section(self, model: type[_Section]) -> _Section:
+        """Return the section that an extension added, by its class."""
+        section = self.block(model)
+        assert section is not None, model  # each has defaults
+        return section
 
     @property
     def to_simulate(self) -> Path | None:

@@ -11,11 +11,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
-from imubench_pipeline.settings.positions import InPositions
+from imubench_pipeline.registry import blocks
+from imubench_pipeline.settings.experiments import (
+    Kind,
+    WithBlocks,
+    kind_of,
+    stated_experiments,
+    with_blocks,
+)
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.shipped import CATALOGUE, folders
-from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import (
     Between,
     ConfigError,
@@ -42,15 +47,6 @@ POSITION = "position"
 
 TABLE_RATE = "table_rate"
 """Name of the column with the rate of the table that a sensor stands on."""
-
-Kind = Literal["static", "two_position", "rate_table", "positions"]
-"""What was done with a sensor during a recording."""
-
-AT_REST: Kind = "static"
-"""Nothing: it was at rest all the time."""
-
-EXPERIMENTS = ("two_position", "rate_table", "positions", "pointing")
-"""Keys of the notes that the ingest does not depend on; a recording has one at most."""
 
 Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
 
@@ -290,7 +286,8 @@ class UsedPart(Strict):
         return self
 
 
-class RecordingNotes(Strict):
+@with_blocks("notes")
+class RecordingNotes(WithBlocks):
     """What may stand in ``<recording>.yaml`` beside a log."""
 
     device: Text | None = Field(None, description="serial number; default: the recording's name")
@@ -306,34 +303,21 @@ class RecordingNotes(Strict):
         "before it of the same device; null: not known",
     )
     use: UsedPart = UsedPart()
-    two_position: TwoPosition | None = Field(
-        None,
-        description="a gyro that was turned between north and south to find the Earth's rate; "
-        "null: the sensor was at rest all the time",
-    )
-    rate_table: OnRateTable | None = Field(
-        None,
-        description="a gyro on a rate table, for scale factor and bias; null: it was on none",
-    )
-    positions: InPositions | None = Field(
-        None,
-        description="a triad that stood in several positions, to find its attitude; null: in one",
-    )
-    pointing: AtRest | None = Field(
-        None,
-        description="where the axis of a gyro at rest points, for its bias without what the Earth "
-        "adds; null: not known",
-    )
     log: dict[str, Any] = Field(default=dict(), description="merged over the sensor's log")
 
     @model_validator(mode="after")
     def _one_kind(self) -> RecordingNotes:
-        stated = [key for key in EXPERIMENTS if getattr(self, key) is not None]
+        stated = stated_experiments(self)
         if len(stated) > 1:
             raise ValueError(
                 f"found {' and '.join(stated)}; expected one of them: a recording is of one kind"
             )
         return self
+
+    @property
+    def kind(self) -> Kind:
+        """What was done with the sensor."""
+        return kind_of(stated_experiments(self))
 
     def check_gyro(self, log: LogFormat) -> None:
         """Check that the gyro of an experiment is in the log, and all that it takes.
@@ -344,30 +328,11 @@ class RecordingNotes(Strict):
             If it is not; the text begins with the key.
         """
         channels = [str(name) for name in log.channels]
-        for key in EXPERIMENTS:
+        for key, experiment in stated_experiments(self).items():
             try:
-                if key == "two_position" and self.two_position is not None:
-                    self.two_position.turned(channels)
-                if key == "rate_table" and self.rate_table is not None:
-                    self.rate_table.gyro(channels, column=log.table_rate is not None)
-                if key == "positions" and self.positions is not None:
-                    self.positions.check(channels)
-                if key == "pointing" and self.pointing is not None:
-                    self.pointing.gyro(channels)
+                experiment.moved_gyro(channels, column=log.table_rate is not None)
             except ValueError as error:
                 raise ValueError(f"{key}.{error}") from None
-
-
-def kind_of(notes: object) -> Kind:
-    """Return what the notes make of a recording, though they may be wrong otherwise."""
-    if isinstance(notes, Mapping):
-        if notes.get("two_position") is not None:
-            return "two_position"
-        if notes.get("rate_table") is not None:
-            return "rate_table"
-        if notes.get("positions") is not None:
-            return "positions"
-    return "static"
 
 
 def read_sensors(folders: Path | Iterable[Path]) -> dict[str, Sensor]:
@@ -410,7 +375,7 @@ def of_ingest(log: LogFormat, notes: RecordingNotes, kind: Kind) -> dict[str, An
         log = log.model_copy(update={"table_rate": None})
     return {
         "kind": kind,
-        "notes": notes.model_dump(mode="json", exclude={"log", *EXPERIMENTS}),
+        "notes": notes.model_dump(mode="json", exclude={"log", *blocks("notes")}),
         "log": log.model_dump(mode="json", exclude={"bandwidth"}),
     }
 

@@ -9,29 +9,29 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Self, TypeVar
+from typing import Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from imubench_pipeline.settings.known_rates import Angle, AtRest, OnRateTable
-from imubench_pipeline.settings.pointing import Pointing
-from imubench_pipeline.settings.positions import InPositions
+from imubench_pipeline.settings.experiments import (
+    Kind,
+    WithBlocks,
+    kind_of,
+    stated_experiments,
+    with_blocks,
+)
 from imubench_pipeline.settings.printed import Kind as FigureKind
 from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
 from imubench_pipeline.settings.sensor import (
-    EXPERIMENTS,
     QUANTITIES,
     Channel,
     ColumnSource,
-    Kind,
     LogFormat,
     Sensor,
     TimeSource,
-    kind_of,
     quantity_of,
 )
 from imubench_pipeline.settings.simulated_sensor import AxisSettings, ImuSettings, check_axes
-from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import (
     ConfigError,
     Duration,
@@ -39,97 +39,14 @@ from imubench_pipeline.settings.validation import (
     NamedPath,
     Strict,
     Text,
-    checked,
 )
 from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.units import naming, quantity_to_si
 
 _Around = TypeVar("_Around", bound=Surroundings)
 
-_Rate = Annotated[Text, checked("angular_rate")]
 _NAME_PATTERN = r"^sim_[A-Za-z0-9_.-]+$"
 _MAX_SAMPLES = 1e10  # 80 GB per channel; more is due to a wrong unit
-
-
-class PublishedRate(Strict):
-    """What a source prints of the Earth's rate that it found."""
-
-    where: Text = Field(description="such as section 6")
-    printed: _Rate = Field(description="with its unit, as printed")
-    part: Text = Field("whole", description="of the run: whole, or such as 'last 13 min'")
-
-
-class SimulatedTurns(TwoPosition):
-    """A gyro that is turned between north and south, by the clock."""
-
-    transient: _Rate = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
-    published: tuple[PublishedRate, ...] = ()
-
-    @model_validator(mode="after")
-    def _parts_are_there(self) -> Self:
-        parts = {"whole", *(f"last {text}" for text in self.last)}
-        for rate in self.published:
-            if rate.part not in parts:
-                raise ValueError(f"published: part is {rate.part!r}; expected one of {parts}")
-        return self
-
-    @property
-    def declared(self) -> TwoPosition:
-        """What would stand beside such a log."""
-        return TwoPosition(**{name: getattr(self, name) for name in TwoPosition.model_fields})
-
-
-class SimulatedTable(OnRateTable):
-    """A gyro on a rate table that keeps to its steps, with ramps between them."""
-
-    scale_factor: float = Field(1.0, gt=0, description="true one: indicated over true rate")
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
-
-    @model_validator(mode="after")
-    def _has_steps(self) -> Self:
-        if not self.steps:
-            raise ValueError("steps is missing; expected the steady rates of the table")
-        return self
-
-    @property
-    def declared(self) -> OnRateTable:
-        """What would stand beside such a log."""
-        return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
-
-
-class SimulatedPositions(InPositions):
-    """A triad that is turned by the clock, and senses gravity and the Earth's rate."""
-
-    roll: Angle = Field("0 deg", description="true one, in the first position")
-    pitch: Angle = Field("0 deg", description="likewise")
-    heading: Angle = Field("0 deg", description="likewise, from north towards east")
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
-
-    @property
-    def declared(self) -> InPositions:
-        """What would stand beside such a log."""
-        return InPositions(**{name: getattr(self, name) for name in InPositions.model_fields})
-
-
-class SimulatedRest(AtRest):
-    """A gyro at rest that senses its part of the Earth's rate."""
-
-    true_heading: Angle = Field("0 deg", description="of the axis, where heading is null")
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
-
-    @property
-    def declared(self) -> AtRest:
-        """What would stand beside such a log."""
-        return AtRest(**{name: getattr(self, name) for name in AtRest.model_fields})
-
-    @property
-    def true(self) -> Pointing:
-        """Where the axis points, exactly."""
-        stated, heading = self.pointing, self.pointing.heading
-        if heading is None:
-            heading = quantity_to_si(self.true_heading, "angle")
-        return Pointing(latitude=stated.latitude, heading=heading, elevation=stated.elevation)
 
 
 class PublishedFigure(Strict):
@@ -233,16 +150,13 @@ class Specimens(Strict):
     )
 
 
-class SimulatedRecording(OfASensor, Surroundings):
+@with_blocks("simulated")
+class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
     """A recording that is made before the run, from known figures."""
 
     recording: str = Field(pattern=_NAME_PATTERN, description="starts with sim_")
     seed: int
     specimens: Specimens | None = Field(None, description="fused to this log; left out: one sensor")
-    two_position: SimulatedTurns | None = None
-    rate_table: SimulatedTable | None = None
-    positions: SimulatedPositions | None = None
-    pointing: SimulatedRest | None = None
 
     @model_validator(mode="after")
     def _of_specimens(self) -> Self:
@@ -259,15 +173,15 @@ class SimulatedRecording(OfASensor, Surroundings):
 
     @model_validator(mode="after")
     def _one_experiment(self) -> Self:
-        stated = [key for key, experiment in self._experiments.items() if experiment is not None]
-        if len(stated) > 1:
-            raise ValueError(f"found {' and '.join(stated)}; expected one of them")
-        for key in stated:
+        experiments = stated_experiments(self)
+        if len(experiments) > 1:
+            raise ValueError(f"found {' and '.join(experiments)}; expected one of them")
+        for key in experiments:
             try:
-                gyro = self.experimental
+                gyro = self.moved_gyro
             except ValueError as error:
                 raise ValueError(f"{key}.{error}") from error
-            if gyro in self.motion or (key == "positions" and self.motion):
+            if gyro in self.motion or (gyro is None and self.motion):
                 raise ValueError(
                     f"motion.{gyro or min(self.motion)}: {key} says how it moves; expected one of "
                     "the two"
@@ -275,12 +189,8 @@ class SimulatedRecording(OfASensor, Surroundings):
         return self
 
     @property
-    def _experiments(self) -> dict[str, object]:
-        return {key: getattr(self, key) for key in EXPERIMENTS}
-
-    @property
-    def experimental(self) -> str | None:
-        """The gyro of its experiment; None where it has none.
+    def moved_gyro(self) -> str | None:
+        """The gyro of its experiment; None where it has none, or one of all axes.
 
         Raises
         ------
@@ -288,19 +198,14 @@ class SimulatedRecording(OfASensor, Surroundings):
             If it is not stated, or not simulated.
         """
         channels = [str(name) for name in self.channels]
-        if self.two_position is not None:
-            return self.two_position.turned(channels)
-        if self.rate_table is not None:
-            return self.rate_table.gyro(channels, column=False)
-        if self.positions is not None:
-            self.positions.check(channels)
-            return None
-        return None if self.pointing is None else self.pointing.gyro(channels)
+        for experiment in stated_experiments(self).values():
+            return experiment.moved_gyro(channels, column=False)
+        return None
 
     @property
     def kind(self) -> Kind:
         """What is done with the sensor."""
-        return kind_of(self._experiments)
+        return kind_of(stated_experiments(self))
 
 
 class Simulated(Strict):

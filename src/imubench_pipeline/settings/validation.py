@@ -143,6 +143,18 @@ Between = Annotated[tuple[Text, Text], AfterValidator(_check_order)]
 Duration = Annotated[Text, checked("time", "a time above 0"), Field(examples=["10 h"])]
 
 
+def _from_zero(dimension: str) -> AfterValidator:
+    return checked(dimension, "a figure from 0", from_zero=True)
+
+
+TimeFromZero = Annotated[Text, _from_zero("time"), Field(examples=["2 s"])]
+Angle = Annotated[Text, checked("angle"), Field(examples=["30 deg"])]
+AngleFromZero = Annotated[Text, _from_zero("angle"), Field(examples=["0.5 deg"])]
+Rate = Annotated[Text, checked("angular_rate"), Field(examples=["-10 deg/s"])]
+RateFromZero = Annotated[Text, _from_zero("angular_rate"), Field(examples=["0.05 deg/s"])]
+AccelerationFromZero = Annotated[Text, _from_zero("acceleration"), Field(examples=["20 mg"])]
+
+
 _Model = TypeVar("_Model", bound=BaseModel)
 
 

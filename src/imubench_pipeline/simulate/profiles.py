@@ -46,6 +46,18 @@ class Constant(Profile):
 
 
 @dataclass(frozen=True)
+class SampledProfile(Profile):
+    """A value at each sample of a log."""
+
+    values: Array
+    rate: float
+
+    def at(self, times: Array) -> Array:
+        """Return the values of the samples at these times."""
+        return self.values[np.rint(times * self.rate).astype(np.int64)]
+
+
+@dataclass(frozen=True)
 class Steps(Profile):
     """Piecewise constant values from their times on; the first one also before."""
 

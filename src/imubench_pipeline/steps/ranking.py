@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.compute as pc
 
-from imubench_pipeline.model.comparisons import ErrorBudgetRow, NavigationRow
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
-from imubench_pipeline.navigation.in_outages import outage_rows
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judgements
 from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
-from imubench_pipeline.settings.requirements import requirements_of
+from imubench_pipeline.registry import Hook
+from imubench_pipeline.settings.requirements import Requirement, requirements_of
 from imubench_pipeline.tables import build, read, write_arrow
+
+OtherErrors = Callable[
+    [pa.Table, Sequence[RecordingRow], Mapping[str, Requirement]], Iterable[ErrorBudgetRow]
+]
+"""Returns errors that are not of dead reckoning, to judge: of a table, recordings, requirements."""
+
+_LIMITS: Hook[OtherErrors] = Hook("limits")
 
 
 def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:
@@ -34,8 +43,9 @@ def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -
         BacktestRow.rows_of(joined["backtest"]),
     )
     sensors = sections["sensors"]
-    outages = outage_rows(NavigationRow.rows_of(joined["navigation"]), recordings, requirements)
-    errors: list[ErrorBudgetRow] = [*ErrorBudgetRow.rows_of(asked), *outages]
+    errors = ErrorBudgetRow.rows_of(asked)
+    for name, errors_of in _LIMITS.by_key().items():
+        errors += errors_of(joined[name], recordings, requirements)
     of_sensors = [row for row in errors if row.sensor in sensors]
     judged = list(judgements(of_sensors, requirements, sensors, basis))
     built = {

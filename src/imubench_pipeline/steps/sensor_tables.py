@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
@@ -16,8 +16,10 @@ from imubench_pipeline.model.estimates import (
     FixedBiasRow,
     ModelRow,
     ParameterRow,
+    SimulatedTruthRow,
 )
 from imubench_pipeline.model.recordings import FindingRow
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.pooled import pooled_rows
@@ -34,10 +36,24 @@ from imubench_pipeline.recordings.fitness import (
 )
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.copies import recorded_twice
+from imubench_pipeline.registry import Hook
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
-from imubench_pipeline.steps.published_figures import published_rows, truth_rows
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.simulate.models import figures_of, imu_model
+from imubench_pipeline.steps.specimens import fused_model, specimens_of, weights_of
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures, without
+from imubench_pipeline.units import quantity_to_si
+
+SensorTable = Callable[
+    [str, Sequence[SimulatedTruthRow], Mapping[str, pa.Table]], Iterable[TableRow]
+]
+"""Returns the rows of a table of a sensor.
+
+By its simulated recordings, as the plan wrote them, their true parameters, and its other tables.
+"""
+
+_ADDED: Hook[SensorTable] = Hook("sensor_tables")
 
 
 def joined_tables(
@@ -99,7 +115,8 @@ def joined_tables(
         joined[name] = build(name, with_doubts(WITH_DOUBTS[name].rows_of(joined[name]), about))
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
-    joined["published_figures"] = build("published_figures", published_rows(truths, truth, joined))
+    for name, rows_of in _ADDED.by_key().items():
+        joined[name] = build(name, rows_of(truths, truth, joined))
     return with_failures(joined, failures)
 
 
@@ -168,3 +185,40 @@ def without_doubles(
         near = _MAX_STEP_DISTANCE * durations.get((finding.sensor, finding.recording), 0.0)
         if not any(abs(row.start - (finding.start or 0.0)) <= near for row in same):
             yield finding
+
+
+def truth_rows(truths: str) -> Iterator[SimulatedTruthRow]:
+    """Yield the rows of the table ``simulated_truth``."""
+    for entry in json.loads(truths):
+        recording = SimulatedRecording.model_validate(entry)
+        rate = quantity_to_si(recording.rate, "frequency")
+        for channel, truth in recording.channels.items():
+            factors = _of_fused(recording, str(channel))
+            for figure in figures_of(truth, channel, rate):
+                factor = factors.get(figure.name.removesuffix(" in the log"), 1.0)
+                yield SimulatedTruthRow(
+                    sensor=recording.sensor,
+                    recording=recording.recording,
+                    channel=channel,
+                    parameter=figure.name,
+                    component=figure.component,
+                    value=figure.value * factor,
+                    unit=figure.unit,
+                    assumed=bool({figure.setting, figure.name} & set(truth.assumed)),
+                    source=recording.source,
+                )
+
+
+def _of_fused(recording: SimulatedRecording, channel: str) -> dict[str, float]:
+    """Return the factors on the noise of one specimen if several are fused."""
+    if recording.specimens is None:
+        return {}
+    models = [model.axes[channel].noise for model in specimens_of(recording)]
+    of_kind = imu_model(recording.channels, recording).axes[channel].noise
+    _, weights = weights_of(models, quantity_to_si(recording.rate, "frequency"))
+    fused = fused_model(models, weights)
+    return {
+        name: getattr(fused, name) / getattr(of_kind, name)
+        for name in ("N", "B", "K")
+        if getattr(of_kind, name)
+    }

@@ -9,21 +9,25 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from imubench_pipeline.registry import sources
+
 _PACKAGE = Path(__file__).parents[1]
 _NAME = _PACKAGE.name
 
 # A whole tree of each module's syntax would take as long to read as all logs of a run.
 _IMPORT = re.compile(r"^ *from (\w+)((?:\.\w+)*) import (\([^)]*\)|.*)$", re.MULTILINE)
 _IMPORTED = re.compile(r"(\w+)(?: as \w+)?")
+_EXTENSIONS = re.compile(r"""\b(Hook|blocks|files_of)\(["'](\w+)["']\)""")
 _TEXT = re.compile(r"""["'](\w[\w.]*\*?)["']""", re.ASCII)
 
 
 def source_digest(*modules: str) -> str:
     """Return a digest of modules of this package and of all that they use of it.
 
-    That is what they import, and what their texts name: another module in full, since some are
-    imported by name when they are needed; every module of a package, by a name that ends in ``.*``;
-    or a file or folder beside the module, such as templates.
+    That is what they import, what extensions add to it (`imubench_pipeline.registry`), and what
+    their texts name: another module in full, since some are imported by name when they are needed;
+    every module of a package, by a name that ends in ``.*``; or a file or folder beside the module,
+    such as templates.
 
     Parameters
     ----------
@@ -68,6 +72,8 @@ def _used(path: Path) -> tuple[Path, ...]:
         for name in _IMPORTED.findall(names):
             with suppress(ValueError):
                 files.append(_path(f"{base}.{name}"[1:]))
+    for call in _EXTENSIONS.findall(text):
+        files += sources(*call)
     for name in dict.fromkeys(_TEXT.findall(text)):
         files += _named(name, path.parent)
     return tuple(files)

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from imubench_pipeline.model import comparisons, estimates, experiments, published, recordings
-from imubench_pipeline.model.table import TableRow, TypedColumn, columns_of, rows_in
+from types import ModuleType
+
+from imubench_pipeline.model import comparisons, estimates, recordings
+from imubench_pipeline.model.table import (
+    OfRecordingRow,
+    TableRow,
+    TypedColumn,
+    columns_of,
+    rows_in,
+)
+from imubench_pipeline.registry import Hook
+
+_MODULES: Hook[ModuleType] = Hook("tables")
+_ADDED = [row for module in _MODULES.objects() for row in rows_in(module)]
 
 ROWS: dict[str, type[TableRow]] = {
     row.table: row
-    for module in (recordings, estimates, comparisons, experiments, published)
-    for row in rows_in(module)
+    for row in (*rows_in(recordings), *rows_in(estimates), *rows_in(comparisons), *_ADDED)
 }
 """The class of the rows of every table a run leaves, by its name."""
 
@@ -23,21 +34,6 @@ SAMPLES = ("envelope", "histogram")
 
 OF_ONE_RECORDING = (*SAMPLES, "samples_of_models", "draws", "error_growth", "drawn_deviations")
 """The tables that are kept with each recording and not joined."""
-
-TURNED = (
-    "earth_rate",
-    "earth_rate_series",
-    "turning",
-    "earth_rate_prediction",
-    "earth_rate_published",
-)
-"""The tables of gyros that were turned: only such recordings have rows."""
-
-CALIBRATED = ("calibration", "calibration_points")
-"""The tables of gyros on a rate table, or at rest where it is known how they point."""
-
-OUTLOOK = ("alignment", "earth_rate_prediction")
-"""The tables of what each sensor at rest could find; the second has rows of turned gyros, too."""
 
 BY_RECORDING = (
     "recordings",
@@ -58,12 +54,9 @@ BY_RECORDING = (
     "low_pass",
     "deterministic",
     "simulated_truth",
-    "published_figures",
     "error_budget",
     "backtest",
-    *TURNED,
-    *CALIBRATED,
-    "alignment",
+    *(row.table for row in _ADDED if issubclass(row, OfRecordingRow)),
 )
 """The joined tables in which a recording has rows of its own."""
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from imubench_pipeline.model.estimates import ParameterRow
-from imubench_pipeline.model.experiments import CalibrationRow, EarthRateRow
 from imubench_pipeline.model.states import Status
 from imubench_pipeline.words.numbers import (
     Unit,
@@ -89,12 +88,3 @@ def model_text(name: str) -> str:
     lines = terms.count("S")
     rest = "+".join(term for term in terms if term != "S")
     return f"{rest} + {counted(lines, 'line')}" if lines else rest
-
-
-def noise_model_text(rows: Sequence[EarthRateRow | CalibrationRow]) -> str:
-    """Return the noise model that weights the data of an experiment, in a sentence."""
-    fitted = next((row for row in rows if row.model), None)
-    if fitted is None:
-        return ""
-    origin = f", from {fitted.model_from}" if fitted.model_from else ""
-    return f"Noise model: {fitted.model}{origin}."

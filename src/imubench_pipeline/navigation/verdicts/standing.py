@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
+from imubench_pipeline.model import table
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import SURE_PROBABILITY, Verdict
 from imubench_pipeline.model.verdicts import Share
-from imubench_pipeline.navigation.in_outages import trajectory_of
 from imubench_pipeline.navigation.suitability.conditions import (
     is_condition,
     shares_of,
@@ -20,6 +20,18 @@ from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, ex
 
 MAX_LIMIT_RATIO = 4.0
 """Maximum ratio of upper to lower limit of an error; beyond it, the log is not conclusive."""
+
+
+@table.row
+class OutageErrorRow(ErrorBudgetRow):
+    """An error at the end of outages on a trajectory."""
+
+    trajectory: Annotated[str | None, table.Column("of the outages")]
+
+
+def trajectory_of(total: ErrorBudgetRow) -> str | None:
+    """Return the trajectory of an error in outages; None for an error of dead reckoning."""
+    return total.trajectory if isinstance(total, OutageErrorRow) else None
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
-from imubench_pipeline.run.nightly.recovery import temporary
 from imubench_pipeline.run.project import has_snakefile
+from imubench_pipeline.run.recovery import temporary
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.digests import read_sealed_json
 from imubench_pipeline.tables.findings import RecordingError

@@ -1,1 +1,0 @@
-"""Bias and scale factor of a gyro from rates that are known: at rest, and on a rate table."""

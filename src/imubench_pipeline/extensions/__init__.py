@@ -1,0 +1,1 @@
+"""What goes beyond static logs, estimates and comparisons: packages that nothing else imports."""

@@ -1,0 +1,109 @@
+"""Errors at the end of GNSS outages, as rows of the table ``error_budget`` for the verdicts.
+
+For each sensor, the filter that is tuned by its recommended estimate is used, on simulated signals.
+Errors are per axis: a root mean square in the plane is divided by sqrt(2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import pyarrow as pa
+from scipy.special import ndtr
+
+from imubench_pipeline.extensions.aided.tables import NavigationRow
+from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
+from imubench_pipeline.navigation.verdicts.standing import OutageErrorRow
+from imubench_pipeline.settings.requirements import DIMENSIONS, Limit, Requirement
+from imubench_pipeline.units import SI_UNITS
+
+_AXIS_FACTORS = {"position": math.sqrt(2.0), "velocity": math.sqrt(2.0), "heading": 1.0}
+"""Root mean square error in the tables over the error of one axis."""
+
+_LIMITS_NOTE = "simulated drives; the limits are those of the runs, not of the estimate"
+
+
+def outage_rows(
+    navigation: pa.Table,
+    recordings: Iterable[RecordingRow],
+    requirements: Mapping[str, Requirement],
+) -> Iterator[OutageErrorRow]:
+    """Yield the rows of the outage limits, for every sensor with static recordings.
+
+    ``recordings`` are the rows of this table. A sensor without a filter run has no
+    figure.
+    """
+    runs: dict[tuple[Any, ...], NavigationRow] = {}
+    for run in NavigationRow.rows_of(navigation):
+        if run.recommended and run.signals != "log" and run.position is not None:
+            runs[run.sensor, run.trajectory, run.outage] = run
+    of_sensors: dict[str, RecordingRow] = {}
+    for recording in recordings:
+        if recording.status == "ok" and recording.kind == "static":
+            of_sensors.setdefault(recording.sensor, recording)
+    for name, requirement in requirements.items():
+        for limit in requirement.in_outages:
+            for sensor, about in of_sensors.items():
+                found = runs.get((sensor, limit.trajectory, limit.seconds))
+                yield _make_row(name, requirement, limit, found or about, found)
+
+
+def _make_row(
+    name: str,
+    requirement: Requirement,
+    limit: Limit,
+    about: NavigationRow | RecordingRow,
+    run: NavigationRow | None,
+) -> OutageErrorRow:
+    allowed = limit.size / requirement.sigmas
+    unknown = OutageErrorRow(
+        sensor=about.sensor,
+        recording=about.recording,
+        requirement=name,
+        axis=requirement.axis,
+        error=limit.error,
+        time=limit.seconds,
+        trajectory=limit.trajectory,
+        source="total",
+        limit=allowed,
+        unit=SI_UNITS[DIMENSIONS[limit.error]],
+        reason="no filter was run for this sensor (setting navigate: of)",
+    )
+    if run is None:
+        return unknown
+    if run.consistent is False:
+        inside = 100.0 * (run.nees_inside or 0.0)
+        reason = (
+            f"the filter of this sensor goes astray: NEES is inside in {inside:.0f} % instead of 95"
+        )
+        return replace(unknown, reason=reason)
+    found = _get_error(run, limit.error)
+    if found is None:
+        return replace(unknown, reason=f"the runs do not tell the error of the {limit.error}")
+    sigma, lower, upper = (size / _AXIS_FACTORS[limit.error] for size in found)
+    spread = math.log(upper / lower) / (2.0 * NORMAL_QUANTILE)
+    assumed = f"; assumed: {run.assumed}" if run.assumed else ""
+    return replace(
+        unknown,
+        sigma=sigma,
+        lower=lower,
+        upper=upper,
+        within=float(ndtr(math.log(allowed / sigma) / spread)),
+        reason=_LIMITS_NOTE + assumed,
+    )
+
+
+def _get_error(run: NavigationRow, error: str) -> tuple[float, float, float] | None:
+    """Return the root mean square of an error with its limits."""
+    value, lower, upper = {
+        "position": (run.position, run.position_lower, run.position_upper),
+        "velocity": (run.velocity, run.velocity_lower, run.velocity_upper),
+        "heading": (run.heading, run.heading_lower, run.heading_upper),
+    }[error]
+    if value is None or lower is None or upper is None:
+        return None
+    return value, lower, upper

@@ -1,0 +1,38 @@
+"""Which sensors filters are run for, and the settings of that."""
+
+from __future__ import annotations
+
+import json
+
+from imubench_pipeline.extensions.aided.settings import NavigateSettings
+from imubench_pipeline.run.plan import Plan, to_json
+
+
+def navigated(plan: Plan) -> list[str]:
+    """Sensors with static recordings that the settings select for navigation."""
+    of = plan.run.section(NavigateSettings).of
+    return [
+        sensor
+        for sensor, recordings in plan.at_rest.items()
+        if of == "all"
+        or (of == "simulated" and all((sensor, r) in plan.simulated for r in recordings))
+    ]
+
+
+def navigate_settings(plan: Plan, sensor: str) -> str:
+    """Return the settings of the navigation of a sensor."""
+    declared = plan.sensors.get(sensor)
+    return to_json(
+        {
+            "navigate": plan.run.section(NavigateSettings).model_dump(mode="json", exclude={"of"}),
+            "asked": sorted(
+                {
+                    (limit.trajectory, limit.outage)
+                    for requirement in plan.requirements.values()
+                    for limit in requirement.in_outages
+                }
+            ),
+            "sensor": declared.model_dump(mode="json", exclude_unset=True) if declared else None,
+            "truths": json.loads(plan.truths(sensor)),
+        }
+    )

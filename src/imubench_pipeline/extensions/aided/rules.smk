@@ -1,0 +1,40 @@
+"""Filters on simulated drives, tuned by all that is known of a sensor."""
+
+from imubench_pipeline.extensions.aided.plan import navigate_settings, navigated
+
+
+rule navigate:
+    input:
+        quality=at_rest("quality.json"),
+        parameters=at_rest("parameters.parquet"),
+        draws=at_rest("draws.parquet"),
+        allan=at_rest("allan.parquet"),
+        low_pass=at_rest("low_pass.parquet"),
+    output:
+        navigation=JOINED + "/navigation.parquet",
+    log:
+        LOGS + "/sensors/{sensor}/navigate.log",
+    group:
+        "comparison"
+    resources:
+        **cost(
+            OfMany(
+                memory=500,
+                memory_of_each=0.2,
+                time=60,
+                time_of_each=0.005,
+                many_jobs=True,
+            )
+        ),
+    params:
+        settings=lambda w: navigate_settings(plan, w.sensor),
+        code=plan.code("navigate", "extensions.aided"),
+        attempt=tried("navigate"),
+    script:
+        "scripts/navigate.py"
+
+
+JOBS["navigate"] = [{"sensor": sensor} for sensor in navigated(plan)]
+ADDED_TABLES |= {
+    name: of_each_sensor(name, navigated(plan)) for name in tables_of(rules.navigate)
+}

@@ -1,0 +1,192 @@
+"""Repeat runs of a filter with several tunings on the same signals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.extensions.aided.axis_states import (
+    AxisStates,
+    StackedStates,
+    split_into_steps,
+    stack,
+)
+from imubench_pipeline.extensions.aided.error_state import run
+from imubench_pipeline.extensions.aided.signals import Signals
+from imubench_pipeline.extensions.aided.strapdown import rotation
+from imubench_pipeline.extensions.aided.trajectories import Trajectory
+from imubench_pipeline.typing import Array
+
+FIX_INTERVAL = 1.0
+"""Time between two fixes, s, rounded to whole samples."""
+
+MAX_STEP = 0.1
+"""Longest step over which transition and noise are accumulated, s."""
+
+INITIAL_TILT_SIGMA, INITIAL_HEADING_SIGMA = math.radians(0.5), math.radians(2.0)
+"""Initial standard deviations of tilt and heading, rad."""
+
+WARM_UP = 120.0
+"""Time with GNSS before the evaluation begins, s."""
+
+
+RECOVERY_TIME = 40.0
+"""Time with GNSS between two outages, s."""
+
+
+@dataclass(frozen=True)
+class Outage:
+    """No fix of GNSS after ``begin`` for ``length``, s."""
+
+    begin: float
+    length: float
+
+
+def schedule(duration: float, lengths: Sequence[float]) -> list[Outage]:
+    """Return outages with these lengths, s, repeated until a run of this duration, s, ends."""
+    outages: list[Outage] = []
+    begin = WARM_UP
+    while True:
+        for length in lengths:
+            if begin + length > duration:
+                return outages
+            outages.append(Outage(begin, length))
+            begin += length + RECOVERY_TIME
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Results of a tuning, from R runs of E fixes.
+
+    Attributes
+    ----------
+    errors, variances : ndarray, shape (R, E, 9)
+    normalised : ndarray, shape (R, E, 6)
+        See `error_state.run`.
+    states : int
+        Number of states of the filter.
+    """
+
+    errors: Array
+    variances: Array
+    normalised: Array
+    states: int
+
+
+class Drive:
+    """A trajectory with outages, for runs of several tunings."""
+
+    def __init__(self, trajectory: Trajectory, outages: Sequence[Outage]) -> None:
+        self.trajectory = trajectory
+        rate = trajectory.sampling
+        self.every = max(round(rate * FIX_INTERVAL), 1)
+        self.width, self.steps = split_into_steps(self.every, math.ceil(rate * MAX_STEP))
+        self.at: NDArray[np.int64] = np.arange(self.every, len(trajectory.rate) + 1, self.every)
+        self.times = self.at / rate
+        self.available = np.ones(len(self.at), dtype=np.bool_)
+        # An outage lasts from a fix to the first one after its end. If its length is not a multiple
+        # of the period, the error at its exact end is interpolated between two epochs.
+        self.period = self.every / rate
+        begun = [(o, int(np.searchsorted(self.times, o.begin + 1e-9)) - 1) for o in outages]
+        fitting = [
+            (o, last) for o, last in begun if last + self._epochs(o.length) < len(self.times)
+        ]
+        self.outages = [outage for outage, _ in fitting]
+        self.last_fixes = [last for _, last in fitting]
+        for outage, last in fitting:
+            self.available[last + 1 : last + 1 + self._epochs(outage.length)] = False
+        gnss = trajectory.gnss
+        self._spread = gnss.spread
+        sigmas = np.array(
+            [
+                *self._spread[:6],
+                INITIAL_TILT_SIGMA,
+                INITIAL_TILT_SIGMA,
+                min(INITIAL_HEADING_SIGMA, gnss.heading),
+            ]
+        )
+        self._start = np.diag(sigmas**2)
+        self._sigmas = sigmas
+
+    def _epochs(self, length: float) -> int:
+        """Return the number of epochs of an outage of this length, s."""
+        return math.ceil(length / self.period - 1e-6)
+
+    def of_outages(self, length: float) -> NDArray[np.int64]:
+        """Return the epochs of each outage of this length, s, shape (outages, epochs)."""
+        lasts = [
+            last
+            for outage, last in zip(self.outages, self.last_fixes, strict=True)
+            if outage.length == length
+        ]
+        return np.add.outer(np.array(lasts, dtype=np.int64), 1 + np.arange(self._epochs(length)))
+
+    def stacked(self, axes: Sequence[AxisStates]) -> StackedStates:
+        """Return the states of six axes over the steps of this drive."""
+        return stack(axes, self.trajectory.sampling, self.width, self.steps)
+
+    def filter(self, stacked: StackedStates, signals: Signals) -> tuple[Array, Array, Array, Array]:
+        """Run the filter once; the result is as in `error_state.run`."""
+        way = self.trajectory
+        off = self._sigmas * signals.start
+        turn, C = np.empty((3, 3)), way.attitude[0]
+        rotation(-off[6], -off[7], -off[8], turn)
+        return run(
+            signals.rate,
+            signals.force,
+            1.0 / way.sampling,
+            way.earth,
+            signals.fixes,
+            self.available,
+            self._spread,
+            way.position[self.at],
+            way.velocity[self.at],
+            way.attitude[self.at],
+            signals.bias,
+            way.position[0] - off[:3],
+            way.velocity[0] - off[3:6],
+            turn @ C,
+            self._start,
+            stacked.first,
+            stacked.step,
+            stacked.epoch,
+            stacked.noise,
+            stacked.sum_observation,
+            stacked.sum_state_covariance,
+            stacked.sum_variance,
+            stacked.first_observation,
+            stacked.start,
+            stacked.mean,
+            stacked.scale,
+            stacked.output,
+            self.width,
+        )
+
+    def repeat(
+        self,
+        tunings: Mapping[str, Sequence[AxisStates]],
+        signals: Callable[[int], Signals],
+        runs: int,
+        threads: int = 1,
+    ) -> dict[str, Outcome]:
+        """Run every tuning on the same signals; ``signals`` takes the number of the run."""
+        stacked = {name: self.stacked(axes) for name, axes in tunings.items()}
+
+        def once(number: int) -> dict[str, tuple[Array, ...]]:
+            of_run = signals(number)
+            return {name: self.filter(each, of_run)[:3] for name, each in stacked.items()}
+
+        with ThreadPoolExecutor(max(1, threads)) as pool:
+            done = list(pool.map(once, range(runs)))
+        outcomes = {}
+        for name in tunings:
+            errors, variances, normalised = (
+                np.stack([each[name][part] for each in done]) for part in range(3)
+            )
+            outcomes[name] = Outcome(errors, variances, normalised, stacked[name].states)
+        return outcomes

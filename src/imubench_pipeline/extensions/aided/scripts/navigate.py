@@ -1,0 +1,14 @@
+"""Run filters on simulated drives, tuned by all that is known of a sensor."""
+
+from pathlib import Path
+
+from imubench_pipeline.extensions.aided.navigate import navigate
+from imubench_pipeline.tables import write
+
+if __name__ == "__main__":
+    rows = navigate(
+        [Path(path).parent for path in snakemake.input.quality],
+        snakemake.wildcards.sensor,
+        snakemake.params.settings,
+    )
+    write("navigation", rows, Path(snakemake.output.navigation))

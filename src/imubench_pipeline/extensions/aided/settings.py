@@ -1,0 +1,75 @@
+"""Settings of the filters that run on simulated drives."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from imubench_pipeline.settings.requirements import Outage, Trajectory
+from imubench_pipeline.settings.validation import (
+    AccelerationFromZero,
+    Duration,
+    Frequency,
+    RateFromZero,
+    Strict,
+    Text,
+    checked,
+)
+from imubench_pipeline.units import difference_to_si, quantity_to_si
+
+_difference = checked("temperature", "a difference, such as 10 K", to_si=difference_to_si)
+
+_AccelerationDensity = Annotated[Text, checked("accel_density", "a density above 0")]
+
+
+def _of_drive(text: str) -> str:
+    if quantity_to_si(text, "time") > 36_000.0:
+        raise ValueError(f"found {text}; expected a drive of at most 10 h")
+    return text
+
+
+def _of_filter(text: str) -> str:
+    if not 10.0 <= quantity_to_si(text, "frequency") <= 1000.0:
+        raise ValueError(f"found {text}; expected 10 Hz to 1 kHz")
+    return text
+
+
+class NavigateSettings(Strict):
+    """Filters tuned by all that is known of a sensor, on simulated drives with outages of GNSS."""
+
+    of: Literal["none", "simulated", "all"] = Field(
+        "simulated", description="sensors: of simulated recordings alone, all, or none"
+    )
+    trajectories: tuple[Trajectory, ...] = Field(("field",), min_length=1)
+    outages: tuple[Outage, ...] = Field(
+        ("10 s", "30 s", "60 s"), min_length=1, description="without GNSS, one after the other"
+    )
+    duration: Annotated[Duration, AfterValidator(_of_drive)] = Field(
+        "310 s", description="of a run; the first 120 s have GNSS; at least what its outages take"
+    )
+    rate: Annotated[Frequency, AfterValidator(_of_filter)] = Field(
+        "50 Hz", description="of the samples that a filter is given"
+    )
+    runs: int = Field(
+        12,
+        ge=4,
+        le=10_000,
+        description="of each trajectory; 100 of 10 min make the errors sure to 5 %",
+    )
+    gyro_bias: RateFromZero = Field(
+        "0.1 deg/s", description="standard deviation of the bias that is another at each switch-on"
+    )
+    accel_bias: AccelerationFromZero = Field("3 mg", description="likewise of accelerometers")
+    accel_noise: _AccelerationDensity = Field(
+        "100 ug/sqrt(Hz)",
+        description="two-sided density of the accelerometers that stand in where a log has none",
+    )
+    gyro_scale: float = Field(
+        0.0, ge=0, lt=0.1, description="standard deviation of the error of the scale factor"
+    )
+    accel_scale: float = Field(0.0, ge=0, lt=0.1, description="likewise of accelerometers")
+    temperature_change: Annotated[Text, _difference] | None = Field(
+        None, examples=["10 K"], description="over a run, where the drift of a sensor is known"
+    )
+    seed: int = Field(20260101, ge=0)

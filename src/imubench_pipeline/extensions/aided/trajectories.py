@@ -1,0 +1,206 @@
+"""True motion: a robot on rows and headlands, a car, a drone, and a vehicle at rest.
+
+Speed, course and climb are sequences of stretches, rounded by a window of a second and more, so
+that specific force and rates are smooth. A wheeled vehicle rolls and pitches with the ground, a
+drone banks in turns. The inverse mechanisation gives the samples of ideal sensors from velocity and
+attitude.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.extensions.aided.strapdown import earth_rate_at, inverse
+from imubench_pipeline.typing import Array
+
+DEFAULT_LATITUDE = math.radians(45.0)
+
+
+@dataclass(frozen=True)
+class Gnss:
+    """Standard deviations of the white errors of a GNSS receiver.
+
+    Attributes
+    ----------
+    position, velocity : float
+        Of one axis, m and m/s.
+    heading : float
+        rad; infinite for a receiver with one antenna, without heading.
+    """
+
+    position: float
+    velocity: float
+    heading: float = math.inf
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviations of position, velocity and heading, shape (7,)."""
+        return np.array([*[self.position] * 3, *[self.velocity] * 3, self.heading])
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """True motion at a rate in Hz, and the samples of ideal sensors.
+
+    Attributes
+    ----------
+    position, velocity : ndarray, shape (L + 1, 3)
+        North, east, down; m and m/s.
+    attitude : ndarray, shape (L + 1, 3, 3)
+        From the axes of the sensor (ahead, right, down) to north, east, down.
+    rate, force : ndarray, shape (L, 3)
+        rad/s and m/s^2: means over the intervals between.
+    sampling : float
+        Hz.
+    earth : ndarray, shape (3,)
+        The Earth's rate, rad/s.
+    gnss : Gnss
+    """
+
+    position: Array
+    velocity: Array
+    attitude: Array
+    rate: Array
+    force: Array
+    sampling: float
+    earth: Array
+    gnss: Gnss
+
+
+_RTK_RECEIVER = Gnss(0.02, 0.03)
+_STANDALONE_RECEIVER = Gnss(1.5, 0.1)
+_TWO_ANTENNA_RECEIVER = Gnss(1.5, 0.1, math.radians(0.5))
+"""Receiver for a vehicle at rest, where the heading is not observable otherwise. Without it, a
+filter that is linearised about its estimate takes the drift of its heading for a turn, which would
+separate biases from tilt: it becomes overconfident."""
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Speed, course, climb, roll and pitch at each sample."""
+
+    speed: Array
+    course: Array
+    climb: Array
+    roll: Array
+    pitch: Array
+
+
+def _build_sequence(
+    time: Array, stretches: Sequence[tuple[float, float]], window: float, sampling: float
+) -> Array:
+    """Return a repeated sequence of values, each for its time, s, smoothed by a window, s."""
+    ends = np.cumsum([length for length, _ in stretches])
+    values = np.array([value for _, value in stretches])
+    held = values[np.minimum(np.searchsorted(ends, time % ends[-1], "right"), len(values) - 1)]
+    shape = np.hanning(max(round(window * sampling), 1) + 2)[1:-1]
+    padded = np.concatenate([np.full(len(shape), held[0]), held, np.full(len(shape), held[-1])])
+    return np.convolve(padded, shape / shape.sum(), "same")[len(shape) : -len(shape)]
+
+
+def _simulate_ground(time: Array, size: float, moving: Array) -> tuple[Array, Array]:
+    """Return roll and pitch on rough ground, rad, scaled by the motion of the vehicle."""
+    roll = np.sin(2.0 * math.pi * 0.37 * time) + 0.6 * np.sin(2.0 * math.pi * 0.83 * time + 1.0)
+    pitch = np.sin(2.0 * math.pi * 0.29 * time + 2.0) + 0.6 * np.sin(2.0 * math.pi * 0.71 * time)
+    return size * moving * roll, size * moving * pitch
+
+
+def _simulate_field(time: Array, sampling: float) -> _Motion:
+    """Return a field: 1.5 m/s along rows of 45 m, half turns of 2 m radius, left and right."""
+    turn = math.pi / 6.0
+    rate = _build_sequence(
+        time, [(30.0, 0.0), (6.0, turn), (30.0, 0.0), (6.0, -turn)], 2.0, sampling
+    )
+    speed = _build_sequence(time, [(29.0, 1.5), (8.0, 1.0), (28.0, 1.5), (7.0, 1.0)], 2.0, sampling)
+    rolled, pitched = _simulate_ground(time, math.radians(1.5), speed / 1.5)
+    return _Motion(speed, np.cumsum(rate) / sampling, np.zeros_like(time), rolled, pitched)
+
+
+def _simulate_car(time: Array, sampling: float) -> _Motion:
+    """Return a drive in streets: up to 14 m/s, turns by 90 degrees, stops at lights."""
+    quarter = math.pi / 2.0 / 5.0
+    speed = _build_sequence(
+        time,
+        [(18.0, 12.0), (7.0, 5.0), (22.0, 14.0), (8.0, 0.0), (20.0, 13.0), (7.0, 5.0), (10.0, 9.0)],
+        4.0,
+        sampling,
+    )
+    turns = [(19.0, 0.0), (5.0, quarter), (45.0, 0.0), (6.5, 0.0), (5.0, -quarter), (11.5, 0.0)]
+    rate = _build_sequence(time, turns, 2.0, sampling) * np.minimum(speed / 4.0, 1.0)
+    rolled, pitched = _simulate_ground(time, math.radians(0.4), np.minimum(speed / 5.0, 1.0))
+    return _Motion(speed, np.cumsum(rate) / sampling, np.zeros_like(time), rolled, pitched)
+
+
+def _simulate_drone(time: Array, sampling: float) -> _Motion:
+    """Return figures of eight at 8 m/s with climbs and descents, banked in turns."""
+    speed = _build_sequence(time, [(40.0, 8.0), (10.0, 4.0)], 4.0, sampling)
+    rate = _build_sequence(time, [(12.0, 0.5), (5.0, 0.0), (12.0, -0.5), (5.0, 0.0)], 3.0, sampling)
+    climb = _build_sequence(
+        time, [(20.0, 0.0), (8.0, 1.5), (20.0, 0.0), (8.0, -1.5)], 3.0, sampling
+    )
+    roll = np.arctan(speed * rate / STANDARD_GRAVITY)
+    pitch = -np.arctan(np.gradient(speed, 1.0 / sampling) / STANDARD_GRAVITY)
+    return _Motion(speed, np.cumsum(rate) / sampling, climb, roll, pitch)
+
+
+def _simulate_rest(time: Array, sampling: float) -> _Motion:
+    """Return no motion."""
+    none = np.zeros_like(time)
+    return _Motion(none, none, none, none, none)
+
+
+_MOTIONS: Mapping[str, tuple[Callable[[Array, float], _Motion], Gnss]] = {
+    "field": (_simulate_field, _RTK_RECEIVER),
+    "car": (_simulate_car, _STANDALONE_RECEIVER),
+    "drone": (_simulate_drone, _STANDALONE_RECEIVER),
+    "rest": (_simulate_rest, _TWO_ANTENNA_RECEIVER),
+}
+
+TRAJECTORY_NAMES = tuple(_MOTIONS)
+"""Names of the trajectories."""
+
+
+def trajectory(
+    name: str, duration: float, sampling: float, latitude: float = DEFAULT_LATITUDE
+) -> Trajectory:
+    """Return a trajectory of a length in s at a rate in Hz, at a latitude in rad.
+
+    Raises
+    ------
+    ValueError
+        If there is none of that name.
+    """
+    if name not in _MOTIONS:
+        raise ValueError(f"trajectory {name!r}, expected one of {', '.join(TRAJECTORY_NAMES)}")
+    moves, gnss = _MOTIONS[name]
+    time = np.arange(round(duration * sampling) + 1) / sampling
+    motion = moves(time, sampling)
+    velocity = np.column_stack(
+        [motion.speed * np.cos(motion.course), motion.speed * np.sin(motion.course), -motion.climb]
+    )
+    attitude = attitudes(motion.roll, motion.pitch, motion.course)
+    earth = earth_rate_at(latitude)
+    position, rate, force = inverse(np.zeros(3), velocity, attitude, 1.0 / sampling, earth)
+    return Trajectory(position, velocity, attitude, rate, force, sampling, earth, gnss)
+
+
+def attitudes(roll: Array, pitch: Array, heading: Array) -> Array:
+    """Return the matrices of angles in rad, shape (L, 3, 3): heading, then pitch, then roll."""
+    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    sh, ch = np.sin(heading), np.cos(heading)
+    rows = [
+        [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
+        [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0))
+
+
+def headings(attitude: Array) -> Array:
+    """Return the headings of matrices in rad, shape (L,)."""
+    return np.arctan2(attitude[:, 1, 0], attitude[:, 0, 0])

@@ -1,0 +1,57 @@
+"""Bias and scale factor of a gyro from rates that are known: at rest, and on a rate table."""
+
+from imubench_pipeline.registry import Block, Extension
+
+EXTENSION = Extension(
+    name="calibration",
+    tables="calibration.tables",
+    blocks=(
+        Block(
+            "notes",
+            "rate_table",
+            "calibration.settings:OnRateTable",
+            "a gyro on a rate table, for scale factor and bias; null: it was on none",
+        ),
+        Block(
+            "notes",
+            "positions",
+            "calibration.settings:InPositions",
+            "a triad that stood in several positions, to find its attitude; null: in one",
+        ),
+        Block(
+            "notes",
+            "pointing",
+            "calibration.settings:AtRest",
+            "where the axis of a gyro at rest points, for its bias without what the Earth "
+            "adds; null: not known",
+        ),
+        Block(
+            "simulated",
+            "rate_table",
+            "calibration.settings:SimulatedTable",
+        ),
+        Block(
+            "simulated",
+            "positions",
+            "calibration.settings:SimulatedPositions",
+        ),
+        Block(
+            "simulated",
+            "pointing",
+            "calibration.settings:SimulatedRest",
+        ),
+    ),
+    motions={
+        "rate_table": "calibration.simulated:on_table",
+        "positions": "calibration.simulated:in_positions",
+        "pointing": "calibration.simulated:at_rest",
+    },
+    rules="rules.smk",
+    recording_pages={
+        "rate_table": "calibration.page_rate_table:RATE_TABLE",
+        "positions": "calibration.page_positions:POSITIONS",
+    },
+    sections=("calibration.figures:NOT_CALIBRATED",),
+    recording_sections=("calibration.figures:at_rest",),
+    templates="templates",
+)

@@ -1,0 +1,174 @@
+"""Accuracy of the self-alignment of a triad over the time at rest, in one position and in two.
+
+The triad is level, its nose to the north: the east gyro determines the accuracy of the heading. Two
+positions are opposite about the vertical, with equal amounts of data. Coarse alignment uses the
+means (`coarse`), fine alignment the filter (`fine`). As a check, triads are simulated from the
+exact distribution of their block means, and aligned coarsely, then by the filter. The root mean
+square of their errors over the standard deviation of the filter is 1 if the latter is right. If the
+error of the heading is too large for that, small angles about the true attitude are compared.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles
+from imubench_pipeline.extensions.calibration.alignment.coarse import (
+    coarse_accuracy,
+    coarse_alignment,
+    mean_vectors,
+)
+from imubench_pipeline.extensions.calibration.alignment.fine import (
+    UNIFORM_HEADING_SIGMA,
+    FineAlignment,
+)
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.earth_rate.simulation import simulate_runs
+from imubench_pipeline.typing import Array
+
+
+@dataclass(frozen=True)
+class TriadRuns:
+    """Simulated runs of one design, and their truth."""
+
+    # shape (runs, b, 6); block means of gyros and accelerometers x, y, z, rad/s and m/s^2
+    means: Array
+    # shape (runs, b, 6); mean of each axis' slow error over each block, its bias included
+    drift: Array
+
+
+def true_means(positions: Positions, site: Site, attitude: Array) -> Array:
+    """Return the readings of an error-free triad, rad/s and m/s^2, shape (b, 6).
+
+    Gyros and accelerometers x, y, z, at an attitude in the first position, shape (3, 3).
+    """
+    to_body = np.swapaxes(attitude @ positions.of_blocks, 1, 2)
+    return np.concatenate([to_body @ site.earth_rate, to_body @ site.specific_force], axis=1)
+
+
+def simulate_triad(
+    triad: Triad,
+    positions: Positions,
+    site: Site,
+    attitude: Array,
+    *,
+    runs: int,
+    rng: np.random.Generator,
+) -> TriadRuns:
+    """Draw the block means of many runs; the fixed biases are drawn for each.
+
+    The attitude, shape (3, 3), belongs to the first position.
+    """
+    drawn = [
+        simulate_runs(
+            model, positions.blocks, earth_rate=0.0, turn_on_bias=bias, runs=runs, rng=stream
+        )
+        for (model, bias), stream in zip(triad.axes, rng.spawn(6), strict=True)
+    ]
+    errors = np.stack([runs_of_axis.means for runs_of_axis in drawn], axis=2)
+    drift = np.stack([runs_of_axis.drift for runs_of_axis in drawn], axis=2)
+    return TriadRuns(errors + true_means(positions, site, attitude), drift)
+
+
+TURN_TIME = 2.0
+"""Time between two positions, s."""
+
+_BLOCKS_BY_POSITIONS = {1: 16, 2: 64}
+"""Blocks of a run, by the number of its positions. Twice as many lower a sigma by 5 % at most,
+after an hour in two positions."""
+
+_MAX_LINEAR_HEADING_SIGMA = 0.2
+"""Largest standard deviation of a heading, rad, for a start from coarse alignment."""
+
+_LEVEL_ATTITUDE = np.eye(3)
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Uncertainty of the attitude after a time."""
+
+    positions: int  # 1 or 2
+    method: str  # ``coarse`` or ``fine``
+    time: float  # s
+    sigma: Array  # shape (3,); of roll, pitch and heading, rad
+    # shape (3,); rms of simulated errors over ``sigma``; NaN where there is no heading
+    errors: Array | None = None
+    simulated: int = 0  # number of simulated triads
+
+    @property
+    def reason(self) -> str | None:
+        """Reason for a missing angle; None if there is none."""
+        if not np.all(np.isfinite(self.sigma)):
+            return (
+                "the noise is so small that rounding errors hide the angles: no sensor is that "
+                "quiet, look at the findings about it"
+            )
+        if self.sigma[2] < UNIFORM_HEADING_SIGMA:
+            return None
+        if self.positions == 1:
+            return (
+                "what is not known of the gyros' biases is more than the horizontal part of the "
+                "Earth's rate: it takes turns about the vertical, or better gyros"
+            )
+        return (
+            "the noise of the gyros in this time is more than the horizontal part of the Earth's "
+            "rate: it takes longer, or better gyros"
+        )
+
+
+def accuracies(
+    triad: Triad,
+    site: Site,
+    rate: float,
+    times: Sequence[float],
+    *,
+    runs: int = 0,
+    rng: np.random.Generator | None = None,
+) -> Iterator[Accuracy]:
+    """Yield the accuracy of a triad after these times, in one position and in two.
+
+    The sampling rate is in Hz; the times, s, increase, each longer than the turn between two
+    positions. For fine alignment, ``rng`` simulates this number of ``runs`` at the last time; 0:
+    none.
+    """
+    for number in (1, 2):
+        for time in times:
+            positions = _build_positions(number, time, rate)
+            coarse = coarse_accuracy(triad, positions, site, _LEVEL_ATTITUDE)
+            yield Accuracy(number, "coarse", time, coarse.sigma)
+            fine = FineAlignment(triad, positions, site, _LEVEL_ATTITUDE)
+            errors = None
+            if runs and rng is not None and time == times[-1]:
+                errors = _simulate_errors(triad, site, fine, runs, rng)
+            yield Accuracy(
+                number, "fine", time, fine.sigma[-1], errors, 0 if errors is None else runs
+            )
+
+
+def _build_positions(number: int, time: float, rate: float) -> Positions:
+    block = time / _BLOCKS_BY_POSITIONS[number]
+    if number == 1:
+        return Positions.at_rest(time, block, rate)
+    dwell = (time - TURN_TIME) / 2.0
+    return Positions.turned_about_z(
+        [0.0, math.pi], dwell=dwell, turning=TURN_TIME, block=block, rate=rate
+    )
+
+
+def _simulate_errors(
+    triad: Triad, site: Site, fine: FineAlignment, runs: int, rng: np.random.Generator
+) -> Array:
+    """Return the rms error of simulated triads over the sigma of the filter, shape (3,)."""
+    drawn = simulate_triad(triad, fine.positions, site, _LEVEL_ATTITUDE, runs=runs, rng=rng)
+    sigma = fine.sigma[-1]
+    if sigma[2] < _MAX_LINEAR_HEADING_SIGMA:
+        start = coarse_alignment(*mean_vectors(drawn.means, fine.positions), site)
+        aligned = fine.run(drawn.means, start)
+        return np.asarray(np.sqrt(np.mean(euler_angles(aligned.attitude) ** 2, axis=0)) / sigma)
+    # Level, to the north: the angles about north, east, down are errors of roll, pitch, heading.
+    ratios = np.sqrt(np.mean(fine.run(drawn.means).psi[:, -1] ** 2, axis=0)) / sigma
+    return np.where([True, True, sigma[2] < UNIFORM_HEADING_SIGMA], ratios, math.nan)

@@ -1,0 +1,114 @@
+"""Coarse alignment: the attitude from the mean specific force and the mean rate of the Earth.
+
+Two vectors that are known in both frames give the matrix between them in closed form (TRIAD;
+H. D. Black, AIAA Journal 2(7), 1964). Gravity comes first: roll and pitch depend on the
+accelerometers alone, and the heading on the horizontal part of the Earth's rate. With mean errors
+df and dw in the navigation frame (K. R. Britting, "Inertial Navigation Systems Analysis",
+Wiley 1971, chapter 9)
+
+    psi_N = df_E / g,   psi_E = -df_N / g,   psi_D = dw_E / (w_ie cos(L)) - tan(L) psi_N.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_jacobian
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.typing import Array
+
+
+@dataclass(frozen=True)
+class CoarseAccuracy:
+    """Uncertainty of an attitude."""
+
+    psi: Array  # shape (3, 3); covariance of the small errors about north, east and down, rad^2
+    sigma: Array  # shape (3,); standard deviations of roll, pitch and heading, rad
+
+
+def coarse_alignment(force: Array, rate: Array, site: Site) -> Array:
+    """Return the attitude from mean specific force and mean rate, shape (..., 3, 3).
+
+    The matrices turn from body to navigation frame. Force, m/s^2, and rate, rad/s, are in the body
+    frame, shape (..., 3).
+
+    Raises
+    ------
+    ValueError
+        If the two vectors are parallel.
+    """
+    return np.asarray(
+        _build_triad(site.specific_force, site.earth_rate)
+        @ np.swapaxes(_build_triad(force, rate), -1, -2)
+    )
+
+
+def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
+    """Return mean specific force and rate in the body frame of the first position, shapes (..., 3).
+
+    Positions are weighted equally, whatever their duration; opposite positions cancel the biases.
+    Turns do not reverse the bias of the gyro along the axis of the turns. If this bias is large and
+    the axis is not vertical, only fine alignment finds the heading. The block means are of gyros
+    and accelerometers x, y, z, rad/s and m/s^2, shape (..., b, 6).
+    """
+    weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
+    rate = np.einsum("bij,...bj->...i", weighted, means[..., :3])
+    force = np.einsum("bij,...bj->...i", weighted, means[..., 3:])
+    return force, rate
+
+
+def coarse_accuracy(
+    triad: Triad, positions: Positions, site: Site, attitude: Array
+) -> CoarseAccuracy:
+    """Return the uncertainty of coarse alignment about an attitude, to first order.
+
+    The attitude, shape (3, 3), is the true one, in the first position.
+
+    Raises
+    ------
+    ValueError
+        If the x axis is vertical.
+    """
+    weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
+    of_sensor = []
+    for three in (triad.axes[:3], triad.axes[3:]):
+        covariance = np.zeros((3, 3))
+        for i, (model, bias) in enumerate(three):
+            along = weighted[:, :, i].T
+            covariance += (
+                along @ (block_mean_covariance(model, positions.blocks) + bias**2) @ along.T
+            )
+        of_sensor.append(attitude @ covariance @ attitude.T)
+    north, _, down = site.earth_rate
+    of_rate, of_force = np.zeros((3, 3)), np.zeros((3, 3))
+    of_force[0, 1], of_force[1, 0] = 1.0 / site.gravity, -1.0 / site.gravity
+    of_force[2, 1] = down / north / site.gravity
+    of_rate[2, 1] = 1.0 / north
+    psi = of_rate @ of_sensor[0] @ of_rate.T + of_force @ of_sensor[1] @ of_force.T
+    euler = euler_jacobian(attitude)
+    return CoarseAccuracy(psi, np.sqrt(np.diag(euler @ psi @ euler.T)))
+
+
+def _compute_weights(positions: Positions) -> Array:
+    """Return block weights with sum 1: dwells equal, blocks of a dwell by their samples."""
+    blocks = positions.blocks
+    of_dwell = np.bincount(blocks.dwell, weights=blocks.count)
+    dwells_with_samples = np.count_nonzero(of_dwell)
+    return np.asarray(blocks.count / of_dwell[blocks.dwell] / dwells_with_samples)
+
+
+def _build_triad(first: Array, second: Array) -> Array:
+    """Return an orthonormal triad as columns: first vector, normal, and the vector across."""
+    along = _normalise(first)
+    normal = _normalise(np.cross(first, second))
+    return np.stack([along, normal, np.cross(along, normal)], axis=-1)
+
+
+def _normalise(vector: Array) -> Array:
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    if np.any(length == 0.0):
+        raise ValueError("specific force and rate are along each other: they give no attitude")
+    return np.asarray(vector / length)

@@ -1,0 +1,158 @@
+"""A triad of gyros and accelerometers at rest: noise, site and positions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
+from imubench_pipeline.extensions.calibration.alignment.attitude import rotation
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Dwell, Experiment
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_NEAREST_POLE = 1e-6
+"""Least cosine of the latitude; nearer to a pole there is no north."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Site:
+    """A place on the Earth, with the rate and specific force of a triad at rest.
+
+    Raises
+    ------
+    ValueError
+        If the latitude is not between the poles, where there is no north, or gravity not above 0.
+    """
+
+    latitude: float  # rad, north positive
+    gravity: float = STANDARD_GRAVITY  # m/s^2
+
+    def __post_init__(self) -> None:
+        if not (abs(self.latitude) < math.pi and math.cos(self.latitude) > _NEAREST_POLE):
+            raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
+        if not (math.isfinite(self.gravity) and self.gravity > 0):
+            raise ValueError(f"gravity is {self.gravity}, expected a number above 0")
+
+    @property
+    def earth_rate(self) -> Array:
+        """Rate of the Earth, north, east and down, rad/s."""
+        return EARTH_RATE * np.array([math.cos(self.latitude), 0.0, -math.sin(self.latitude)])
+
+    @property
+    def specific_force(self) -> Array:
+        """Specific force of a triad at rest, north, east and down, m/s^2."""
+        return np.array([0.0, 0.0, -self.gravity])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Triad:
+    """Three gyros and three accelerometers along the axes x, y, z of the body.
+
+    Parameters
+    ----------
+    gyros, accelerometers : sequence of NoiseModel
+        Three each, SI.
+    gyro_bias, accelerometer_bias : float
+        Standard deviations of the fixed biases, of each axis by itself, rad/s and m/s^2.
+
+    Raises
+    ------
+    ValueError
+        If there are not three of each, or a deviation is negative or not finite.
+    """
+
+    gyros: Sequence[NoiseModel]
+    accelerometers: Sequence[NoiseModel]
+    gyro_bias: float
+    accelerometer_bias: float
+
+    def __post_init__(self) -> None:
+        for name in ("gyros", "accelerometers"):
+            if len(getattr(self, name)) != 3:
+                raise ValueError(f"{len(getattr(self, name))} {name}, expected three")
+        for name in ("gyro_bias", "accelerometer_bias"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"{name} is {value}, expected a number from 0")
+
+    @classmethod
+    def of_one_kind(
+        cls,
+        gyro: NoiseModel,
+        accelerometer: NoiseModel,
+        *,
+        gyro_bias: float,
+        accelerometer_bias: float,
+    ) -> Triad:
+        """Return a triad with equal axes; the biases are in rad/s and m/s^2."""
+        return cls(
+            gyros=(gyro,) * 3,
+            accelerometers=(accelerometer,) * 3,
+            gyro_bias=gyro_bias,
+            accelerometer_bias=accelerometer_bias,
+        )
+
+    @property
+    def axes(self) -> list[tuple[NoiseModel, float]]:
+        """Noise and sigma of the fixed bias of gyros x, y, z and accelerometers x, y, z."""
+        return [(model, self.gyro_bias) for model in self.gyros] + [
+            (model, self.accelerometer_bias) for model in self.accelerometers
+        ]
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Blocks of a run at rest, in one position or in several with known turns from the first.
+
+    Raises
+    ------
+    ValueError
+        If there is no rotation matrix for every dwell.
+    """
+
+    blocks: Blocks  # neither their sense nor their latitude is used
+    # shape (dwells, 3, 3); turns vectors of the body frame of each dwell into the first one
+    turned: Array
+
+    def __post_init__(self) -> None:
+        dwells = int(self.blocks.dwell[-1]) + 1
+        if self.turned.shape != (dwells, 3, 3):
+            raise ValueError(f"turned has the shape {self.turned.shape}, expected ({dwells}, 3, 3)")
+        square = self.turned @ np.swapaxes(self.turned, 1, 2)
+        if not (
+            np.allclose(square, np.eye(3), atol=1e-6) and np.all(np.linalg.det(self.turned) > 0)
+        ):
+            raise ValueError("turned holds a matrix that is no rotation")
+
+    @classmethod
+    def at_rest(cls, duration: float, block: float, rate: float) -> Positions:
+        """Return one position, in blocks of at most ``block`` s; the sampling rate is in Hz."""
+        samples = max(round(duration * rate), 1)
+        run = Experiment((Dwell(0, samples, 1),), rate, 0.0)
+        return cls(run.blocks(max(round(block * rate), 1)), np.eye(3)[None])
+
+    @classmethod
+    def turned_about_z(
+        cls, headings: Sequence[float], *, dwell: float, turning: float, block: float, rate: float
+    ) -> Positions:
+        """Return positions that differ by exactly known turns about the z axis.
+
+        The headings are angles from the first, rad; 0, pi is the classical pair. ``dwell`` is the
+        data in each position, ``turning`` the time between two, ``block`` the largest length of a
+        block, s; the sampling rate is in Hz.
+        """
+        run = Experiment.regular(
+            dwell=dwell, turning=turning, dwells=len(headings), rate=rate, latitude=0.0
+        )
+        angles = np.zeros((len(headings), 3))
+        angles[:, 2] = np.asarray(headings) - headings[0]
+        return cls(run.blocks(max(round(block * rate), 1)), rotation(angles))
+
+    @property
+    def of_blocks(self) -> Array:
+        """The matrix of each block, shape (b, 3, 3)."""
+        return np.asarray(self.turned[self.blocks.dwell])

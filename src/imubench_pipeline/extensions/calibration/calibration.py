@@ -1,0 +1,372 @@
+"""Bias and scale factor of one recording of a gyro on a rate table or at rest, as rows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.extensions.calibration.least_squares import (
+    Limits,
+    NotObservable,
+    NotObservableError,
+)
+from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.extensions.calibration.positions import attitude_rows, true_angles
+from imubench_pipeline.extensions.calibration.rate_table import Calibration, calibrate, residuals
+from imubench_pipeline.extensions.calibration.schedule import Schedule
+from imubench_pipeline.extensions.calibration.settings import (
+    AtRest,
+    InPositions,
+    OnRateTable,
+    SimulatedPositions,
+    SimulatedRest,
+    SimulatedTable,
+)
+from imubench_pipeline.extensions.calibration.still import bias_at_rest
+from imubench_pipeline.extensions.calibration.tables import (
+    CALIBRATED,
+    CalibrationPointRow,
+    CalibrationRow,
+)
+from imubench_pipeline.model.table import TableRow
+from imubench_pipeline.recordings.kept import kept_logs
+from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.steps.noise_source import (
+    NO_MODEL,
+    NoiseSource,
+    noise_source,
+    segments_reason,
+)
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.typing import Array
+from imubench_pipeline.units import quantity_to_si
+
+UNITS = {
+    "bias": "rad/s",
+    "present_bias": "rad/s",
+    "scale_factor": "1",
+    "quadratic": "s/rad",
+    "asymmetry": "1",
+    "linearity": "1",
+    "earth_rate": "rad/s",
+    "heading": "rad",
+}
+"""SI unit of each quantity of the table ``calibration``."""
+
+_RUN_PARAMETERS = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "present_bias")}
+
+
+def calibration_tables(
+    folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
+) -> dict[str, Sequence[TableRow]]:
+    """Return the rows of the tables of a gyro on a rate table, or at rest where it points known.
+
+    `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
+    of `imubench_pipeline.run.plan.Plan.experiment_settings`. A rejected recording has no rows.
+    """
+    rows: dict[str, Sequence[TableRow]] = {name: [] for name in CALIBRATED}
+    logs = kept_logs(folder)
+    if not logs:
+        return rows
+    sections = json.loads(settings)
+    if (positions := _positions(sections)) is not None:
+        stated = Sensor.model_validate(sections["sensor"])
+        names = {"sensor": sensor, "recording": recording}
+        rows["calibration"] = list(attitude_rows(names, logs, static, stated, *positions))
+        return rows
+    declared, simulated = _declared(sections)
+    # Of several gyros the notes name one: the ingest has seen to it.
+    metadata = read_metadata(next(iter(logs.values())).path)
+    gyros = (name for name in [*logs, *metadata["unusable"]] if name.startswith("gyro_"))
+    channel: str = declared.channel or next(gyros)
+    key = Key(sensor, recording, channel)
+    if channel not in logs:
+        run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
+        reason = f"{channel} cannot be used; the findings of the recording say why"
+        return rows | vars(_without(asdict(key) | {"run": run}, "not_shown", reason))
+    log = GyroLog(
+        key,
+        logs[channel],
+        noise_source(folder, static, key, Sensor.model_validate(sections["sensor"])),
+        metadata.get("begins", 0.0),
+        _truth(simulated, channel),
+    )
+    if isinstance(declared, OnRateTable):
+        return rows | vars(_on_rate_table(log, declared))
+    return rows | vars(_at_rest(log, declared))
+
+
+def _positions(sections: Mapping[str, Any]) -> tuple[InPositions, dict[str, float]] | None:
+    """Return the positions of a triad, and the true attitude of a simulated one; else None."""
+    if "simulated" in sections:
+        positions = SimulatedRecording.model_validate(sections["simulated"]).block(
+            SimulatedPositions
+        )
+        if positions is None:
+            return None
+        return positions.declared, true_angles(positions.model_dump())
+    if "positions" in sections:
+        return InPositions.model_validate(sections["positions"]), {}
+    return None
+
+
+def _declared(
+    sections: Mapping[str, Any],
+) -> tuple[OnRateTable | AtRest, SimulatedRecording | None]:
+    """Return what stands beside a log, or would stand beside a simulated one."""
+    if "simulated" not in sections:
+        if "rate_table" in sections:
+            return OnRateTable.model_validate(sections["rate_table"]), None
+        return AtRest.model_validate(sections["pointing"]), None
+    simulated = SimulatedRecording.model_validate(sections["simulated"])
+    if (table := simulated.block(SimulatedTable)) is not None:
+        return table.declared, simulated
+    rest = simulated.block(SimulatedRest)
+    assert rest is not None  # only recordings with one of both are calibrated
+    return rest.declared, simulated
+
+
+def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, float]:
+    """Return the true figures of a simulation: its bias, and what it has of a line."""
+    if simulated is None:
+        return {}
+    truth = {}
+    for name, axis in simulated.channels.items():
+        if name == channel and axis.bias is not None:
+            truth["bias"] = quantity_to_si(axis.bias, "angular_rate")
+    if (table := simulated.block(SimulatedTable)) is not None:
+        truth |= {"scale_factor": table.scale_factor}
+        truth |= {"quadratic": 0.0, "asymmetry": 0.0}
+    return truth
+
+
+@dataclass
+class Rows:
+    """Rows of the tables that a calibration leaves."""
+
+    calibration: list[CalibrationRow] = field(default_factory=list)
+    calibration_points: list[CalibrationPointRow] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class GyroLog:
+    """The log of a gyro that is calibrated, with what is known of it.
+
+    Attributes
+    ----------
+    source : NoiseSource or None
+        Its noise; without it nothing is estimated.
+    begins : float
+        Time of the first sample that is used, s from the first of the recording.
+    truth : dict of str to float
+        True figures of a simulation, SI.
+    """
+
+    key: Key
+    log: ChannelLog
+    source: NoiseSource | None
+    begins: float = 0.0
+    truth: Mapping[str, float] = field(default_factory=dict)
+
+    def names(self, run: str, pointing: Pointing | None) -> dict[str, Any]:
+        """Return what every row of the table ``calibration`` says."""
+        row: dict[str, Any] = asdict(self.key) | {"run": run}
+        if self.source is not None:
+            row |= {"model": self.source.model.name, "model_from": self.source.words}
+        if pointing is not None:
+            row |= {name: getattr(pointing, name) for name in _DIRECTION_PARAMETERS}
+            row |= {"earth_rate": pointing.rate, "earth_rate_sigma": pointing.rate_sigma}
+        return row
+
+
+_DIRECTION_PARAMETERS = ("latitude", "heading", "elevation")
+
+
+def _at_rest(gyro: GyroLog, declared: AtRest) -> Rows:
+    """Return the bias of a gyro whose axis points where it is stated; else the rows say why not."""
+    pointing = declared.pointing
+    names = gyro.names("at_rest", pointing)
+    if len(gyro.log.segments) > 1:
+        return _without(names, "not_shown", segments_reason(gyro.log))
+    if gyro.source is None:
+        return _without(names, "no_model", NO_MODEL)
+    samples = on_grid(gyro.log.blocks(), gyro.log.grid)
+    try:
+        bias = bias_at_rest(samples, gyro.log.rate, gyro.source.model, pointing)
+    except ValueError as error:
+        return _without(names, "too_short", str(error))
+    about = names | {
+        "duration": len(samples) / gyro.log.rate,
+        "samples": int(np.isfinite(samples).sum()),
+        "scatter": _finite(bias.p_value[0]),
+        "half_width": bias.bound,
+    }
+    limits, noise = bias.fixed_interval(), bias.fixed_noise_sigma
+    fixed = _figure(gyro, "bias", bias.fixed, bias.fixed_sigma, limits, noise)
+    limits, noise = bias.present_interval(), bias.present_noise_sigma
+    present = _figure(gyro, "present_bias", bias.present, bias.present_sigma, limits, noise)
+    found = [CalibrationRow(**(about | row)) for row in (fixed, present)]
+    return Rows([*found, *_open(names, bias.not_observable)])
+
+
+def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Rows:
+    """Return scale factor and bias of a gyro on a rate table; else the rows say why not."""
+    pointing = None if declared.axis is None else declared.axis.pointing
+    names = gyro.names("rate_table", pointing)
+    if len(gyro.log.segments) > 1:
+        return _without(names, "not_shown", segments_reason(gyro.log))
+    try:
+        schedule = _schedule(gyro, declared)
+    except ValueError as error:
+        return _without(names, "too_short", str(error))
+    if gyro.source is None:
+        return _without(names, "no_model", NO_MODEL)
+    model = gyro.source.model
+    setting = declared.si("setting_sigma", "angular_rate")
+    samples = on_grid(gyro.log.blocks(), gyro.log.grid)
+    try:
+        fit, measured = calibrate(samples, schedule, model, pointing, setting_sigma=setting)
+    except NotObservableError as error:
+        return _without(names, "not_observable", str(error))
+    except ValueError as error:
+        return _without(names, "too_short", str(error))
+    earth = 0.0 if pointing is None else pointing.rate
+    rates = schedule.of_blocks(measured.blocks) + earth
+    left = residuals(fit, measured, rates, model, setting)
+    about = names | {
+        "duration": measured.blocks.duration,
+        "samples": int(measured.blocks.count.sum()),
+        "rates": len(left.dwell),
+        "scatter": _finite(fit.line.p_value[0]) if fit.line.freedom else None,
+    }
+    rows = Rows([CalibrationRow(**(about | row)) for row in _line(gyro, fit)])
+    rows.calibration += _open(names, fit.not_observable)
+    for k, dwell in enumerate(left.dwell.tolist()):
+        stretch = schedule.stretches[dwell]
+        rows.calibration_points.append(
+            CalibrationPointRow(
+                **asdict(gyro.key),
+                number=dwell + 1,
+                start=stretch.start / schedule.rate + gyro.begins,
+                stop=stretch.stop / schedule.rate + gyro.begins,
+                table_rate=float(schedule.table_rates[dwell]),
+                earth_rate=earth,
+                mean=float(left.mean[k]),
+                line=float(left.line[k]),
+                residual=float(left.value[k]),
+                sigma=float(left.sigma[k]),
+            )
+        )
+    return rows
+
+
+def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
+    """Return the steady rates in samples of the log; ValueError where there are none."""
+    log, settling = gyro.log, declared.si("settling", "time")
+    if not declared.steps:
+        if not log.table_rate:
+            raise ValueError(
+                "log.table_rate: the column has another clock than the gyro; give it as a column "
+                "of the same file, or state the steps (rate_table: steps)"
+            )
+        try:
+            return Schedule.from_column(
+                on_grid(log.table_rates(), log.grid),
+                log.rate,
+                tolerance=declared.si("tolerance", "angular_rate"),
+                shortest=declared.si("shortest", "time"),
+                settling=settling,
+            )
+        except ValueError as error:
+            raise ValueError(
+                f"log.table_rate: {error}; check the column and its unit, or change rate_table: "
+                f"tolerance ({declared.tolerance}) and shortest ({declared.shortest})"
+            ) from None
+    ends = gyro.begins + log.grid / log.rate
+    steps = []
+    for number, step in enumerate(declared.steps, 1):
+        start, stop = step.seconds
+        if start < gyro.begins or stop > ends + 1.0 / log.rate:
+            raise ValueError(
+                f"rate_table.steps: step {number} lasts from {start:g} to {stop:g} s; expected "
+                f"steps within the log, which is used from {gyro.begins:g} to {ends:g} s: mend "
+                "the step, or 'use:' beside the log"
+            )
+        rate = quantity_to_si(step.rate, "angular_rate")
+        steps.append((start - gyro.begins, min(stop, ends) - gyro.begins, rate))
+    return Schedule.from_steps(steps, log.rate, settling=settling)
+
+
+def _line(gyro: GyroLog, fit: Calibration) -> Iterator[dict[str, Any]]:
+    """Yield what is found of the line, and of its straightness."""
+    noise = float(fit.line.sigma[0])
+    yield _figure(gyro, "bias", fit.bias, fit.bias_sigma, fit.bias_interval(), noise)
+    sigma, interval = fit.scale_factor_sigma, fit.scale_factor_interval()
+    yield _figure(gyro, "scale_factor", fit.scale_factor, sigma, interval, sigma)
+    for name, term in (("quadratic", fit.quadratic), ("asymmetry", fit.asymmetry)):
+        if term is not None:
+            row = _figure(gyro, name, term.value, term.sigma, term.interval(), term.sigma)
+            yield row | {"chance": float(term.p_value[0])}
+    if (straight := fit.linearity) is not None:
+        sigma = float(straight.sigma[int(np.abs(straight.deviation[0]).argmax())])
+        row = _figure(gyro, "linearity", straight.value, sigma, straight.interval(), sigma)
+        yield row | {"chance": float(straight.p_value[0])}
+
+
+def _figure(
+    gyro: GyroLog, name: str, value: Array, sigma: float, interval: Limits, noise: float
+) -> dict[str, Any]:
+    lower, upper = interval
+    return {
+        "parameter": name,
+        "value": float(value[0]),
+        "lower": float(lower[0]),
+        "upper": float(upper[0]),
+        "unit": UNITS[name],
+        "status": "ok",
+        "sigma": float(sigma),
+        "sigma_noise": noise,
+        "truth": gyro.truth.get(name),
+    }
+
+
+def _open(
+    names: Mapping[str, Any], quantities: tuple[NotObservable, ...]
+) -> Iterator[CalibrationRow]:
+    """Yield what the run cannot tell, each with its reason."""
+    for unknown in quantities:
+        yield CalibrationRow(
+            **names,
+            parameter=unknown.quantity,
+            unit=UNITS[unknown.quantity],
+            status="not_observable",
+            reason=unknown.reason,
+            half_width=unknown.half_width,
+        )
+
+
+def _without(names: Mapping[str, Any], status: str, reason: str) -> Rows:
+    """Return the rows of a run of which nothing can be estimated."""
+    return Rows(
+        [
+            CalibrationRow(
+                **names,
+                parameter=parameter,
+                unit=UNITS[parameter],
+                status=status,
+                reason=reason,
+            )
+            for parameter in _RUN_PARAMETERS[names["run"]]
+        ]
+    )
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,300 @@
+"""What a rate table, or rest with a known direction, tells of a gyro, in lines and sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Protocol
+
+from imubench_pipeline.extensions.calibration.tables import CalibrationRow
+from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.site import Section, Site
+from imubench_pipeline.report.view import RecordingView
+from imubench_pipeline.words.numbers import (
+    degrees_text,
+    limit_digits,
+    number_text,
+    percent_text,
+    sentence,
+)
+
+WORDS = {
+    "bias": "bias at the start",
+    "present_bias": "bias at the end",
+    "scale_factor": "scale factor",
+    "quadratic": "quadratic term",
+    "asymmetry": "asymmetry",
+    "linearity": "deviation from the line, of the largest rate",
+    "earth_rate": "the Earth's rate",
+    "heading": "heading",
+}
+"""Name of each figure on a page."""
+
+_PPM = 1e6
+_PERCENT = 1e2
+_OF_RATIO = {
+    "scale_factor": ("", 1.0),
+    "asymmetry": (" ppm", _PPM),
+    "quadratic": (" ppm per °/s", _PPM * math.radians(1.0)),
+    "linearity": (" %", _PERCENT),
+}
+"""Unit on a page of what is no rate, and the factor to it."""
+
+_DOUBTED = 0.05
+"""Chance below which a straight line is doubted."""
+
+
+def answer(rows: Sequence[CalibrationRow], system: System) -> str:
+    """Return scale factor and bias of a recording in a sentence, or why there are none.
+
+    Of its rows of the table ``calibration``, as all below.
+    """
+    by_parameter = {row.parameter: row for row in rows}
+    bias = by_parameter.get("bias")
+    if bias is None:
+        return "Nothing was found of this recording."
+    if bias.value is None:
+        return sentence(bias.reason)
+    unit = page_unit("gyro", "adev", system)
+    text = (
+        f"The bias is {_around(bias.value, bias.lower, bias.upper, unit.text)} {unit.sign} (95 %)"
+    )
+    scale = by_parameter.get("scale_factor")
+    if scale is not None and scale.value is not None:
+        error, lower, upper = (
+            None if size is None else _PPM * (size - 1.0)
+            for size in (scale.value, scale.lower, scale.upper)
+        )
+        off = _around(error, lower, upper, number_text)
+        text = f"The scale factor is off by {off} ppm. " + text
+    text += ". "
+    straight = by_parameter.get("linearity")
+    if straight is not None and straight.chance is not None and straight.value is not None:
+        doubted = straight.chance < _DOUBTED
+        largest = number_text(_PERCENT * straight.value, 3)
+        text += f"The largest deviation from the line is {largest} % of the largest rate. "
+        text += f"A straight line {'does not fit' if doubted else 'fits'}: noise alone departs as "
+        text += f"far from it with a chance of {percent_text(straight.chance, 2)}."
+    return text.strip()
+
+
+def _around(
+    value: float | None,
+    lower: float | None,
+    upper: float | None,
+    as_text: Callable[[float | None, int], str],
+) -> str:
+    half = None
+    if lower is not None and upper is not None:
+        half = (upper - lower) / 2.0
+    digits = limit_digits(lower, upper, 3)
+    return f"{as_text(value, digits)} ± {as_text(half, 2)}"
+
+
+def lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table of what was found; a figure that is no rate as text."""
+    for row in rows:
+        if row.status == "not_observable" and row.parameter in ("earth_rate", "heading"):
+            continue
+        line = {
+            **row.columns(),
+            "words": WORDS[row.parameter],
+            "digits": limit_digits(row.lower, row.upper, 4),
+            "is_rate": row.unit == "rad/s",
+            "percent": None if row.chance is None else percent_text(row.chance, 2),
+            "why": sentence(row.reason),
+        }
+        yield line | _texts(row)
+
+
+def _texts(row: CalibrationRow) -> dict[str, str]:
+    """Return a ratio with its limits as text."""
+    name = row.parameter
+    if row.value is None or name not in _OF_RATIO:
+        return dict.fromkeys(("text", "limits", "sigma_text", "truth_text"), "–")
+    shown = (row.value, row.lower, row.upper, row.truth)
+    if name == "scale_factor":
+        digits = limit_digits(row.lower, row.upper, 4)
+        value, low, high, true = (number_text(size, digits) for size in shown)
+        sigma = "–" if row.sigma is None else f"{number_text(_PPM * row.sigma, 3)} ppm"
+    else:
+        _, per = _OF_RATIO[name]
+        value, low, high, true, sigma = (
+            number_text(None if size is None else per * size, 3) for size in (*shown, row.sigma)
+        )
+    return {
+        "text": value + _OF_RATIO[name][0],
+        "limits": f"{low} to {high}",
+        "sigma_text": sigma,
+        "truth_text": true,
+    }
+
+
+def not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
+    """Return what a recording cannot tell, each with the reason."""
+    return [
+        {"words": WORDS[row.parameter], "why": sentence(row.reason), **row.columns()}
+        for row in rows
+        if row.status == "not_observable"
+    ]
+
+
+def scatter_words(rows: Sequence[CalibrationRow]) -> str:
+    """Return whether the scatter is that of the noise model, in a sentence."""
+    chance = next((row.scatter for row in rows if row.scatter is not None), None)
+    if chance is None:
+        return ""
+    text = percent_text(chance, 2)
+    if chance < _DOUBTED / 5.0:
+        return (
+            "The means scatter more than the noise model allows: that much or more has a chance of "
+            f"{text}. The noise was another one, or the sensor was warming up or moved: the limits "
+            "are too narrow."
+        )
+    return f"The scatter of the means is that of the noise model: as much or more in {text}."
+
+
+def earth_words(rows: Sequence[CalibrationRow], system: System) -> str:
+    """Return what was taken off for the rotation of the Earth, in a sentence."""
+    row = next((row for row in rows if row.earth_rate is not None), None)
+    if row is None:
+        return "What the Earth's rotation adds along the axis is a part of the bias."
+    unit = page_unit("gyro", "adev", system)
+    text = (
+        f"The Earth's rate along the axis, {unit.text(row.earth_rate, 4)} {unit.sign} (latitude "
+        f"{degrees_text(row.latitude)}, {_direction(row)}), is taken off"
+    )
+    if row.half_width:
+        text += f"; with no heading it is within ± {unit.text(row.half_width, 3)} {unit.sign}"
+    elif row.earth_rate_sigma:
+        text += (
+            f"; by the direction it is sure to {unit.text(row.earth_rate_sigma, 2)} {unit.sign} "
+            "(1σ)"
+        )
+    return text + "."
+
+
+def _direction(row: CalibrationRow) -> str:
+    elevation = f"elevation {degrees_text(row.elevation)}"
+    if row.heading is not None:
+        return f"heading {degrees_text(row.heading)}, {elevation}"
+    upright = row.elevation is not None and abs(math.cos(row.elevation)) < 1e-6
+    return elevation if upright else f"{elevation}, no heading"
+
+
+class Estimated(Protocol):
+    """An estimate in a table."""
+
+    @property
+    def value(self) -> float | None:
+        """The value."""
+
+    @property
+    def reason(self) -> str | None:
+        """Why there is none."""
+
+    @property
+    def model(self) -> str | None:
+        """The terms of the noise model."""
+
+    @property
+    def model_from(self) -> str | None:
+        """What that is from."""
+
+
+def calibrated(site: Site) -> list[RecordingView]:
+    """Return the recordings on a rate table, in positions, or at rest with a direction."""
+    named = site.named_in(CalibrationRow)
+    return [
+        view
+        for view in site.views
+        if view.row.kind in ("rate_table", "positions") or view.full_name in named
+    ]
+
+
+def without_result(
+    views: Sequence[RecordingView], rows_of: Callable[[RecordingView], Sequence[Estimated]]
+) -> Iterator[dict[str, Any]]:
+    """Yield the recordings of an experiment of which nothing could be estimated, and why."""
+    for view in views:
+        rows = rows_of(view)
+        if rows and all(row.value is None for row in rows):
+            yield {"view": view, "reason": sentence(rows[0].reason)}
+
+
+NOT_CALIBRATED = Section(
+    page="index.html",
+    template="not_calibrated.html.jinja",
+    context=lambda site: (
+        list(without_result(calibrated(site), lambda view: view.rows(CalibrationRow))) or None
+    ),
+)
+"""What could not be calibrated, on the start page."""
+
+
+def at_rest(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | None:
+    """Return what the page of a static recording says of its bias; None without a direction."""
+    rows = [row for row in view.rows(CalibrationRow) if row.run == "at_rest"]
+    if not rows:
+        return None
+    return "at_rest.html.jinja", {
+        "channel": rows[0].channel,
+        "lines": [line for line in lines(rows) if line["status"] != "not_observable"],
+        "open": not_observable(rows),
+        "noise": noise_words(rows),
+        "scatter": scatter_words(rows),
+        "earth": earth_words(rows, site.system),
+    }
+
+
+def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
+    """Return the lines of the page that has all calibrated recordings, by kind of run."""
+    by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
+    for view in calibrated(site):
+        rows = view.rows(CalibrationRow)
+        if not rows:
+            continue
+        if rows[0].run == "positions":
+            by_run["positions"].append({"view": view, "lines": list(attitude_lines(rows))})
+            continue
+        by_run[rows[0].run].append(
+            {
+                "view": view,
+                "lines": {line["parameter"]: line for line in lines(rows)},
+                "answer": answer(rows, site.system),
+                "earth": earth_words(rows, site.system),
+            }
+        )
+    return by_run
+
+
+def attitude_lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
+    """Yield roll, pitch and heading in degrees, of rows of ``calibration`` of one recording."""
+    for row in rows:
+        value, lower, upper, truth = (
+            None if angle is None else math.degrees(angle)
+            for angle in (row.value, row.lower, row.upper, row.truth)
+        )
+        digits = limit_digits(lower, upper, 3)
+        off = None
+        if value is not None and truth is not None and row.sigma is not None:
+            off = math.remainder(value - truth, 360.0) / math.degrees(row.sigma)
+        yield {
+            "words": row.parameter,
+            "value": "–" if value is None else f"{number_text(value, digits)}°",
+            "limits": ""
+            if lower is None or upper is None
+            else f"{number_text(lower, digits)}° to {number_text(upper, digits)}°",
+            "truth": "–" if truth is None else f"{number_text(truth, digits)}°",
+            "off": "–" if off is None else f"{number_text(off, 2)} σ",
+            "why": sentence(row.reason),
+        }
+
+
+def noise_words(rows: Sequence[Estimated]) -> str:
+    """Return the noise model that weights the data, in a sentence."""
+    fitted = next((row for row in rows if row.model), None)
+    if fitted is None:
+        return ""
+    origin = f", from {fitted.model_from}" if fitted.model_from else ""
+    return f"Noise model: {fitted.model}{origin}."

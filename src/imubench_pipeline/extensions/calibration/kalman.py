@@ -1,0 +1,208 @@
+"""The Earth's rate as an unknown constant, by Kalman filter and smoother.
+
+The filter of Silva et al. (eq. 15, 16) needs the rate as an input; see `known_rate`. Here the rate
+w is a state in addition to the error of the gyro, observed with the sign of the dwell:
+
+    x = [w, z_G ..., z_K],    mean of a block = s cos(latitude) w + mean of (z_G + ... + z_K) + v.
+
+The filter is a `block_filter` with one constant and one axis. Its square roots keep their
+precision from an uninformative start of 1 rad/s down to 1e-10 rad/s.
+
+References
+----------
+P. Park and T. Kailath, "New square-root algorithms for Kalman filtering" and "Square-root RTS
+smoothing algorithms", IEEE Trans. Autom. Control 40(5), 1995, and Int. J. Control 62(5), 1995;
+H. E. Rauch, F. Tung and C. T. Striebel, AIAA Journal 3(8), 1965; Y. Bar-Shalom, X. R. Li and
+T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", Wiley 2001, section 5.4
+(NEES, NIS).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from imubench_pipeline.extensions.calibration.block_filter import BlockFilter, deviation, triangle
+from imubench_pipeline.extensions.calibration.experiment import Blocks
+from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA, block_states
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_SINGULAR_TOLERANCE = 1e-12
+"""Relative singular value of a predicted root with unit rows, below which it is rounding."""
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """Filtered estimates after each block, from the data up to its end."""
+
+    time: Array  # shape (b,); end of each block, s from the first sample of the first
+    rate: Array  # shape (runs, b); estimated Earth's rate, rad/s
+    rate_sigma: Array  # shape (b,); its standard deviation, rad/s
+    # shape (runs, b); estimated mean of the gyro's slow error over the block, its bias included,
+    # rad/s
+    drift: Array
+    drift_sigma: Array  # shape (b,); its standard deviation, rad/s
+    innovation: Array  # shape (runs, b); each block mean less its prediction, rad/s
+    innovation_sigma: Array  # shape (b,); its standard deviation, rad/s
+    # shape (runs, b, m + 2); rate, the states of `RateFilter.names` at the sample after the block,
+    # and the drift
+    states: Array
+    roots: Array  # shape (b, m + 2, m + 2); lower triangular roots of their covariances
+
+    @property
+    def nis(self) -> Array:
+        """Normalised innovation squared, shape (runs, b): chi-squared of one degree."""
+        return np.asarray((self.innovation / self.innovation_sigma) ** 2)
+
+    def rate_nees(self, rate: float) -> Array:
+        """Return the squared error of the rate over its variance, shape (runs, b).
+
+        Chi-squared of one degree of freedom for a consistent filter, once both positions have been
+        observed and the prior no longer matters. The true rate is in rad/s.
+        """
+        return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
+
+    def nees(self, rate: float, states: Array) -> Array:
+        """Return the normalised estimation error squared of rate and all states, shape (runs, b).
+
+        Chi-squared of m + 1 degrees of freedom; see `rate_nees`. Not finite where a state is known
+        exactly. The true rate is in rad/s, the true states, at the sample after each block, are of
+        shape (runs, b, m).
+        """
+        error = self.states[:, :, :-1].copy()
+        error[:, :, 0] -= rate
+        error[:, :, 1:] -= states
+        squares = np.empty(error.shape[:2])
+        for k, root in enumerate(self.roots[:, :-1, :-1]):
+            white = solve_triangular(root, error[:, k].T, lower=True)
+            squares[:, k] = np.sum(white**2, axis=0)
+        return squares
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """Smoothed estimates of each block from all the data."""
+
+    # shape (runs,); estimated Earth's rate, rad/s: a constant, equal to the last filtered value
+    rate: Array
+    rate_sigma: float  # its standard deviation, rad/s
+    # shape (runs, b); mean of the gyro's slow error over each block, its bias included, rad/s
+    drift: Array
+    drift_sigma: Array  # shape (b,); its standard deviation, rad/s
+    states: Array  # shape (runs, b, m + 2); as in `Filtered`
+
+
+class RateFilter:
+    """The filter of one design: blocks and noise model. It filters any number of runs at once.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    model : NoiseModel
+        Its flicker noise is a bank of Gauss-Markov processes; a ramp and lines are estimated, see
+        `states.block_states`.
+    turn_on_bias : float
+        Standard deviation of the fixed bias, rad/s. By default it is unknown.
+    rate_sigma : float
+        Standard deviation of the prior of the rate about 0, rad/s; by default uninformative.
+
+    Raises
+    ------
+    ValueError
+        If a standard deviation is negative or not finite.
+    """
+
+    def __init__(
+        self,
+        blocks: Blocks,
+        model: NoiseModel,
+        *,
+        turn_on_bias: float = UNINFORMATIVE_SIGMA,
+        rate_sigma: float = UNINFORMATIVE_SIGMA,
+    ) -> None:
+        if not (math.isfinite(rate_sigma) and rate_sigma >= 0):
+            raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
+        self.blocks = blocks
+        self._states = block_states(model, blocks, turn_on_bias)
+        self._filter = BlockFilter(
+            (self._states,), blocks.seen[:, None, None], np.array([[rate_sigma]])
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The m states of the gyro's error, see `states.BlockStates`; the rate is before them."""
+        return self._states.names
+
+    @property
+    def rate_sigma(self) -> Array:
+        """Standard deviation of the rate after each block, rad/s, shape (b,); needs no data."""
+        return deviation(self._filter.roots, 0)
+
+    def run(self, means: Array) -> Filtered:
+        """Filter runs of one design from block means, rad/s, shape (runs, b).
+
+        Raises
+        ------
+        ValueError
+            If there is not one mean a block, or one is not finite: a block without a mean is no
+            block (`experiment.block_means`).
+        """
+        self.blocks.check_means(means)
+        states, innovation = self._filter.run(means[:, :, None])
+        roots = self._filter.roots
+        return Filtered(
+            self.blocks.end,
+            states[:, :, 0],
+            self.rate_sigma,
+            states[:, :, -1],
+            deviation(roots, -1),
+            innovation[:, :, 0],
+            np.abs(self._filter.innovation_roots[:, 0, 0]),
+            states,
+            roots,
+        )
+
+    def smooth(self, filtered: Filtered) -> Smoothed:
+        """Smooth the result of `run` (Rauch, Tung and Striebel), with square roots."""
+        states = filtered.states.copy()
+        gains, sigma = self._smoother_gains
+        for k in range(len(self.blocks) - 2, -1, -1):
+            transition, _ = self._filter.matrices(k + 1)
+            predicted = filtered.states[:, k] @ transition.T
+            states[:, k] += (states[:, k + 1] - predicted) @ gains[k].T
+        return Smoothed(
+            states[:, -1, 0], float(self.rate_sigma[-1]), states[:, :, -1], sigma, states
+        )
+
+    @cached_property
+    def _smoother_gains(self) -> tuple[Array, Array]:
+        """Gains of the smoother at all but the last block, and sigma of the drift at each."""
+        root = self._filter.roots[-1]
+        gains = np.empty((len(self.blocks) - 1, *root.shape))
+        sigma = np.empty(len(self.blocks))
+        sigma[-1] = deviation(root, -1)
+        for k in range(len(gains) - 1, -1, -1):
+            gains[k], rest = self._compute_smoothing(k)
+            root = triangle(np.concatenate([rest, gains[k] @ root], axis=1))
+            sigma[k] = deviation(root, -1)
+        return gains, sigma
+
+    def _compute_smoothing(self, k: int) -> tuple[Array, Array]:
+        """Return the smoother gain at a block, and a root of its covariance given the next one."""
+        transition, noise = self._filter.matrices(k + 1)
+        root = self._filter.roots[k]
+        n = len(root)
+        joint = np.zeros((2 * n, n + noise.shape[1]))
+        joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ root, noise, root
+        after = triangle(joint)
+        predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
+        # Without process noise the mean of a block depends on the states: no plain inverse.
+        scale = np.linalg.norm(predicted, axis=1)
+        unit = np.where(scale > 0.0, scale, 1.0)
+        gain = shared @ np.linalg.pinv(predicted / unit[:, None], rcond=_SINGULAR_TOLERANCE) / unit
+        return gain, rest

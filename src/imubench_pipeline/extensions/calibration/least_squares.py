@@ -1,0 +1,217 @@
+"""Generalised least squares on the means of blocks of a log, with the noise model's covariance.
+
+    y = X b + e,   cov(e) = C,   b^ = (X^T C^-1 X)^-1 X^T C^-1 y,   cov(b^) = (X^T C^-1 X)^-1
+
+(A. C. Aitken 1935). `earth_rate.covariance` gives C: the covariance of the means by white noise,
+Gauss-Markov processes, flicker noise, random walk and the other terms. The standard errors follow
+from the noise model, not from the scatter, which contains little of the slow noise. The scatter is
+a check: (y - X b^)^T C^-1 (y - X b^) is chi-squared of b - p degrees of freedom if the noise model
+and X are right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.stats import chi2, norm
+
+from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_MAX_SIGMA_INCREASE = 1e-3
+"""Largest relative increase of a standard error by longer blocks."""
+
+_MAX_BLOCKS = 1024
+"""Largest number of blocks in the test of a block length."""
+
+_MIN_SINGULAR_VALUE = 1e-8
+"""Least singular value of independent whitened regressors of unit length; others are rounding."""
+
+CONFIDENCE_LEVEL = 0.95
+"""Confidence level of intervals."""
+
+Quantity = Literal[
+    "earth_rate", "bias", "heading", "scale_factor", "asymmetry", "quadratic", "linearity"
+]
+
+
+@dataclass(frozen=True)
+class NotObservable:
+    """A quantity that the recording does not determine."""
+
+    quantity: Quantity
+    reason: str  # in words
+    # half of the range of the bias due to the unknown quantity, rad/s; None if it is unbounded
+    half_width: float | None = None
+
+
+class NotObservableError(ValueError):
+    """The data do not determine a requested quantity, however little noise they have."""
+
+
+Limits = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Result of generalised least squares for runs of one design."""
+
+    value: Array  # shape (runs, p); estimates, SI
+    covariance: Array  # shape (p, p); of their errors, by the noise model
+    chi_squared: Array  # shape (runs,); squared residuals in units of the noise model
+    freedom: int  # their degrees of freedom, b - p
+
+    @property
+    def sigma(self) -> Array:
+        """Standard errors, shape (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def p_value(self) -> Array:
+        """Probability of residuals at least as large if the model is right, shape (runs,)."""
+        return np.asarray(chi2.sf(self.chi_squared, self.freedom))
+
+    def interval(self) -> Limits:
+        """Return confidence limits, by the noise model, shapes (runs, p)."""
+        return limits(self.value, self.sigma)
+
+
+def limits(value: Array, sigma: Array | float) -> Limits:
+    """Return the 95 % limits, lower and upper, of estimates with normal errors.
+
+    The standard errors have the unit of the values, and a shape that broadcasts with theirs.
+    """
+    half = half_width() * sigma
+    return value - half, value + half
+
+
+def half_width(level: float = CONFIDENCE_LEVEL) -> float:
+    """Return half of a two-sided interval of the normal distribution, in standard deviations.
+
+    A level of 0.95 gives 1.96.
+
+    Raises
+    ------
+    ValueError
+        If it is not between 0 and 1.
+    """
+    if not 0 < level < 1:
+        raise ValueError(f"level is {level}, expected one between 0 and 1")
+    return float(norm.ppf(0.5 + level / 2.0))
+
+
+class LeastSquares:
+    """The estimator of one design: blocks, noise model and regressors.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        Their sense is not used.
+    model : NoiseModel
+        With some noise in every sample.
+    regressors : ndarray, shape (b, p)
+    further : ndarray, shape (b, b), optional
+        Covariance that is added to the covariance of the noise, (rad/s)^2.
+    names : sequence of str
+        Of the regressors, for the error.
+
+    Raises
+    ------
+    NotObservableError
+        If there are fewer blocks than regressors, or the regressors are collinear.
+    """
+
+    def __init__(
+        self,
+        blocks: Blocks,
+        model: NoiseModel,
+        regressors: Array,
+        *,
+        further: Array | None = None,
+        names: Sequence[str] = (),
+    ) -> None:
+        listed = f" ({', '.join(names)})" if names else ""
+        if len(blocks) < regressors.shape[1]:
+            raise NotObservableError(
+                f"{len(blocks)} means cannot tell {regressors.shape[1]} parameters{listed}"
+            )
+        self._blocks = blocks
+        covariance = block_mean_covariance(model, blocks)
+        if further is not None:
+            covariance = covariance + further
+        self._root = cholesky(covariance, lower=True)
+        white = solve_triangular(self._root, regressors, lower=True)
+        length = np.linalg.norm(white, axis=0)
+        if np.any(length == 0.0):
+            raise NotObservableError(f"a regressor is 0 throughout{listed}")
+        basis, values, turn = np.linalg.svd(white / length, full_matrices=False)
+        if values[-1] < _MIN_SINGULAR_VALUE:
+            raise NotObservableError(f"the data cannot tell these from each other{listed}")
+        self._basis = basis
+        self._back = (turn.T / values) / length[:, None]
+        self.covariance = self._back @ self._back.T
+
+    @property
+    def sigma(self) -> Array:
+        """Standard errors of the parameters; they need no data, shape (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def fit(self, means: Array) -> Fit:
+        """Estimate the parameters of runs of one design from means of shape (runs, b).
+
+        Raises
+        ------
+        ValueError
+            If there is not one finite mean a block.
+        """
+        self._blocks.check_means(means)
+        white = solve_triangular(self._root, means.T, lower=True).T
+        along = white @ self._basis
+        residual = white - along @ self._basis.T
+        return Fit(
+            along @ self._back.T,
+            self.covariance,
+            np.sum(residual**2, axis=1),
+            means.shape[1] - self._basis.shape[1],
+        )
+
+
+def block_length(
+    experiment: Experiment, model: NoiseModel, regressors: Callable[[Blocks], Array]
+) -> int:
+    """Return the longest block, in samples, whose means keep the information of the samples.
+
+    Blocks are shortened by halves until a fourth of their length would lower no standard error by
+    0.1 %. There are 1,024 blocks at most, none longer than the longest dwell. ``regressors`` gives
+    the regressors of blocks, shape (b, p).
+
+    Raises
+    ------
+    NotObservableError
+        If samples do not determine the parameters, either.
+    """
+    length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
+    sigmas: dict[int, Array] = {}
+
+    def sigma(longest: int) -> Array:
+        if longest not in sigmas:
+            blocks = experiment.blocks(longest)
+            sigmas[longest] = LeastSquares(blocks, model, regressors(blocks)).sigma
+        return sigmas[longest]
+
+    while len(blocks := experiment.blocks(length)) < regressors(blocks).shape[1] and length > 1:
+        length //= 2
+    while length > 1:
+        shorter = max(length // 4, 1)
+        if len(experiment.blocks(shorter)) > _MAX_BLOCKS:
+            break
+        if np.all(sigma(shorter) > (1.0 - _MAX_SIGMA_INCREASE) * sigma(length)):
+            break
+        length //= 2
+    return length

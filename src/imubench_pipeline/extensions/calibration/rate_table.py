@@ -1,0 +1,378 @@
+"""Scale factor, bias and linearity of a gyro from steady rates of a rate table.
+
+    mean of a block = bias + S (table rate + Earth's rate along the axis) + noise
+
+by generalised least squares over all steady rates (`least_squares`): the noise model describes the
+drift of the gyro from one rate to the next. The scale-factor tests of IEEE Std 952-2020 fit a line.
+Further terms test the line: a quadratic term; the asymmetry, the difference of the scale factors of
+positive and negative rates as a fraction of their mean; and the linearity, the largest deviation of
+a rate from the line as a fraction of full scale, here the largest rate of the test.
+
+The axis of the gyro is along the axis of the table. Then the Earth's rate along it is constant, and
+a part of the bias if it is unknown; the perpendicular part averages out over whole turns. An angle
+a between the two axes multiplies the scale factor by cos(a), and is not separable from it.
+
+The residuals of each steady rate and their covariance (`residuals`):
+
+    r = A (m - X b),   cov(r) = A (C + D - X (X^T (C + D)^-1 X)^-1 X^T) A^T,
+
+m the block means, X and b the regressors and estimates of the line by generalised least squares, A
+the mean over the blocks of a steady rate, C the covariance of the noise model and D the covariance
+of the true rates about the stated ones.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Measured, block_means
+from imubench_pipeline.extensions.calibration.least_squares import (
+    CONFIDENCE_LEVEL,
+    Fit,
+    LeastSquares,
+    Limits,
+    NotObservable,
+    NotObservableError,
+    block_length,
+    half_width,
+    limits,
+)
+from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.extensions.calibration.schedule import Schedule
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_MAX_UNKNOWN_RATE = 1e-12
+"""Largest unknown part of the Earth's rate along the axis that is ignored, rad/s."""
+
+_NO_SCALE = NotObservable(
+    "asymmetry", "the gyro does not follow the table: there is no scale factor to be a fraction of"
+)
+
+_RATE_TOLERANCE = 1e-9
+"""Relative difference below which two rates are equal up to rounding."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """A further term of the line, in runs of one design."""
+
+    # shape (runs,); of the quadratic term, s/rad; of the asymmetry, a fraction of the scale factor
+    value: Array
+    sigma: float  # its standard error by the noise model
+
+    @property
+    def p_value(self) -> Array:
+        """Probability of a value at least as far from 0 if the line is right, shape (runs,)."""
+        return np.asarray(chi2.sf((self.value / self.sigma) ** 2, 1))
+
+    def interval(self) -> Limits:
+        """Return confidence limits, shapes (runs,)."""
+        return limits(self.value, self.sigma)
+
+
+@dataclass(frozen=True)
+class Linearity:
+    """The largest deviation of a rate from the line, over full scale, in runs of one design."""
+
+    deviation: Array  # shape (runs, levels); deviation of each rate from the line, over full scale
+    sigma: Array  # shape (levels,); its standard error by the noise model
+    full_scale: float  # the largest rate of the test, rad/s
+    # shape (runs,); probability of deviations at least as large in total, if the line is right
+    p_value: Array
+
+    @property
+    def value(self) -> Array:
+        """The largest deviation, a fraction of full scale without sign, shape (runs,)."""
+        return np.abs(self.deviation).max(axis=1)
+
+    def interval(self) -> Limits:
+        """Return confidence limits of the largest true deviation, shapes (runs,).
+
+        The limits hold for all rates together (Bonferroni), since noise alone makes the largest of
+        many deviations large.
+        """
+        half = half_width(1.0 - (1.0 - CONFIDENCE_LEVEL) / self.sigma.size) * self.sigma
+        size = np.abs(self.deviation)
+        return np.maximum(size - half, 0.0).max(axis=1), (size + half).max(axis=1)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Bias and scale factor in runs of one design."""
+
+    line: Fit  # bias, rad/s, at the first sample of the first block, and scale factor
+    # standard error of the bias, including the Earth's rate along the axis, rad/s
+    bias_sigma: float
+    quadratic: Term | None  # coefficient of the square of the rate, in addition to the line, s/rad
+    # difference of the scale factors of positive and negative rates over their mean, with one bias
+    asymmetry: Term | None
+    linearity: Linearity | None
+    # reasons for missing values, and quantities that contain others
+    not_observable: tuple[NotObservable, ...]
+
+    @property
+    def bias(self) -> Array:
+        """Bias, rad/s, shape (runs,)."""
+        return self.line.value[:, 0]
+
+    @property
+    def scale_factor(self) -> Array:
+        """Indicated over true rate, shape (runs,): 1 and the scale factor's error."""
+        return self.line.value[:, 1]
+
+    @property
+    def scale_factor_sigma(self) -> float:
+        """Its standard error."""
+        return float(self.line.sigma[1])
+
+    def bias_interval(self) -> Limits:
+        """Return confidence limits of the bias, rad/s, shapes (runs,)."""
+        return limits(self.bias, self.bias_sigma)
+
+    def scale_factor_interval(self) -> Limits:
+        """Return confidence limits of the scale factor, shapes (runs,)."""
+        return limits(self.scale_factor, self.scale_factor_sigma)
+
+
+class RateTable:
+    """A recording on a rate table: its blocks, the gyro's noise, and the rates that are known.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    blocks : Blocks
+        Of the schedule's `experiment`.
+    model : NoiseModel
+        Of the gyro, with some noise in every sample.
+    pointing : Pointing, optional
+        Direction of the table's axis, along which the gyro's is; without one the Earth's rate is
+        a part of the bias. Its heading may be left open where the axis is vertical.
+    setting_sigma : float
+        Standard deviation of the table's true rate about the stated one, of each stretch by
+        itself, rad/s.
+
+    Raises
+    ------
+    NotObservableError
+        If there is one rate only: the scale factor cannot be told from the bias.
+    ValueError
+        If the deviation is negative, or the heading is left open where it counts.
+    """
+
+    def __init__(
+        self,
+        schedule: Schedule,
+        blocks: Blocks,
+        model: NoiseModel,
+        pointing: Pointing | None = None,
+        *,
+        setting_sigma: float = 0.0,
+    ) -> None:
+        if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
+            raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")
+        if (
+            pointing is not None
+            and pointing.heading is None
+            and pointing.half_width > _MAX_UNKNOWN_RATE
+        ):
+            raise ValueError(
+                "the heading of the table's axis is not known: give it, or leave the direction out "
+                "and the Earth's rate is a part of the bias"
+            )
+        earth = 0.0 if pointing is None else pointing.rate
+        self._earth_sigma = 0.0 if pointing is None else pointing.rate_sigma
+        rate = schedule.of_blocks(blocks) + earth
+        self._levels = _index_levels(rate)
+        number = int(self._levels.max()) + 1
+        self._rates = np.array([rate[self._levels == level][0] for level in range(number)])
+        if number < 2:
+            raise NotObservableError(
+                f"the table has one rate only, {rate[0]:g} rad/s: a scale factor cannot be told "
+                "from a bias; another rate is needed, best of the other sense"
+            )
+        further = setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
+        ones = np.ones(len(blocks))
+
+        def squares(*columns: Array) -> LeastSquares:
+            return LeastSquares(blocks, model, np.column_stack(columns), further=further)
+
+        self._line = squares(ones, rate)
+        self._open: list[NotObservable] = []
+        if pointing is None:
+            self._open.append(
+                NotObservable("bias", "the Earth's rate along the axis is a part of the bias")
+            )
+        self._quadratic = self._asymmetry = self._each = None
+        if number > 2:
+            self._quadratic = squares(ones, rate, rate**2)
+            self._each = squares(*np.eye(number)[self._levels].T)
+        else:
+            for name in ("quadratic", "linearity"):
+                self._open.append(
+                    NotObservable(name, "two rates lie on a line whatever the gyro does")
+                )
+        try:
+            self._asymmetry = squares(ones, rate, np.abs(rate) / 2.0)
+        except NotObservableError:
+            self._open.append(
+                NotObservable(
+                    "asymmetry",
+                    "it takes three rates, and both senses among them: otherwise it is a bias or a "
+                    "scale factor",
+                )
+            )
+
+    @property
+    def sigma(self) -> tuple[float, float]:
+        """Standard errors of bias, rad/s, and scale factor; they need no data."""
+        bias, scale = self._line.sigma
+        return math.hypot(bias, self._earth_sigma), float(scale)
+
+    def fit(self, means: Array) -> Calibration:
+        """Estimate bias and scale factor in runs of this design from block means, rad/s, (runs, b).
+
+        Raises
+        ------
+        ValueError
+            If there is not one finite mean a block.
+        """
+        line = self._line.fit(means)
+        asymmetry = self._fit_asymmetry(means)
+        still = self._asymmetry is not None and asymmetry is None
+        return Calibration(
+            line,
+            self.sigma[0],
+            _fit_term(self._quadratic, means),
+            asymmetry,
+            self._test_linearity(line, means),
+            (*self._open, *[_NO_SCALE] * still),
+        )
+
+    def _test_linearity(self, line: Fit, means: Array) -> Linearity | None:
+        if self._each is None:
+            return None
+        each = self._each.fit(means)
+        explained = np.maximum(line.chi_squared - each.chi_squared, 0.0)
+        at_rates = np.column_stack([np.ones(len(self._rates)), self._rates])
+        # The line is fitted to the same means, which reduces the covariance of the residuals.
+        variance = np.diag(each.covariance - at_rates @ line.covariance @ at_rates.T)
+        full_scale = float(np.abs(self._rates).max())
+        return Linearity(
+            (each.value - line.value @ at_rates.T) / full_scale,
+            np.sqrt(np.maximum(variance, 0.0)) / full_scale,
+            full_scale,
+            np.asarray(chi2.sf(explained, line.freedom - each.freedom)),
+        )
+
+    def _fit_asymmetry(self, means: Array) -> Term | None:
+        """Return the asymmetry over the mean scale factor of both senses."""
+        if self._asymmetry is None:
+            return None
+        fit = self._asymmetry.fit(means)
+        scale = fit.value[:, 1]
+        if np.any(np.abs(scale) <= half_width() * fit.sigma[1]):
+            return None
+        # The error of the scale factor is of second order.
+        sigma = float(self._asymmetry.sigma[-1] / np.abs(scale).mean())
+        return Term(fit.value[:, -1] / scale, sigma)
+
+
+def calibrate(
+    log: Array,
+    schedule: Schedule,
+    model: NoiseModel,
+    pointing: Pointing | None = None,
+    *,
+    setting_sigma: float = 0.0,
+) -> tuple[Calibration, Measured]:
+    """Return bias and scale factor of a gyro from a log on a rate table, and its block means.
+
+    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are as
+    in `RateTable`.
+
+    Raises
+    ------
+    NotObservableError
+        If there is one rate only.
+    ValueError
+        If the log ends before the schedule does, or too few samples are present.
+    """
+    run = schedule.experiment
+    whole = max(stretch.stop - stretch.start for stretch in schedule.stretches)
+    _ = RateTable(schedule, run.blocks(whole), model, pointing)
+    longest = block_length(
+        run,
+        model,
+        lambda blocks: np.column_stack([np.ones(len(blocks)), schedule.of_blocks(blocks)]),
+    )
+    measured = block_means([log], run, longest)
+    table = RateTable(schedule, measured.blocks, model, pointing, setting_sigma=setting_sigma)
+    return table.fit(measured.means), measured
+
+
+def _index_levels(rate: Array) -> NDArray[np.int64]:
+    """Return the index of each rate among the distinct ones, equal up to rounding."""
+    order = np.argsort(rate, kind="stable")
+    risen = np.diff(rate[order], prepend=rate[order[0]]) > _RATE_TOLERANCE * np.abs(rate).max()
+    levels = np.empty(len(rate), dtype=np.int64)
+    levels[order] = np.cumsum(risen)
+    return levels
+
+
+def _fit_term(squares: LeastSquares | None, means: Array) -> Term | None:
+    if squares is None:
+        return None
+    return Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Residuals of steady rates from the line."""
+
+    # shape (k,); index in the schedule, from 0; rates without samples are left out
+    dwell: NDArray[np.int64]
+    mean: Array  # shape (k,); mean reading, rad/s
+    line: Array  # shape (k,); value of the line, rad/s
+    sigma: Array  # shape (k,); standard deviation of mean less line, rad/s
+
+    @property
+    def value(self) -> Array:
+        """Mean less line, rad/s, shape (k,)."""
+        return self.mean - self.line
+
+
+def residuals(
+    calibration: Calibration,
+    measured: Measured,
+    rates: Array,
+    model: NoiseModel,
+    setting_sigma: float = 0.0,
+) -> Residuals:
+    """Return the residuals of each steady rate, for a calibration of one run.
+
+    ``rates`` is the rate of table and Earth in each block, shape (b,), rad/s; ``setting_sigma`` is
+    the standard deviation of the true rate about the stated one, rad/s.
+    """
+    blocks = measured.blocks
+    dwell, place = np.unique(blocks.dwell, return_inverse=True)
+    mean_of = np.zeros((len(dwell), len(blocks)))
+    mean_of[place, np.arange(len(blocks))] = blocks.count
+    mean_of /= mean_of.sum(axis=1, keepdims=True)
+    regressors = np.column_stack([np.ones(len(blocks)), rates])
+    covariance = block_mean_covariance(model, blocks)
+    covariance = covariance + setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
+    covariance -= regressors @ calibration.line.covariance @ regressors.T
+    variance = np.einsum("ki,ij,kj->k", mean_of, covariance, mean_of)
+    return Residuals(
+        dwell.astype(np.int64),
+        mean_of @ measured.means[0],
+        mean_of @ (regressors @ calibration.line.value[0]),
+        np.sqrt(np.maximum(variance, 0.0)),
+    )

@@ -1,0 +1,148 @@
+"""The steady rates of a rate table: from its schedule, or from a column with the table's rate.
+
+The ramps between two steady rates are left out, and a settling time of table and gyro after each
+ramp.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Dwell, Experiment
+from imubench_pipeline.typing import Array
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Steady rates of a table, in their order.
+
+    Parameters
+    ----------
+    stretches : sequence of Dwell
+        Samples of each; their sense is not used.
+    table_rates : ndarray, shape (stretches,)
+        Rate of the table with respect to the Earth, rad/s, of the gyro's sign.
+    rate : float
+        Sampling rate, Hz.
+
+    Raises
+    ------
+    ValueError
+        If there is none, there is not one rate for each stretch, one is not finite, or stretches
+        overlap.
+    """
+
+    stretches: Sequence[Dwell]
+    table_rates: Array
+    rate: float
+
+    def __post_init__(self) -> None:
+        if len(self.table_rates) != len(self.stretches):
+            raise ValueError(
+                f"{len(self.table_rates)} table rates for {len(self.stretches)} stretches"
+            )
+        if not np.isfinite(self.table_rates).all():
+            raise ValueError("a table rate is not finite")
+        _ = self.experiment  # stretches in order, and a sampling rate above 0
+
+    @classmethod
+    def from_steps(
+        cls, steps: Sequence[tuple[float, float, float]], rate: float, *, settling: float = 0.0
+    ) -> Schedule:
+        """Return the schedule of known steps.
+
+        Each step is start and end of a steady rate, s from the first sample, and the rate, rad/s.
+        The settling time, s, at its start is left out. The sampling rate is in Hz.
+
+        Raises
+        ------
+        ValueError
+            If a step holds no sample after it has settled; see `Schedule`.
+        """
+        stretches = []
+        for start, stop, table_rate in steps:
+            # The first sample not before a time, with a tolerance for rounding.
+            first, last = (math.ceil(time * rate - 1e-6) for time in (start + settling, stop))
+            if not 0 <= first < last:
+                raise ValueError(
+                    f"the step of {table_rate:g} rad/s from {start:g} to {stop:g} s holds no "
+                    f"sample after {settling:g} s of settling"
+                )
+            stretches.append(Dwell(first, last, 1))
+        return cls(tuple(stretches), np.array([step[2] for step in steps]), rate)
+
+    @classmethod
+    def from_column(
+        cls, column: Array, rate: float, *, tolerance: float, shortest: float, settling: float = 0.0
+    ) -> Schedule:
+        """Find the steady rates in a column with the table's rate.
+
+        A sample is steady if the column stays within the tolerance for half the shortest time about
+        it. Consecutive steady samples are a stretch if they last long enough, and if the column
+        stays within twice the tolerance over all of them, which excludes slow ramps. The rate is
+        the mean of the column.
+
+        Parameters
+        ----------
+        column : ndarray, shape (n,)
+            rad/s; NaN is not steady.
+        rate : float
+            Sampling rate, Hz.
+        tolerance : float
+            Range of the column at a steady rate, including its noise, rad/s.
+        shortest : float
+            Shorter stretches are left out, s; the time includes settling.
+        settling : float
+            Time at the start of each stretch that is left out, s.
+
+        Raises
+        ------
+        ValueError
+            If the tolerance is negative, the shortest time is not longer than the settling, or
+            there is no steady rate.
+        """
+        if not tolerance >= 0:
+            raise ValueError(f"tolerance is {tolerance}, expected a rate from 0")
+        if not shortest > settling >= 0:
+            raise ValueError(f"shortest is {shortest} s, expected more than {settling} s settling")
+        window = 2 * max(round(shortest * rate / 4.0), 1) + 1
+        filled = np.where(np.isfinite(column), column, np.inf)
+        highest = maximum_filter1d(filled, window, mode="nearest")
+        lowest = minimum_filter1d(filled, window, mode="nearest")
+        with np.errstate(invalid="ignore"):
+            steady = (highest - lowest <= tolerance) & np.isfinite(highest)
+        change = np.diff(steady.astype(np.int8), prepend=0, append=0)
+        half = window // 2
+        stretches: list[Dwell] = []
+        rates: list[float] = []
+        for start, stop in zip(
+            np.flatnonzero(change == 1), np.flatnonzero(change == -1), strict=True
+        ):
+            # The window about the first steady sample is steady, too.
+            before = stretches[-1].stop if stretches else 0
+            first, last = max(int(start) - half, before), min(int(stop) + half, len(column))
+            part = column[first:last]
+            if (last - first) / rate < shortest or np.ptp(part) > 2.0 * tolerance:
+                continue
+            first += round(settling * rate)
+            stretches.append(Dwell(first, last, 1))
+            rates.append(float(np.mean(column[first:last])))
+        if not stretches:
+            raise ValueError(
+                f"the table's rate is nowhere steady to {tolerance:g} rad/s for {shortest:g} s"
+            )
+        return cls(tuple(stretches), np.array(rates), rate)
+
+    @property
+    def experiment(self) -> Experiment:
+        """The stretches as dwells, for block means; the latitude is not used."""
+        return Experiment(tuple(self.stretches), self.rate, 0.0)
+
+    def of_blocks(self, blocks: Blocks) -> Array:
+        """Return the table's rate in each block of `experiment`, rad/s, shape (b,)."""
+        return np.asarray(self.table_rates[blocks.dwell])

@@ -1,0 +1,18 @@
+"""Find bias and scale factor of a gyro whose rates are known; nothing of a rejected recording."""
+
+from pathlib import Path
+
+from imubench_pipeline.extensions.calibration.calibration import calibration_tables
+from imubench_pipeline.tables import write
+
+if __name__ == "__main__":
+    names = snakemake.wildcards
+    found = calibration_tables(
+        Path(snakemake.input.quality).parent,
+        [Path(path).parent for path in snakemake.input.static_quality],
+        names.sensor,
+        names.recording,
+        snakemake.params.settings,
+    )
+    for table, path in snakemake.output.items():
+        write(table, found[table], Path(path))

@@ -1,0 +1,307 @@
+"""What is declared of sensors whose rates or directions are known: beside logs, and simulated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, ClassVar, Self
+
+from pydantic import Field, model_validator
+
+from imubench_pipeline.extensions.calibration.pointing import Pointing
+from imubench_pipeline.settings.experiments import Experiment, Gyro, stated_gyro
+from imubench_pipeline.settings.requirements import Latitude, Time
+from imubench_pipeline.settings.validation import (
+    AccelerationFromZero,
+    Angle,
+    AngleFromZero,
+    Rate,
+    RateFromZero,
+    Strict,
+    Text,
+    TimeFromZero,
+)
+from imubench_pipeline.units import quantity_to_si
+
+_MAX_UNKNOWN_EARTH_RATE = 1e-9
+"""Largest uncertainty of the Earth's rate about an axis without a heading, rad/s."""
+
+TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+"""The axes that it takes, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
+
+
+class Direction(Strict):
+    """Where an axis points on the Earth.
+
+    Raises
+    ------
+    ValueError
+        If the latitude is missing, or a figure has a unit of another dimension or is out of range.
+    """
+
+    latitude: Latitude = Field(description="of the place, with its unit; south is negative")
+    heading: Angle | None = Field(
+        None, description="of the axis, from north towards east; null: not known"
+    )
+    elevation: Angle = Field(
+        "0 deg", description="of the axis above the horizon: 90 deg up, -90 deg down"
+    )
+    heading_sigma: AngleFromZero = Field("0 deg", description="standard deviation of the heading")
+    elevation_sigma: AngleFromZero = Field(
+        "0 deg", description="standard deviation of the elevation"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _placed(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("latitude") is None:
+            raise ValueError(
+                "latitude is missing; expected where the log was recorded, such as "
+                "latitude: 45.1 deg (south: negative)"
+            )
+        return data
+
+    @property
+    def pointing(self) -> Pointing:
+        """The same in rad."""
+        angles = {
+            name: quantity_to_si(getattr(self, name), "angle")
+            for name in ("latitude", "elevation", "heading_sigma", "elevation_sigma")
+        }
+        heading = None if self.heading is None else quantity_to_si(self.heading, "angle")
+        return Pointing(heading=heading, **angles)
+
+
+class AtRest(Direction, Experiment):
+    """A static log of a gyro whose axis points where it is known, or known in part."""
+
+    is_static: ClassVar[bool] = True
+
+    channel: Gyro | None = Field(
+        None, description="whose axis that is; null: the only gyro of the log"
+    )
+
+    def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> str:
+        """Return the one of the log's channels whose axis is stated, as of `stated_gyro`."""
+        return stated_gyro(self.channel, channels, "points there")
+
+
+class Step(Strict):
+    """A steady rate of the table."""
+
+    start: TimeFromZero = Field(description="from the first sample of the recording")
+    end: TimeFromZero = Field(description="likewise")
+    rate: Rate = Field(description="of the table, positive where a good gyro reads more")
+
+    @model_validator(mode="after")
+    def _lasts(self) -> Self:
+        if self.seconds[1] <= self.seconds[0]:
+            raise ValueError(f"end is {self.end}; expected a time after start, {self.start}")
+        return self
+
+    @property
+    def seconds(self) -> tuple[float, float]:
+        """Start and end, s."""
+        return quantity_to_si(self.start, "time"), quantity_to_si(self.end, "time")
+
+
+class OnRateTable(Experiment):
+    """A log of a gyro on a rate table, its axis along that of the table.
+
+    Raises
+    ------
+    ValueError
+        If a figure has a unit of another dimension or is out of range, steps are not in order,
+        settling takes all of a step, or the heading of an axis that is not vertical is missing.
+    """
+
+    steps: tuple[Step, ...] = Field(
+        (), description="steady rates in their order; none: they are in the column log.table_rate"
+    )
+    channel: Gyro | None = Field(
+        None, description="along the axis of the table; null: the only gyro of the log"
+    )
+    settling: TimeFromZero = Field("2 s", description="left out at the start of each steady rate")
+    tolerance: RateFromZero = Field(
+        "0.05 deg/s", description="range of the column log.table_rate at a steady rate"
+    )
+    shortest: Time = Field(
+        "10 s", description="steady rate that is looked for in that column, settling included"
+    )
+    setting_sigma: RateFromZero = Field(
+        "0 deg/s", description="standard deviation of each true rate about the stated one"
+    )
+    axis: Direction | None = Field(
+        None,
+        description="where the axis of the table points, for the part of the Earth's rate; null: "
+        "that is a part of the bias",
+    )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        settling = quantity_to_si(self.settling, "time")
+        for number, step in enumerate(self.steps, 1):
+            if step.seconds[1] - step.seconds[0] <= settling:
+                raise ValueError(
+                    f"steps: step {number} lasts from {step.start} to {step.end}; expected more "
+                    f"than the settling of {self.settling}: lengthen it, or lower settling"
+                )
+        for number, (before, after) in enumerate(pairwise(self.steps), 2):
+            if after.seconds[0] < before.seconds[1]:
+                raise ValueError(
+                    f"steps: step {number} starts at {after.start}, before step {number - 1} ends "
+                    f"at {before.end}; expected steps in their order"
+                )
+        if not self.steps and quantity_to_si(self.shortest, "time") <= settling:
+            raise ValueError(
+                f"shortest is {self.shortest}; expected more than the settling of {self.settling}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _heading_where_it_counts(self) -> Self:
+        if self.axis is None or self.axis.heading is not None:
+            return self
+        if self.axis.pointing.half_width > _MAX_UNKNOWN_EARTH_RATE:
+            raise ValueError(
+                "axis.heading is missing; expected where the axis of the table points, such as "
+                "heading: 0 deg (north), as it is not vertical (elevation: 90 deg or -90 deg); or "
+                "leave 'axis' out: the Earth's rate is then a part of the bias"
+            )
+        return self
+
+    def si(self, name: str, dimension: str) -> float:
+        """Return one of its figures in SI."""
+        return quantity_to_si(getattr(self, name), dimension)
+
+    def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str:
+        """Return the one of the log's channels that is along the axis of the table.
+
+        `column`: the log has a column with the rate of the table.
+
+        Raises
+        ------
+        ValueError
+            As `stated_gyro`; and if the rates of the table are stated nowhere, or twice.
+        """
+        if not self.steps and not column:
+            raise ValueError(
+                "steps: missing; expected the steady rates, such as - {start: 0 s, end: 60 s, "
+                "rate: 10 deg/s}, or a column with the rate of the table, log: {table_rate: "
+                "{column: ..., unit: deg/s}}"
+            )
+        if self.steps and column:
+            raise ValueError(
+                f"steps: found {len(self.steps)} of them, and the column log.table_rate; expected "
+                "one of the two: leave one out"
+            )
+        return stated_gyro(self.channel, channels, "is along that of the table")
+
+
+class InPositions(Experiment):
+    """A triad that is turned about its z axis, by the clock, and stands still between the turns.
+
+    Raises
+    ------
+    ValueError
+        If a figure has a unit of another dimension or is out of range, or a turn takes all of a
+        dwell.
+    """
+
+    latitude: Latitude = Field(description="of the place, with its unit; south is negative")
+    dwell: Time = Field(description="from the start of one turn to the start of the next")
+    turning: TimeFromZero = Field("2 s", description="of it at the end that the turn takes")
+    turned: tuple[Angle, ...] = Field(
+        ("0 deg", "180 deg"),
+        min_length=1,
+        description="angle of each position from the first, about z; they follow each other again "
+        "and again",
+    )
+    gyro_bias: RateFromZero = Field("0.5 deg/s", description="standard deviation of each")
+    accelerometer_bias: AccelerationFromZero = Field("20 mg", description="likewise")
+
+    @model_validator(mode="after")
+    def _stands(self) -> Self:
+        if self.seconds("turning") >= self.seconds("dwell"):
+            raise ValueError(
+                f"turning is {self.turning}; expected less than the dwell, {self.dwell}"
+            )
+        return self
+
+    def seconds(self, name: str) -> float:
+        """Return one of its times in s."""
+        return quantity_to_si(getattr(self, name), "time")
+
+    @property
+    def latitude_si(self) -> float:
+        """The latitude, rad."""
+        return quantity_to_si(self.latitude, "angle")
+
+    def angle(self, number: int) -> float:
+        """Return the angle of a position, counted from 0, from the first one, rad.
+
+        It grows where the next one is less far round, so that all turns go the same way.
+        """
+        angles = [quantity_to_si(text, "angle") for text in self.turned]
+        return angles[number % len(angles)] + 2.0 * math.pi * (number // len(angles))
+
+    def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> None:
+        """Raise ValueError if the log lacks an axis; it is about all of them."""
+        missing = [name for name in TRIAD if name not in channels]
+        if missing:
+            raise ValueError(
+                f"the log has no {', '.join(missing)}; expected three gyros and accelerometers"
+            )
+
+
+class SimulatedTable(OnRateTable):
+    """A gyro on a rate table that keeps to its steps, with ramps between them."""
+
+    scale_factor: float = Field(1.0, gt=0, description="true one: indicated over true rate")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @model_validator(mode="after")
+    def _has_steps(self) -> Self:
+        if not self.steps:
+            raise ValueError("steps is missing; expected the steady rates of the table")
+        return self
+
+    @property
+    def declared(self) -> OnRateTable:
+        """What would stand beside such a log."""
+        return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
+
+
+class SimulatedPositions(InPositions):
+    """A triad that is turned by the clock, and senses gravity and the Earth's rate."""
+
+    roll: Angle = Field("0 deg", description="true one, in the first position")
+    pitch: Angle = Field("0 deg", description="likewise")
+    heading: Angle = Field("0 deg", description="likewise, from north towards east")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @property
+    def declared(self) -> InPositions:
+        """What would stand beside such a log."""
+        return InPositions(**{name: getattr(self, name) for name in InPositions.model_fields})
+
+
+class SimulatedRest(AtRest):
+    """A gyro at rest that senses its part of the Earth's rate."""
+
+    true_heading: Angle = Field("0 deg", description="of the axis, where heading is null")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @property
+    def declared(self) -> AtRest:
+        """What would stand beside such a log."""
+        return AtRest(**{name: getattr(self, name) for name in AtRest.model_fields})
+
+    @property
+    def true(self) -> Pointing:
+        """Where the axis points, exactly."""
+        stated, heading = self.pointing, self.pointing.heading
+        if heading is None:
+            heading = quantity_to_si(self.true_heading, "angle")
+        return Pointing(latitude=stated.latitude, heading=heading, elevation=stated.elevation)

@@ -1,0 +1,74 @@
+"""What ideal gyros and accelerometers sense on a rate table, in positions, and at rest."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
+from imubench_pipeline.extensions.calibration.alignment.triad import Site
+from imubench_pipeline.extensions.calibration.positions import true_angles
+from imubench_pipeline.extensions.calibration.settings import (
+    TRIAD,
+    SimulatedPositions,
+    SimulatedRest,
+    SimulatedTable,
+)
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.simulate.profiles import Constant, SampledProfile
+from imubench_pipeline.typing import Array
+from imubench_pipeline.units import quantity_to_si
+
+
+def at_rest(recording: SimulatedRecording, rate: float) -> dict[str, Constant]:
+    """Return the part of the Earth's rate that a gyro at rest senses."""
+    rest = recording.block(SimulatedRest)
+    assert rest is not None
+    return {str(recording.moved_gyro): Constant(rest.true.rate)}
+
+
+def on_table(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+    """Return what the gyro indicates of the table, which goes straight from rate to rate."""
+    table = recording.block(SimulatedTable)
+    assert table is not None
+    times = [time for step in table.steps for time in step.seconds]
+    rates = np.repeat([quantity_to_si(step.rate, "angular_rate") for step in table.steps], 2)
+    true = np.interp(np.arange(recording.samples) / rate, times, rates)
+    earth = 0.0 if table.axis is None else table.axis.pointing.rate
+    indicated = SampledProfile(table.scale_factor * (true + earth), rate)
+    return {str(recording.moved_gyro): indicated}
+
+
+def in_positions(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+    """Return what a triad senses that is turned at a steady rate between its positions."""
+    positions, samples = recording.block(SimulatedPositions), recording.samples
+    assert positions is not None
+    dwell, turning = positions.seconds("dwell"), positions.seconds("turning")
+    number = math.ceil(samples / rate / dwell) + 1
+    # Where it stands, and where it begins to turn; without a turn it is moved between two samples.
+    times = np.repeat(np.arange(number) * dwell, 2)
+    times[1::2] += dwell - max(turning, 0.5 / rate)
+    angles = np.repeat([positions.angle(k) for k in range(number)], 2)
+    at = np.arange(samples) / rate
+    angle = np.interp(at, times, angles)
+    turned = np.diff(np.interp(at[0] + (np.arange(samples + 1) - 0.5) / rate, times, angles)) * rate
+    attitude = matrix(*true_angles(positions.model_dump()).values())
+    true = sensed(Site(latitude=positions.latitude_si), attitude, angle, turned)
+    return {name: SampledProfile(true[:, k], rate) for k, name in enumerate(TRIAD)}
+
+
+def sensed(site: Site, attitude: Array, angle: Array, turning: Array) -> Array:
+    """Return rate and specific force in the body frame, rad/s and m/s^2, shape (n, 6).
+
+    Gyros and accelerometers x, y, z are without errors, and the turns are about the accelerometers.
+    The attitude, shape (3, 3), belongs to the first position; ``angle`` is the angle from it about
+    z, rad, and ``turning`` the rate of this angle, rad/s, shape (n,).
+    """
+    cosine, sine = np.cos(angle), np.sin(angle)
+    columns = []
+    for vector in (site.earth_rate, site.specific_force):
+        x, y, z = attitude.T @ vector
+        columns += [cosine * x + sine * y, cosine * y - sine * x, np.full(len(angle), z)]
+    columns[2] = columns[2] + turning
+    return np.stack(columns, axis=1)

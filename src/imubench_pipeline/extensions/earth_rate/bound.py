@@ -1,0 +1,202 @@
+"""The Cramér-Rao bound of the Earth's rate, and a block length that loses no information.
+
+The bound is the variance of generalised least squares over the covariance C of the block means;
+Gaussian noise reaches it. With h the sensitivity of the block means to the rate, and 1 to the fixed
+bias,
+
+    information of the rate = h^T C^-1 h - (h^T C^-1 1)^2 / (1^T C^-1 1 + 1 / bias variance).
+
+It uses nothing of the filter. White noise alone gives N / sqrt(T) / cos(latitude) for T seconds in
+dwells, if the bias is known; all other noise only adds to it.
+
+`whiten` decorrelates block means in a time that grows with their number, not with its cube. For any
+blocks, `covariance.block_mean_covariance` and a Cholesky root do the same. For noise with states,
+the innovations of a Kalman filter over their standard deviations are L^-1 y, with L the root of the
+same covariance (R. E. Kalman 1960). The tests compare the closed-form covariance with the states.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+
+from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
+from imubench_pipeline.extensions.calibration.states import block_states
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_MAX_SIGMA_INCREASE = 1e-3
+"""Largest relative increase of the standard deviation by longer blocks."""
+
+_TESTED_DWELLS = 4
+"""Dwells on which a block length is tested."""
+
+MAX_BLOCKS = 2048
+"""Largest number of blocks in the test of a block length, and in a prediction."""
+
+
+def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
+    """Return L^-1 columns, shape (b, c), with L L^T the covariance of the block means of a model.
+
+    The model must have some noise in every sample.
+
+    Raises
+    ------
+    ValueError
+        If a mean has no noise, given those before it.
+    """
+    states = block_states(model, blocks, turn_on_bias=0.0)
+    innovations = _compute_innovations(
+        np.stack([step.transition for step in states.steps]),
+        np.stack([step.factor @ step.factor.T for step in states.steps]),
+        states.which,
+        states.initial @ states.initial.T,
+        states.white**2,
+        np.ascontiguousarray(columns),
+    )
+    if not np.isfinite(innovations).all():
+        raise ValueError(f"the noise model {model.name} leaves a mean without noise")
+    return innovations
+
+
+@njit(cache=True, nogil=True)
+def _compute_innovations(
+    transitions: Array,
+    noises: Array,
+    which: NDArray[np.int64],
+    covariance: Array,
+    white: Array,
+    columns: Array,
+) -> Array:
+    """Return innovations over their standard deviations.
+
+    The last row of a transition matrix gives the mean of the block.
+    """
+    # Plain loops: products of arrays take eight times as long to compile.
+    m, width = covariance.shape[0], columns.shape[1]
+    covariance = covariance.copy()
+    filtered = np.zeros((m, width))
+    through, predicted = np.zeros((m + 1, m)), np.zeros((m + 1, m + 1))
+    states = np.zeros((m + 1, width))
+    innovations = np.zeros(columns.shape)
+    for k in range(len(which)):
+        transition, noise = transitions[which[k]], noises[which[k]]
+        for i in range(m + 1):
+            for j in range(m):
+                through[i, j] = 0.0
+                for r in range(m):
+                    through[i, j] += transition[i, r] * covariance[r, j]
+            for j in range(m + 1):
+                predicted[i, j] = noise[i, j]
+                for r in range(m):
+                    predicted[i, j] += through[i, r] * transition[j, r]
+            for j in range(width):
+                states[i, j] = 0.0
+                for r in range(m):
+                    states[i, j] += transition[i, r] * filtered[r, j]
+        variance = predicted[m, m] + white[k]
+        if not variance > 0.0:
+            innovations[k, 0] = np.nan
+            return innovations
+        for j in range(width):
+            innovation = columns[k, j] - states[m, j]
+            innovations[k, j] = innovation / math.sqrt(variance)
+            for i in range(m):
+                filtered[i, j] = states[i, j] + predicted[i, m] / variance * innovation
+        for i in range(m):
+            for j in range(m):
+                covariance[i, j] = predicted[i, j] - predicted[i, m] * predicted[j, m] / variance
+    return innovations
+
+
+def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
+    """Return the least standard deviation of the rate that the data up to each block allow.
+
+    In rad/s, shape (b,); infinite where the rate and the bias are not separable. The standard
+    deviation of the bias, rad/s, is by default unknown. The model must have some noise in every
+    sample: N, or a process with such noise.
+
+    Raises
+    ------
+    ValueError
+        If the turn-on bias is negative, or NaN.
+    """
+    return sigma_of(information(blocks, model, turn_on_bias))
+
+
+def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
+    """Return the Fisher information of the rate in the data up to each block, (rad/s)^-2, (b,).
+
+    The parameters and errors are as in `cramer_rao`.
+    """
+    # The root of the leading blocks is the leading part of the root.
+    root = cholesky(block_mean_covariance(model, blocks), lower=True, overwrite_a=True)
+    return _eliminate_bias(solve_triangular(root, _build_design(blocks), lower=True), turn_on_bias)
+
+
+def information_by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float) -> Array:
+    """Return the same as `information`, faster for many blocks."""
+    return _eliminate_bias(whiten(model, blocks, _build_design(blocks)), turn_on_bias)
+
+
+def _build_design(blocks: Blocks) -> Array:
+    """Return the sensitivity of the means to the rate, and to a fixed bias, shape (b, 2)."""
+    return np.column_stack([blocks.seen, np.ones(len(blocks))])
+
+
+def _eliminate_bias(white: Array, turn_on_bias: float) -> Array:
+    if not turn_on_bias >= 0:
+        raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0, or infinity")
+    rate = np.cumsum(white[:, 0] ** 2)
+    if turn_on_bias == 0:
+        return rate
+    cross = np.cumsum(white[:, 0] * white[:, 1])
+    bias = np.cumsum(white[:, 1] ** 2) + 1.0 / turn_on_bias**2
+    left = rate - cross**2 / bias
+    return np.asarray(np.where(left > 1e-9 * rate, left, 0.0))
+
+
+def bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
+    """Return `cramer_rao` at the end of a run, rad/s, faster for many blocks."""
+    return float(sigma_of(information_by_states(blocks, model, turn_on_bias))[-1])
+
+
+def block_length(experiment: Experiment, model: NoiseModel) -> int:
+    """Return the longest block, in samples, whose means keep the information of the samples.
+
+    Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
+    than 0.1 %. The bound is computed for the first four dwells, with 2,048 blocks at most, none
+    longer than the longest dwell.
+    """
+    tried = Experiment(experiment.dwells[:_TESTED_DWELLS], experiment.rate, experiment.latitude)
+    length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
+    if len({dwell.sense for dwell in tried.dwells}) < 2:
+        return length  # the rate is not observable, from samples either
+    sigmas: dict[int, float] = {}
+
+    def sigma(longest: int) -> float:
+        if longest not in sigmas:
+            sigmas[longest] = float(
+                sigma_of(information_by_states(tried.blocks(longest), model, math.inf))[-1]
+            )
+        return sigmas[longest]
+
+    while length > 4 and len(tried.blocks(length // 4)) <= MAX_BLOCKS:
+        if sigma(length // 4) > (1.0 - _MAX_SIGMA_INCREASE) * sigma(length):
+            break
+        length //= 2
+    return length
+
+
+def sigma_of(fisher: Array) -> Array:
+    """Return the standard deviations, rad/s, of information, 1/(rad/s)², both of shape (n,).
+
+    They are infinite where there is no information.
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / np.sqrt(fisher))

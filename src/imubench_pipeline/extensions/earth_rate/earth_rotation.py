@@ -1,0 +1,444 @@
+"""The Earth's rate of one recording of a gyro that was turned, as rows of the tables."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.linalg import LinAlgError
+
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.earth_rate.courses import (
+    METHODS,
+    Course,
+    Courses,
+    estimate_courses,
+    sigma_ranges,
+    thin,
+    white_sigma,
+)
+from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
+from imubench_pipeline.extensions.earth_rate.published import RunDesign, published_row
+from imubench_pipeline.extensions.earth_rate.settings import (
+    EarthRateSettings,
+    SimulatedTurns,
+    TwoPosition,
+)
+from imubench_pipeline.extensions.earth_rate.tables import (
+    TURNED,
+    EarthRatePredictionRow,
+    EarthRatePublishedRow,
+    EarthRateRow,
+    EarthRateSeriesRow,
+    TurningRow,
+)
+from imubench_pipeline.extensions.earth_rate.turning import find_turning
+from imubench_pipeline.extensions.earth_rate.turns import FoundDwell, Turning
+from imubench_pipeline.model.table import TableRow
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.recordings.kept import kept_logs
+from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.simulate.models import axis_model
+from imubench_pipeline.steps.noise_source import (
+    NO_MODEL,
+    NoiseSource,
+    noise_source,
+    segments_reason,
+)
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.typing import Array
+from imubench_pipeline.units import quantity_to_si
+
+WHOLE = "whole"
+"""Name of the part that is all of a recording."""
+
+_MIN_SCHEDULED_SHARE = 0.9
+"""Min. share of turns found only by the schedule from which the turns count as not visible."""
+
+_Z_95 = 1.96
+"""Standard deviations of a 95 % limit."""
+
+_KNOWN_RATE_REASON = (
+    "bias tracking with known rate: the filter is given the Earth's rate and returns it; whatever "
+    "rate it is given, it finds"
+)
+
+
+_POSITION_CLOCK_REASON = (
+    "the position has a clock of its own; give it as a column of the file that the gyro is in, or "
+    "leave 'position' out"
+)
+
+
+_Timed = TypeVar("_Timed", TurningRow, EarthRateSeriesRow)
+
+
+def earth_rate_tables(
+    folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
+) -> dict[str, list[TableRow]]:
+    """Return the rows of the tables of a gyro that was turned; none of a rejected recording.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the recording.
+    static : sequence of Path
+        Folders of the static recordings of the same sensor.
+    sensor, recording : str
+    settings : str
+        As `imubench_pipeline.run.plan.Plan.experiment_settings` gives them.
+    """
+    rows: dict[str, list[TableRow]] = {name: [] for name in TURNED}
+    sections = json.loads(settings)
+    logs = kept_logs(folder)
+    if not logs:
+        return rows
+    simulated = turns = None
+    if "simulated" in sections:
+        simulated = SimulatedRecording.model_validate(sections["simulated"])
+        turns = simulated.block(SimulatedTurns)
+    declared = turns.declared if turns else TwoPosition.model_validate(sections["two_position"])
+    metadata = read_metadata(next(iter(logs.values())).path)
+    channel = declared.moved_gyro([*logs, *metadata["unusable"]])
+    key = Key(sensor, recording, channel)
+    if channel not in logs:
+        reason = f"{channel} cannot be used; the findings of the recording say why"
+        rows["earth_rate"] = list(_without(_names(key, declared), WHOLE, "not_shown", reason))
+        return rows
+    how = EarthRateSettings.model_validate(sections["earth_rate"])
+    source = noise_source(folder, static, key, Sensor.model_validate(sections["sensor"]), how.draws)
+    begins = metadata.get("begins", 0.0)
+    found = _earth_rate(key, logs[channel], declared, source, how, begins)
+    rows |= vars(found)
+    if simulated is not None and turns is not None:
+        published = _published(key, simulated, turns, found.earth_rate)
+        rows["earth_rate_published"] = list(published)
+    return rows
+
+
+def _published(
+    key: Key,
+    simulated: SimulatedRecording,
+    turns: SimulatedTurns,
+    estimates: Sequence[EarthRateRow],
+) -> Iterator[EarthRatePublishedRow]:
+    """Yield what the source of a simulated recording prints, beside what is found of it."""
+    rate = quantity_to_si(simulated.rate, "frequency")
+    schedule = RunDesign(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
+    (noise,) = (
+        axis_model(axis, name).noise
+        for name, axis in simulated.channels.items()
+        if name == key.channel
+    )
+    values = {(row.part, row.method): row.value for row in estimates}
+    for figure in turns.published:
+        part = figure.part
+        text = simulated.duration if part == WHOLE else part.removeprefix("last ")
+        value = quantity_to_si(figure.printed, "angular_rate")
+        yield EarthRatePublishedRow(
+            **asdict(key),
+            part=part,
+            place=figure.where,
+            printed=figure.printed,
+            **published_row(value, schedule, quantity_to_si(text, "time"), noise),
+            simulated=values.get((part, "pairs")),
+            simulated_filter=values.get((part, "filter")),
+            assumed=", ".join(turns.assumed) or None,
+        )
+
+
+@dataclass
+class EarthRate:
+    """Rows of the tables that an experiment leaves."""
+
+    earth_rate: list[EarthRateRow] = field(default_factory=list)
+    earth_rate_series: list[EarthRateSeriesRow] = field(default_factory=list)
+    turning: list[TurningRow] = field(default_factory=list)
+    earth_rate_prediction: list[EarthRatePredictionRow] = field(default_factory=list)
+
+
+def _names(key: Key, declared: TwoPosition, source: NoiseSource | None = None) -> dict[str, Any]:
+    """Return what every row of the table ``earth_rate`` says."""
+    return asdict(key) | {
+        "latitude": declared.latitude_si,
+        "model": source.model.name if source else None,
+        "model_from": source.words if source else None,
+    }
+
+
+def _earth_rate(
+    key: Key,
+    log: ChannelLog,
+    declared: TwoPosition,
+    source: NoiseSource | None,
+    settings: EarthRateSettings,
+    begins: float,
+) -> EarthRate:
+    """Find the turns of a gyro and estimate the Earth's rate; else the rows say why not.
+
+    Without a noise source the turns are found, and nothing is estimated. `begins`: time of the
+    first sample that is used, s from the first of the recording.
+    """
+    tables = EarthRate()
+    names = _names(key, declared, source)
+    if len(log.segments) > 1 or log.position_elsewhere:
+        reason = segments_reason(log) if len(log.segments) > 1 else _POSITION_CLOCK_REASON
+        tables.earth_rate += _without(names, WHOLE, "not_shown", reason)
+        return tables
+    if source is not None:
+        _predict(key, log.rate, declared, source, settings, tables)
+    samples = on_grid(log.blocks(), log.grid)
+    try:
+        turning = find_turning(
+            samples,
+            log.rate,
+            declared.seconds("dwell"),
+            turning=declared.seconds("turning"),
+            start=declared.seconds("start"),
+            first_sense=declared.first_sense,
+            position=on_grid(log.positions(), log.grid) if log.position else None,
+            model=source.model if source else None,
+            margin=quantity_to_si(settings.margin, "time"),
+            trust_schedule=declared.trust_schedule,
+        )
+    except ValueError as error:
+        reason = (
+            f"no turns: {error}; check 'dwell' and 'channel' of two_position, or give the log a "
+            "column with the position (log: position)"
+        )
+        tables.earth_rate += _without(names, WHOLE, "no_turns", reason)
+        return tables
+    tables.turning += _later(_turning_rows(key, turning, samples, log.rate), begins)
+    if source is None:
+        tables.earth_rate += _without(names, WHOLE, "no_model", NO_MODEL)
+        return tables
+    used = _used(samples, turning, log.rate)
+    dwells = [dwell for _, dwell in _dwells(turning, log.rate)]
+    bias, unsure = declared.turn_on_bias_si, _unsure(turning, declared.trust_schedule)
+    model, *drawn = (_drifting(each, declared.drift_si) for each in (source.model, *source.drawn))
+    for part, start in _parts(declared, len(samples) / log.rate):
+        chosen = [dwell for dwell in dwells if dwell.start >= start * log.rate]
+        try:
+            experiment = _experiment(chosen, log.rate, declared)
+            courses = estimate_courses(used, experiment, model, source.papers, bias)
+        except (ValueError, LinAlgError) as error:
+            tables.earth_rate += _without(names, part, "too_short", str(error))
+            continue
+        extent = {"dwells": len(chosen), "turns": len(chosen) - 1}
+        ranges = sigma_ranges(courses.measured.blocks, model, drawn, bias)
+        rows = _estimates(names | extent, part, courses, source, unsure, log.rate)
+        tables.earth_rate += [EarthRateRow(**(row | ranges.get(row["method"], {}))) for row in rows]
+        tables.earth_rate_series += _later(_series(key, part, courses), begins)
+    return tables
+
+
+def _drifting(model: NoiseModel, drift: float) -> NoiseModel:
+    """Return a model with a steady drift of a standard deviation beside its own, rad/s^2."""
+    return replace(model, R=(model.R**2 + drift**2) ** 0.5) if drift else model
+
+
+def _predict(
+    key: Key,
+    rate: float,
+    declared: TwoPosition,
+    source: NoiseSource,
+    settings: EarthRateSettings,
+    into: EarthRate,
+) -> None:
+    turning = declared.seconds("turning")
+    outlook = Outlook(
+        source.model,
+        declared.latitude_si,
+        turning,
+        rate,
+        math.inf if declared.turn_on_bias_si is None else declared.turn_on_bias_si,
+    )
+    run_time = max(
+        quantity_to_si(settings.run_time, "time"), 3.0 * declared.seconds("dwell") + turning
+    )
+    rows = prediction_rows(outlook, declared.seconds("dwell") - turning, settings.goals, run_time)
+    into.earth_rate_prediction += [EarthRatePredictionRow(**asdict(key), **row) for row in rows]
+
+
+def _experiment(dwells: Sequence[Dwell], rate: float, declared: TwoPosition) -> Experiment:
+    if len(dwells) < 2:
+        raise ValueError(f"{len(dwells)} dwells are not enough; it takes one of each position")
+    return Experiment(tuple(dwells), rate, declared.latitude_si)
+
+
+def _parts(declared: TwoPosition, duration: float) -> Iterator[tuple[str, float]]:
+    """Yield what is estimated by itself, and where in the log it begins, s."""
+    yield WHOLE, 0.0
+    for text in declared.last:
+        yield f"last {text}", max(duration - quantity_to_si(text, "time"), 0.0)
+
+
+def _later(rows: Iterator[_Timed], begins: float) -> Iterator[_Timed]:
+    """Yield rows with their times counted from the first sample of the recording."""
+    for row in rows:
+        times = {name: getattr(row, name, None) for name in ("start", "stop", "time")}
+        later = {name: time + begins for name, time in times.items() if time is not None}
+        yield replace(row, **later)
+
+
+def _dwells(turning: Turning, rate: float) -> Iterator[tuple[FoundDwell, Dwell]]:
+    """Yield the dwells that hold samples."""
+    for dwell in turning.dwells:
+        if dwell.stop - dwell.start > 2.0 / rate:
+            yield dwell, dwell.in_samples(rate)
+
+
+def _used(samples: Array, turning: Turning, rate: float) -> Array:
+    """Return the samples without those of knocks."""
+    used = samples.copy()
+    used[turning.senses(len(samples), rate) == 0] = np.nan
+    return used
+
+
+def _turning_rows(key: Key, turning: Turning, samples: Array, rate: float) -> Iterator[TurningRow]:
+    """Yield the rows of the table ``turning``."""
+    names = asdict(key)
+    for text in turning.doubts:
+        yield TurningRow(**names, what="doubt", doubts=text)
+    used = _used(samples, turning, rate)
+    for number, (dwell, part) in enumerate(_dwells(turning, rate), 1):
+        values = used[part.start : part.stop]
+        finite = np.isfinite(values)
+        yield TurningRow(
+            **names,
+            what="dwell",
+            number=number,
+            start=dwell.start,
+            stop=dwell.stop,
+            sense=dwell.sense,
+            found_by=dwell.found_by,
+            mean=float(values[finite].mean()) if finite.any() else None,
+            doubts="; ".join(dwell.doubts) or None,
+        )
+    for number, turn in enumerate(turning.turns, 1):
+        yield TurningRow(
+            **names,
+            what="turn",
+            number=number,
+            start=turn.start,
+            stop=turn.stop,
+            time=turn.time,
+            found_by=turn.found_by,
+            peak=turn.peak,
+            doubts="; ".join(turn.doubts) or None,
+        )
+    for number, (start, stop) in enumerate(turning.knocks, 1):
+        yield TurningRow(**names, what="knock", number=number, start=start, stop=stop)
+
+
+def _estimates(
+    names: dict[str, Any],
+    part: str,
+    courses: Courses,
+    source: NoiseSource,
+    unsure: dict[str, Any],
+    rate: float,
+) -> Iterator[dict[str, Any]]:
+    measured, blocks = courses.measured, courses.measured.blocks
+    about = names | {
+        "part": part,
+        "unit": "rad/s",
+        "truth": EARTH_RATE,
+        "white": white_sigma(source.model, blocks),
+        "duration": blocks.duration,
+        "samples": int(blocks.count.sum()),
+        "missing": measured.missing + measured.left_out,
+        "block": courses.longest / rate,
+    }
+    for course in courses.courses:
+        yield about | _figure(course, unsure)
+
+
+def _unsure(turning: Turning, trusted: bool) -> dict[str, Any]:
+    """Return status and reason of estimates of which sign or turns are not known."""
+    reasons = []
+    by_schedule, turns = turning.by_schedule, len(turning.turns)
+    unseen = by_schedule >= _MIN_SCHEDULED_SHARE * turns
+    if unseen:
+        reasons.append(
+            f"{by_schedule} of {turns} turns rest on the schedule: nothing else shows that it was "
+            f"turned, and its level alternates by {abs(turning.alternation.z):.1f} standard errors"
+        )
+        if not trusted:
+            reasons.append(
+                "chance alone does so in one log of some 400 that were never turned; if this one "
+                "was turned by the clock, state 'trust_schedule: true'"
+            )
+    if turning.ambiguous:
+        reasons.append(
+            "where the axis points first is not known, and taken for north: the sign may be the "
+            "other one; state 'first: north' or 'first: south'"
+        )
+    if not reasons:
+        return {}
+    doubtful = turning.ambiguous or (unseen and not trusted)
+    return {"status": "ambiguous" if doubtful else "ok", "reason": "; ".join(reasons)}
+
+
+def _figure(course: Course, unsure: dict[str, Any]) -> dict[str, Any]:
+    row: dict[str, Any] = {"method": course.method, "parameter": "earth_rate"}
+    if course.reason is not None:
+        return row | {"status": "not_shown", "reason": course.reason}
+    value = float(course.rate[-1])
+    if course.sigma is None:
+        return row | {
+            "value": value,
+            "status": "given",
+            "reason": _KNOWN_RATE_REASON,
+            "settled": None if course.settled in (None, math.inf) else course.settled,
+        }
+    sigma = float(course.sigma[-1])
+    row |= {
+        "status": "ok",
+        "value": value,
+        "lower": value - _Z_95 * sigma,
+        "upper": value + _Z_95 * sigma,
+        "sigma": sigma,
+        "off_sigma": (value - EARTH_RATE) / sigma,
+    }
+    return row | unsure
+
+
+def _without(names: dict[str, Any], part: str, status: str, reason: str) -> Iterator[EarthRateRow]:
+    """Yield the rows of a part of which nothing can be estimated."""
+    for method in METHODS:
+        yield EarthRateRow(
+            **names,
+            part=part,
+            method=method,
+            parameter="earth_rate",
+            unit="rad/s",
+            truth=EARTH_RATE,
+            status=status,
+            reason=reason,
+        )
+
+
+def _series(key: Key, part: str, courses: Courses) -> Iterator[EarthRateSeriesRow]:
+    """Yield the rows of the table ``earth_rate_series``."""
+    drift = Course("smoother", courses.drift_time, courses.drift, courses.drift_sigma)
+    shown = [*(("rate", course) for course in courses.courses), ("drift", drift)]
+    for quantity, course in shown:
+        for k in thin(len(course.time)):
+            yield EarthRateSeriesRow(
+                **asdict(key),
+                part=part,
+                method=course.method,
+                quantity=quantity,
+                time=float(course.time[k]),
+                value=float(course.rate[k]),
+                sigma=None if course.sigma is None else float(course.sigma[k]),
+            )

@@ -1,0 +1,130 @@
+"""What the page of the Earth's rate says of how well sensors at rest find their attitude."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.extensions.earth_rate.tables import AlignmentRow
+from imubench_pipeline.report.payload import Arrays
+from imubench_pipeline.report.practical import page_unit
+from imubench_pipeline.report.site import Site
+from imubench_pipeline.words.numbers import degrees_text, duration_text, number_text, sentence
+
+_SHOWN = (60.0, 600.0, 3600.0)
+"""Times of the table, s; the figure has more."""
+
+_POSITIONS = {1: "one position", 2: "two opposite positions"}
+
+
+def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
+    """Return what is said of each sensor with gyros and accelerometers; arrays take its figures."""
+    entries = []
+    for view in site.views:
+        rows = view.rows(AlignmentRow)
+        if rows:
+            about = rows[0]
+            unit, fine = page_unit("gyro", "adev", site.system), page_unit("accel", "adev", "si")
+            entries.append(
+                {
+                    "view": view,
+                    "latitude": degrees_text(about.latitude),
+                    "biases": (
+                        f"Fixed biases of {unit.text(about.gyro_bias, 3)} {unit.sign} "
+                        f"({about.gyro_bias_from}) and "
+                        f"{fine.text(about.accelerometer_bias, 3)} {fine.sign} "
+                        f"({about.accelerometer_bias_from})."
+                    ),
+                    "axes": _axes(about),
+                    "lines": [_line(row) for row in rows if row.time in _SHOWN],
+                    "none": list(dict.fromkeys(sentence(row.reason) for row in rows if row.reason)),
+                    "check": _check(rows),
+                    "drawn": _drawn(rows, arrays),
+                }
+            )
+    return entries
+
+
+def _axes(row: AlignmentRow) -> str:
+    """Return which axes stand for others that the log has not, in a sentence."""
+    lent_axes = []
+    for channels, words in ((row.gyros, "gyro"), (row.accelerometers, "accelerometer")):
+        pairs = [entry.split(": ") for entry in channels.split(", ")]
+        lent = [axis for axis, channel in pairs if not channel.endswith(f"_{axis}")]
+        if lent:
+            lent_axes.append(f"{words} {' and '.join(lent)}")
+    if not lent_axes:
+        return ""
+    return f"The log has no {', '.join(lent_axes)}: the axes that are there stand for them."
+
+
+def _line(row: AlignmentRow) -> dict[str, Any]:
+    return {
+        "position": _POSITIONS[row.positions],
+        "method": row.method,
+        "time": duration_text(row.time),
+        "roll": _angle(row.roll),
+        "pitch": _angle(row.pitch),
+        "heading": _angle(row.heading),
+    }
+
+
+def _angle(value: float | None) -> str:
+    return "not to be had" if value is None else degrees_text(value, 3)
+
+
+def _check(rows: Sequence[AlignmentRow]) -> str:
+    """Return what simulated triads say of the standard deviations, in a sentence."""
+    comparisons = []
+    for row in rows:
+        if row.simulated is None:
+            continue
+        ratios = (
+            ("roll", row.error_roll),
+            ("pitch", row.error_pitch),
+            ("heading", row.error_heading),
+        )
+        ratio_words = ", ".join(
+            f"{name} {number_text(ratio, 3)}" for name, ratio in ratios if ratio is not None
+        )
+        comparisons.append(f"in {_POSITIONS[row.positions]} {ratio_words}")
+    if not comparisons:
+        return ""
+    number = next(row.simulated for row in rows if row.simulated is not None)
+    last = duration_text(max(row.time for row in rows))
+    return (
+        f"Check: {number} simulated triads of this noise, aligned for {last} by the filter; rms "
+        f"of their errors over the predicted σ: {'; '.join(comparisons)}."
+    )
+
+
+def _drawn(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str, Any]]:
+    """Return the courses of the figure: level is the worse of roll and pitch."""
+    courses = []
+    for positions in _POSITIONS:
+        for method in ("coarse", "fine"):
+            own = [r for r in rows if r.positions == positions and r.method == method]
+            values = {
+                "heading": [r.heading for r in own],
+                "level": [_worse(r.roll, r.pitch) for r in own],
+            }
+            for angle, sigma in values.items():
+                points = [(r.time, s) for r, s in zip(own, sigma, strict=True) if s]
+                if points:
+                    courses.append(
+                        {
+                            "positions": positions,
+                            "method": method,
+                            "angle": angle,
+                            "time": arrays.exact([time for time, _ in points]),
+                            "sigma": arrays.exact(np.degrees([s for _, s in points]).tolist()),
+                        }
+                    )
+    return courses
+
+
+def _worse(*angles: float | None) -> float | None:
+    """Return the largest angle; None where one is not known, which may be the largest."""
+    return None if None in angles else max(angle for angle in angles if angle is not None)

@@ -1,0 +1,348 @@
+"""The page of a recording of a gyro that was turned between north and south."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.extensions.calibration.figures import noise_words
+from imubench_pipeline.extensions.earth_rate.tables import (
+    EarthRatePredictionRow,
+    EarthRatePublishedRow,
+    EarthRateRow,
+    EarthRateSeriesRow,
+    TurningRow,
+)
+from imubench_pipeline.model.estimates import EnvelopeRow
+from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
+from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words
+from imubench_pipeline.report.site import RecordingPage, Site
+from imubench_pipeline.report.view import RecordingView
+from imubench_pipeline.words.numbers import (
+    counted,
+    degrees_text,
+    duration_text,
+    limit_digits,
+    number_text,
+    percent_text,
+    sentence,
+)
+
+METHOD_TERMS = {
+    "pairs": "by_pairs",
+    "triples": "by_triples",
+    "filter": "rate_filter",
+    "smoother": "rate_smoother",
+    "known_rate": "known_rate",
+    "known_rate_radians": "known_rate",
+}
+"""Term of the glossary of each method."""
+
+METHOD_WORDS = {
+    "pairs": "pairs of dwells",
+    "triples": "A-B-A differences",
+    "filter": "filter, rate unknown",
+    "smoother": "smoother, rate unknown",
+    "known_rate": "bias tracking with known rate, P₀ in (°/s)²",
+    "known_rate_radians": "bias tracking with known rate, P₀ in (rad/s)²",
+}
+ESTIMATES = ("filter", "pairs", "triples")
+"""The methods that find the rate, the one to use first; the smoother's is that of the filter."""
+
+
+def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    """Return what the template needs; ``folder`` is the recording's."""
+    arrays = Arrays()
+    rows = view.rows(EarthRateRow)
+    channel = rows[0].channel if rows else ""
+    whole = [row for row in rows if row.part == "whole"]
+    turning = view.rows(TurningRow)
+    parts = list(dict.fromkeys(row.part for row in rows if row.value is not None))
+    envelope = rows_of_samples(folder, EnvelopeRow)
+    prediction = view.rows(EarthRatePredictionRow)
+    return {
+        **about_of(site, view, [], folder),
+        "channel": channel,
+        "summary": _summary(view, turning, rows),
+        "answer": answer(whole, site.system),
+        "doubts": [sentence(row.doubts) for row in turning if row.what == "doubt"],
+        "findings": view.findings,
+        "lines": [line(row) for row in rows],
+        "given": given_words(rows),
+        "noise": noise_words(rows),
+        "has_range": any(row.sigma_lower is not None for row in rows),
+        "latitude": latitude_text(rows) if rows else "",
+        "parts": parts,
+        "has_samples": any(row.channel == channel for row in envelope),
+        "has_drift": any(row.quantity == "drift" for row in view.rows(EarthRateSeriesRow)),
+        "published": list(published_lines(view.rows(EarthRatePublishedRow))),
+        "needs": needs(prediction),
+        "has_prediction": bool(prediction),
+        "stretches": list(_stretches(turning)),
+        "command": site.again(view, "earth_rate"),
+        "page": {
+            "looks": {},
+            "channels": [],
+            "findings": [],
+            "samples": samples_payload(envelope, [], arrays),
+            "turned": _payload(view, rows, turning, arrays),
+            "prediction": prediction_payload(prediction, arrays),
+            "arrays": arrays.texts,
+        },
+    }
+
+
+TURNED_PAGE = RecordingPage("turned.html.jinja", context, "two positions")
+"""The page of a gyro that was turned between north and south."""
+
+
+def _summary(
+    view: RecordingView, turning: Sequence[TurningRow], rows: Sequence[EarthRateRow]
+) -> str:
+    turns = sum(event.what == "turn" for event in turning)
+    parts = [f"{counted(turns, 'turn')} between north and south"]
+    if rows:
+        parts.append(f"at latitude {latitude_text(rows)}")
+    return summary_words(view, parts)
+
+
+def latitude_text(rows: Sequence[EarthRateRow | EarthRatePredictionRow]) -> str:
+    """Return the latitude of a recording in degrees, of rows that have it, at least one."""
+    return degrees_text(rows[0].latitude)
+
+
+def answer(rows: Sequence[EarthRateRow], system: System) -> str:
+    """Return what was found in a sentence: the filter's estimate, or why there is none.
+
+    Of rows of the table ``earth_rate``, of the whole recording.
+    """
+    by_method = {row.method: row for row in rows}
+    best = by_method.get("filter")
+    if best is None:
+        return "Nothing was found of the turns of this recording."
+    if best.value is None:
+        return sentence(best.reason)
+    unit = page_unit("gyro", "adev", system)
+    value, truth = (unit.text(number, 4) for number in (best.value, best.truth))
+    size = None if best.upper is None else best.upper - best.value
+    away = None if best.off_sigma is None else abs(best.off_sigma)
+    text = (
+        f"The filter finds an Earth's rate of {value} ± {unit.text(size, 2)} {unit.sign} (95 %); "
+        f"it is {truth} {unit.sign}, {number_text(away, 2)} standard deviations away."
+    )
+    if away is not None and away > _FAR:
+        text += (
+            " So far off is not noise: a wrong sense, axis or latitude, a sensor that is warming "
+            "up, or another noise than at rest."
+        )
+    return text + (f" {sentence(best.reason)}" if best.reason else "")
+
+
+def given_words(rows: Sequence[EarthRateRow]) -> str:
+    """Return from when on the filter that is given the rate stays near it, in a sentence.
+
+    Of rows of ``earth_rate``, of one recording or of several; empty where none was given.
+    """
+    given = [row for row in rows if row.part == "whole" and row.status == "given"]
+    parts = []
+    for method, unit in (("known_rate", "(°/s)²"), ("known_rate_radians", "(rad/s)²")):
+        times = [row.settled for row in given if row.method == method]
+        reached = sorted(time for time in times if time is not None)
+        if not times:
+            continue
+        ends = [duration_text(time) for time in dict.fromkeys(reached[:1] + reached[-1:])]
+        text = f"after {' to '.join(ends)} of data" if ends else "not by the end"
+        if ends and len(reached) < len(times):
+            text += f", in {len(times) - len(reached)} of {len(times)} not by the end"
+        parts.append(f"{text} with P₀ in {unit}")
+    if not parts:
+        return ""
+    return (
+        f"Within a tenth of the rate that it is given it stays {'; '.join(parts)}: till then its "
+        "mean has the noise of all that came, and has it whatever the filter is given."
+    )
+
+
+_FAR = 4.0
+"""Standard deviations beyond which an estimate is not what noise makes of it."""
+
+
+def line(row: EarthRateRow) -> dict[str, Any]:
+    """Return a line of the table of estimates, of a row of ``earth_rate``."""
+    return {
+        **row.columns(),
+        "term": METHOD_TERMS[row.method],
+        "words": METHOD_WORDS[row.method],
+        "digits": limit_digits(row.lower, row.upper, 4),
+        "off": "–" if row.off_sigma is None else f"{number_text(row.off_sigma, 2)} σ",
+        "why": sentence(row.reason),
+        "use": row.method == "filter" and row.status == "ok",
+    }
+
+
+def published_lines(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table of what a source prints of its runs."""
+    for row in rows:
+        yield {
+            **row.columns(),
+            "length": duration_text(row.duration),
+            "off": off_words(row),
+        }
+
+
+def off_words(row: EarthRatePublishedRow) -> str:
+    """Return by how many standard deviations a published estimate is off."""
+    return f"{number_text(row.off_sigma, 3)} σ"
+
+
+def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
+    """Return what it takes to find the Earth's rate, for a table and a sentence.
+
+    Of rows of the table ``earth_rate_prediction``, of one recording.
+    """
+    goals = [row for row in rows if row.of == "goal"]
+    if not goals:
+        return None
+    curve = [row for row in rows if row.of == "dwell"]
+    best = next((row for row in curve if row.best), None)
+    nearly = [row.dwell for row in curve if row.nearly_best]
+    return {
+        "dwell": duration_text(goals[0].dwell),
+        "goals": [
+            {
+                "goal": percent_text(row.goal),
+                "turns": f"{row.turns:,}".replace(",", " "),
+                "time": duration_text(row.time),
+                "seconds": row.time,
+                "sigma": row.sigma,
+                "heading": _heading(row.heading),
+            }
+            for row in goals
+        ],
+        "best": ""
+        if best is None
+        else (
+            f"In a run of {duration_text(best.time)} the best dwell has "
+            f"{number_text(best.dwell, 3)} s of data ({counted(best.turns, 'turn')}): it "
+            f"gives the Earth's rate to {percent_text(best.relative)}. "
+            + _about_best(best.dwell, [row.dwell for row in curve], nearly)
+        ),
+    }
+
+
+def _about_best(best: float, tried: Sequence[float], nearly: Sequence[float]) -> str:
+    """Return which dwells are as good as the best, in a sentence; at an edge of the search so."""
+    near = [*nearly, best]
+    low, high = (number_text(limit, 3) for limit in (min(near), max(near)))
+    if best in (max(tried), min(tried)):
+        longest = best == max(tried)
+        text = f"It is the {'longest' if longest else 'shortest'} that was tried"
+        if low == high:
+            return f"{text}."
+        limit = f"down to {low}" if longest else f"up to {high}"
+        return f"{text}; {limit} s it is less than 1 % worse."
+    if low == high:
+        return "All others that were tried are worse by 1 % or more."
+    return f"From {low} s to {high} s it is less than 1 % worse."
+
+
+_SMALL = 0.5
+"""Largest standard deviation of a heading, rad, of which the formula for small angles tells."""
+
+
+def _heading(heading: float | None) -> str:
+    if heading is not None and heading > _SMALL:
+        return f"above {degrees_text(_SMALL, 2)}"
+    return degrees_text(heading, 3)
+
+
+def _stretches(turning: Sequence[TurningRow]) -> Iterator[dict[str, Any]]:
+    """Yield dwells, turns and knocks in the order of time."""
+    listed = [row for row in turning if row.start is not None]
+    for row in sorted(listed, key=lambda row: (row.start, row.what)):
+        position = {1: "north", -1: "south"}.get(row.sense or 0, "")
+        yield {**row.columns(), "position": position}
+
+
+def _payload(
+    view: RecordingView,
+    rows: Sequence[EarthRateRow],
+    turning: Sequence[TurningRow],
+    arrays: Arrays,
+) -> dict[str, Any]:
+    """Return what the figures of dwells and estimates are drawn from."""
+    dwells, turns = ([row for row in turning if row.what == what] for what in ("dwell", "turn"))
+    series = view.rows(EarthRateSeriesRow)
+    return {
+        "channel": rows[0].channel if rows else "",
+        "truth": rows[0].truth if rows else None,
+        "latitude": rows[0].latitude if rows else None,
+        "simulated": view.simulated,
+        "dwells": {
+            "start": arrays.exact(numbers(row.start for row in dwells)),
+            "stop": arrays.exact(numbers(row.stop for row in dwells)),
+            "mean": arrays.exact(numbers(row.mean for row in dwells)),
+            "north": [row.sense == 1 for row in dwells],
+        },
+        "turns": arrays.exact(numbers(row.time for row in turns)),
+        "found_by": [row.found_by for row in turns],
+        "parts": {
+            part: {
+                "range": _range([row for row in series if row.part == part], rows[0].truth),
+                "courses": _courses([row for row in series if row.part == part], arrays),
+            }
+            for part in dict.fromkeys(row.part for row in series)
+        },
+    }
+
+
+def _courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[str, Any]:
+    courses: dict[str, Any] = {}
+    for name in dict.fromkeys((row.quantity, row.method) for row in series):
+        own = [row for row in series if (row.quantity, row.method) == name]
+        courses["drift" if name[0] == "drift" else name[1]] = {
+            "name": "drift" if name[0] == "drift" else METHOD_WORDS[name[1]],
+            "time": arrays.exact([row.time for row in own]),
+            "value": arrays.exact([row.value for row in own]),
+            "sigma": arrays.exact(numbers(row.sigma for row in own)),
+        }
+    return courses
+
+
+def _range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[float]:
+    """Return what a figure of the estimates shows of the rate: the first ones are far off."""
+    rates = [row for row in series if row.quantity == "rate"]
+    if not rates:
+        return [0.0, 2.0 * truth]
+    first, last = rates[0].time, max(row.time for row in rates)
+    later = [row for row in rates if row.time >= first + 0.12 * (last - first)]
+    high = max(abs(row.value - truth) + 2.0 * (row.sigma or 0.0) for row in later)
+    return [truth - 1.1 * high, truth + 1.1 * high]
+
+
+_ALONG: Mapping[str, Callable[[EarthRatePredictionRow], float]] = {
+    "time": lambda row: row.time,
+    "dwell": lambda row: row.dwell,
+}
+"""Along what the curves of a prediction are drawn, by what its rows are of."""
+
+
+def prediction_payload(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -> dict[str, Any]:
+    """Return what the figures of the prediction of a recording are drawn from."""
+    goals = [row.goal for row in rows if row.of == "goal"]
+    payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
+    for of, x in _ALONG.items():
+        own = sorted((row for row in rows if row.of == of and row.sigma is not None), key=x)
+        payload[of] = {
+            "x": arrays.exact([x(row) for row in own]),
+            "sigma": arrays.exact(numbers(row.sigma for row in own)),
+            "turns": [row.turns for row in own],
+            "run": own[0].time if own else None,
+            "length": own[0].dwell if own else None,
+            "best": next((k for k, row in enumerate(own) if row.best), None),
+            "nearly": [row.dwell for row in own if row.nearly_best],
+        }
+    return payload

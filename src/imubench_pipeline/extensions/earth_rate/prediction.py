@@ -1,0 +1,293 @@
+"""Predict the accuracy of the Earth's rate and north by a gyro, and the best dwell.
+
+All results are the Cramér-Rao bound of runs of equal dwells (`extensions.earth_rate.bound`).
+`prediction_rows` gives the necessary turns and times as rows of the table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.earth_rate.bound import (
+    MAX_BLOCKS,
+    block_length,
+    information_by_states,
+    sigma_of,
+)
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_MAX_COMPUTED_DWELLS = 64
+"""Largest number of computed dwells; beyond, the information grows as over their latter half."""
+
+_MIN_COMPUTED_DWELLS = 8
+"""Least number of computed dwells, if 64 of them have too many blocks."""
+
+_INFORMATION_TOLERANCE = 1e-9
+"""Relative tolerance of the information for rounding."""
+
+_NEARLY_BEST_LOSS = 0.01
+"""Relative rise of the standard deviation within which a dwell is nearly the best."""
+
+_DWELL_CURVE_POINTS = 40
+"""Approximate number of points on a curve over the dwell."""
+
+_REFINEMENT_POINTS = 15
+"""Number of further points about the best one."""
+
+Row = dict[str, Any]
+
+MAX_TURNS = 10**12
+"""Largest number of turns of a goal; at one a second they take 30 000 years."""
+
+_TIME_CURVE_POINTS = 60
+"""Number of points on the curve over time."""
+
+_MAX_CURVE_TURNS = 20_000
+"""Largest number of turns on the curve over time; goals may need more."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The least standard deviation of the rate as a run grows."""
+
+    turns: NDArray[np.int64]  # shape (k,); turns done, from 1
+    time: Array  # shape (k,); end of the dwell after the last turn, s
+    sigma: Array  # shape (k,); rad/s
+
+
+@dataclass(frozen=True)
+class DwellCurve:
+    """The least standard deviation of the rate for a given run time, over the dwell."""
+
+    dwells: NDArray[np.int64]  # shape (k,); number of dwells, increasing
+    dwell: Array  # shape (k,); data in each, s
+    sigma: Array  # shape (k,); rad/s
+
+    @property
+    def best(self) -> int:
+        """Index of the least standard deviation."""
+        return int(np.argmin(self.sigma))
+
+    def nearly_best(self) -> tuple[float, float]:
+        """Return the range of dwells with a loss of 1 % at most; the optimum is mostly broad.
+
+        Shortest and longest dwell of the curve about the best one, s.
+        """
+        little = self.sigma <= (1.0 + _NEARLY_BEST_LOSS) * self.sigma[self.best]
+        worse = np.flatnonzero(~little)
+        first = int(np.max(worse[worse < self.best], initial=-1)) + 1
+        last = int(np.min(worse[worse > self.best], initial=len(little))) - 1
+        return float(self.dwell[last]), float(self.dwell[first])
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """A gyro, a place and the time of a turn, for the bound of the Earth's rate.
+
+    Beyond 64 dwells the information grows linearly with the number of dwells: with periodic turns,
+    only noise at the frequency of the turns and its odd multiples matters.
+    """
+
+    model: NoiseModel
+    latitude: float  # rad
+    turning: float  # time that a turn takes, s
+    rate: float  # sampling rate, Hz
+    # standard deviation of the fixed bias, rad/s; by default unknown
+    turn_on_bias: float = math.inf
+
+    def against_time(self, dwell: float, turns: int) -> Prediction:
+        """Return the bound after each turn and dwell up to the last turn; the dwell is in s."""
+        information = self._compute_information(dwell, turns + 1)
+        number = np.arange(1, turns + 1)
+        time = (number + 1) * dwell + number * self.turning
+        return Prediction(number, time, sigma_of(information[1:]))
+
+    def turns_needed(self, dwell: float, relative: float) -> int | None:
+        """Return the number of turns for a relative standard deviation of the Earth's rate.
+
+        None: more than `MAX_TURNS`.
+
+        The run lasts (turns + 1) dwells, each with ``dwell`` s of data, and the turns. A
+        ``relative`` of 0.01 is 1 % of the Earth's rate.
+
+        Raises
+        ------
+        ValueError
+            If it is not above 0.
+        """
+        if not relative > 0:
+            raise ValueError(f"relative is {relative}, expected a number above 0")
+        wanted = (relative * EARTH_RATE) ** -2
+        information = self._compute_information(dwell, _MAX_COMPUTED_DWELLS)
+        reached = np.flatnonzero(information >= wanted * (1.0 - _INFORMATION_TOLERANCE))
+        if len(reached):
+            return int(reached[0])
+        left = (wanted - information[-1]) / max(_compute_growth(information), math.ulp(0.0))
+        if left > MAX_TURNS:
+            return None
+        return _MAX_COMPUTED_DWELLS - 1 + math.ceil(left - _INFORMATION_TOLERANCE * left)
+
+    def sigma_after(self, dwell: float, turns: int) -> float:
+        """Return the bound after a number of turns and the dwell after the last, rad/s."""
+        information = self._compute_information(dwell, _MAX_COMPUTED_DWELLS)
+        beyond = max(turns + 1 - _MAX_COMPUTED_DWELLS, 0)
+        last = information[min(turns, _MAX_COMPUTED_DWELLS - 1)] + (
+            _compute_growth(information) * beyond if beyond else 0.0
+        )
+        return float(sigma_of(np.array([last]))[0])
+
+    def time_needed(self, dwell: float, relative: float) -> float:
+        """Return the run time for a relative standard deviation of the Earth's rate, s.
+
+        Infinity: more than `MAX_TURNS`.
+        """
+        turns = self.turns_needed(dwell, relative)
+        return math.inf if turns is None else (turns + 1) * dwell + turns * self.turning
+
+    def over_dwell(self, run_time: float) -> DwellCurve:
+        """Return the bound of a run of a length, s, over the dwell, from one turn to short dwells.
+
+        The run consists of dwells and turns. The shortest dwell is a fourth of the turning time, or
+        one second.
+
+        Raises
+        ------
+        ValueError
+            If there is no time for two dwells and a turn.
+        """
+        if run_time - self.turning < 2.0 / self.rate:
+            raise ValueError(f"{run_time} s do not hold two dwells and a turn")
+        shortest = max(self.turning / 4.0, 1.0, 2.0 / self.rate)
+        most = max(int((run_time + self.turning) / (shortest + self.turning)), 2)
+        number = np.unique(np.rint(np.geomspace(2, most, _DWELL_CURVE_POINTS)).astype(np.int64))
+        sigma = self._compute_sigma(run_time, number)
+        best = int(np.argmin(sigma))
+        around = number[max(best - 1, 0)], number[min(best + 1, len(number) - 1)]
+        between = np.rint(np.linspace(*around, _REFINEMENT_POINTS)).astype(np.int64)
+        between = np.setdiff1d(between, number)
+        sigma = np.concatenate([sigma, self._compute_sigma(run_time, between)])
+        number = np.concatenate([number, between])
+        order = np.argsort(number)
+        number = number[order]
+        dwell = (run_time - (number - 1) * self.turning) / number
+        return DwellCurve(number, dwell, sigma[order])
+
+    def _compute_sigma(self, run_time: float, dwells: NDArray[np.int64]) -> Array:
+        """Return the bound of a run for these numbers of dwells, shape (k,)."""
+        last = [
+            self._compute_information((run_time - (n - 1) * self.turning) / n, n)[-1]
+            for n in dwells.tolist()
+        ]
+        return sigma_of(np.array(last))
+
+    def heading(self, dwell: float, turns: int) -> Array:
+        """Return the least standard deviation of the heading by gyrocompassing after each turn.
+
+        The axis is perpendicular to north, and is turned end for end: half the difference of its
+        readings is w_ie cos(latitude) times the (small) heading error. An error s of this half
+        difference is a heading error s / (w_ie cos(latitude)), as in `error_budget.Gyrocompass`
+        with two positions. Here s = sigma cos(latitude), with sigma of the rate. In rad, shape
+        (turns,).
+        """
+        of_axis = self.against_time(dwell, turns).sigma * math.cos(self.latitude)
+        return np.asarray(of_axis / (EARTH_RATE * math.cos(self.latitude)))
+
+    def _compute_information(self, dwell: float, dwells: int) -> Array:
+        """Return the information after each of a number of dwells."""
+        design = Experiment.regular(
+            dwell=dwell,
+            turning=self.turning,
+            dwells=min(dwells, _MAX_COMPUTED_DWELLS),
+            rate=self.rate,
+            latitude=self.latitude,
+        )
+        longest = block_length(design, self.model)
+        each = -(-design.samples_in_dwells // len(design.dwells) // longest)
+        summed = max(MAX_BLOCKS // each, _MIN_COMPUTED_DWELLS)
+        blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
+        last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
+        information = information_by_states(blocks, self.model, self.turn_on_bias)[last]
+        more = np.arange(1, dwells - len(information) + 1)
+        return (
+            np.concatenate([information, information[-1] + _compute_growth(information) * more])
+            if len(more)
+            else information
+        )
+
+
+def _compute_growth(information: Array) -> float:
+    """Return the mean information that a dwell of the latter half adds."""
+    half = len(information) // 2
+    return float(information[-1] - information[-1 - half]) / half
+
+
+def prediction_rows(
+    outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float
+) -> Iterator[Row]:
+    """Yield the rows of the table ``earth_rate_prediction``, without the names.
+
+    ``dwell`` is the data in each dwell, s; the goals are standard deviations relative to the
+    Earth's rate; the best dwell is computed for the run time, s.
+
+    Raises
+    ------
+    ValueError
+        If the run time does not hold two dwells and a turn.
+    """
+    for row in _yield_rows(outlook, dwell, goals, run_time):
+        yield {"latitude": outlook.latitude, **row}
+
+
+def _yield_rows(
+    outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float
+) -> Iterator[Row]:
+    most = 1
+    for goal in sorted(goals, reverse=True):
+        turns = outlook.turns_needed(dwell, goal)
+        if turns is None:
+            continue
+        most = max(most, turns)
+        time = (turns + 1) * dwell + turns * outlook.turning
+        # The reached value: the last necessary turn may give far more than the goal.
+        sigma = outlook.sigma_after(dwell, turns)
+        yield {"of": "goal", "goal": goal} | _make_row(dwell, turns, time, sigma)
+    course = outlook.against_time(dwell, min(max(most, 2), _MAX_CURVE_TURNS))
+    shown = (
+        np.unique(np.rint(np.geomspace(1, len(course.turns), _TIME_CURVE_POINTS)).astype(np.int64))
+        - 1
+    )
+    for k in shown.tolist():
+        point = int(course.turns[k]), float(course.time[k]), float(course.sigma[k])
+        yield {"of": "time"} | _make_row(dwell, *point)
+    curve = outlook.over_dwell(run_time)
+    low, high = curve.nearly_best()
+    for k, number in enumerate(curve.dwells.tolist()):
+        length = float(curve.dwell[k])
+        yield (
+            {"of": "dwell", "best": k == curve.best, "nearly_best": low <= length <= high}
+            | _make_row(length, number - 1, run_time, float(curve.sigma[k]))
+        )
+
+
+def _make_row(dwell: float, turns: int, time: float, sigma: float) -> Row:
+    finite_sigma = sigma if math.isfinite(sigma) else None
+    relative = None if finite_sigma is None else finite_sigma / EARTH_RATE
+    # Heading error of a gyro perpendicular to north: sigma cos(latitude) over w_ie cos(latitude),
+    # see `Outlook.heading`.
+    return {
+        "dwell": dwell,
+        "turns": turns,
+        "time": time,
+        "sigma": finite_sigma,
+        "relative": relative,
+        "heading": relative,
+    }

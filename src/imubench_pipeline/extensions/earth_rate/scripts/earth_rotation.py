@@ -1,0 +1,18 @@
+"""Find the turns of a gyro in its log, and the Earth's rate; nothing of a rejected recording."""
+
+from pathlib import Path
+
+from imubench_pipeline.extensions.earth_rate.earth_rotation import earth_rate_tables
+from imubench_pipeline.tables import write
+
+if __name__ == "__main__":
+    names = snakemake.wildcards
+    found = earth_rate_tables(
+        Path(snakemake.input.quality).parent,
+        [Path(path).parent for path in snakemake.input.static_quality],
+        names.sensor,
+        names.recording,
+        snakemake.params.settings,
+    )
+    for table, path in snakemake.output.items():
+        write(table, found[table], Path(path))

@@ -1,0 +1,15 @@
+"""Predict what a sensor at rest finds of attitude, north and the Earth's rate."""
+
+from pathlib import Path
+
+from imubench_pipeline.extensions.earth_rate.outlook import outlook_tables
+from imubench_pipeline.tables import write
+
+if __name__ == "__main__":
+    found = outlook_tables(
+        [Path(path).parent for path in snakemake.input.quality],
+        snakemake.wildcards.sensor,
+        snakemake.params.settings,
+    )
+    for table, path in snakemake.output.items():
+        write(table, found[table], Path(path))

@@ -1,0 +1,191 @@
+"""What is declared of gyros that are turned between north and south, and sought of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, field_validator, model_validator
+
+from imubench_pipeline.settings.experiments import Experiment, Gyro, stated_gyro
+from imubench_pipeline.settings.requirements import Latitude, Time
+from imubench_pipeline.settings.validation import (
+    AccelerationFromZero,
+    RateFromZero,
+    Strict,
+    Text,
+    checked,
+)
+from imubench_pipeline.units import quantity_to_si
+
+
+def _deviation(dimension: str) -> AfterValidator:
+    return checked(dimension, "a standard deviation from 0", from_zero=True)
+
+
+_from_zero = checked("time", "a time from 0", from_zero=True)
+_Rate = Annotated[Text, checked("angular_rate")]
+TimeFromZero = Annotated[Text, _from_zero, Field(examples=["2 s"])]
+
+_REQUIRED_KEYS = {
+    "latitude": "where the log was recorded, such as latitude: 45.1 deg (south: negative)",
+    "dwell": "the time from one turn to the next, such as dwell: 30 s",
+}
+
+
+class TwoPosition(Experiment):
+    """A log in which one gyro was turned end for end, between north and south, again and again.
+
+    Raises
+    ------
+    ValueError
+        If latitude or dwell is missing, a figure has a unit of another dimension or is out of
+        range, or turning takes half of the dwell or more.
+    """
+
+    latitude: Latitude = Field(
+        description="of the place, with its unit; south is negative, to no effect"
+    )
+    dwell: Time = Field(description="nominal, from the start of one turn to the start of the next")
+    channel: Gyro | None = Field(
+        None, description="that was turned; null: the only gyro of the log"
+    )
+    turning: TimeFromZero = Field("2 s", description="that a turn takes, where it is not seen")
+    start: TimeFromZero = Field(
+        "0 s", description="when the first dwell of the schedule begins, from the first sample used"
+    )
+    first: Literal["north", "south"] | None = Field(
+        None, description="where the axis points in the first dwell; null: not known"
+    )
+    trust_schedule: bool = Field(
+        False, description="take the schedule's word where nothing of the turns is seen"
+    )
+    turn_on_bias: Annotated[Text, _deviation("angular_rate")] | None = Field(
+        None,
+        description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known",
+    )
+    drift: Annotated[Text, _deviation("gyro_ramp")] | None = Field(
+        None,
+        description="standard deviation of a steady drift beside the noise, such as 20 deg/h/h "
+        "while the sensor warms up; null: none",
+    )
+    last: tuple[Time, ...] = Field(
+        (), description="of the log, which are estimated by themselves as well, such as 13 min"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _said(cls, data: Any) -> Any:
+        if isinstance(data, dict):
+            for key, needed in _REQUIRED_KEYS.items():
+                if data.get(key) is None:
+                    raise ValueError(f"{key} is missing; expected {needed}")
+        return data
+
+    @field_validator("latitude")
+    @classmethod
+    def _sees_rotation(cls, latitude: str) -> str:
+        if abs(quantity_to_si(latitude, "angle")) > quantity_to_si("89 deg", "angle"):
+            raise ValueError(
+                "expected at most 89 deg: at a pole a horizontal axis sees nothing of the Earth's "
+                "rate"
+            )
+        return latitude
+
+    @model_validator(mode="after")
+    def _turns_fit(self) -> Self:
+        if 2.0 * self.seconds("turning") >= self.seconds("dwell"):
+            raise ValueError(
+                f"turning is {self.turning}; expected less than half of the dwell of {self.dwell}"
+            )
+        return self
+
+    def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
+        """Return one of its times in s."""
+        return quantity_to_si(getattr(self, name), "time")
+
+    @property
+    def latitude_si(self) -> float:
+        """Latitude, rad."""
+        return quantity_to_si(self.latitude, "angle")
+
+    @property
+    def first_sense(self) -> int | None:
+        """Sense of the first dwell: 1 north, -1 south; None where it is not known."""
+        return None if self.first is None else {"north": 1, "south": -1}[self.first]
+
+    @property
+    def turn_on_bias_si(self) -> float | None:
+        """Standard deviation of the fixed bias, rad/s; None where it is not known."""
+        return quantity_to_si(self.turn_on_bias, "angular_rate") if self.turn_on_bias else None
+
+    @property
+    def drift_si(self) -> float:
+        """Standard deviation of a steady drift, rad/s^2."""
+        return quantity_to_si(self.drift, "gyro_ramp") if self.drift else 0.0
+
+    def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> str:
+        """Return the one of the log's channels that was turned, as of `stated_gyro`."""
+        return stated_gyro(self.channel, channels, "was turned")
+
+
+class PublishedRate(Strict):
+    """What a source prints of the Earth's rate that it found."""
+
+    where: Text = Field(description="such as section 6")
+    printed: _Rate = Field(description="with its unit, as printed")
+    part: Text = Field("whole", description="of the run: whole, or such as 'last 13 min'")
+
+
+class SimulatedTurns(TwoPosition):
+    """A gyro that is turned between north and south, by the clock."""
+
+    transient: _Rate = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    published: tuple[PublishedRate, ...] = ()
+
+    @model_validator(mode="after")
+    def _parts_are_there(self) -> Self:
+        parts = {"whole", *(f"last {text}" for text in self.last)}
+        for rate in self.published:
+            if rate.part not in parts:
+                raise ValueError(f"published: part is {rate.part!r}; expected one of {parts}")
+        return self
+
+    @property
+    def declared(self) -> TwoPosition:
+        """What would stand beside such a log."""
+        return TwoPosition(**{name: getattr(self, name) for name in TwoPosition.model_fields})
+
+
+class EarthRateSettings(Strict):
+    """The Earth's rate from gyros that were turned, and what it would take."""
+
+    margin: TimeFromZero = Field(
+        "0.5 s", description="left out on both sides of a turn that is seen"
+    )
+    goals: tuple[float, ...] = Field(
+        (1.0, 0.1, 0.01),
+        min_length=1,
+        description="standard deviations that are asked for, as a part of the Earth's rate",
+    )
+    run_time: Time = Field("1 h", description="of a run, for which the best dwell is sought")
+    latitude: Latitude = Field(
+        "45 deg", description="where sensors at rest are to find the Earth's rate, and north"
+    )
+    gyro_bias: RateFromZero = Field(
+        "0.5 deg/s",
+        description="standard deviation of the fixed bias of gyros whose datasheet prints none",
+    )
+    accelerometer_bias: AccelerationFromZero = Field(
+        "20 mg",
+        description="standard deviation of that of accelerometers, likewise",
+    )
+    draws: int = Field(60, ge=20, description="noise models that give the range of a sigma")
+
+    @field_validator("goals")
+    @classmethod
+    def _above_zero(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
+        if min(goals) <= 0:
+            raise ValueError("expected parts above 0, such as 0.01 for 1 %")
+        return goals

@@ -1,0 +1,137 @@
+"""Simulated Earth-rate experiments: the block means of many runs, or a whole log.
+
+The runs of Silva et al. (section 6) are here as designs: 120, 12, 25 and 60 minutes at 32 Hz,
+turned every 30 s, with the printed parameters. The paper prints neither the latitude nor the time
+of a turn; both are assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
+from imubench_pipeline.extensions.calibration.states import block_states
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.simulate.model import SensorModel
+from imubench_pipeline.simulate.simulation import simulate
+from imubench_pipeline.typing import Array
+
+PAPER_MODEL = NoiseModel(
+    N=math.radians(0.0122), B=math.radians(0.0027), T_B=238.1, K=math.radians(6.8314e-5)
+)
+"""SiRRS01-03 by Silva et al., section 5.1, SI."""
+
+PAPER_RATE = 32.0
+"""Sampling rate of the runs, Hz (Silva et al., section 6)."""
+
+PAPER_PERIOD = 30.0
+"""Time between turns, s (Silva et al., section 6)."""
+
+PAPER_MINUTES = {"1": 120.0, "2": 12.0, "3": 25.0, "4": 60.0, "4, last 13 min": 13.0}
+"""Length of the runs, min (Silva et al., section 6); the last is a part of run 4."""
+
+ASSUMED_LATITUDE = math.radians(-23.3)
+"""Latitude of Londrina, where the authors work, rad: the paper prints none."""
+
+ASSUMED_TURNING = 2.0
+"""Time of a turn within each 30 s, s: the paper prints none."""
+
+
+def paper_run(minutes: float) -> Experiment:
+    """Return the design of a run of Silva et al.: north first, a turn every 30 s."""
+    return Experiment.regular(
+        dwell=PAPER_PERIOD - ASSUMED_TURNING,
+        turning=ASSUMED_TURNING,
+        dwells=round(60.0 * minutes / PAPER_PERIOD),
+        rate=PAPER_RATE,
+        latitude=ASSUMED_LATITUDE,
+    )
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Simulated runs of one design, and their truth."""
+
+    means: Array  # shape (runs, b); block means, rad/s
+    # shape (runs, b); mean of the slow error over each block, its bias included, rad/s
+    drift: Array
+    # shape (runs, b, m); states at the sample after each block (`states.BlockStates`)
+    states: Array
+
+
+def simulate_runs(
+    model: NoiseModel,
+    blocks: Blocks,
+    *,
+    earth_rate: float,
+    turn_on_bias: float,
+    runs: int,
+    rng: np.random.Generator,
+) -> Runs:
+    """Draw the block means of many runs, from their exact joint distribution.
+
+    The Earth's rate is in rad/s, and so is the standard deviation of the fixed bias, which is drawn
+    for each run.
+    """
+    block_model = block_states(model, blocks, turn_on_bias)
+    m = len(block_model.names)
+    state = rng.standard_normal((runs, m)) @ block_model.initial.T
+    states, drift = np.empty((runs, len(blocks), m)), np.empty((runs, len(blocks)))
+    for k, which in enumerate(block_model.which):
+        step = block_model.steps[which]
+        after = state @ step.transition.T + rng.standard_normal((runs, m + 1)) @ step.factor.T
+        state, drift[:, k] = after[:, :m], after[:, m]
+        states[:, k] = state
+    white = block_model.white * rng.standard_normal(drift.shape)
+    return Runs(earth_rate * blocks.seen + drift + white, drift, states)
+
+
+def simulate_log(
+    model: SensorModel,
+    experiment: Experiment,
+    *,
+    earth_rate: float,
+    transient: ArrayLike,
+    rng: np.random.Generator,
+) -> Array:
+    """Return a whole log of an experiment, including turns, rad/s, shape (samples,).
+
+    During a turn, the axis moves from one position to the other with a sinusoidal speed, and senses
+    the Earth's rate times the cosine of the angle. The turn is about a perpendicular axis: only
+    misalignment makes it visible, as a pulse peak sin^2(pi t / turning). The log begins with the
+    first sample at 0 and ends with the last dwell. The bias of the model is the fixed bias of this
+    run. The other parameters are as in `true_rate`.
+    """
+    true = true_rate(experiment, earth_rate, transient)
+    return simulate(model, experiment.rate, len(true), rng, true=lambda a, b: true[a:b])
+
+
+def true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
+    """Return the readings of an error-free gyro in an experiment, rad/s, shape (samples,).
+
+    They end with the last dwell. ``transient`` is the peak of the pulse of turns, one value or one
+    per turn, in rad/s as the Earth's rate.
+    """
+    dwells = experiment.dwells
+    peaks = np.broadcast_to(np.asarray(transient, dtype=np.float64), len(dwells) - 1)
+    seen = earth_rate * math.cos(experiment.latitude)
+    true = np.full(dwells[-1].stop, dwells[0].sense * seen)
+    for i, dwell in enumerate(dwells):
+        true[dwell.start : dwell.stop] = dwell.sense * seen
+        if i == 0:
+            continue
+        before = dwells[i - 1]
+        part = (np.arange(before.stop, dwell.start) - before.stop + 0.5) / max(
+            dwell.start - before.stop, 1
+        )
+        if dwell.sense == before.sense:
+            true[before.stop : dwell.start] = before.sense * seen
+        else:
+            angle = 0.5 * math.pi * (1.0 - np.cos(math.pi * part))
+            true[before.stop : dwell.start] = before.sense * seen * np.cos(angle)
+        true[before.stop : dwell.start] += peaks[i - 1] * np.sin(math.pi * part) ** 2
+    return true

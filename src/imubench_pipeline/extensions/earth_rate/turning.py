@@ -1,0 +1,350 @@
+"""Dwells and turning points of a gyro that is turned end for end, from its log.
+
+Turning a sensitive axis end for end is a rotation about an axis perpendicular to it: the gyro
+senses cross-axis coupling and handling, which may be much or nothing. A column with the position
+decides if there is one, else the events in the log, and without these the schedule. `stays` reads
+turns from such a column.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.extensions.earth_rate.alternation import alternation, contradiction
+from imubench_pipeline.extensions.earth_rate.choice_of_turns import EDGE_DWELL_FRACTION
+from imubench_pipeline.extensions.earth_rate.sight import (
+    TurnSchedule,
+    disturbances,
+    find_turns,
+    leave_out_knocks,
+)
+from imubench_pipeline.extensions.earth_rate.transients import (
+    CLEAR_LOG_LIKELIHOOD,
+    Event,
+    LevelBlocks,
+    blocks_of,
+    outliers,
+    steps,
+    transients,
+)
+from imubench_pipeline.extensions.earth_rate.turns import (
+    DETECTION_ORDER,
+    FoundDwell,
+    Turn,
+    Turning,
+)
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_POSITION_TOLERANCE = 0.1
+"""Tolerance about a position, as a share of the distance between the two positions."""
+
+
+@dataclass(frozen=True)
+class Stays:
+    """Stays of the sensor in its positions."""
+
+    # start, stop: shape (n,); s; what lies between two of them is turning
+    start: Array
+    stop: Array
+    # shape (n,); whether it is the position of the larger number; alternates
+    high: NDArray[np.bool_]
+    senses: bool  # whether the column has +1 and -1, and so gives the sense
+    # whether more than a twentieth of the column lies outside both positions, for longer than a
+    # turn: perhaps there are more than two positions
+    away: bool
+
+
+def stays(position: Array, rate: float, shortest: float) -> Stays:
+    """Find the stays in two positions.
+
+    The positions are the medians of the column's lower and upper half, by range. A sample within a
+    tenth of their distance of one is in it; other samples are turning, or overshoot. Consecutive
+    stays in the same position are merged. The column, shape (n,), has two positions as
+    numbers in any unit, such as angles, 0 and 1, or -1 and +1; NaN where it is not known. An angle
+    must not wrap at one of them. The rate is in Hz; stays below the shortest, s, are overshoots.
+
+    Raises
+    ------
+    ValueError
+        If the column has one position only, or none.
+    """
+    finite = np.flatnonzero(np.isfinite(position))
+    if len(finite) == 0:
+        raise ValueError("the column with the position has no numbers")
+    value = position[finite]
+    middle = 0.5 * (float(value.min()) + float(value.max()))
+    if value.min() == value.max():
+        raise ValueError(f"the position is {middle:g} throughout: the log never turns")
+    low, high = float(np.median(value[value <= middle])), float(np.median(value[value > middle]))
+    near = _POSITION_TOLERANCE * (high - low)
+    state = np.where(np.abs(value - high) <= near, 1, np.where(np.abs(value - low) <= near, 0, -1))
+    change = np.flatnonzero(np.diff(state)) + 1
+    first = np.concatenate(([0], change))
+    last = np.concatenate((change, [len(state)])) - 1
+    merged: list[list[float]] = []
+    away = 0.0
+    for a, b in zip(first, last, strict=True):
+        start, stop = finite[a] / rate, (finite[b] + 1) / rate
+        if state[a] < 0 or stop - start < shortest:
+            away += (stop - start) if stop - start > shortest else 0.0
+            continue
+        if merged and merged[-1][2] == state[a]:
+            merged[-1][1] = stop
+        else:
+            merged.append([start, stop, state[a]])
+    if len(merged) < 2:
+        raise ValueError("the column with the position shows no two stays: the log never turns")
+    table = np.array(merged)
+    return Stays(
+        table[:, 0],
+        table[:, 1],
+        table[:, 2] == 1,
+        bool(np.allclose([low, high], [-1.0, 1.0], atol=0.05)),
+        away > 0.05 * len(position) / rate,
+    )
+
+
+def find_turning(
+    log: Array,
+    rate: float,
+    dwell: float,
+    *,
+    turning: float = 2.0,
+    start: float = 0.0,
+    first_sense: int | None = None,
+    position: Array | None = None,
+    model: NoiseModel | None = None,
+    margin: float = 0.5,
+    trust_schedule: bool = False,
+) -> Turning:
+    """Find the dwells and the turning points of a log.
+
+    A column with the position decides if there is one. Else the transients and steps that fit the
+    schedule best are chosen (`extensions.earth_rate.choice_of_turns.choose`): a missed turn makes
+    a dwell twice as long, an overshoot belongs to its turn, a knock is left out. Turns that are too
+    weak to detect are inserted from the schedule between the detected ones. If fewer than 40 % of
+    the scheduled turns are detected, the schedule gives all of them.
+
+    A transient within a fifth of a dwell of an end of the log is handling, and cut off with that
+    end. Only the schedule separates handling as long as a turn (0.2 s and more) from a turn: if the
+    dwells differ by more than some tenths, it is taken for a turn.
+    ``benchmarks/dwell_detection.py`` measures how often, and which peaks are found.
+
+    The sense alternates at each turn. An extra or a missed turn inverts all later senses; if the
+    alternation then clearly has the opposite sign, the result has a doubt. The first sense is
+    ``first_sense``, or given by the column if it has +1 and -1. Otherwise +1 is assumed and the
+    result is ``ambiguous``: all senses may be inverted, and with them the sign of an estimated
+    rate. The known rate of the Earth is not used.
+
+    Without a transient, the log must alternate by 3 standard errors with the schedule. Runs where
+    chance hides the alternation are then refused, which favours large estimates.
+    ``trust_schedule`` accepts the schedule instead.
+
+    Parameters
+    ----------
+    log : ndarray, shape (n,)
+        Rate of the gyro, rad/s; NaN where a sample is missing.
+    rate : float
+        Hz.
+    dwell : float
+        Nominal time from the start of a turn to the start of the next, s.
+    turning : float
+        Time that a turn takes, s; for turns that are not detected.
+    start : float
+        When the first dwell of the schedule begins, s from the first sample; only for turns that
+        are not detected.
+    first_sense : {1, -1}, optional
+        Sense of the first dwell.
+    position : ndarray, shape (n,), optional
+        Position of the sensor (`stays`), sampled as the log.
+    model : NoiseModel, optional
+        Noise of the sensor at rest, SI; by default estimated from the log.
+    margin : float
+        Margin that is left out on both sides of a detected turn, s.
+    trust_schedule : bool
+        Accept the schedule if no turns are detected at all.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range; if the log is shorter than two dwells; if there is no
+        evidence of turns.
+    """
+    log = np.asarray(log, dtype=np.float64)
+    schedule = _check_schedule(log, rate, dwell, turning, start, first_sense, margin)
+    blocks = blocks_of(log, rate, dwell, model)
+    events = _detect_events(blocks, log, rate, dwell, model)
+    doubts = []
+    if blocks.rough:
+        doubts.append("the noise of the log is not that of the model: the log's is used")
+    column_sense = None
+    if position is not None:
+        turns, knocks, column_sense, more_doubts = _find_turns_in_column(
+            position, log, rate, events, schedule
+        )
+    else:
+        turns, knocks, more_doubts = find_turns(blocks, events, schedule, trust_schedule)
+    doubts += more_doubts
+    stretches, more_doubts = _find_stretches(turns, knocks, schedule)
+    doubts += more_doubts
+    knocks = sorted([*knocks, *_select_outliers(outliers(blocks, log, rate), turns, knocks)])
+    knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
+    signs = leave_out_knocks(blocks, knocks)
+    size = alternation(signs, stretches)
+    first, more_doubts = _choose_first_sense(first_sense, column_sense)
+    doubts += more_doubts
+    place = contradiction(signs, stretches)
+    if place is not None:
+        doubts.append(
+            f"from {stretches[place][0]:.0f} s on the log alternates the other way: "
+            "a turn too many or too few near there?"
+        )
+    ambiguous = first_sense is None and column_sense is None
+    return Turning(
+        tuple(_build_dwells(stretches, turns, first, schedule)),
+        tuple(turns),
+        tuple(knocks),
+        ambiguous,
+        replace(size, value=first * size.value),
+        tuple(doubts),
+    )
+
+
+def _check_schedule(
+    log: Array,
+    rate: float,
+    dwell: float,
+    turning: float,
+    start: float,
+    first_sense: int | None,
+    margin: float,
+) -> TurnSchedule:
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise ValueError(f"rate is {rate}, expected Hz above 0")
+    if not (math.isfinite(dwell) and dwell > 0.0):
+        raise ValueError(f"dwell is {dwell}, expected s above 0")
+    if not 0.0 <= turning < 0.5 * dwell:
+        raise ValueError(f"turning is {turning}, expected s from 0 to half the dwell of {dwell} s")
+    if first_sense not in (None, 1, -1):
+        raise ValueError(f"first_sense is {first_sense}, expected 1, -1 or None")
+    if not margin >= 0.0:
+        raise ValueError(f"margin is {margin}, expected s from 0")
+    if log.ndim != 1:
+        raise ValueError(f"the log has the shape {log.shape}, expected one axis")
+    duration = len(log) / rate
+    if duration < 2.0 * dwell - 1.0 / rate:
+        raise ValueError(f"the log lasts {duration:g} s, less than two dwells of {dwell:g} s")
+    tolerance = max(0.1 * dwell, min(2.0, 0.2 * dwell))
+    return TurnSchedule(dwell, start, turning, tolerance, margin, duration)
+
+
+def _detect_events(
+    blocks: LevelBlocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
+) -> list[Event]:
+    """Return transients and steps in order of time; of near ones, the greater."""
+    events = transients(blocks, log, rate)
+    near = max(3.0, 0.1 * dwell)
+    for step in steps(blocks, dwell, model, rate):
+        beside = [e for e in events if e.start - near < step.time < e.stop + near]
+        # The level follows a step at once, except in the blocks of the step itself.
+        greater = [e for e in beside if e.kind == "transient" and e.peak > 1.5 * step.peak]
+        if all(event.haste for event in greater):
+            events = [e for e in events if e not in beside or e in greater]
+            events.append(step)
+    return sorted(events, key=lambda event: event.time)
+
+
+def _find_turns_in_column(
+    position: Array, log: Array, rate: float, events: list[Event], schedule: TurnSchedule
+) -> tuple[list[Turn], list[tuple[float, float]], int | None, list[str]]:
+    if np.shape(position) != np.shape(log):
+        raise ValueError(
+            f"the position has the shape {np.shape(position)}, the log {np.shape(log)}"
+        )
+    column_stays = stays(np.asarray(position, dtype=np.float64), rate, 0.1 * schedule.dwell)
+    turns, used = [], set()
+    for stop, start in zip(column_stays.stop[:-1], column_stays.start[1:], strict=True):
+        first, last, peak = float(stop), float(start), None
+        for k, event in enumerate(events):
+            near = event.stop > stop - 3.0 and event.start < start + 3.0
+            if near and not event.haste and event.likelihood > CLEAR_LOG_LIKELIHOOD:
+                first, last = min(first, event.start), max(last, event.stop)
+                peak = max(peak or 0.0, event.peak)
+                used.add(k)
+        time = 0.5 * float(stop + start)
+        turns.append(Turn(first - schedule.margin, last + schedule.margin, time, "column", peak))
+    doubts = (
+        ["the column is in neither position for long: more than two?"] if column_stays.away else []
+    )
+    rest = [e for k, e in enumerate(events) if k not in used and e.kind == "transient"]
+    sense = (1 if column_stays.high[0] else -1) if column_stays.senses else None
+    return turns, disturbances(rest), sense, doubts
+
+
+def _select_outliers(
+    out: Sequence[tuple[float, float]], turns: Sequence[Turn], knocks: Sequence[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Return the outliers outside of turns and knocks."""
+    left_out = sorted([*knocks, *((turn.start, turn.stop) for turn in turns)])
+    starts = np.array([start for start, _ in left_out])
+    latest = np.maximum.accumulate([stop for _, stop in left_out])
+    before = np.searchsorted(starts, [start for start, _ in out], side="right") - 1
+    return [
+        (start, stop)
+        for (start, stop), k in zip(out, before.tolist(), strict=True)
+        if k < 0 or latest[k] < stop
+    ]
+
+
+def _find_stretches(
+    turns: Sequence[Turn], knocks: Sequence[tuple[float, float]], schedule: TurnSchedule
+) -> tuple[list[tuple[float, float]], list[str]]:
+    """Return start and stop of the dwells between turns; handling at the ends is cut off."""
+    edge = EDGE_DWELL_FRACTION * schedule.dwell
+    first = max((stop for _, stop in knocks if stop < min(edge, turns[0].start)), default=0.0)
+    late = max(schedule.duration - edge, turns[-1].stop)
+    last = min((start for start, _ in knocks if start > late), default=schedule.duration)
+    starts = [first, *(turn.stop for turn in turns)]
+    stops = [*(turn.start for turn in turns), last]
+    stretches = [(start, max(start, stop)) for start, stop in zip(starts, stops, strict=True)]
+    short = sum(stop - start < 0.1 * schedule.dwell for start, stop in stretches)
+    doubts = [f"{short} dwells are shorter than a tenth of {schedule.dwell:g} s"] if short else []
+    return stretches, doubts
+
+
+def _choose_first_sense(stated: int | None, column: int | None) -> tuple[int, list[str]]:
+    """Return the sense of the first dwell, and the doubts about it."""
+    if column is not None:
+        if stated not in (None, column):
+            return column, [f"the first sense is {column:+d} by the column, {stated:+d} was given"]
+        return column, []
+    if stated is not None:
+        return stated, []
+    return 1, ["the sense of the first dwell is assumed: all may be the other way round"]
+
+
+def _build_dwells(
+    stretches: Sequence[tuple[float, float]],
+    turns: Sequence[Turn],
+    first: int,
+    schedule: TurnSchedule,
+) -> list[FoundDwell]:
+    """Return the dwells with their senses, which also alternate over an empty dwell."""
+    dwells = []
+    for k, (start, stop) in enumerate(stretches):
+        beside = turns[max(0, k - 1) : k + 1]
+        doubts = [word for turn in beside for word in turn.doubts]
+        if stop - start > 1.5 * schedule.dwell:
+            doubts.append(f"it lasts {(stop - start) / schedule.dwell:.1f} dwells: a missed turn?")
+        if stop <= start:
+            continue
+        by = max((turn.found_by for turn in beside), key=DETECTION_ORDER.index)
+        sense = first if k % 2 == 0 else -first
+        dwells.append(FoundDwell(start, stop, sense, by, tuple(dict.fromkeys(doubts))))
+    return dwells

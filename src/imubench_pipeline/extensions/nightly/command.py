@@ -1,0 +1,85 @@
+"""`imubench nightly`: what a timer calls, while loggers write."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib import import_module
+from pathlib import Path
+
+from imubench_pipeline.settings.command_line import LONGEST, Command, number, seconds
+from imubench_pipeline.settings.extras import extra
+
+_TIME_TYPE = number(0.0, LONGEST, "a time, such as 10 s", seconds)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command is given."""
+    parser.usage = "%(prog)s [options] [folder] [-- FLAG ...]"
+    parser.description = "What stands after -- goes to snakemake, such as --workflow-profile DIR."
+    parser.add_argument(
+        "folder", type=Path, nargs="?", help="of logs, or a checkout; default: this one"
+    )
+    parser.add_argument("--project", type=Path, metavar="DIR", help="the folder, as an option")
+    parser.add_argument(
+        "-c", "--cores", default="all", metavar="N", help="cores for Snakemake; default: all"
+    )
+    parser.add_argument(
+        "--config", nargs="+", default=[], metavar="KEY=VALUE", help="settings, as for snakemake"
+    )
+    parser.add_argument(
+        "--settle",
+        type=_TIME_TYPE,
+        default="10 s",
+        metavar="TIME",
+        help="a log is complete when nothing of it has changed for so long; default: 10 s",
+    )
+    parser.add_argument(
+        "--wait",
+        type=_TIME_TYPE,
+        default="0 s",
+        metavar="TIME",
+        help="how long to wait for a run that goes on; default: not at all",
+    )
+    parser.add_argument(
+        "--quiet", action="store_true", help="print the summary only if the exit status is not 0"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the workflow on the logs that are complete; return the exit status."""
+    with extra("workflow", "run the workflow"):
+        import_module("snakemake")
+    from imubench_pipeline.extensions.nightly.night import Night, TakenError
+    from imubench_pipeline.extensions.nightly.summary import STATUS, in_words
+    from imubench_pipeline.settings.validation import ConfigError
+
+    try:
+        if options.folder and options.project:
+            raise ConfigError("found a folder and --project; expected one of the two")
+        folder = options.folder or options.project or Path()
+        night = Night(folder, options.config, options.flags)
+        summary = night.run(options.cores, options.settle, options.wait)
+    except KeyboardInterrupt:
+        print("stopped by a signal before Snakemake began", file=sys.stderr)
+        return 2
+    except (ConfigError, TakenError, OSError) as error:
+        print(f"imubench nightly: {error}", file=sys.stderr)
+        return 2
+    status = STATUS[summary.outcome]
+    if status or not options.quiet:
+        print(in_words(summary), end="", file=sys.stderr if status == 2 else sys.stdout)
+    return status
+
+
+COMMAND = Command(
+    "run on the logs that are complete, and say what is new: for timers",
+    add_arguments,
+    run,
+    (
+        "fine",
+        "a log was rejected, a warning is new or a device has changed since the last run",
+        "failed, for one recording at least, or another run goes on",
+    ),
+    passes_on=True,
+)

@@ -1,0 +1,278 @@
+"""One nightly run: lock, recover, hold back incomplete logs, run, compare, report."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from shutil import disk_usage
+from types import FrameType
+from typing import Any
+
+import yaml
+
+from imubench_pipeline.extensions.nightly.running import errors, last_lines, run_snakemake
+from imubench_pipeline.extensions.nightly.settling import Found, Skip, look, moved, settled
+from imubench_pipeline.extensions.nightly.state import (
+    State,
+    StateError,
+    load_tables,
+    read_state,
+    state_of,
+)
+from imubench_pipeline.extensions.nightly.summary import Skipped, Summary, compared, in_words
+from imubench_pipeline.report.drop_zone import drop_zone_lines
+from imubench_pipeline.run import recovery
+from imubench_pipeline.run.lock import Lock, TakenError, lock_of
+from imubench_pipeline.run.project import snakefile_of
+from imubench_pipeline.settings.config import Run, read_config, read_run
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.tables import write_content, write_json
+from imubench_pipeline.tables.seals import night_place, seal_files
+
+__all__ = ["Night", "TakenError"]
+
+_PATH_SETTINGS = ("logs", "results", "held_back")
+_OWN_FLAGS = {"--config", "-C", "--configfile", "--configfiles"}
+_LOW_DISK_SPACE = 200e6  # bytes
+_MAX_ERRORS = 5
+_RETRY_INTERVAL = 5.0  # s between two looks at a Snakemake that somebody else runs
+_CHANGED_WHILE_READ = "it was written to while it was read: what the results say is of a part of it"
+
+
+class Night:
+    """A run of the workflow of a project.
+
+    Parameters
+    ----------
+    project : Path
+        Folder of logs, or a checkout.
+    config : sequence of str
+        Settings ``key=value`` beyond its file, as Snakemake takes them.
+    flags : sequence of str
+        Further flags of Snakemake.
+
+    Raises
+    ------
+    ConfigError
+        If the folder is neither of the two, or the settings cannot be read.
+    """
+
+    def __init__(self, project: Path, config: Sequence[str], flags: Sequence[str] = ()) -> None:
+        self.project = project.absolute()
+        self._snakefile = snakefile_of(self.project)
+        if own := set(flags) & _OWN_FLAGS:
+            raise ConfigError(f"{', '.join(own)}: expected --config of imubench nightly instead")
+        run = _read_run_settings(self.project / "config/config.yaml", config)
+        self.logs = self.project / run.logs
+        self.results = self.project / run.results
+        self.folder = self.results / "nightly"
+        self._always_held_back = run.held_back
+        self._config = [entry for entry in config if not entry.startswith("held_back=")]
+        self._flags = flags
+        self._began = datetime.now(UTC)
+        self._put_right: list[str] = []
+
+    def run(self, cores: str, settle: float, wait: float) -> Summary:
+        """Run the workflow once; also write the summary to the folder ``nightly`` of the results.
+
+        `settle`: min. time without change of a complete log, s; `wait`: max. time to wait for
+        another run, s.
+
+        Raises
+        ------
+        TakenError
+            If another run is still active.
+        """
+        until = time.monotonic() + wait
+        with Lock(lock_of(self.results)) as lock, _interrupt_on_signals():
+            lock.acquire(wait)
+            self._began = datetime.now(UTC)
+            self._wait_for_others(until)
+            before = self._read_previous_state()
+            self._recover(lock)
+            seen, skips = settled(self.logs, settle, before.logs if before else {})
+            try:
+                failure = self._run_snakemake(cores, skips, lock)
+            except OSError as error:
+                failure = [str(error)]
+            except KeyboardInterrupt:
+                failure = ["it was stopped by a signal; the next run goes on where it was"]
+            summary, after = self._summarise(before, seen, skips, failure)
+            try:
+                self._keep(summary, after)
+            except OSError as error:
+                why = [
+                    *summary.failure,
+                    f"the summary cannot be kept: {error}",
+                    *self._describe_disk_space(),
+                ]
+                return summary.model_copy(update={"outcome": "failed", "failure": why})
+        return summary
+
+    @property
+    def _state(self) -> Path:
+        return self.folder / "state.json"
+
+    @property
+    def _log(self) -> Path:
+        return self.folder / f"{self._began:%Y%m%dT%H%M%SZ}.log"
+
+    def _read_previous_state(self) -> State | None:
+        try:
+            return read_state(self._state)
+        except StateError as error:
+            self._put_right.append(str(error))
+            return None
+
+    def _wait_for_others(self, until: float) -> None:
+        """Wait for a Snakemake that a user runs on these results."""
+        while locks := recovery.snakemake_locks(self.project, self.results):
+            process = recovery.owner(locks, self.project, self.results)
+            if process is None:
+                return
+            if time.monotonic() >= until:
+                raise TakenError(f"Snakemake (process {process}) works on {self.results}")
+            time.sleep(min(_RETRY_INTERVAL, max(until - time.monotonic(), 0.0)))
+
+    def _recover(self, lock: Lock) -> None:
+        locks = recovery.snakemake_locks(self.project, self.results)
+        note = lock.left_over
+        if locks and not note:
+            since = datetime.fromtimestamp(locks[0].stat().st_mtime, UTC)
+            note = {"since": since.isoformat(timespec="seconds")}  # a run by hand
+        if note:
+            self._put_right.append(f"the run of {note.get('since')} did not reach its end")
+        if ended := recovery.end_left_over(note, self.project):
+            self._put_right.append(f"steps that still ran, and were ended: {ended}")
+        for path in locks:
+            path.unlink(missing_ok=True)
+        if recovery.restarted(note) and (doubtful := recovery.remove_doubtful(self.results)):
+            self._put_right.append(
+                f"the machine was restarted: files of its last minute made again: {doubtful}"
+            )
+        number, size = recovery.remove_temporary(self.results, lock.since)
+        if number:
+            self._put_right.append(f"temporary files removed: {number} ({size / 1e6:.1f} MB)")
+        lock.left_over = {}
+
+    def _run_snakemake(self, cores: str, skips: Sequence[Skip], lock: Lock) -> list[str]:
+        """Run Snakemake; return why it failed, if it did."""
+        arguments = ["--snakefile", str(self._snakefile), f"-c{cores}", "--rerun-incomplete"]
+        arguments += [*self._flags, *self._held_back(skips)]
+        status = run_snakemake(arguments, self.project, self._log, lock)
+        if status == 0:
+            return []
+        messages = [f"a step said: {error}" for error in errors(self._log)[:_MAX_ERRORS]]
+        why = f"Snakemake ended with exit status {status}; the last lines of its log:"
+        return [*messages, why, *last_lines(self._log)]
+
+    def _held_back(self, skips: Sequence[Skip]) -> list[str]:
+        """Return the flags that hold logs back."""
+        names = {*self._always_held_back, *(skip.recording for skip in skips if skip.held_back)}
+        file = self.folder / "held_back.yaml"
+        write_json({"held_back": sorted(names)}, file)
+        return ["--configfile", str(file), *(["--config", *self._config] if self._config else [])]
+
+    def _summarise(
+        self,
+        before: State | None,
+        seen: Mapping[str, Found],
+        skips: Sequence[Skip],
+        failure: Sequence[str],
+    ) -> tuple[Summary, State | None]:
+        finished = datetime.now(UTC)
+        fields: dict[str, Any] = {"outcome": "failed"}
+        after, analysed = None, before.recordings if before else {}
+        tables = None
+        try:
+            if not failure:
+                tables = load_tables(self.results)
+        except (OSError, ValueError) as error:
+            failure = [f"the tables cannot be read: {error}"]
+        held_back = {skip.recording for skip in skips if skip.held_back}
+        late = sorted(moved(seen, look(self.logs)) - held_back)
+        skips = [*skips, *(Skip(name, _CHANGED_WHILE_READ, held_back=False) for name in late)]
+        was_skipped = before.skipped if before else {}
+        since = {skip.recording: was_skipped.get(skip.recording, self._began) for skip in skips}
+        if tables is not None:
+            logs = {name: log.files for name, log in seen.items() if name not in held_back}
+            after = state_of(tables, finished, logs, since)
+            fields = compared(before, after, tables, late)
+            fields["files"] = drop_zone_lines(self.results)
+            analysed = after.recordings
+            after = after.without(late, before)
+        fields["skipped"] = [
+            Skipped(
+                recording=skip.recording,
+                reason=skip.reason,
+                keeps_results=skip.held_back and skip.recording in analysed,
+                since=since[skip.recording],
+            )
+            for skip in skips
+        ]
+        summary = Summary(
+            began=self._began,
+            finished=finished,
+            seconds=(finished - self._began).total_seconds(),
+            put_right=self._put_right,
+            failure=[*failure, *(self._describe_disk_space() if failure else [])],
+            report=str(self.results / "report/index.html"),
+            log=str(self._log),
+            **fields,
+        )
+        return summary, after
+
+    def _describe_disk_space(self) -> list[str]:
+        free = disk_usage(self.results).free
+        return [f"the disk of the results has only {free / 1e6:.0f} MB left"] * (
+            free < _LOW_DISK_SPACE
+        )
+
+    def _keep(self, summary: Summary, after: State | None) -> None:
+        for name in (self._log.stem, "latest"):
+            files = [self.folder / f"{name}.{kind}" for kind in ("json", "txt")]
+            write_content(summary.model_dump_json(indent=1) + "\n", files[0])
+            write_content(in_words(summary), files[1])
+            log = [self._log] if name != "latest" and self._log.is_file() else []
+            seal_files(self.results, night_place(name), [*files, *log], {})
+        # Last: if the summary was not written, the next run reports the same news.
+        if after is not None:
+            after.write(self._state)
+            seal_files(self.results, night_place("state"), [self._state], {})
+
+
+def _read_run_settings(file: Path, config: Sequence[str]) -> Run:
+    """Return where the logs and the results are; the rest is Snakemake's to read."""
+    settings = read_config(file)
+    for entry in config:
+        key, equals, value = entry.partition("=")
+        if not equals:
+            raise ConfigError(f"--config: found {entry!r}; expected KEY=VALUE")
+        settings |= {key: yaml.load(value, Loader=yaml.BaseLoader)}
+    return read_run(
+        {key: settings[key] for key in _PATH_SETTINGS if key in settings}, f"{file} or --config"
+    )
+
+
+@contextmanager
+def _interrupt_on_signals() -> Iterator[None]:
+    """Handle the signals that end a service like Ctrl-C, for an orderly end."""
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    numbers = [signal.SIGTERM, signal.SIGHUP]
+    replaced = {
+        number: signal.signal(number, stop)
+        for number in numbers
+        if signal.getsignal(number) is not signal.SIG_IGN  # as nohup wants it
+    }
+    try:
+        yield
+    finally:
+        for number, handler in replaced.items():
+            signal.signal(number, handler)

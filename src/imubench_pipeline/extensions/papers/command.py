@@ -1,0 +1,123 @@
+"""`imubench papers`: what the papers print beside what is found, in the terminal."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imubench_pipeline.settings.command_line import NO_RESULTS, Command
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from imubench_pipeline.extensions.papers.tables import PublishedRow
+
+_KEYS = ("maia", "silva", "engers")
+_LEGEND = (
+    "Ratio: found over printed; ± how far from 1 still agrees, as does what is printed inside the "
+    "interval of what is found. Derived: is not printed, but follows from what is."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command to its parser."""
+    parser.add_argument(
+        "results",
+        type=Path,
+        nargs="?",
+        help="folder of the results of a run; default: what follows from printed figures alone",
+    )
+    parser.add_argument("--paper", choices=_KEYS, help="this one alone")
+    parser.add_argument("--place", help='such as "Table 3"; default: all')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the lines; return the exit status."""
+    # Only what computes or draws loads this: the other commands answer at once.
+    from imubench_pipeline.extensions.papers.about import PAPERS
+    from imubench_pipeline.extensions.papers.tables import PublishedRow
+    from imubench_pipeline.report.show import show
+
+    if arguments.results is None:
+        from imubench_pipeline.extensions.papers.lines import rows_without_a_run
+
+        rows = list(rows_without_a_run())
+        expected = "without the results of a run: what needs no log"
+    else:
+        from imubench_pipeline.tables import read, tables_of_run
+
+        try:
+            path = tables_of_run(arguments.results, ["published"])["published"]
+            rows = PublishedRow.rows_of(read("published", [path]))
+        except (OSError, ValueError) as error:
+            print(error, file=sys.stderr)
+            return 2
+        expected = f"{path}: the run simulates the logs of no paper"
+    wanted = [paper for paper in PAPERS if arguments.paper in (None, paper.key)]
+    names = {paper.name for paper in wanted}
+    places = list(dict.fromkeys(row.place for row in rows if row.paper in names))
+    if arguments.place is not None and arguments.place not in places:
+        shown = ", ".join(places) or expected
+        print(f"no place {arguments.place!r}; there are: {shown}", file=sys.stderr)
+        return 2
+
+    def shown_parts(width: int) -> Iterator[RenderableType]:
+        for paper in wanted:
+            own = [
+                row
+                for row in rows
+                if row.paper == paper.name and arguments.place in (None, row.place)
+            ]
+            if own:
+                yield from _parts(f"{paper.name}: {paper.title}", own, width)
+
+    if not rows:
+        print(expected)
+    show(shown_parts)
+    return 0
+
+
+def _parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[RenderableType]:
+    """Yield the table of a paper, and why lines differ."""
+    from rich.text import Text
+
+    from imubench_pipeline.extensions.papers.about import VERDICTS
+    from imubench_pipeline.extensions.papers.page import cells
+    from imubench_pipeline.report.terminal_table import fitting
+
+    reasons = list(dict.fromkeys(row.reason for row in rows if row.reason))
+    lines: list[list[str | Text]] = []
+    for row in rows:
+        shown = cells(row)
+        note = f" [{reasons.index(row.reason) + 1}]" if row.reason else ""
+        lines.append(
+            [
+                row.place,
+                row.quantity,
+                row.printed_as,
+                shown["found_text"],
+                f"{shown['ratio_text']} {shown['tolerance_text']}".strip(),
+                row.verdict + note,
+            ]
+        )
+    heads = ["Place", "Quantity", "Printed", "Found", "Ratio", "Verdict"]
+    yield fitting(title, heads, lines, width, names=1)
+    yield Text()
+    yield Text(_LEGEND)
+    for number, reason in enumerate(reasons, start=1):
+        yield Text(f"  [{number}] {reason}")
+    meanings = {str(verdict): meaning for verdict, meaning in VERDICTS.items()}
+    for verdict in dict.fromkeys(row.verdict for row in rows):
+        yield Text(f"  {verdict}: {meanings[verdict]}")
+    yield Text()
+
+
+COMMAND = Command(
+    "print what the papers say, line by line, beside what is found",
+    add_arguments,
+    run,
+    ("printed", "", NO_RESULTS),
+)

@@ -1,0 +1,205 @@
+"""The page of the papers, line by line: what is printed, what is found, and why they differ."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from imubench_pipeline.extensions.papers.about import (
+    BASES,
+    PAPERS,
+    VERDICTS,
+    About,
+    Drawn,
+    Verdict,
+)
+from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
+from imubench_pipeline.report.payload import Arrays, channel_payload, looks
+from imubench_pipeline.report.search import Found
+from imubench_pipeline.report.site import Entry, Section, Site
+from imubench_pipeline.report.view import ChannelView, RecordingView
+from imubench_pipeline.words.numbers import limit_digits, number_text, percent_text
+
+
+def _context(site: Site) -> dict[str, Any]:
+    there = _pages(site)
+    rows = site.rows(PublishedRow)
+    arrays = Arrays()
+    drawn = _drawn(site)
+    payloads = [channel_payload(channel, channel.rate, arrays) for _, _, channel in drawn]
+    used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
+    return {
+        "bases": BASES,
+        "verdicts": VERDICTS,
+        "panel": _panel(site.rows(AccuracyRow)),
+        "papers": [
+            _paper(paper, own, there)
+            | {"figures": [figure for figure in drawn if figure[0] in paper.drawn]}
+            for paper in PAPERS
+            if (own := [row for row in rows if row.paper == paper.name])
+        ],
+        "page": {"looks": looks(used), "channels": payloads, "arrays": arrays.texts},
+    }
+
+
+def _views(site: Site) -> list[RecordingView]:
+    """Return the recordings whose curves are drawn."""
+    names = dict.fromkeys((one.sensor, one.recording) for paper in PAPERS for one in paper.drawn)
+    views = {view.full_name: view for view in site.views if view.simulated and not view.left_out}
+    return [views[name] for name in names if name in views]
+
+
+PAPERS_PAGE = Entry(
+    place=5,
+    file="papers.html",
+    title="Papers",
+    context=_context,
+    tables=("published", "accuracy"),
+    views=_views,
+    exists=lambda site: bool(site.rows(PublishedRow)),
+)
+"""The page of every table, figure and equation of the papers of which the run has logs."""
+
+
+def _drawn(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
+    """Return the curves that stand for figures, those that there are."""
+    channels = {
+        (*view.full_name, channel.channel): (view, channel)
+        for view in _views(site)
+        for channel in view.channels()
+    }
+    return [
+        (one, *channels[key])
+        for paper in PAPERS
+        for one in paper.drawn
+        if (key := (one.sensor, one.recording, one.channel)) in channels
+    ]
+
+
+def _panel(rows: Sequence[AccuracyRow]) -> dict[str, Any]:
+    """Return how far each method is from the bound: a line a method, a cell a parameter."""
+    symbols = list(dict.fromkeys(row.parameter for row in rows))
+    by = {(row.method, row.parameter): row for row in rows}
+    return {
+        "logs": rows[0].logs if rows else 0,
+        "symbols": symbols,
+        "bounds": [
+            percent_text(next(r.bound for r in rows if r.parameter == symbol)) for symbol in symbols
+        ],
+        "lines": [
+            {"method": method, "cells": [_cell(by[method, symbol]) for symbol in symbols]}
+            for method in dict.fromkeys(row.method for row in rows)
+        ],
+    }
+
+
+def _cell(row: AccuracyRow) -> dict[str, str]:
+    if row.rmse is None:
+        return {"error": "no value", "ratio": ""}
+    low, high = (number_text(end, 2) for end in (row.ratio_lower, row.ratio_upper))
+    given = "" if row.given == row.logs else f", in {row.given} logs"
+    return {
+        "error": f"{percent_text(row.rmse)}{given}",
+        "ratio": f"{number_text(row.ratio, 3)} ({low} to {high})",
+    }
+
+
+def _pages(site: Site) -> set[str]:
+    """Return the pages that a line may lead to."""
+    of_recordings = {view.page for view in site.views if not view.left_out}
+    return of_recordings | {file for file, _ in site.navigation}
+
+
+_COUNTED: dict[Verdict, tuple[str, str]] = {
+    "agrees": ("agrees", "agree"),
+    "differs": ("differs", "differ"),
+    "possible": ("is possible", "are possible"),
+    "refuted": ("is refuted", "are refuted"),
+    "misprint": ("is a misprint", "are misprints"),
+    "done here": ("is done here", "are done here"),
+    "not to be had": ("is not to be had", "are not to be had"),
+}
+
+
+def _paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[str, Any]:
+    verdicts = Counter(row.verdict for row in rows)
+    return {
+        "about": paper,
+        "lines": [
+            {
+                **row.columns(),
+                "page": row.page if (row.page or "").split("#")[0] in there else None,
+                **cells(row),
+            }
+            for row in rows
+        ],
+        "counts": [
+            f"{verdicts[verdict]} {words[verdicts[verdict] > 1]}"
+            for verdict, words in _COUNTED.items()
+            if verdicts[verdict]
+        ],
+        "filters": {
+            "place": list(dict.fromkeys(row.place for row in rows)),
+            "verdict": list(dict.fromkeys(row.verdict for row in rows)),
+            "basis": list(dict.fromkeys(row.basis for row in rows)),
+        },
+    }
+
+
+def cells(row: PublishedRow) -> dict[str, str]:
+    """Return what is found, the ratio and its tolerance of a row of ``published``, as texts.
+
+    What is found is in the unit of the paper, so that it can be held beside what is printed.
+    """
+    found = ""
+    if row.found is not None:
+        digits = limit_digits(row.lower, row.upper, 3)
+        shown = (row.found, row.lower, row.upper)
+        value, lower, upper = (
+            None if x is None else number_text(x / row.scale, digits) for x in shown
+        )
+        unit = "" if row.printed_unit == "-" else f" {row.printed_unit}"
+        found = f"{value}{unit}"
+        if lower is not None and upper is not None:
+            found += f" ({lower} to {upper})"
+    words = "; ".join(filter(None, (found, row.found_words)))
+    ratio, tolerance = "–", ""
+    if row.ratio is not None:
+        ratio = number_text(row.ratio, 3)
+        tolerance = f"±{percent_text(row.tolerance, 2)}"
+    return {"found_text": words or "–", "ratio_text": ratio, "tolerance_text": tolerance}
+
+
+def find_lines(site: Site) -> Iterator[Found]:
+    """Yield every line of the papers, for the search."""
+    sections = {paper.name: paper.key for paper in PAPERS}
+    for row in site.rows(PublishedRow):
+        title = f"{row.place}: {row.quantity}"
+        words = f"{row.paper} {row.printed_as} {row.verdict}"
+        yield "paper", title, f"papers.html#{sections[row.paper]}", words
+
+
+READING = Section(
+    page="theory.html",
+    template="reading.html.jinja",
+    context=lambda site: words_of_reading(site.rows(AccuracyRow)) or None,
+    tables=("accuracy",),
+)
+"""What comes of reading the curve, on the page of the theory."""
+
+
+def words_of_reading(rows: Sequence[AccuracyRow]) -> str:
+    """Return what comes of reading the curve, by the table ``accuracy``; empty where that is."""
+    of_curve = {row.parameter: row for row in rows if row.method == "curve"}
+    if not of_curve:
+        return ""
+    bias, walk = of_curve["B"], of_curve["K"]
+    off = ""
+    if bias.bias is not None:
+        size = number_text(100.0 * abs(bias.bias), 2)
+        off = f", {size} % too {'small' if bias.bias < 0 else 'large'}"
+    return (
+        f"In {bias.logs} simulated logs of 10 h it finds B in {bias.given or 'none'}{off}, "
+        f"and K in {walk.given or 'none'}: "
+    )

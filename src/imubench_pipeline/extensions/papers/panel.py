@@ -1,0 +1,95 @@
+"""Compare the errors of the methods on simulated logs of one channel with the Cramér-Rao bound.
+
+The channel is the gyro of the MTi-7 by Table 2 of Maia et al., its logs of 10 h at a tenth of its
+rate: N, B, T_B and K are the same, and so is the information about B, T_B and K.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+import numpy as np
+
+from imubench_pipeline.allan import allan_variance
+from imubench_pipeline.estimators import curve as reading
+from imubench_pipeline.estimators import least_squares
+from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate
+from imubench_pipeline.estimators.identifiability import bounds_of
+from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
+from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.whittle import Whittle, whittle_of
+from imubench_pipeline.extensions.papers.maia_printed import DURATION, MTI_GYRO
+from imubench_pipeline.extensions.papers.tables import AccuracyRow
+from imubench_pipeline.noise.simulate import channel_rng, simulate
+
+LOGS = 100
+"""Number of logs, enough to separate ratios of 1.1 and 1.5. `benchmarks/accuracy.py` has more, at
+the full rate."""
+
+_RATE = MTI_GYRO.rate / 10.0
+_FIT_METHODS: tuple[Literal["paper", "weighted"], ...] = ("paper", "weighted")
+
+Values = Mapping[str, float | None]
+
+
+def panel_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
+    """Yield the rows of the table ``accuracy``.
+
+    The likelihood uses the model of the papers, up to half of the sampling rate.
+    """
+    model = MTI_GYRO.table_2
+    bounds = bounds_of(model, _RATE, DURATION, _RATE / 2.0)
+    by_method: dict[str, list[Values]] = {}
+    whittle: Whittle | None = None
+    for number in range(logs):
+        estimates, whittle = _estimate_log(number, whittle)
+        for method, values in estimates.items():
+            by_method.setdefault(method, []).append(values)
+    for method, of_logs in by_method.items():
+        for name in PARAMETERS:
+            truth = float(getattr(model, name))
+            given = [value for values in of_logs if (value := values[name]) is not None]
+            errors = np.array(given) / truth - 1.0
+            rmse = math.sqrt(float(np.mean(errors**2))) if given else None
+            # Relative standard deviation of the rms of n normal errors: 1 / sqrt(2 n).
+            spread = 1.96 / math.sqrt(2.0 * len(given)) if given else 0.0
+            ratio = None if rmse is None else rmse / bounds[name]
+            yield AccuracyRow(
+                method=method,
+                parameter=name,
+                logs=logs,
+                given=len(given),
+                rmse=rmse,
+                bias=float(np.mean(errors)) if given else None,
+                bound=bounds[name],
+                ratio=ratio,
+                ratio_lower=None if ratio is None else ratio * (1.0 - spread),
+                ratio_upper=None if ratio is None else ratio * (1.0 + spread),
+            )
+
+
+def _estimate_log(number: int, before: Whittle | None) -> tuple[dict[str, Values], Whittle]:
+    """Return the estimates of each method for a log, None where it has none, and the likelihood.
+
+    The likelihood `before` of another log has the same bins, and so the same spectral shapes.
+    """
+    samples = round(DURATION * _RATE)
+    rng = channel_rng(1, MTI_GYRO.sensor, MTI_GYRO.channel, f"panel {number}")
+    log = simulate(MTI_GYRO.table_2, _RATE, samples, rng)
+    curve = allan_variance(log, _RATE, overlap="octave")
+    estimates = [reading.read(curve), *(least_squares.solve(curve, method=m) for m in _FIT_METHODS)]
+    spectrum, _ = spectra([log], samples, _RATE)
+    whittle = before.of(spectrum) if before else whittle_of(spectrum, _RATE / 2.0)
+    best = whittle.maximum(PAPERS_MODEL)
+    powers = [best.parameter("N"), float(best.biases[0]), float(best.times[0]), best.parameter("K")]
+    by_likelihood = {
+        name: value if value > 0.0 else None for name, value in zip(PARAMETERS, powers, strict=True)
+    }
+    of_curve = {estimate.method: _get_values(estimate) for estimate in estimates}
+    return of_curve | {"likelihood_gm": by_likelihood}, whittle
+
+
+def _get_values(estimate: Estimate) -> Values:
+    return {name: estimate.parameters[name].value for name in PARAMETERS}

@@ -1,0 +1,66 @@
+"""What the papers print, beside what is found."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from imubench_pipeline.model.table import Column, TableRow, table
+
+
+@table("published")
+class PublishedRow(TableRow):
+    """A row of the table ``published``."""
+
+    paper: Annotated[str, Column("its authors")]
+    place: Annotated[str, Column("table, figure, equation or section, with its number there")]
+    quantity: Annotated[str, Column("of what, in words")]
+    printed_as: Annotated[
+        str,
+        Column("as printed, with its unit; derived: what follows from it alone"),
+    ]
+    printed: Annotated[float | None, Column("the same; null: it is no number", "as in unit")] = None
+    found: Annotated[float | None, Column("what is found here", "as in unit")] = None
+    lower: Annotated[
+        float | None,
+        Column("lower limit of it, 95 % where no other is said", "as in unit"),
+    ] = None
+    upper: Annotated[float | None, Column("upper limit of it", "as in unit")] = None
+    found_words: Annotated[str | None, Column("beside the number, or in its place")] = None
+    ratio: Annotated[float | None, Column("found over printed")] = None
+    tolerance: Annotated[
+        float | None,
+        Column("how far from 1 a ratio still agrees; null: there is no ratio"),
+    ] = None
+    unit: Annotated[str, Column("SI unit of the numbers")]
+    printed_unit: Annotated[str, Column("unit in which the paper prints it")]
+    scale: Annotated[float, Column("one printed unit", "as in unit")]
+    basis: Annotated[
+        str,
+        Column("come back, simulated, computed or checked: what is found rests on that"),
+    ]
+    verdict: Annotated[
+        str,
+        Column("agrees, differs, possible, refuted, misprint, done here or not to be had"),
+    ]
+    reason: Annotated[str | None, Column("why they differ")] = None
+    page: Annotated[str | None, Column("of the report, where its counterpart is")] = None
+    check: Annotated[str, Column("test or benchmark that stands behind the line")]
+
+
+@table("accuracy")
+class AccuracyRow(TableRow):
+    """A row of the table ``accuracy``."""
+
+    method: Annotated[str, Column("estimation method; likelihood_gm with the papers' model alone")]
+    parameter: Annotated[str, Column("N, B, T_B or K")]
+    logs: Annotated[int, Column("simulated")]
+    given: Annotated[int, Column("of them that the method gives a value for")]
+    rmse: Annotated[
+        float | None,
+        Column("root mean square error of these values over the truth"),
+    ] = None
+    bias: Annotated[float | None, Column("their mean error over the truth")] = None
+    bound: Annotated[float, Column("Cramér-Rao bound of the standard deviation over the truth")]
+    ratio: Annotated[float | None, Column("rmse over bound")] = None
+    ratio_lower: Annotated[float | None, Column("lower 95 % limit of it, as logs are few")] = None
+    ratio_upper: Annotated[float | None, Column("upper 95 % limit of it")] = None

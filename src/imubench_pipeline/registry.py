@@ -1,0 +1,145 @@
+"""What the packages in `extensions/` add to the core, which imports none of them.
+
+Each declares one `Extension`, as ``EXTENSION``. What it adds is named by references, such as
+``"aided.limits:outage_rows"``: an object of a module in `extensions/`, imported when the core asks
+for it through a `Hook`, which states its type. So each process of a run imports only what it needs.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Generic, Literal, TypeVar
+
+FOLDER = Path(__file__).with_name("extensions")
+"""The extensions; without this folder there are none."""
+
+T = TypeVar("T")
+
+Place = Literal["run", "notes", "simulated"]
+"""Files that have blocks of settings: the configuration, the notes beside a log, a simulated
+recording."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block of settings.
+
+    ``model``: reference to its class; without a description it has its defaults where it is left
+    out, and else it is null.
+    """
+
+    place: Place
+    key: str
+    model: str
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What one extension adds; references are named from the folder `extensions/`."""
+
+    name: str
+    needs: tuple[str, ...] = ()  # other extensions, without which it is not used
+    tables: str | None = None  # the module with the classes of its rows
+    blocks: tuple[Block, ...] = ()  # of settings
+    rules: str | None = None  # file of its rules for Snakemake
+    motions: Mapping[str, str] = field(default_factory=dict)  # simulated ones, by their block
+    limits: Mapping[str, str] = field(default_factory=dict)  # errors to judge, by their table
+    sensor_tables: Mapping[str, str] = field(default_factory=dict)  # of a sensor, by name
+    commands: Mapping[str, str] = field(default_factory=dict)  # of `imubench`, by name
+    pages: tuple[str, ...] = ()  # that a report has once
+    recording_pages: Mapping[str, str] = field(default_factory=dict)  # by kind of recording
+    sections: tuple[str, ...] = ()  # of pages that a report has once
+    recording_sections: tuple[str, ...] = ()  # of the page of a static recording
+    search: tuple[str, ...] = ()  # names that the search of the report finds
+    templates: str | None = None  # folder
+    glossary: str | None = None  # file of the terms of its pages
+
+
+@cache
+def installed_extensions() -> tuple[Extension, ...]:
+    """Return the extensions whose packages are there, in alphabetical order."""
+    names = sorted(module.name for module in pkgutil.iter_modules([str(FOLDER)]) if module.ispkg)
+    found: list[Extension] = [
+        import_module(f"{__package__}.extensions.{name}").EXTENSION for name in names
+    ]
+    return tuple(one for one in found if set(one.needs) <= set(names))
+
+
+File = Literal["rules", "templates", "glossary"]
+"""Files and folders that an extension may have."""
+
+
+def files_of(what: File) -> list[Path]:
+    """Return the files, or folders, of one kind of all extensions."""
+    stated = ((one.name, getattr(one, what)) for one in installed_extensions())
+    return [FOLDER / name / file for name, file in stated if file is not None]
+
+
+class Hook(Generic[T]):
+    """A place of the core where extensions add objects of one type.
+
+    Parameters
+    ----------
+    name : str
+        The field of `Extension`. The digest of the code of a step follows the references of the
+        hooks that its modules declare: `sources`.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def objects(self) -> list[T]:
+        """Return the objects of all extensions."""
+        return list(self.by_key().values())
+
+    def by_key(self) -> dict[str, T]:
+        """Return the objects of all extensions by their keys, or by their references."""
+        return {key: load(reference) for key, reference in references(self._name).items()}
+
+
+def references(hook: str) -> dict[str, str]:
+    """Return the references of all extensions for a hook, by their keys."""
+    found: dict[str, str] = {}
+    for extension in installed_extensions():
+        stated = getattr(extension, hook)
+        if isinstance(stated, Mapping):
+            found |= stated
+        elif stated is not None:
+            found |= {one: one for one in ([stated] if isinstance(stated, str) else stated)}
+    return found
+
+
+def blocks(place: Place) -> dict[str, Block]:
+    """Return the blocks of settings of all extensions in files of one kind, by their keys."""
+    every = (block for extension in installed_extensions() for block in extension.blocks)
+    return {block.key: block for block in every if block.place == place}
+
+
+def load(reference: str) -> Any:
+    """Return the object of a reference, or the module if it names no object."""
+    module, _, name = reference.partition(":")
+    loaded = import_module(f"{__package__}.extensions.{module}")
+    return getattr(loaded, name) if name else loaded
+
+
+def sources(of: str, name: str) -> list[Path]:
+    """Return the files that a module uses where it calls this module for extensions.
+
+    Parameters
+    ----------
+    of : str
+        What is called: ``Hook``, ``blocks`` or ``files_of``.
+    name : str
+        With which name.
+    """
+    if of == "files_of":
+        folders = files_of(name)  # type: ignore[arg-type]  # as the module has it
+        return [file for path in folders for file in (path.rglob("*") if path.is_dir() else [path])]
+    stated = references(name).values() if of == "Hook" else [b.model for b in blocks(name).values()]  # type: ignore[arg-type]  # likewise
+    return [FOLDER / f"{reference.partition(':')[0].replace('.', '/')}.py" for reference in stated]

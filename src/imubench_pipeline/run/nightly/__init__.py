@@ -1,1 +1,0 @@
-"""`imubench nightly`: what a timer calls, while loggers write."""

@@ -1,0 +1,111 @@
+"""Blocks of settings that extensions add, and what notes state of a sensor that is moved."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Literal, TypeVar
+
+from pydantic import BaseModel, Field, create_model
+
+from imubench_pipeline.registry import Place, blocks, load
+from imubench_pipeline.settings.validation import Strict
+
+Kind = str
+"""What was done with a sensor during a recording: ``static``, or the key of its block of notes."""
+
+AT_REST: Kind = "static"
+"""Nothing: it was at rest all the time."""
+
+Gyro = Literal["gyro_x", "gyro_y", "gyro_z"]
+
+_Block = TypeVar("_Block", bound=BaseModel)
+_Model = TypeVar("_Model", bound="WithBlocks")
+
+
+class WithBlocks(Strict):
+    """Settings to which extensions may add blocks."""
+
+    def block(self, model: type[_Block]) -> _Block | None:
+        """Return the block of a class; None where none is stated."""
+        return next((value for _, value in self if isinstance(value, model)), None)
+
+
+def with_blocks(place: Place) -> Callable[[type[_Model]], type[_Model]]:
+    """Return a decorator that adds the blocks of all extensions to a model, as fields.
+
+    A block of a run has its defaults where it is left out; any other is null then.
+    """
+
+    def extend(model: type[_Model]) -> type[_Model]:
+        fields: dict[str, Any] = {}
+        for key, block in blocks(place).items():
+            of = load(block.model)
+            stated = Field(None, description=block.description or None)
+            fields[key] = (of, of()) if place == "run" else (of | None, stated)
+        return create_model(
+            model.__name__,
+            __base__=model,
+            __module__=model.__module__,
+            __doc__=model.__doc__,
+            **fields,
+        )
+
+    return extend
+
+
+class Experiment(Strict):
+    """What was done with a sensor during a recording, or how it stood, as its notes state it."""
+
+    is_static: ClassVar[bool] = False
+    """Whether the sensor was at rest all the time."""
+
+    @abstractmethod
+    def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str | None:
+        """Return the one of the log's channels that it is about; None: it is about all axes.
+
+        `column`: the log has a column with the rate of a table.
+
+        Raises
+        ------
+        ValueError
+            If the log lacks what it takes; the text begins with the key.
+        """
+
+
+def stated_experiments(settings: WithBlocks) -> dict[str, Experiment]:
+    """Return the experiments that are stated, by their keys."""
+    return {key: value for key, value in settings if isinstance(value, Experiment)}
+
+
+def kind_of(notes: object) -> Kind:
+    """Return what the notes make of a recording, though they may be wrong otherwise."""
+    if isinstance(notes, Mapping):
+        for key, block in blocks("notes").items():
+            if notes.get(key) is not None and not load(block.model).is_static:
+                return key
+    return AT_REST
+
+
+def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
+    """Return the gyro that an experiment is about: the one that its notes state, or the only one.
+
+    `what` completes "the gyro whose axis ..." of the error.
+
+    Raises
+    ------
+    ValueError
+        If it is not among the channels of the log, or is not stated and the log has another number
+        of gyros than one; the text begins with the key.
+    """
+    gyros = [name for name in channels if name.startswith("gyro_")]
+    if stated in gyros:
+        return stated
+    in_log = ", ".join(gyros) or "no gyro"
+    if stated is not None:
+        raise ValueError(f"channel: found {stated!r}; the log has {in_log}")
+    if len(gyros) != 1:
+        raise ValueError(
+            f"channel: missing; expected the gyro whose axis {what}, the log has {in_log}"
+        )
+    return gyros[0]

@@ -1,8 +1,0 @@
-"""Say what the papers print, and what is found of it."""
-
-from pathlib import Path
-
-from imubench_pipeline.steps.papers import write_published
-
-if __name__ == "__main__":
-    write_published(map(Path, snakemake.input), map(Path, snakemake.output))
