@@ -13,10 +13,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
-from imubench_pipeline.model.comparisons import DatasheetRow, ErrorBudgetRow, FusionRow, PooledRow
+from imubench_pipeline.model.comparisons import DatasheetRow, ErrorBudgetRow, PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, FindingRow, RecordingRow
-from imubench_pipeline.model.table import ChannelRow, OfRecordingRow
+from imubench_pipeline.model.table import ChannelRow, OfRecordingRow, TableRow
 from imubench_pipeline.tables.findings import LEFT_OUT
 
 Key = tuple[str, str]  # sensor, recording
@@ -116,7 +116,7 @@ class Doubt:
 
 
 Estimated = TypeVar("Estimated", ParameterRow, FixedBiasRow)
-Doubted = TypeVar("Doubted", bound=ErrorBudgetRow | DatasheetRow | FusionRow)
+Doubted = TypeVar("Doubted", bound=TableRow)
 
 
 def doubts(
@@ -271,17 +271,22 @@ def undecided(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Itera
             yield replace(row, value=None, lower=None, upper=None, status="does_not_decide")
 
 
-def with_doubts(rows: Iterable[Doubted], recordings: Iterable[RecordingRow]) -> Iterator[Doubted]:
-    """Yield rows with the doubts about their recordings."""
+def with_doubts(
+    rows: Iterable[Doubted],
+    recordings: Iterable[RecordingRow],
+    named: Collection[tuple[str, str]] = (("sensor", "recording"),),
+) -> Iterator[Doubted]:
+    """Yield rows with the doubts about their recordings.
+
+    `named`: the columns of sensor and recording of each recording that a row is of.
+    """
     by_recording: dict[tuple[str, str | None], str] = {
         _key(row): row.doubts or "" for row in recordings
     }
     for row in rows:
-        keys = [(row.sensor, row.recording)]
-        if isinstance(row, FusionRow):
-            keys.append((row.other, row.other_recording))
-        texts = [by_recording.get(key, "") for key in keys]
-        yield replace(row, doubts="; ".join(filter(None, dict.fromkeys(texts))))
+        texts = [by_recording.get((row[sensor], row[recording]), "") for sensor, recording in named]
+        doubts_text = "; ".join(filter(None, dict.fromkeys(texts)))
+        yield replace(row, doubts=doubts_text)  # type: ignore[type-var]  # a dataclass
 
 
 def with_doubts_of_all(
