@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import allan_variance, cluster_sizes
-from imubench_pipeline.navigation.fusion.board import Board, Shared
-from imubench_pipeline.navigation.fusion.kalman import KalmanFusion
-from imubench_pipeline.navigation.fusion.prediction import fused_allan
-from imubench_pipeline.navigation.fusion.samples import fuse
-from imubench_pipeline.navigation.fusion.weights import ByFrequency, Constant, best_constant, equal
+from imubench_pipeline.extensions.fusion.board import Board, Shared
+from imubench_pipeline.extensions.fusion.kalman import KalmanFusion
+from imubench_pipeline.extensions.fusion.prediction import fused_allan
+from imubench_pipeline.extensions.fusion.samples import fuse
+from imubench_pipeline.extensions.fusion.weights import ByFrequency, Constant, best_constant, equal
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.model.comparisons import ErrorBudgetRow, FusionRow, PooledRow
+from imubench_pipeline.extensions.fusion.tables import RECORDINGS_OF_A_PAIR, FusionRow
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, PooledRow
 from imubench_pipeline.model.estimates import ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.navigation.pooled import pooled_rows
@@ -154,7 +155,9 @@ def test_rows_carry_the_doubts_of_what_they_stand_on() -> None:
     assert [row.doubts for row in with_doubts(rows, about)] == ["lines (gyro_x)", ""]
     pair = {"sensor": "s", "recording": "b", "other": "s", "other_recording": "a"}
     pairs = typed(FusionRow, [pair])
-    assert [row.doubts for row in with_doubts(pairs, about)] == ["lines (gyro_x)"]
+    assert [row.doubts for row in with_doubts(pairs, about, RECORDINGS_OF_A_PAIR)] == [
+        "lines (gyro_x)"
+    ]
     pools = typed(PooledRow, [{"sensor": "s", "device": device} for device in (None, "one", "two")])
     said = [row.doubts for row in with_doubts_of_all(pools, about)]
     assert said == ["a: lines (gyro_x)", "a: lines (gyro_x)", ""]

@@ -7,9 +7,9 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.model.estimates import ErrorGrowthRow
+from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.error_growth import growth_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, standard
-from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.navigation.ratios import deviation_rows, ratio_of_deviations
 
 NAMES = {"sensor": "alpha", "recording": "night"}
@@ -92,7 +92,7 @@ def test_errors_grow_with_time_and_shrink_with_the_window() -> None:
 
 def test_a_ratio_follows_from_what_is_kept_of_each_channel() -> None:
     a, b = (
-        FusionChannel("s", f"r{n}", "gyro_x", True, 3600.0, estimate(1.0 + n / 3, n))
+        ComparedChannel("s", f"r{n}", "gyro_x", True, 3600.0, estimate(1.0 + n / 3, n))
         for n in (1, 2)
     )
     how = {"longest": 1 / 9, "draws": DRAWS, "seed": 3}
@@ -114,6 +114,6 @@ def test_a_ratio_follows_from_what_is_kept_of_each_channel() -> None:
 
 def test_nothing_is_kept_of_a_channel_without_noise() -> None:
     nothing = Estimate("likelihood", {"N": Parameter(None, "not_identified")})
-    channel = FusionChannel("s", "r", "gyro_x", True, 3600.0, nothing)
+    channel = ComparedChannel("s", "r", "gyro_x", True, 3600.0, nothing)
     assert [*deviation_rows(channel, 100.0, longest=1 / 9, draws=9, seed=1)] == []
     assert [*growth_rows(NAMES, {"gyro_x": nothing}, times=(), window=60.0, **HOW)] == []

@@ -6,9 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from imubench_pipeline.extensions.fusion.specimens import (
+    fused_blocks,
+    fused_model,
+    specimens_of,
+    weights_of,
+)
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.sensor_tables import truth_rows
-from imubench_pipeline.steps.specimens import fused_blocks, fused_model, specimens_of, weights_of
 
 DEGREE = math.pi / 180.0
 AXIS = {"N": "0.3 deg/sqrt(h)", "B": "10 deg/h", "T_B": "5 s", "K": "1 deg/h/sqrt(h)"}

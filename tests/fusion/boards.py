@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.navigation.fusion.board import Board
+from imubench_pipeline.extensions.fusion.board import Board
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 

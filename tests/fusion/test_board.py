@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.navigation.fusion.board import Board, Shared, block_mean_spectrum, divided
-from imubench_pipeline.navigation.fusion.prediction import allan_of_spectrum
+from imubench_pipeline.extensions.fusion.board import Board, Shared, block_mean_spectrum, divided
+from imubench_pipeline.extensions.fusion.prediction import allan_of_spectrum
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.noise.block_means import of_block_means
 

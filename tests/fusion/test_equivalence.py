@@ -5,17 +5,13 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.navigation.fusion.board import Board
-from imubench_pipeline.navigation.fusion.equivalence import (
-    FusionChannel,
-    TemperaturePart,
-    equivalence_rows,
-    number_needed,
-)
-from imubench_pipeline.navigation.fusion.prediction import fused_allan
-from imubench_pipeline.navigation.fusion.weights import equal
+from imubench_pipeline.extensions.fusion.board import Board
+from imubench_pipeline.extensions.fusion.equivalence import equivalence_rows
+from imubench_pipeline.extensions.fusion.fusion import fusion_rows
+from imubench_pipeline.extensions.fusion.prediction import fused_allan
+from imubench_pipeline.extensions.fusion.weights import equal
+from imubench_pipeline.navigation.compared import ComparedChannel, TemperaturePart, number_needed
 from imubench_pipeline.settings.config import FusionSettings
-from imubench_pipeline.steps.fusion import fusion_rows
 from imubench_pipeline.tables import build
 from tests.fusion.boards import FLICKER
 from tests.report.tables import joined, recording_rows, rejected_rows
@@ -30,13 +26,15 @@ def known(spread: float = 1.1, **values: float) -> dict[str, Parameter]:
     }
 
 
-def candidate(sensor: str, parameters: dict[str, Parameter], **about: Any) -> FusionChannel:
+def candidate(sensor: str, parameters: dict[str, Parameter], **about: Any) -> ComparedChannel:
     given = {"recording": "r", "channel": "gyro_x", "simulated": False, "duration": 10 * HOURS}
-    return FusionChannel(sensor, estimate=Estimate("likelihood", parameters), **{**given, **about})
+    return ComparedChannel(
+        sensor, estimate=Estimate("likelihood", parameters), **{**given, **about}
+    )
 
 
 def rows_of(
-    *candidates: FusionChannel,
+    *candidates: ComparedChannel,
     tau: float = 10.0,
     common: dict[str, float] | None = None,
     draws: int = 400,

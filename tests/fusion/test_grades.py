@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
-from imubench_pipeline.navigation.fusion.grades import Grade, grade_rows
+from imubench_pipeline.extensions.fusion.grades import Grade, grade_rows
+from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.tables import build
@@ -19,7 +19,7 @@ CATALOGUE = read_sensors(PROJECT / "config/sensors")
 
 def channel(
     n: float, floor: float | None, axis: str = "x", sensor: str = "cheap", **about: Any
-) -> FusionChannel:
+) -> ComparedChannel:
     """N in °/√h, and the lowest point of the curve in °/h."""
     noise = n * 60.0 * HOUR
     own = {"N": Parameter(noise, lower=0.9 * noise, upper=1.1 * noise)}
@@ -30,10 +30,10 @@ def channel(
     )
     estimate = Estimate("likelihood", own, curve={"sigma_min": lowest})
     names = {"recording": "r", "channel": f"gyro_{axis}", "simulated": False, "duration": 1e4}
-    return FusionChannel(sensor, estimate=estimate, **(names | about))
+    return ComparedChannel(sensor, estimate=estimate, **(names | about))
 
 
-def rows_of(*channels: FusionChannel, grade: str = "stim300") -> dict[tuple[str, str], Any]:
+def rows_of(*channels: ComparedChannel, grade: str = "stim300") -> dict[tuple[str, str], Any]:
     grades = [Grade(grade, grade, CATALOGUE[grade].datasheet)]
     rows = build("grades", grade_rows(channels, grades)).to_pylist()
     return {(row["option"] or "", row["statistic"]): row for row in rows}

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.navigation.fusion.board import Board, Shared
-from imubench_pipeline.navigation.fusion.kalman import KalmanFusion
-from imubench_pipeline.navigation.fusion.samples import at_fused_rate, fuse
-from imubench_pipeline.navigation.fusion.weights import ByFrequency, best_constant, equal
+from imubench_pipeline.extensions.fusion.board import Board, Shared
+from imubench_pipeline.extensions.fusion.kalman import KalmanFusion
+from imubench_pipeline.extensions.fusion.samples import at_fused_rate, fuse
+from imubench_pipeline.extensions.fusion.weights import ByFrequency, best_constant, equal
 from imubench_pipeline.noise import NoiseModel
 from tests.fusion.boards import FLICKER, ROUGH, SMOOTH, logs
 

@@ -5,11 +5,11 @@ from scipy.integrate import quad
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.allan.confidence import deviation_limits
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.navigation.fusion.board import Board, Shared
-from imubench_pipeline.navigation.fusion.kalman import KalmanFusion
-from imubench_pipeline.navigation.fusion.prediction import fused_allan, fused_psd, prediction_limits
-from imubench_pipeline.navigation.fusion.samples import fuse
-from imubench_pipeline.navigation.fusion.weights import ByFrequency, Constant, best_constant, equal
+from imubench_pipeline.extensions.fusion.board import Board, Shared
+from imubench_pipeline.extensions.fusion.kalman import KalmanFusion
+from imubench_pipeline.extensions.fusion.prediction import fused_allan, fused_psd, prediction_limits
+from imubench_pipeline.extensions.fusion.samples import fuse
+from imubench_pipeline.extensions.fusion.weights import ByFrequency, Constant, best_constant, equal
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from tests.conftest import few
 from tests.fusion.boards import FLICKER, ROUGH, SMOOTH, logs

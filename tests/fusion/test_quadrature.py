@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.navigation.fusion.prediction import allan_of_spectrum, nodes
+from imubench_pipeline.extensions.fusion.prediction import allan_of_spectrum, nodes
 from imubench_pipeline.noise import NoiseModel
 
 RATE = 100.0

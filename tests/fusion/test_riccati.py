@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from imubench_pipeline.navigation.fusion.kalman import steady_covariance
+from imubench_pipeline.extensions.fusion.kalman import steady_covariance
 
 
 def test_it_is_the_solution_of_the_riccati_equation() -> None:

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.navigation.fusion.board import Board
-from imubench_pipeline.navigation.fusion.samples import at_fused_rate, fuse
-from imubench_pipeline.navigation.fusion.weights import equal
+from imubench_pipeline.extensions.fusion.board import Board
+from imubench_pipeline.extensions.fusion.samples import at_fused_rate, fuse
+from imubench_pipeline.extensions.fusion.weights import equal
 from imubench_pipeline.noise import NoiseModel
 
 BOARD = Board([NoiseModel(N=1e-4)] * 2, [100.0, 200.0])

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from imubench_pipeline.navigation.fusion.board import Board, Parts, Shared
-from imubench_pipeline.navigation.fusion.weights import (
+from imubench_pipeline.extensions.fusion.board import Board, Parts, Shared
+from imubench_pipeline.extensions.fusion.weights import (
     ByFrequency,
     Constant,
     best_constant,

@@ -12,6 +12,7 @@ import pyarrow as pa
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.extensions.fusion.fusion import fusion_rows
 from imubench_pipeline.extensions.papers.lines import rows_without_a_run
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import BacktestRow, FixedBiasRow, ParameterRow
@@ -29,7 +30,6 @@ from imubench_pipeline.report.publish import site_of
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.steps.fusion import fusion_rows
 from imubench_pipeline.tables import build, write, write_arrow
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES

@@ -1,8 +1,7 @@
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.model.comparisons import FusionRow, GradeRow
-from imubench_pipeline.report.fusion import (
+from imubench_pipeline.extensions.fusion.page import (
     FUSION,
     equal_numbers,
     grade_lines,
@@ -10,6 +9,7 @@ from imubench_pipeline.report.fusion import (
     shared_words,
     unprinted_grades,
 )
+from imubench_pipeline.extensions.fusion.tables import FusionRow, GradeRow
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.tables import build
 from tests.report.tables import joined, recording_rows, site

@@ -11,7 +11,7 @@ from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS
 from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, Method, estimate
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary, cut
-from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
+from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.ratios import Ratio, ratio_of_deviations, ratio_of_parameters
 from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.settings.config import FusionSettings
@@ -237,12 +237,12 @@ def _pair(
             yield Compared(channel, "adev", tau, names, deviations, ratio)
 
 
-def _make_fusion_channel(estimate: ChannelEstimate) -> FusionChannel:
-    """Return a channel in the form of `navigation.fusion`."""
+def _make_fusion_channel(estimate: ChannelEstimate) -> ComparedChannel:
+    """Return a channel in the form of `extensions.fusion`."""
     curve = estimate.measured
     assert curve is not None
     sensor, _, recording = estimate.log.partition("/")
-    return FusionChannel(
+    return ComparedChannel(
         sensor=sensor,
         recording=recording,
         channel=estimate.channel,

@@ -23,7 +23,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.estimates import DrawnDeviationRow
-from imubench_pipeline.navigation.fusion.equivalence import FusionChannel, number_needed
+from imubench_pipeline.navigation.compared import ComparedChannel, number_needed
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.noise.stacked import summed
@@ -118,8 +118,8 @@ def _add_in_quadrature(*sides: float | None) -> float | None:
 
 
 def ratio_of_deviations(
-    first: FusionChannel,
-    second: FusionChannel,
+    first: ComparedChannel,
+    second: ComparedChannel,
     tau: float,
     *,
     longest: float,
@@ -130,7 +130,7 @@ def ratio_of_deviations(
 
     Parameters
     ----------
-    first, second : FusionChannel
+    first, second : ComparedChannel
     tau : float
         s.
     longest : float
@@ -160,7 +160,7 @@ def ratio_of_deviations(
     return Ratio(None if unknown else value, *limits, unknown)
 
 
-def _draw_models(channel: FusionChannel, draws: int, seed: int) -> list[NoiseModel]:
+def _draw_models(channel: ComparedChannel, draws: int, seed: int) -> list[NoiseModel]:
     stream = channel_rng(seed, repr(channel.model), channel.channel, "ratio")
     return channel.drawn(draws, stream)
 
@@ -172,7 +172,7 @@ def _compute_variances(models: Sequence[NoiseModel], tau: Sequence[float]) -> Ar
 
 
 def deviation_rows(
-    channel: FusionChannel, rate: float, *, longest: float, draws: int, seed: int
+    channel: ComparedChannel, rate: float, *, longest: float, draws: int, seed: int
 ) -> Iterator[DrawnDeviationRow]:
     """Yield the rows of the table ``drawn_deviations`` of a channel.
 
@@ -181,7 +181,7 @@ def deviation_rows(
 
     Parameters
     ----------
-    channel : FusionChannel
+    channel : ComparedChannel
     rate : float
         Sampling rate of its log, Hz.
     longest : float

@@ -13,11 +13,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from imubench_pipeline.model.comparisons import DatasheetRow, ErrorBudgetRow, FusionRow, PooledRow
+from imubench_pipeline.model.comparisons import DatasheetRow, ErrorBudgetRow, PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, FindingRow, RecordingRow
 from imubench_pipeline.model.states import Fitness
-from imubench_pipeline.model.table import ChannelRow, OfRecordingRow
+from imubench_pipeline.model.table import ChannelRow, OfRecordingRow, TableRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.tables.findings import LEFT_OUT
 
@@ -115,7 +115,7 @@ class Doubt:
 
 
 Estimated = TypeVar("Estimated", ParameterRow, FixedBiasRow)
-Doubted = TypeVar("Doubted", bound=ErrorBudgetRow | DatasheetRow | FusionRow)
+Doubted = TypeVar("Doubted", bound=TableRow)
 
 
 def doubts(
@@ -269,22 +269,22 @@ def undecided(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Itera
             yield replace(row, value=None, lower=None, upper=None, status="does_not_decide")
 
 
-def with_doubts(rows: Iterable[Doubted], recordings: Iterable[RecordingRow]) -> Iterator[Doubted]:
-    """Yield rows with the codes of the doubts about their recordings."""
+def with_doubts(
+    rows: Iterable[Doubted],
+    recordings: Iterable[RecordingRow],
+    named: Collection[tuple[str, str]] = (("sensor", "recording"),),
+) -> Iterator[Doubted]:
+    """Yield rows with the codes of the doubts about their recordings.
+
+    ``named``: the columns of sensor and recording of each recording of a row.
+    """
     by_recording: dict[tuple[str, str | None], list[str]] = {
         _key(row): [doubt.code for doubt in row.doubts] for row in recordings
     }
     for row in rows:
-        codes = [code for key in _stands_on(row) for code in by_recording.get(key, ())]
-        yield replace(row, doubts=tuple(dict.fromkeys(codes)))
-
-
-def _stands_on(
-    row: ErrorBudgetRow | DatasheetRow | FusionRow,
-) -> Sequence[tuple[str, str | None]]:
-    """Return sensor and recording that a row is computed from; both of a comparison."""
-    own = row.sensor, row.recording
-    return (own, (row.other, row.other_recording)) if isinstance(row, FusionRow) else (own,)
+        keys = [(getattr(row, sensor), getattr(row, recording)) for sensor, recording in named]
+        codes = [code for key in keys for code in by_recording.get(key, ())]
+        yield replace(row, doubts=tuple(dict.fromkeys(codes)))  # type: ignore[type-var]  # a dataclass
 
 
 def with_doubts_of_all(

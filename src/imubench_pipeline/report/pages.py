@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from imubench_pipeline.registry import Hook
-from imubench_pipeline.report import compare, fusion, made, recording, shortlist, start, theory
+from imubench_pipeline.report import compare, made, recording, shortlist, start, theory
 from imubench_pipeline.report.sensor import device_page, sensor_page
 from imubench_pipeline.report.site import RECORDING_PAGES, Entry, Page, Site
 
@@ -17,7 +17,7 @@ ENTRIES: Sequence[Entry] = (
     start.RECORDINGS,
     start.DATASHEETS,
     shortlist.SHORTLIST,
-    *sorted((fusion.FUSION, *_ADDED.objects()), key=lambda entry: entry.place),
+    *sorted(_ADDED.objects(), key=lambda entry: entry.place),
     theory.THEORY,
     made.MADE,
 )

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
 from pydantic import BaseModel, Field, create_model
 
 from imubench_pipeline.registry import Place, blocks, load
 from imubench_pipeline.settings.validation import Strict
+
+if TYPE_CHECKING:
+    from imubench_pipeline.settings.simulated_sensor import AxisSettings
 
 Kind = str
 """What was done with a sensor during a recording: ``static``, or the key of its block of notes."""
@@ -71,6 +74,14 @@ class Experiment(Strict):
         ValueError
             If the log lacks what it takes; the text begins with the key.
         """
+
+
+class SimulatedSensors(Strict):
+    """What is simulated instead of one sensor."""
+
+    @abstractmethod
+    def check(self, channels: Mapping[Any, AxisSettings]) -> None:
+        """Raise ValueError if the channels have what it cannot take."""
 
 
 def stated_experiments(settings: WithBlocks) -> dict[str, Experiment]:

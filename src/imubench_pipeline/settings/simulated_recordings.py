@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from imubench_pipeline.settings.experiments import (
     Kind,
+    SimulatedSensors,
     WithBlocks,
     kind_of,
     stated_experiments,
@@ -141,35 +142,26 @@ class OfASensor(ImuSettings):
         return round(quantity_to_si(self.duration, "time") * rate)
 
 
-class Specimens(Strict):
-    """Several of one sensor on a board, fused to one log."""
-
-    number: int = Field(ge=2, le=1000)
-    spread: float = Field(
-        0.0, ge=0, le=1, description="standard deviation of the logarithm of N, B and K of each"
-    )
-
-
 @with_blocks("simulated")
 class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
     """A recording that is made before the run, from known figures."""
 
     recording: str = Field(pattern=_NAME_PATTERN, description="starts with sim_")
     seed: int
-    specimens: Specimens | None = Field(None, description="fused to this log; left out: one sensor")
 
     @model_validator(mode="after")
-    def _of_specimens(self) -> Self:
-        if self.specimens is None:
-            return self
-        for name, axis in self.channels.items():
-            other = [key for key in ("R", "Q", "further", "sinusoids") if getattr(axis, key)]
-            if axis.N is None or other:
-                found = f"{other[0]} in it" if other else "no N in it"
-                raise ValueError(
-                    f"specimens: channels.{name} has {found}; expected N, and B and K at most"
-                )
+    def _simulated_otherwise(self) -> Self:
+        for key, sensors in self.simulated_sensors.items():
+            try:
+                sensors.check(self.channels)
+            except ValueError as error:
+                raise ValueError(f"{key}: {error}") from None
         return self
+
+    @property
+    def simulated_sensors(self) -> dict[str, SimulatedSensors]:
+        """What is simulated instead of one sensor, by its key: one at most."""
+        return {key: value for key, value in self if isinstance(value, SimulatedSensors)}
 
     @model_validator(mode="after")
     def _one_experiment(self) -> Self:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +10,33 @@ import numpy as np
 from imubench_pipeline.estimators.estimate import SI_UNITS
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.registry import Hook
 from imubench_pipeline.settings.sensor import Channel, quantity_of
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.settings.simulated_sensor import AxisSettings, ImuSettings
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, in_the_log
+from imubench_pipeline.simulate.profiles import Profile
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
 _NOISE_PARAMETERS = ("N", "B", "T_B", "K", "R", "Q")
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """How a recording is simulated that is not of one sensor."""
+
+    # yields the blocks of its channels, with its motion and its temperature
+    blocks: Callable[
+        [SimulatedRecording, Mapping[str, Profile], Profile | None], Iterator[dict[str, Array]]
+    ]
+    # returns the factors on N, B and K of a channel, against those of one sensor
+    factors: Callable[[SimulatedRecording, str], Mapping[str, float]]
+
+
+SIMULATIONS: Hook[Simulation] = Hook("simulations")
+"""How they are simulated, by their block of settings."""
 
 
 def axis_model(settings: AxisSettings, channel: str) -> SensorModel:

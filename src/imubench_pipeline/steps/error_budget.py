@@ -12,10 +12,10 @@ from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.model.estimates import DeterministicRow, DrawnDeviationRow, TemperatureRow
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
+from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.error_budget.printed_errors import in_use
 from imubench_pipeline.navigation.error_growth import growth_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.navigation.ratios import deviation_rows
 from imubench_pipeline.recordings.kept import Quality, kept_static_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, FusionSettings
@@ -67,7 +67,7 @@ def _deviations(
     """Yield the rows of the table ``drawn_deviations``."""
     how = FusionSettings.model_validate(sections["fusion"])
     for name, estimate in estimates.items():
-        channel = FusionChannel(
+        channel = ComparedChannel(
             sensor=names["sensor"],
             recording=names["recording"],
             channel=name,

@@ -39,8 +39,7 @@ from imubench_pipeline.recordings.quality.copies import recorded_twice
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.simulate.models import figures_of, imu_model
-from imubench_pipeline.steps.specimens import fused_model, specimens_of, weights_of
+from imubench_pipeline.simulate.models import SIMULATIONS, figures_of
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures, without
 from imubench_pipeline.units import quantity_to_si
@@ -193,7 +192,9 @@ def truth_rows(truths: str) -> Iterator[SimulatedTruthRow]:
         recording = SimulatedRecording.model_validate(entry)
         rate = quantity_to_si(recording.rate, "frequency")
         for channel, truth in recording.channels.items():
-            factors = _of_fused(recording, str(channel))
+            factors: Mapping[str, float] = {}
+            for key in recording.simulated_sensors:
+                factors = SIMULATIONS.by_key()[key].factors(recording, str(channel))
             for figure in figures_of(truth, channel, rate):
                 factor = factors.get(figure.name.removesuffix(" in the log"), 1.0)
                 yield SimulatedTruthRow(
@@ -207,18 +208,3 @@ def truth_rows(truths: str) -> Iterator[SimulatedTruthRow]:
                     assumed=bool({figure.setting, figure.name} & set(truth.assumed)),
                     source=recording.source,
                 )
-
-
-def _of_fused(recording: SimulatedRecording, channel: str) -> dict[str, float]:
-    """Return the factors on the noise of one specimen if several are fused."""
-    if recording.specimens is None:
-        return {}
-    models = [model.axes[channel].noise for model in specimens_of(recording)]
-    of_kind = imu_model(recording.channels, recording).axes[channel].noise
-    _, weights = weights_of(models, quantity_to_si(recording.rate, "frequency"))
-    fused = fused_model(models, weights)
-    return {
-        name: getattr(fused, name) / getattr(of_kind, name)
-        for name in ("N", "B", "K")
-        if getattr(of_kind, name)
-    }

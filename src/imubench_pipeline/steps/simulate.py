@@ -17,9 +17,8 @@ from imubench_pipeline.settings.sensor import TEMPERATURE, ColumnSource, LogForm
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import simulate_imu
-from imubench_pipeline.simulate.models import imu_model
+from imubench_pipeline.simulate.models import SIMULATIONS, imu_model
 from imubench_pipeline.simulate.profiles import Profile, profiles_of
-from imubench_pipeline.steps.specimens import fused_blocks
 from imubench_pipeline.tables import making
 from imubench_pipeline.units import quantity_to_si
 
@@ -72,8 +71,8 @@ def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, ND
     motion = dict(motion)
     for key in stated_experiments(recording):
         motion |= _MOTIONS.by_key()[key](recording, rate)
-    if recording.specimens is not None:
-        return fused_blocks(recording, motion, temperature)
+    for key in recording.simulated_sensors:
+        return SIMULATIONS.by_key()[key].blocks(recording, motion, temperature)
     return simulate_imu(
         model,
         rate,

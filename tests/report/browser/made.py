@@ -23,12 +23,13 @@ from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
 from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.extensions.fusion.fusion import NEEDED, fusion_rows
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.error_growth import growth_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
 from imubench_pipeline.navigation.pooled import pooled_rows
 from imubench_pipeline.navigation.ratios import deviation_rows
 from imubench_pipeline.noise import NoiseModel
@@ -41,7 +42,6 @@ from imubench_pipeline.report.site import Site
 from imubench_pipeline.settings.config import FusionSettings, Run
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor, quantity_of
-from imubench_pipeline.steps.fusion import NEEDED, fusion_rows
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
@@ -343,10 +343,10 @@ def write_samples(log: Log, results: Path) -> None:
 DRAWN = {"draws": 60, "seed": 1}
 
 
-def fused(log: Log, channel: str) -> FusionChannel:
+def fused(log: Log, channel: str) -> ComparedChannel:
     """Return a channel of a log as it is compared with another."""
     names = (log.sensor, log.recording, channel, log.simulated)
-    return FusionChannel(*names, SAMPLES / RATE, log.recommended(channel))
+    return ComparedChannel(*names, SAMPLES / RATE, log.recommended(channel))
 
 
 @functools.cache

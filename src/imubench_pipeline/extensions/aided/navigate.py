@@ -172,7 +172,7 @@ def _list_sources(
     """Yield the sources of signals: the simulator, and a measured log."""
     block = _choose_block(logged, how)
     spreads = _make_spreads(how)
-    known = truth is not None and truth.specimens is None
+    known = truth is not None and not truth.simulated_sensors
     if known and truth is not None:
         axes = {str(name): model for name, model in imu_model(truth.channels, truth).axes.items()}
     else:

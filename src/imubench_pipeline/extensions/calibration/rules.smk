@@ -24,4 +24,6 @@ rule calibration:
 
 
 JOBS["calibration"] = jobs_of_each(CALIBRATED)
-ADDED_TABLES |= {name: of_each(CALIBRATED, name) for name in tables_of(rules.calibration)}
+ADDED_TABLES |= {
+    name: of_each(CALIBRATED, name) for name in tables_of(rules.calibration)
+}

@@ -59,7 +59,9 @@ rule outlook:
 
 
 JOBS["earth_rotation"] = jobs_of_each(TURNED)
-ADDED_TABLES |= {name: of_each(TURNED, name) for name in tables_of(rules.earth_rotation)}
+ADDED_TABLES |= {
+    name: of_each(TURNED, name) for name in tables_of(rules.earth_rotation)
+}
 ADDED_TABLES |= {
     name: ADDED_TABLES.get(name, []) + of_each_sensor(name)
     for name in tables_of(rules.outlook)

@@ -1,11 +1,21 @@
 """Several sensors together: boards, a virtual IMU, how many of one equal another."""
 
-from imubench_pipeline.registry import Extension
+from imubench_pipeline.registry import Block, Extension
 
 EXTENSION = Extension(
     name="fusion",
     tables="fusion.tables",
+    blocks=(
+        Block(
+            "simulated",
+            "specimens",
+            "fusion.settings:Specimens",
+            "fused to this log; left out: one sensor",
+        ),
+    ),
+    simulations={"specimens": "fusion.specimens:SPECIMENS"},
     sensor_tables={"published_figures": "fusion.published_figures:published_rows"},
-    pages=("fusion.boards:BOARDS",),
+    pages=("fusion.page:FUSION", "fusion.boards:BOARDS"),
     templates="templates",
+    rules="rules.smk",
 )

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from imubench_pipeline.model.table import ChannelRow, Column, LowerLimit, UpperLimit, table
+from imubench_pipeline.model.comparisons import DoubtCodes
+from imubench_pipeline.model.table import (
+    ChannelRow,
+    Column,
+    LowerLimit,
+    TableRow,
+    UpperLimit,
+    table,
+)
 
 
 @table("published_figures")
@@ -38,3 +46,78 @@ class PublishedFigureRow(ChannelRow):
         Column("the largest of several, or of two readings", "as in unit"),
     ] = None
     reason: Annotated[str | None, Column("why the printed figure differs")] = None
+
+
+@table("fusion")
+class FusionRow(TableRow):
+    """A row of the table ``fusion``."""
+
+    quantity: Annotated[str, Column("gyro or accel")]
+    tau: Annotated[float, Column("averaging time at which they are compared", "s")]
+    sensor: Annotated[str, Column("several of these are averaged")]
+    recording: Annotated[str | None, Column("that answers for it: of its median channel")] = None
+    channel: Annotated[str | None, Column("that answers")] = None
+    simulated: Annotated[bool | None, Column("that recording is simulated")] = None
+    adev: Annotated[
+        float | None,
+        Column("Allan deviation of one of them, by its noise model", "rad/s or m/s^2"),
+    ] = None
+    floor: Annotated[
+        float | None,
+        Column("part of it that all have in common: any number keeps it", "rad/s or m/s^2"),
+    ] = None
+    common_share: Annotated[float | None, Column("the same as a part of the variance")] = None
+    temperature_share: Annotated[
+        float | None,
+        Column("part of the variance that temperature adds: common"),
+    ] = None
+    other: Annotated[str, Column("sensor to be matched")]
+    other_recording: Annotated[str | None, Column("that answers for it")] = None
+    other_channel: Annotated[str | None, Column("that answers")] = None
+    other_simulated: Annotated[bool | None, Column("that one is simulated")] = None
+    other_adev: Annotated[float | None, Column("its Allan deviation", "rad/s or m/s^2")] = None
+    n: Annotated[
+        float | None,
+        Column("how many equal it, not rounded; below 1: one is better"),
+    ] = None
+    lower: Annotated[
+        float | None,
+        Column("lower 95 % limit of n; null: no number is enough"),
+    ] = None
+    upper: Annotated[
+        float | None,
+        Column("upper 95 % limit of n; null: no number may be enough"),
+    ] = None
+    reachable: Annotated[bool | None, Column("some number is enough")] = None
+    reason: Annotated[str | None, Column("why there is no n or no limit")] = None
+    doubts: DoubtCodes = ()
+
+
+@table("grades")
+class GradeRow(TableRow):
+    """A row of the table ``grades``."""
+
+    quantity: Annotated[str, Column("gyro or accel")]
+    sensor: Annotated[str, Column("several of these are averaged")]
+    recording: Annotated[str, Column("that answers for it: of its middle channel")]
+    channel: Annotated[str, Column("that answers")]
+    simulated: Annotated[bool, Column("that recording is simulated")]
+    grade: Annotated[str, Column("sensor of the class that is to be reached, by its datasheet")]
+    grade_name: Annotated[str, Column("its vendor and model")]
+    option: Annotated[str | None, Column("of that one")] = None
+    statistic: Annotated[str, Column("N, or sigma_min: the lowest point of the curve")]
+    value: Annotated[float | None, Column("of one of them", "SI")] = None
+    lower: Annotated[float | None, Column("lower 95 % limit", "SI")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit", "SI")] = None
+    printed: Annotated[float | None, Column("of the grade, in the same convention", "SI")] = None
+    n: Annotated[
+        float | None,
+        Column("how many equal it, not rounded, if they have nothing in common"),
+    ] = None
+    n_lower: Annotated[float | None, Column("by the lower limit")] = None
+    n_upper: Annotated[float | None, Column("by the upper limit")] = None
+    reason: Annotated[str | None, Column("why there is no n")] = None
+
+
+RECORDINGS_OF_A_PAIR = (("sensor", "recording"), ("other", "other_recording"))
+"""The columns of ``fusion`` that name recordings."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
+from imubench_pipeline.extensions.fusion.tables import GradeRow
 from imubench_pipeline.extensions.papers.claims import Claim, Result, no_result
 from imubench_pipeline.extensions.papers.engers_axes import DEGREE, NAMES
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.model.comparisons import GradeRow
 
 _SECTION = "Section 1.0.1.1"
 _TEST = "tests/test_specimens.py"

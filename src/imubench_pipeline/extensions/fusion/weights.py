@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.navigation.fusion.board import Board, Parts
+from imubench_pipeline.extensions.fusion.board import Board, Parts
 from imubench_pipeline.typing import Array
 
 _MIN_VARIANCE_RATIO = 1e-14
@@ -52,7 +52,7 @@ class ByFrequency:
 
     w(f) = S^-1 1 / (1^T S^-1 1) with S the spectral matrix: inverse spectra without shared
     processes. They are the weights of an optimal, non-causal smoother. No causal filter has less
-    noise at any frequency; the Kalman filter (`imubench_pipeline.navigation.fusion.kalman`) has
+    noise at any frequency; the Kalman filter (`imubench_pipeline.extensions.fusion.kalman`) has
     slightly more where the weights change.
 
     Attributes

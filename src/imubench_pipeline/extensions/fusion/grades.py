@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.model.comparisons import GradeRow
-from imubench_pipeline.navigation.fusion.equivalence import FusionChannel
+from imubench_pipeline.extensions.fusion.tables import GradeRow
+from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.settings.printed import Datasheet
 
 PARAMETER_OF_STATISTIC = {"N": "N", "adev_minimum": "sigma_min"}
@@ -45,12 +45,14 @@ class Grade:
                     yield option, one
 
 
-def grade_rows(candidates: Iterable[FusionChannel], grades: Sequence[Grade]) -> Iterator[GradeRow]:
+def grade_rows(
+    candidates: Iterable[ComparedChannel], grades: Sequence[Grade]
+) -> Iterator[GradeRow]:
     """Yield the rows of the table ``grades``: each sensor against each printed figure.
 
     The axis with the median N represents a sensor; measured axes are preferred to simulated ones.
     """
-    by_sensor: dict[tuple[str, str], list[FusionChannel]] = {}
+    by_sensor: dict[tuple[str, str], list[ComparedChannel]] = {}
     for channel in candidates:
         quantity = channel.channel.split("_")[0]
         by_sensor.setdefault((quantity, channel.sensor), []).append(channel)
@@ -79,12 +81,12 @@ def grade_rows(candidates: Iterable[FusionChannel], grades: Sequence[Grade]) -> 
                 yield _compare(row, own, printed)
 
 
-def _select_middle(channels: Sequence[FusionChannel]) -> FusionChannel:
+def _select_middle(channels: Sequence[ComparedChannel]) -> ComparedChannel:
     measured = [channel for channel in channels if not channel.simulated] or list(channels)
     return sorted(measured, key=lambda channel: channel.model.N)[len(measured) // 2]
 
 
-def _get_estimate(channel: FusionChannel, statistic: str) -> Parameter:
+def _get_estimate(channel: ComparedChannel, statistic: str) -> Parameter:
     estimate = channel.estimate
     of: Mapping[str, Parameter] = estimate.parameters
     if statistic == "adev_minimum":

@@ -1,27 +1,28 @@
 """Specimens of one sensor on a board, fused to one log: the aim of Engers (2021, section 1).
 
 Each specimen has noise of its own, and parameters of its own about those of its kind; their
-weights are those of least white noise, N^-2 (`navigation.fusion.weights.best_constant`). What all
+weights are those of least white noise, N^-2 (`extensions.fusion.weights.best_constant`). What all
 of a kind have at the same time, such as T_B and the low-pass, is that of the fused log too, so that
 its noise is of the same terms, smaller by what `fused_model` says.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from imubench_pipeline.navigation.fusion.board import Board
-from imubench_pipeline.navigation.fusion.samples import fuse
-from imubench_pipeline.navigation.fusion.weights import Constant, best_constant
+from imubench_pipeline.extensions.fusion.board import Board
+from imubench_pipeline.extensions.fusion.samples import fuse
+from imubench_pipeline.extensions.fusion.settings import Specimens
+from imubench_pipeline.extensions.fusion.weights import Constant, best_constant
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.sensor import TEMPERATURE
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.imu import ImuModel, simulate_imu
-from imubench_pipeline.simulate.models import imu_model
+from imubench_pipeline.simulate.models import Simulation, imu_model
 from imubench_pipeline.simulate.profiles import Profile
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
@@ -33,7 +34,7 @@ _SPREAD_PARAMETERS = ("N", "B", "K")
 def specimens_of(recording: SimulatedRecording) -> list[ImuModel]:
     """Return the models of the specimens of a recording: one where none are declared."""
     whole = imu_model(recording.channels, recording)
-    stated = recording.specimens
+    stated = recording.block(Specimens)
     if stated is None:
         return [whole]
     made = []
@@ -75,7 +76,7 @@ def _scale_model(model: NoiseModel, factors: Array) -> NoiseModel:
 
 def fused_blocks(
     recording: SimulatedRecording,
-    motion: dict[str, Profile],
+    motion: Mapping[str, Profile],
     temperature: Profile | None,
 ) -> Iterator[dict[str, Array]]:
     """Yield the blocks of a log of fused specimens, and of the temperature that they share.
@@ -108,3 +109,20 @@ def fused_blocks(
         if TEMPERATURE in parts[0]:
             blocks[TEMPERATURE] = parts[0][TEMPERATURE]
         yield blocks
+
+
+def factors_of_fused(recording: SimulatedRecording, channel: str) -> dict[str, float]:
+    """Return the factors on the noise of one specimen that several have when they are fused."""
+    models = [model.axes[channel].noise for model in specimens_of(recording)]
+    of_kind = imu_model(recording.channels, recording).axes[channel].noise
+    _, weights = weights_of(models, quantity_to_si(recording.rate, "frequency"))
+    fused = fused_model(models, weights)
+    return {
+        name: getattr(fused, name) / getattr(of_kind, name)
+        for name in ("N", "B", "K")
+        if getattr(of_kind, name)
+    }
+
+
+SPECIMENS = Simulation(fused_blocks, factors_of_fused)
+"""How specimens on a board are simulated."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from imubench_pipeline.model.comparisons import FusionRow, GradeRow
+from imubench_pipeline.extensions.fusion.tables import FusionRow, GradeRow
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES
 from imubench_pipeline.words.numbers import number_text, percent_text

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.extensions.fusion.board import Board
+from imubench_pipeline.extensions.fusion.weights import Constant, Weights
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
-from imubench_pipeline.navigation.fusion.board import Board
-from imubench_pipeline.navigation.fusion.weights import Constant, Weights
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

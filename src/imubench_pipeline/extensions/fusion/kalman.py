@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, schur
 from scipy.sparse import csr_array
 
-from imubench_pipeline.navigation.fusion.board import Board, stochastic
+from imubench_pipeline.extensions.fusion.board import Board, stochastic
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, bias_instability
 from imubench_pipeline.noise.block_means import of_block_means
 from imubench_pipeline.typing import Array
@@ -106,7 +106,7 @@ class KalmanFusion:
     a bank of Gauss-Markov processes.
 
     A sample has the least variance of all causal filters. At each frequency, an optimal smoother
-    (`imubench_pipeline.navigation.fusion.weights.ByFrequency`) has the same or less noise. Ramps
+    (`imubench_pipeline.extensions.fusion.weights.ByFrequency`) has the same or less noise. Ramps
     and lines are not estimated: they pass with the weights at their frequency.
 
     Parameters

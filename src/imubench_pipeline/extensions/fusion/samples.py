@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from imubench_pipeline.navigation.fusion.board import Board
-from imubench_pipeline.navigation.fusion.kalman import KalmanFusion
-from imubench_pipeline.navigation.fusion.weights import Constant
+from imubench_pipeline.extensions.fusion.board import Board
+from imubench_pipeline.extensions.fusion.kalman import KalmanFusion
+from imubench_pipeline.extensions.fusion.weights import Constant
 from imubench_pipeline.typing import Array
 
 _BLOCK_LENGTH = 1 << 16

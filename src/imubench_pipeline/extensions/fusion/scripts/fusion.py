@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from imubench_pipeline.steps.fusion import write_fusion
+from imubench_pipeline.extensions.fusion.fusion import write_fusion
 
 if __name__ == "__main__":
     write_fusion(

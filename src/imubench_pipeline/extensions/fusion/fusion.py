@@ -12,17 +12,14 @@ import pyarrow.compute as pc
 
 from imubench_pipeline.estimators.estimate import JointDraws
 from imubench_pipeline.estimators.rows import draws, estimate_of
-from imubench_pipeline.model.comparisons import FusionRow, GradeRow
+from imubench_pipeline.extensions.fusion.equivalence import equivalence_rows
+from imubench_pipeline.extensions.fusion.grades import Grade, grade_rows
+from imubench_pipeline.extensions.fusion.tables import RECORDINGS_OF_A_PAIR, FusionRow, GradeRow
 from imubench_pipeline.model.estimates import CompensatedAllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import ChannelRow, TableRow
+from imubench_pipeline.navigation.compared import ComparedChannel, TemperaturePart
 from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
-from imubench_pipeline.navigation.fusion.equivalence import (
-    FusionChannel,
-    TemperaturePart,
-    equivalence_rows,
-)
-from imubench_pipeline.navigation.fusion.grades import Grade, grade_rows
 from imubench_pipeline.recordings.fitness import left_out, with_doubts
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
@@ -37,7 +34,7 @@ def candidates(
     tables: Mapping[str, pa.Table],
     joint: Mapping[tuple[str, str], Path] | None,
     besides: Container[str] = (),
-) -> Iterator[FusionChannel]:
+) -> Iterator[ComparedChannel]:
     """Yield the channels of recordings that decide, each with the estimate of the method to use.
 
     Where temperature is taken out of a channel, its estimate is that of what temperature leaves.
@@ -75,7 +72,7 @@ def candidates(
             continue
         path = (joint or {}).get((sensor, recording))
         of = about[sensor, recording]
-        yield FusionChannel(
+        yield ComparedChannel(
             sensor,
             recording,
             channel,
@@ -125,7 +122,7 @@ def fusion_rows(
         draws=how.draws,
         seed=how.seed,
     )
-    return with_doubts(rows, RecordingRow.rows_of(tables["recordings"]))
+    return with_doubts(rows, RecordingRow.rows_of(tables["recordings"]), RECORDINGS_OF_A_PAIR)
 
 
 TACTICAL_CLASS = "tactical"
