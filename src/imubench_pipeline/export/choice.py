@@ -14,6 +14,7 @@ from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError
 from imubench_pipeline.export.temperature import AXES
 from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 Key = tuple[str, str]  # recording, channel
 _Estimated = tuple[str, str, str]  # and method
@@ -155,7 +156,7 @@ def parameter_notes(estimate: Estimate) -> list[str]:
     for number, name, parameter in estimate.components():
         label = name if number == 1 else f"{name} of component {number}"
         reason = f" ({parameter.reason})" if parameter.reason else ""
-        status = parameter.status.replace("_", " ")
+        status = STATUS_WORDS[parameter.status]
         lower, upper = parameter.lower, parameter.upper
         between = ""
         if lower is not None and upper is not None:

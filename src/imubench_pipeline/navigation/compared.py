@@ -14,6 +14,7 @@ from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Paramete
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.estimates import STATUS_WORDS
 
 _MIN_RELEVANT_SHARE = 0.1
 """Minimum share of the Allan variance for which an unknown parameter matters."""
@@ -102,7 +103,7 @@ class ComparedChannel:
                     continue
                 part = _bound_variance(name, group, tau)
                 if part > _MIN_RELEVANT_SHARE * total:
-                    status = parameter.status.replace("_", " ")
+                    status = STATUS_WORDS[parameter.status]
                     yield f"{name} of {self.sensor}/{self.recording} {self.channel} is {status}"
 
 

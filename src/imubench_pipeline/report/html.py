@@ -19,7 +19,7 @@ from markupsafe import Markup, escape
 from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.words.estimates import symbol_text
+from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, duration_text, number_text, started_text
 from imubench_pipeline.words.verdicts import doubts_text
 
@@ -61,7 +61,7 @@ def environment(system: System) -> jinja2.Environment:
             if value is None:
                 text = f"{_hint(status)}"
             else:
-                shown = status.replace("_", " ")
+                shown = STATUS_WORDS.get(status, status)
                 text = f"{number(value)}" + (
                     f' <span class="status">{shown}</span>' if status else ""
                 )
